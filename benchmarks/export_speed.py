@@ -21,7 +21,7 @@ pin_threads()
 
 import numpy as np
 
-from cpfls_cli.export import c_source, reference_points
+from cpfls_cli.export import c_source
 from cpfls_cli.fuzzy import InputRange
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.visited import CELLS
@@ -90,8 +90,7 @@ def random_model(settings: StructureSettings) -> Model:
 
 def write(model: Model, folder: Path) -> None:
     """Export a model, and compile it in both precisions."""
-    sheet = sheet_of(model, name="m")
-    source = c_source(sheet, reference_points(model, np.random.default_rng(1)), "m")
+    source = c_source(sheet_of(model, name="m"), "m")
     (folder / "m.c").write_text(source.source)
     (folder / "m.h").write_text(source.header)
     (folder / "loops.c").write_text(LOOPS)

@@ -26,9 +26,9 @@ pin_threads()
 import numpy as np
 
 from cpfls_cli.config.load import load_study
+from cpfls_cli.export import c_source, python_source
 from cpfls_cli.export.course import Course
 from cpfls_cli.export.registry import TARGETS, exported
-from cpfls_cli.export.vehicle_forms import vehicle_c, vehicle_python
 from cpfls_cli.export.verify import verified
 from cpfls_cli.flights.playback import flights_to_play
 from cpfls_cli.playback.model import VehicleModel
@@ -116,7 +116,7 @@ def seconds(work) -> float:
 
 def in_c(model, folder):
     """Compile the C of a vehicle, and give a call of many steps."""
-    written = vehicle_c(sheet_of_vehicle(model), "vehicle")
+    written = c_source(sheet_of_vehicle(model), "vehicle")
     (folder / "vehicle.c").write_text(written.source)
     (folder / "vehicle.h").write_text(written.header)
     (folder / "loop.c").write_text(LOOP)
@@ -142,7 +142,7 @@ def batch() -> None:
 
     model, rng = truth(), np.random.default_rng(0)
     numpy_form, jax_form = {"__name__": "n"}, {"__name__": "j"}
-    exec(vehicle_python(sheet_of_vehicle(model), "v.py"), numpy_form)
+    exec(python_source(sheet_of_vehicle(model), "v.py"), numpy_form)
     exec(exported(sheet_of_vehicle(model), "jax", "v.py").text, jax_form)
     rotor = np.tile(numpy_form["steady"](np.full(4, 570.0)), (BATCH, 1))
     rate = rng.normal(size=(BATCH, 3))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import keyword
 import re
 import sys
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -13,28 +12,16 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
-from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.output import write_texts
-from cpfls_cli.artifacts.store import read_record
-from cpfls_cli.commands.vehicle_sheets import require_usable, sheet_of, whole_of
+from cpfls_cli.commands.vehicle_sheets import sheet_of
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.holding import Missing
-from cpfls_cli.export.json_form import json_text
-from cpfls_cli.export.points import reference_points
-from cpfls_cli.export.registry import TARGETS, exported, tabled
+from cpfls_cli.export.registry import FORMS, Exported, exported
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.export.text import checked_identifier, identifier
-from cpfls_cli.export.vehicle_forms import vehicle_c, vehicle_json, vehicle_python
-from cpfls_cli.export.vehicle_sheet import VehicleSheet
-from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.visited import CELLS
-from cpfls_cli.pages.export import export_answer, vehicle_export_answer
+from cpfls_cli.pages.export import export_answer
 from cpfls_cli.report.outcome import Outcome
 
-_SEED = 1
-_LANGUAGES = {"json": "JSON", "c": "C", "python": "Python"}
-ENDINGS = {"json": ".json", "c": ".c", "python": ".py"} | {form: target.ending for form, target in TARGETS.items()}
+ENDINGS = {form: chosen.ending for form, chosen in FORMS.items()}
 # What the module imports beside the standard library: under such a name it would import itself.
 _IMPORTED = ("casadi", "jax", "numpy", "rotorpy")
 
@@ -46,7 +33,7 @@ def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     ----------
     job : Job
         Its study is not used: a model holds its own.
-    form : {"json", "c", "python"}, a word of `TARGETS`, or None
+    form : a word of `FORMS`, or None
         None takes the suffix of the output.
     name : str or None
         Prefix of the names in C, name of the model in JSON and XML; None takes the name of the output.
@@ -57,109 +44,36 @@ def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     source = take_inputs(job, {"model": model})["model"]
     # The file that was asked for first: a message about its folder is to name it.
     check_outputs(job, *reversed(outputs))
-    if form in TARGETS:
-        return _for_target(job, sheet_of(model, prefix, source, force=job.force), form)
-    if whole_of(model) is not None:
-        sheet, missing = tabled(sheet_of(model, prefix, source, force=job.force), _LANGUAGES[form])
-        return _of_vehicle(job, sheet, form, _vehicle_texts(sheet, form, outputs), sheet.told, missing)
-    identified = _sheet(model, prefix, source.sha256, job)
-    sizes = _written(job, _texts(identified, form, outputs))
-    summary = _summary(job, form, prefix, sizes) | _of_model(identified)
-    return Outcome(summary, tuple(export_answer(identified.record, model, sizes, dry_run=job.dry_run)))
-
-
-def _for_target(job: Job, sheet: VehicleSheet, form: str) -> Outcome:
-    """Write a vehicle for a simulator or a library."""
+    sheet = sheet_of(model, prefix, source, force=job.force)
     made = exported(sheet, form, job.output.name)
-    return _of_vehicle(job, sheet, form, {job.output: made.text}, [*sheet.told, *made.told], made.missing)
+    texts = dict(zip(outputs, made.texts.values(), strict=True))
+    if not job.dry_run:
+        write_texts(texts)
+    sizes = {str(path): len(text.encode()) for path, text in texts.items()}
+    answer = export_answer([*sheet.told, *made.told], sheet.warnings, sizes, job.dry_run)
+    return Outcome(_summary(job, form, sheet, made, sizes), tuple(answer))
 
 
-def _of_vehicle(
-    job: Job,
-    sheet: VehicleSheet,
-    form: str,
-    texts: dict[Path, str],
-    told: Sequence[str],
-    missing: Sequence[Missing],
-) -> Outcome:
-    sizes = _written(job, texts)
-    summary = {
-        **_summary(job, form, sheet.name, sizes),
+def _summary(job: Job, form: str, sheet: Sheet, made: Exported, sizes: dict[str, int]) -> dict[str, Any]:
+    identified = sheet.identified
+    return {
+        "dry_run": job.dry_run,
+        "format": form,
+        "name": sheet.name,
+        "output": list(sizes),
+        "bytes": sum(sizes.values()),
+        "complete": sheet.complete,
+        "verdict": sheet.verdict,
         "rotors": sheet.model.rotors,
         "weights": len(sheet.weights),
         "effects": [effect.name for effect in sheet.model.effects],
         "learned": sheet.remainder is not None,
-        "missing": [asdict(each) for each in missing],
+        "missing": [asdict(each) for each in made.missing],
+        "parameters": identified and identified.structure.parameters,
+        "fuzzy": sheet.rules is not None,
+        "rigid_body": bool(sheet.rigid_body.any()),
+        "region_share": identified and float(np.mean(identified.visited)),
     }
-    return Outcome(summary, tuple(vehicle_export_answer(told, sizes, job.dry_run)))
-
-
-def _written(job: Job, texts: dict[Path, str]) -> dict[str, int]:
-    """Write files, and give the bytes of each."""
-    if not job.dry_run:
-        write_texts(texts)
-    return {str(path): len(text.encode()) for path, text in texts.items()}
-
-
-def _summary(job: Job, form: str, name: str, sizes: dict[str, int]) -> dict[str, Any]:
-    return {
-        "dry_run": job.dry_run,
-        "format": form,
-        "name": name,
-        "output": list(sizes),
-        "bytes": sum(sizes.values()),
-    }
-
-
-def _of_model(sheet: Sheet) -> dict[str, Any]:
-    return {
-        "complete": sheet.record.complete,
-        "verdict": sheet.record.verdict_label,
-        "parameters": sheet.model.structure.parameters,
-        "fuzzy": sheet.fuzzy,
-        "rigid_body": sheet.rigid,
-        "region_share": sheet.region_share,
-    }
-
-
-def _sheet(path: Path, name: str, sha256: str, job: Job) -> Sheet:
-    record = read_record(path, ModelRecord)
-    if not record.complete and not job.force:
-        raise InputError(
-            f"{path}: the search for this model did not come to its end ({record.stop_reason or 'unknown'}); "
-            "`cpfls identify ... --resume` goes on, --force exports the model as it is, marked as incomplete"
-        )
-    require_usable(path, record.verdict_label, force=job.force)
-    return Sheet(name, _usable(record.rebuilt(path), path), record, path.name, sha256)
-
-
-def _usable(model: Model, path: Path) -> Model:
-    """Refuse what no other program could evaluate."""
-    if model.visited.shape != (CELLS, CELLS):
-        raise InputError(f"{path}: model/visited: is {model.visited.shape}, not {(CELLS, CELLS)}; identify it again")
-    for partition, peaks in zip(model.structure.partitions, model.partitions, strict=True):
-        if not (np.all(np.diff(peaks) >= 0.0) and np.all((peaks >= 0.0) & (peaks <= 1.0))):
-            raise InputError(f"{path}: model/weights: those of {partition.name} make no partition; identify it again")
-    return model
-
-
-def _texts(sheet: Sheet, form: str, outputs: list[Path]) -> dict[Path, str]:
-    points = reference_points(sheet.model, np.random.default_rng(_SEED))
-    if form == "json":
-        return {outputs[0]: json_text(sheet, points)}
-    if form == "python":
-        return {outputs[0]: python_source(sheet, points, outputs[0].name)}
-    written = c_source(sheet, points, outputs[1].stem)
-    return {outputs[0]: written.header, outputs[1]: written.source}
-
-
-def _vehicle_texts(sheet: VehicleSheet, form: str, outputs: list[Path]) -> dict[Path, str]:
-    if form == "json":
-        return {outputs[0]: vehicle_json(sheet)}
-    if form == "python":
-        return {outputs[0]: vehicle_python(sheet, outputs[0].name)}
-    written = vehicle_c(sheet, outputs[1].stem)
-    return {outputs[0]: written.header, outputs[1]: written.source}
 
 
 def _form_of(output: Path) -> str:
@@ -218,11 +132,11 @@ def _outputs_of(output: Path, form: str) -> list[Path]:
             f"its own words or modules, not {', '.join(_IMPORTED[:-1])} or {_IMPORTED[-1]}, such as "
             f"{identifier(output.stem)}_model.py"
         )
-    if form != "c":
+    if not FORMS[form].also:
         return [output]
     if not re.fullmatch(r"[A-Za-z0-9_.+-]+", output.stem):
         raise InputError(f"{output}: C includes its header by name; use letters, digits and any of _ . + - in it")
-    return [output.with_suffix(".h"), output]
+    return [output.with_suffix(FORMS[form].also), output]
 
 
 def _importable(stem: str) -> bool:

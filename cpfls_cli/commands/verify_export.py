@@ -7,8 +7,8 @@ from pathlib import Path
 
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.job import input_file
-from cpfls_cli.artifacts.store import read_record
-from cpfls_cli.commands.vehicle_sheets import sheet_of, study_of, whole_of
+from cpfls_cli.artifacts.store import holds, read_record
+from cpfls_cli.commands.vehicle_sheets import sheet_of, study_of
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.registry import exported, require_package
 from cpfls_cli.export.text import identifier
@@ -76,7 +76,7 @@ def run(model: Path, flight: Path, options: Options, *, force: bool, dry_run: bo
 
 def _as_logged(model: Path, logged: LoggedFlight) -> PlaybackFlight:
     """Give a flight with its logged rotor speeds, but without the faults of sensors that a model knows of."""
-    if whole_of(model) is not ExtendedRecord:
+    if not holds(model, ExtendedRecord):
         return logged.playback
     extended = read_record(model, ExtendedRecord).rebuilt(model)
     return playback_flight(logged.name, [extended.repaired(part) for part in logged.parts], logged.hold)

@@ -13,9 +13,13 @@ from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.polynomial import STATE_TERMS
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.scales import hover_speed
+from cpfls_cli.errors import InputError
+from cpfls_cli.export.points import body_inertia
+from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Body, Motion
-from cpfls_cli.playback.model import Remainder, VehicleModel
+from cpfls_cli.playback.model import Remainder, VehicleModel, body_of
 from cpfls_cli.playback.player import Player, apart, free_runs, player_of, rotor_terms_along
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.rotations import rotation_matrix
@@ -27,6 +31,7 @@ _RUNS, _PERIOD = 24, 0.01
 _FREQUENCIES = (0.7, 2.0, 5.0)
 _SPEED_SPREAD, _VELOCITY, _RATE, _TILT = 0.05, 1.5, 1.0, 0.25
 _NOTHING, _ROUNDING = 1e-9, 1e-12
+_STEEP = 0.1
 _LAG, _DELAY, _SLOW = "lag of the rotors", "delay of the rotors", "slow actuation"
 _LINEAR = "part of the thrust that is linear in the speed"
 _ROTORS = "what differs between rotors, and their places"
@@ -164,6 +169,27 @@ def held_by(
     """
     known = slice(0, len(STATE_TERMS))
     return Held(holds(model.weights)[:, known], response, body or model.body, squares)
+
+
+def constant_body(model: VehicleModel) -> Body:
+    """Take the inertia of a vehicle for targets that hold but one: the mean over the attitudes that training visited.
+
+    Raises
+    ------
+    InputError
+        If that is the inertia of no body.
+    """
+    if model.fuzzy is None:
+        return model.body
+    assert isinstance(model.fuzzy, Model), "an inertia over attitude is that of an identified model"
+    cell = 2 * np.pi / CELLS
+    roll, pitch = ((np.argwhere(model.fuzzy.visited) + 0.5) * cell - np.pi).T
+    attitude = np.column_stack([roll, pitch, np.zeros_like(roll)])
+    tensors = body_inertia(model.fuzzy, attitude[np.abs(np.cos(attitude[:, 1])) > _STEEP])
+    mean = tensors.mean(axis=0) if len(tensors) else np.zeros((3, 3))
+    if not np.linalg.eigvalsh(mean).min() > 0:
+        raise InputError("its inertia, averaged where training went, is that of no body; identify it again")
+    return body_of(model.vehicle, mean)
 
 
 def of_a_body(body: Body, margin: float = 0.0) -> Body:

@@ -2,31 +2,49 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
-from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.scores import JudgedGroup
+import numpy as np
+
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD
 from cpfls_cli.dynamics.rigid_body import VERTICAL
-from cpfls_cli.export.points import Expected
-from cpfls_cli.export.sheet import EXPORTER, Sheet, rule_labels, rules_along
-from cpfls_cli.export.source import visited_rows
+from cpfls_cli.effects.polynomial import FACTORS
+from cpfls_cli.export.points import PERIOD
+from cpfls_cli.export.sheet import EXPORTER, Sheet, base_of, rule_labels, rules_along
+from cpfls_cli.export.source import (
+    airflow_order,
+    airflow_peaks,
+    attitudes_of,
+    points_of,
+    response_of,
+    run_of,
+    visited_rows,
+)
 from cpfls_cli.export.text import strict_json
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.fuzzy.membership import Z_FUNCTION
+from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.visited import CELLS
-from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric
 from cpfls_cli.regressor.structure import Block
 
-FORMAT, VERSION = "cpfls/model-json", 1
+FORMAT, VERSION = "cpfls/model-json", 2
 _ANGLES = ("roll", "pitch")
 
 _CONVENTIONS = {
+    "body_frame": f"{BODY}: x forward, y left, z up",
+    "world_frame": WORLD,
+    "position, velocity": "world frame, m and m/s",
+    "rotation": "matrix R that turns body vectors into the world frame",
+    "rate": "omega, body frame, rad/s",
+    "air": "velocity through the air, body frame, m/s: R^T (velocity - wind)",
+    "speed": "of the rotors, rad/s",
+}
+_ON_ATTITUDE = {
     "q": f"roll, pitch, yaw in rad; {EULER}: R = Rz(yaw) Ry(pitch) Rx(roll) turns body vectors into the world frame",
     "qd": "rates of q, rad/s",
     "qdd": "accelerations of q, rad/s^2",
-    "body_frame": f"{BODY}: x forward, y left, z up",
-    "world_frame": WORLD,
     "torque": "generalised torque on q, N m: D(q) qdd + C(q, qd) qd",
     "D": "inertia matrix on q, kg m^2, symmetric: fuzzy functions plus W^T I W",
     "C": "Coriolis matrix, kg m^2/s: C_ij = 1/2 sum_k (dD_ij/dq_k + dD_ik/dq_j - dD_jk/dq_i) qd_k",
@@ -34,7 +52,7 @@ _CONVENTIONS = {
     "body_torque": f"W^-T torque, N m; the Euler angles tell little of it where |cos(pitch)| < {VERTICAL}",
 }
 
-HOW_TO_EVALUATE = (
+HOW_TO_EVALUATE_INERTIA = (
     "Each of fuzzy.functions is the entry of D at [row, column] and at the transposed place: the sum over its rules of "
     "firing * (coefficients of the rule . features); D12 is zero. To D comes W^T I W, I from rigid_body.tensor.",
     "s(q) is the triangle wave with s(0) = 0, s(pi/2) = 1, s(pi) = 0, s(3 pi/2) = -1. With the input map data-range, "
@@ -48,63 +66,114 @@ HOW_TO_EVALUATE = (
     "Features of one input: 1 and its own, which are the seesaw consequent input, or sin q .. sin nq, cos q .. cos nq "
     "with n = harmonic_order. Of two inputs: 1, those of roll, those of pitch (additive), or all products of (1, "
     "roll's) and (1, pitch's), pitch's running fastest (tensor).",
+    "Where v' and omega' are asked for, inertia stands for B = W^-T D W^-1 at the attitude. The step is taken with the "
+    "angular momentum L = B omega in the place of omega: L' = torque - W^-T ((dW/dt)^T L - 1/2 grad (qd^T D qd)), grad "
+    "by q, qd = W^-1 omega; L_m = L + h/2 L', and omega_m = inverse B L_m with the B of R_m; L + h L' likewise.",
     "reference_points hold states with the results; their errors compare with scale (of D, C, torque, body torque).",
 )
 
-_SCORE_UNITS = {"mse": "(N m)^2", "max_error": "N m", "relative_error": "1", "r2": "1", "vaf": "1", "r2_body": "1"}
+HOW_TO_EVALUATE = (
+    "Row k of (torque x y z in N m, force x y z in N) is the sum over all weights of that row of weight * term of the "
+    "motion * term of the rotors, both by their index from 0 in the lists of their names.",
+    "Terms of the motion are 1; u v w p q r, the components of air and rate; their products; |u| u, |u| v, |u| w with "
+    "the length |u| of air; |p| p, |q| q, |r| r; then for each column c of the learned part c U and c U^2, U = "
+    "sqrt(u^2 + v^2).",
+    "Columns of the learned part: with the angle a = atan2(v, u) and x = (a mod 2 pi) / 2 pi, the membership functions "
+    "have their peaks at the breakpoints b. Between two, u = (x - b1) / (b2 - b1): the left function falls by "
+    f"{Z_FUNCTION}, the right one is 1 minus that. Rule 1 fires by the first function plus the last, the others by "
+    "their own; one breakpoint alone is one rule that fires by 1. Columns run over rules, then over features: 1 and "
+    "sin a .. sin n a, cos a .. cos n a with n = harmonic_order, or where that is 0 the triangle wave s with s(0) = 0, "
+    "s(pi/2) = 1, s(pi) = 0, s(3 pi/2) = -1. Column times firing.",
+    "Terms of the rotors over the step from sample k to k + 1 of length h: 1; mean w of the speed that acts; w^2; its "
+    "change over the step / h; z - w^2. The logged speed, late by delay_s with straight lines between samples, is x; "
+    "before the first sample it is the first. lag_s > 0: tau w' + w = x, exactly, for x a straight line between "
+    "samples, or constant over a step where speeds are held; it starts at the first x. Without lag w is x, for held "
+    "speeds changing at samples. Slow actuation: slow_s z' + z = w^2, w^2 constant over each step, z the mean over the "
+    "step; it starts at the first w^2.",
+    "v' = (0, 0, -gravity) + R force / mass; omega' = inverse inertia (torque - omega x inertia omega). One step of "
+    "length h, midpoint rule: with the accelerations at the state, v_m = v + h/2 v', omega_m = omega + h/2 omega', R_m "
+    "= R exp(h/2 [omega]x); with the accelerations there, position + h v_m, v + h v', omega + h omega', R exp(h "
+    "[omega_m]x). The terms of the rotors are constant over a step.",
+    "reference_wrenches and reference_runs hold what cpfls computes; errors compare with scale.",
+)
 
 
-def json_text(sheet: Sheet, points: Expected) -> str:
+def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
     """Write a model as strict JSON.
+
+    Parameters
+    ----------
+    told : sequence of str
+        Further paragraphs on what it is worth.
 
     Returns
     -------
     str
-        In ASCII; null in place of what is not finite.
+        In ASCII; null in place of what is not finite, or what the model does not have.
     """
-    record = sheet.record
+    found, vehicle = sheet.identified, sheet.model.vehicle
+    points, runs, attitudes = sheet.references
     document = {
         "format": FORMAT,
         "format_version": VERSION,
         "name": sheet.name,
-        "complete": record.complete,
-        "stop_reason": record.stop_reason or None,
-        "verdict": _verdict(record),
-        "findings": record.findings,
-        "conventions": _CONVENTIONS,
-        "how_to_evaluate": HOW_TO_EVALUATE,
-        "structure": _structure(sheet),
-        "fuzzy": _fuzzy(sheet),
-        "rigid_body": _rigid_body(sheet),
-        "excited_region": _region(sheet),
-        "judged": {"units": _SCORE_UNITS, **_judged(record.judged)},
+        "complete": sheet.complete,
+        "stop_reason": sheet.stopped,
+        "verdict": None if sheet.verdict is None else {"label": sheet.verdict},
+        "findings": [],
+        "worth": [*sheet.worth, *told],
+        "conventions": _CONVENTIONS if found is None else _CONVENTIONS | _ON_ATTITUDE,
+        "how_to_evaluate": HOW_TO_EVALUATE if found is None else (*HOW_TO_EVALUATE_INERTIA, *HOW_TO_EVALUATE),
+        "mass_kg": vehicle.mass_kg,
+        "gravity_m_s2": vehicle.gravity_m_s2,
+        "inertia_kg_m2": symmetric(sheet.rigid_body) if found is None else None,
+        "structure": None if found is None else _structure(found),
+        "fuzzy": None if found is None else _fuzzy(found),
+        "rigid_body": None if found is None else _rigid_body(found),
+        "excited_region": None if found is None else _region(found),
+        "rotors": sheet.model.rotors,
+        "response": response_of(sheet),
+        "effects": {
+            effect.name: {"coefficients": effect.coefficients, "shape": dict(effect.shape)}
+            for effect in sheet.model.effects
+        },
+        "terms_of_motion": sheet.terms,
+        "terms_of_rotors": sheet.rotor_terms,
+        "factors_of_products": FACTORS.tolist(),
+        "weights": {name: column.tolist() for name, column in sheet.weights._asdict().items()},
+        "learned": None
+        if sheet.remainder is None
+        else {"breakpoints": airflow_peaks(sheet), "harmonic_order": airflow_order(sheet)},
+        "judged": None,
         "provenance": _provenance(sheet),
-        "reference_points": _points(points),
+        "period_s": PERIOD,
+        "reference_points": attitudes_of(attitudes),
+        "reference_wrenches": points_of(points),
+        "reference_runs": [run_of(run) for run in runs],
     }
-    return strict_json(document)
+    return strict_json({**document, **sheet.evidence})
 
 
-def _structure(sheet: Sheet) -> dict[str, Any]:
-    structure, settings = sheet.model.structure, sheet.model.structure.settings
+def _structure(model: Model) -> dict[str, Any]:
+    structure, settings = model.structure, model.structure.settings
     return {
         "structure": settings.structure,
         "input_map": settings.input_map,
         "consequents": settings.consequents,
         "harmonic_order": settings.harmonic_order if settings.consequents == "harmonic" else None,
         "products": settings.products,
-        "base": sheet.record.model.base,
+        "base": base_of(model),
         "membership_functions": {p.name: p.functions for p in structure.partitions},
         "parameters": structure.parameters,
     }
 
 
-def _fuzzy(sheet: Sheet) -> dict[str, Any]:
-    model = sheet.model
+def _fuzzy(model: Model) -> dict[str, Any]:
     return {
         "inputs": {name: _range(r) for name, r in zip(_ANGLES, model.ranges, strict=True)},
         "breakpoints": {p.name: b for p, b in zip(model.structure.partitions, model.partitions, strict=True)},
         "unit": "kg m^2",
-        "functions": {block.function.name: _function(sheet, block) for block in model.structure.blocks},
+        "functions": {block.function.name: _function(model, block) for block in model.structure.blocks},
     }
 
 
@@ -112,10 +181,10 @@ def _range(data: InputRange) -> dict[str, float]:
     return {"minimum": data.minimum, "maximum": data.maximum, "width": data.width}
 
 
-def _function(sheet: Sheet, block: Block) -> dict[str, Any]:
-    structure, function = sheet.model.structure, block.function
+def _function(model: Model, block: Block) -> dict[str, Any]:
+    structure, function = model.structure, block.function
     labels = rule_labels(block, structure) if block.partitions else ["constant"]
-    coefficients = sheet.model.coefficients[block.columns].reshape(block.rules, block.features)
+    coefficients = model.coefficients[block.columns].reshape(block.rules, block.features)
     return {
         "row": function.row,
         "column": function.column,
@@ -125,43 +194,22 @@ def _function(sheet: Sheet, block: Block) -> dict[str, Any]:
     }
 
 
-def _rigid_body(sheet: Sheet) -> dict[str, Any]:
-    values = dict(zip(INERTIA_PARAMETERS, sheet.model.rigid_body.tolist(), strict=True))
+def _rigid_body(model: Model) -> dict[str, Any]:
+    values = dict(zip(INERTIA_PARAMETERS, model.rigid_body.tolist(), strict=True))
     return {"unit": "kg m^2", "frame": BODY, "tensor": values}
 
 
-def _region(sheet: Sheet) -> dict[str, Any]:
+def _region(model: Model) -> dict[str, Any]:
     return {
         "description": "'#' where training visited roll and pitch; a line for each roll, pitch along it, from -180 deg",
         "cell_deg": 360 / CELLS,
-        "share": sheet.region_share,
-        "rows": visited_rows(sheet.model),
-    }
-
-
-def _verdict(record: ModelRecord) -> dict[str, Any] | None:
-    if record.verdict is None or record.verdict.label is None:
-        return None
-    reasons = [{"reason": reason, "speaks": float(speaks)} for reason, speaks in record.verdict.reasons]
-    return {"label": record.verdict.label, "region": record.verdict.region or "", "reasons": reasons}
-
-
-def _judged(judged: JudgedGroup) -> dict[str, Any]:
-    counts = zip(judged.parts, judged.samples, judged.outside, strict=True)
-    return {
-        "parts": {part: {"samples": int(samples), "outside": int(outside)} for part, samples, outside in counts},
-        "models": {
-            model: {
-                part: {measure: judged.of_axes(measure, model, part).tolist() for measure in judged.measures}
-                for part in judged.parts
-            }
-            for model in judged.models
-        },
+        "share": np.mean(model.visited),
+        "rows": visited_rows(model),
     }
 
 
 def _provenance(sheet: Sheet) -> dict[str, Any]:
-    header = sheet.record.origin
+    header = sheet.origin
     return {
         "model": {"name": sheet.file, "sha256": sheet.sha256},
         "cpfls_version": header.version,
@@ -170,19 +218,3 @@ def _provenance(sheet: Sheet) -> dict[str, Any]:
         "inputs": {role: vars(source) for role, source in header.inputs.items()},
         "config": sheet.config,
     }
-
-
-def _points(points: Expected) -> list[dict[str, Any]]:
-    motion = points.motion
-    columns = {
-        "q": motion.attitude,
-        "qd": motion.rate,
-        "qdd": motion.acceleration,
-        "D": points.inertia,
-        "C": points.coriolis,
-        "torque": points.torque,
-        "body_torque": points.body,
-        "scale": points.scale,
-        "inside": points.inside,
-    }
-    return [{name: values[index] for name, values in columns.items()} for index in range(len(points))]

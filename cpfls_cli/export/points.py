@@ -4,22 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel, coriolis_matrix
 from cpfls_cli.dynamics.rigid_body import body_torque
+from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.inertia import symmetric
+from cpfls_cli.playback.model import VehicleModel, wrench_of
+from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.player import one_step
+from cpfls_cli.playback.rotors import Hold
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues, Regressor
 
 POINTS = 8
+"""States at which an export is compared with the library."""
+
+PERIOD = 0.01
+"""Length of the steps of the runs that an export tests itself with, s."""
+
 _RATE, _ACCELERATION = 3.0, 10.0
 _UPRIGHT = 0.2
+_STEPS = 12
+_SPREAD = 0.2
+_SECOND = 1.0
 
 
 @dataclass(frozen=True)
@@ -84,7 +99,7 @@ def _scale(inertia: InertiaValues, motion: Motion, fuzzy: bool) -> Array:
     return np.where(scale > 0.0, scale, 1.0)
 
 
-def reference_points(model: Model, rng: np.random.Generator) -> Expected:
+def attitude_points(model: Model, rng: np.random.Generator) -> Expected:
     """Draw a few states, half of them where training went, and compute what the model gives there.
 
     Returns
@@ -106,3 +121,114 @@ def _cells(allowed: BoolArray, rng: np.random.Generator) -> Iterator[tuple[int, 
     places = np.argwhere(allowed)
     for index in rng.permutation(len(places))[:POINTS]:
         yield int(places[index, 0]), int(places[index, 1])
+
+
+def body_inertia(model: InertiaModel, attitude: Array) -> Array:
+    """Evaluate an inertia over attitude about the body axes, shape (samples, 3, 3), kg m^2."""
+    axes = [rotations.attitude_rate(attitude, np.broadcast_to(axis, attitude.shape)) for axis in np.eye(3)]
+    inverse = np.stack(axes, axis=2)
+    return np.asarray(inverse.swapaxes(1, 2) @ model.inertia(attitude).value @ inverse)
+
+
+class ReferencePoints(NamedTuple):
+    """States, what the model gives there, and the sizes of the terms that it is a sum of.
+
+    Attributes
+    ----------
+    air, rate : array, shape (point, 3)
+    rotor : array, shape (point, 1 + 4 rotors)
+    wrench, scale : array, shape (point, 6)
+    """
+
+    air: Array
+    rate: Array
+    rotor: Array
+    wrench: Array
+    scale: Array
+
+
+class ReferenceRun(NamedTuple):
+    """A run along logged rotor speeds, step by step.
+
+    Attributes
+    ----------
+    hold : {"linear", "previous"}
+    speed : array, shape (step + 1, rotor), rad/s
+    rotor : array, shape (step, 1 + 4 rotors)
+        Terms of the rotors over each step.
+    states : State
+        Before the first step and after each.
+    condition : float
+        Largest condition number of an inertia over attitude on the way, which magnifies rounding; 1 for a constant one.
+    """
+
+    hold: Hold
+    speed: Array
+    rotor: Array
+    states: State
+    condition: float = 1.0
+
+    @property
+    def scale(self) -> Array:
+        """Sizes of position, velocity, rotation and rate that errors compare with, shape (4,), at least that of 1."""
+        return self.condition * np.array([max(float(np.abs(part).max()), 1.0) for part in self.states])
+
+    @property
+    def rotor_scale(self) -> Array:
+        """Sizes of the terms of the rotors: 1, speeds, squares, accelerations, slowness; shape (5,)."""
+        fastest = float(self.speed.max())
+        return np.array([1.0, fastest, fastest**2, fastest / PERIOD, fastest**2])
+
+
+def reference_points(model: VehicleModel, rng: np.random.Generator, count: int = POINTS) -> ReferencePoints:
+    """Draw states, and compute what the model gives there."""
+    air, rate = rng.normal(0.0, 3.0, (2, count, 3))
+    speed = _speeds(model, rng, count)
+    turning = rng.normal(0.0, speed.mean() / _SECOND, speed.shape)
+    slow = _speeds(model, rng, count) ** 2 - speed**2
+    rotor = np.hstack([np.ones((count, 1)), speed, speed**2, turning, slow])
+    return ReferencePoints(air, rate, rotor, model.wrench(air, rate, rotor), term_sizes(model, air, rate, rotor))
+
+
+def term_sizes(model: VehicleModel, air: Array, rate: Array, rotor: Array) -> Array:
+    """Sum the sizes of the terms of torque and force, which their rounding errors are relative to.
+
+    Parameters
+    ----------
+    air, rate : array, shape (samples, 3), m/s and rad/s, body frame
+    rotor : array, shape (samples, 1 + 4 rotors)
+
+    Returns
+    -------
+    array, shape (samples, 6)
+        Above zero.
+    """
+    sizes = wrench_of(np.abs(model.weights), np.abs(model.terms(air, rate)), np.abs(rotor))
+    return np.where(sizes > 0.0, sizes, 1.0)
+
+
+def reference_run(model: VehicleModel, rng: np.random.Generator, hold: Hold, steps: int = _STEPS) -> ReferenceRun:
+    """Fly along rotor speeds at random, beginning from some state, until long after the delay."""
+    steps += ceil(model.response.delay_s / PERIOD)
+    speed = _speeds(model, rng, steps + 1)
+    rotor = model.rotor_terms(speed, PERIOD, hold)[:-1]
+    place, velocity, rate, attitude = rng.uniform(-1.0, 1.0, (4, 1, 3))
+    path = [State(place, velocity, rotations.rotation_matrix(attitude), rate)]
+    for row in rotor:
+        path.append(one_step(model, path[-1], row[None], PERIOD))
+    states = State(*(np.concatenate(parts) for parts in zip(*path, strict=True)))
+    if model.fuzzy is None or not np.isfinite(states.rate).all():
+        return ReferenceRun(hold, speed, rotor, states)
+    tensors = body_inertia(model.fuzzy, rotations.euler_angles(states.rotation))
+    return ReferenceRun(hold, speed, rotor, states, float(np.linalg.cond(tensors).max()))
+
+
+def runs_of(model: VehicleModel, rng: np.random.Generator) -> tuple[ReferenceRun, ...]:
+    """Fly twice; without the runs in which the inertia over attitude becomes that of no body."""
+    runs = (reference_run(model, rng, "linear"), reference_run(model, rng, "previous"))
+    return tuple(run for run in runs if np.isfinite(run.states.rate).all())
+
+
+def _speeds(model: VehicleModel, rng: np.random.Generator, count: int) -> Array:
+    around = rng.uniform(1.0 - _SPREAD, 1.0 + _SPREAD, (count, model.rotors))
+    return np.asarray(hover_speed(model.vehicle) * around)

@@ -1,36 +1,60 @@
-"""What a vehicle is exported for: the simulators and libraries, what each holds, how it is written and flown."""
+"""The forms of an export: languages, simulators and libraries, what each holds, how it is written and flown."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 
 from cpfls_cli.errors import InputError, install_command
 from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import Held, Holds, Missing, missing, together
-from cpfls_cli.export.simulators.functions import casadi_text, fly_casadi, fly_jax, jax_text, whole
+from cpfls_cli.export.json_form import json_text
+from cpfls_cli.export.sheet import Sheet
+from cpfls_cli.export.simulators.functions import casadi_text, fly_casadi, fly_jax, jax_text
 from cpfls_cli.export.simulators.mjcf import fly_mjcf, mjcf_held, mjcf_text
 from cpfls_cli.export.simulators.rotorpy import fly_rotorpy, rotorpy_held, rotorpy_text
 from cpfls_cli.export.simulators.sdf import fly_sdf, sdf_held, sdf_text
-from cpfls_cli.export.vehicle_sheet import VehicleSheet
+from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 
-Write = Callable[[VehicleSheet, Held, Sequence[str], str], str]
+Write = Callable[[Sheet, Held, Sequence[str], str], str]
+"""Takes a model, what the target holds of it, what it does not, in words, and the name of the file."""
 
 
 @dataclass(frozen=True)
-class Target:
-    """A simulator or library that a vehicle is exported for.
+class Form:
+    """A form that a model is exported in.
 
     Attributes
     ----------
     title : str
     ending : str
-        Of its files.
+        Of its file.
+    held : callable
+        From a vehicle to what the form holds of it, and to how it takes weights.
+    write : callable
+    also : str
+        Ending of a file that the other one needs; empty for none.
+    """
+
+    title: str
+    ending: str
+    held: Callable[[VehicleModel], tuple[Held, Holds]]
+    write: Write
+    also: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Target(Form):
+    """A simulator or library that a vehicle is exported for.
+
+    Attributes
+    ----------
     package : str
         That flies it; empty where this program does.
     step_s : float
@@ -38,95 +62,95 @@ class Target:
     levels : int
         Flights, each with half the step of the one before, that a step of no length follows from; 0 for a target that
         takes the very steps of a playback.
-    held : callable
-        From a vehicle to what the target flies of it, and to how it takes weights.
-    write, fly : callable
+    fly : callable
     """
 
-    title: str
-    ending: str
-    package: str
-    step_s: float
-    levels: int
-    held: Callable[[VehicleModel], tuple[Held, Holds]]
-    write: Write
     fly: Callable[[str, Course], State]
+    package: str
+    step_s: float = np.inf
+    levels: int = 0
+
+
+def _whole(model: VehicleModel) -> tuple[Held, Holds]:
+    """Take what code holds of a vehicle: everything that is a sum of weights, and an inertia over attitude."""
+    return Held.whole(model), lambda weights: weights
+
+
+def _c(sheet: Sheet, _held: Held, told: Sequence[str], file: str) -> str:
+    path = Path(file)
+    source = c_source(sheet, path.stem, told)
+    return source.header if path.suffix == ".h" else source.source
 
 
 TARGETS = {
-    "mjcf": Target("MuJoCo", ".xml", "mujoco", 1e-3, 4, mjcf_held, mjcf_text, fly_mjcf),
-    "sdf": Target("Gazebo's motor model", ".sdf", "", 1e-3, 4, sdf_held, sdf_text, fly_sdf),
-    "rotorpy": Target("RotorPy", ".py", "rotorpy", np.inf, 4, rotorpy_held, rotorpy_text, fly_rotorpy),
-    "casadi": Target("CasADi", ".py", "casadi", np.inf, 0, whole, casadi_text, fly_casadi),
-    "jax": Target("JAX", ".py", "jax", np.inf, 0, whole, jax_text, fly_jax),
+    "mjcf": Target("MuJoCo", ".xml", mjcf_held, mjcf_text, fly=fly_mjcf, package="mujoco", step_s=1e-3, levels=4),
+    "sdf": Target("Gazebo's motor model", ".sdf", sdf_held, sdf_text, fly=fly_sdf, package="", step_s=1e-3, levels=4),
+    "rotorpy": Target("RotorPy", ".py", rotorpy_held, rotorpy_text, fly=fly_rotorpy, package="rotorpy", levels=4),
+    "casadi": Target("CasADi", ".py", _whole, casadi_text, fly=fly_casadi, package="casadi"),
+    "jax": Target("JAX", ".py", _whole, jax_text, fly=fly_jax, package="jax"),
 }
-"""By the word of ``--format``."""
+"""Those that can be flown, by the word of ``--format``."""
+
+FORMS: dict[str, Form] = {
+    "json": Form("JSON", ".json", _whole, lambda sheet, _held, told, _file: json_text(sheet, told)),
+    "c": Form("C", ".c", _whole, _c, also=".h"),
+    "python": Form("Python", ".py", _whole, lambda sheet, _held, told, file: python_source(sheet, file, told=told)),
+    **TARGETS,
+}
+"""All, by the word of ``--format``."""
 
 
 @dataclass(frozen=True)
 class Exported:
-    """A vehicle as a target takes it.
+    """A model in a form.
 
     Attributes
     ----------
-    text : str
-        Of the file.
+    texts : dict of str to str
+        Of each file by its name, the one that needs the others last.
     held : Held
     missing : tuple of Missing
     told : tuple of str
-        What the target does not hold, in words.
+        What the form does not hold, in words.
     """
 
-    text: str
+    texts: dict[str, str]
     held: Held
     missing: tuple[Missing, ...]
     told: tuple[str, ...]
 
+    @property
+    def text(self) -> str:
+        """Of the file that needs the others."""
+        return list(self.texts.values())[-1]
 
-def exported(sheet: VehicleSheet, form: str, file: str) -> Exported:
-    """Write a vehicle for a target.
+
+def exported(sheet: Sheet, form: str, file: str) -> Exported:
+    """Write a model in a form.
 
     Parameters
     ----------
     form : str
-        Of `TARGETS`.
+        Of `FORMS`.
     file : str
         Name of the file.
 
     Raises
     ------
     InputError
-        If the target cannot hold the vehicle at all.
+        If it cannot hold the model at all.
     """
-    target = TARGETS[form]
+    chosen = FORMS[form]
     try:
-        held, holds = target.held(sheet.model)
+        held, holds = chosen.held(sheet.model)
     except InputError as error:
         raise InputError(f"{sheet.file}: {error}") from None
-    left, told = _left(sheet, held, holds, target.title)
-    return Exported(target.write(sheet, held, [*sheet.facts, "", *told], file), held, left, told)
+    left, told = _left(sheet, held, holds, chosen.title)
+    files = [Path(file).with_suffix(ending).name for ending in (chosen.also, chosen.ending) if ending]
+    return Exported({name: chosen.write(sheet, held, told, name) for name in files}, held, left, told)
 
 
-def tabled(sheet: VehicleSheet, title: str) -> tuple[VehicleSheet, tuple[Missing, ...]]:
-    """Take what a table of weights holds of a vehicle.
-
-    Parameters
-    ----------
-    title : str
-        Of the language that it is written in.
-
-    Returns
-    -------
-    sheet : VehicleSheet
-        That says what is left out.
-    missing : tuple of Missing
-    """
-    model = replace(sheet.model, fuzzy=None)
-    left, told = _left(sheet, Held.whole(model), lambda weights: weights, title)
-    return replace(sheet, model=model, worth=(*sheet.worth, *told)), left
-
-
-def _left(sheet: VehicleSheet, held: Held, holds: Holds, title: str) -> tuple[tuple[Missing, ...], tuple[str, ...]]:
+def _left(sheet: Sheet, held: Held, holds: Holds, title: str) -> tuple[tuple[Missing, ...], tuple[str, ...]]:
     """List what is left of a vehicle, and say so."""
     about_hover = missing(sheet.model, held, holds, np.array(sheet.floor), sheet.wind)
     left = (*about_hover, *sheet.outside)

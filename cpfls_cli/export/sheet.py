@@ -1,17 +1,24 @@
-"""Everything about a model that goes into an export: the model, where it comes from, and what it is worth in words."""
+"""Everything about a model that goes into an export: the vehicle, where it comes from, what it is worth in words."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.scores import MODEL
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.config.load import parse_config
+from cpfls_cli.effects.polynomial import STATE_TERMS
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.export.holding import Missing
+from cpfls_cli.export.points import Expected, ReferencePoints, ReferenceRun, attitude_points, reference_points, runs_of
 from cpfls_cli.identification.model import Model
+from cpfls_cli.inertia import six_parameters
+from cpfls_cli.playback.model import Remainder, VehicleModel
 from cpfls_cli.regressor.structure import Block, ModelStructure
 from cpfls_cli.version import __version__
 
@@ -20,7 +27,35 @@ EXPORTER = __version__
 
 DO_NOT_USE = "DO NOT USE: this is the verdict on the model, which was exported all the same."
 
-_SIGNS = {1: "for", -1: "against"}
+_SEED = 1
+_ROWS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
+
+
+class Weights(NamedTuple):
+    """The weights that are not zero: entry by entry its row, its term of the motion, its term of the rotors.
+
+    Attributes
+    ----------
+    row, term, rotor : array of int, shape (entry,)
+        Row 0 to 2 of torque, 3 to 5 of force.
+    weight : array, shape (entry,), SI
+    """
+
+    row: IntArray
+    term: IntArray
+    rotor: IntArray
+    weight: Array
+
+    def __len__(self) -> int:
+        return len(self.weight)
+
+
+class References(NamedTuple):
+    """What the library computes, for an export to test itself: torque and force, runs, and torque over attitude."""
+
+    points: ReferencePoints
+    runs: tuple[ReferenceRun, ...]
+    attitudes: Expected | None
 
 
 @dataclass(frozen=True)
@@ -31,88 +66,163 @@ class Sheet:
     ----------
     name : str
         Prefix of all names in source code, an identifier.
-    model : Model
-        What is evaluated.
-    record : ModelRecord
-        The artifact that it was read from.
+    model : VehicleModel
+        In still air; where its inertia depends on the attitude, it is that of an identified model.
+    worth : tuple of str
+        Paragraphs that say what it is worth.
+    origin : Header
+        Of the artifact that it was read from.
     file, sha256 : str
         Name, without its folder, and hash of the artifact.
+    verdict : str or None
+        In a word.
+    stopped : str or None
+        Why its search did not come to its end; None where it did.
+    evidence : mapping of str
+        What it was judged by, for JSON.
+    outside : tuple of Missing
+        Parts of the artifact that the model does not hold: effects that are no sums of weights.
+    wind : tuple of float, m/s, world frame
+        Of the flights that it was made with.
+    floor : tuple of float, length 6, N m and N
+        Noise floors of the flights that it was made with; NaN where unknown.
+    warnings : tuple of str
+        What speaks against using it.
     """
 
     name: str
-    model: Model
-    record: ModelRecord
+    model: VehicleModel
+    worth: tuple[str, ...]
+    origin: Header
     file: str
     sha256: str
+    verdict: str | None = None
+    stopped: str | None = None
+    evidence: Mapping[str, Any] = field(default_factory=dict)
+    outside: tuple[Missing, ...] = ()
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    floor: tuple[float, ...] = (np.nan,) * 6
+    warnings: tuple[str, ...] = ()
 
     @property
-    def rigid(self) -> bool:
-        """Whether a rigid body lies under the fuzzy part."""
-        return bool(self.model.rigid_body.any())
+    def identified(self) -> Model | None:
+        """The identified model that its inertia over attitude is that of; None for a constant inertia."""
+        fuzzy = self.model.fuzzy
+        assert fuzzy is None or isinstance(fuzzy, Model), "an inertia over attitude is that of an identified model"
+        return fuzzy
 
     @property
-    def fuzzy(self) -> bool:
-        """Whether the fuzzy part does anything, or is all there is."""
-        return bool(self.model.coefficients.any()) or not self.rigid
+    def rigid_body(self) -> Array:
+        """Inertia of the rigid body, under the fuzzy part where there is one, shape (6,), kg m^2."""
+        found = self.identified
+        return six_parameters(self.model.vehicle.inertia_kg_m2) if found is None else found.rigid_body
 
     @property
-    def region_share(self) -> float:
-        """Share of the circle of roll and pitch that training visited."""
-        return float(np.mean(self.model.visited))
+    def rules(self) -> Model | None:
+        """The identified model where its fuzzy part does anything, or is all there is."""
+        found = self.identified
+        return found if found and (found.coefficients.any() or not found.rigid_body.any()) else None
+
+    @property
+    def complete(self) -> bool:
+        """Whether the search for it came to its end."""
+        return self.stopped is None
+
+    @cached_property
+    def weights(self) -> Weights:
+        """The weights that are not zero."""
+        row, term, rotor = (places.astype(np.int64) for places in np.nonzero(self.model.weights))
+        return Weights(row, term, rotor, self.model.weights[row, term, rotor])
+
+    @property
+    def remainder(self) -> Remainder | None:
+        """The learned part."""
+        return self.model.remainder
+
+    @property
+    def terms(self) -> list[str]:
+        """Names of the terms of the motion."""
+        columns = range((self.model.term_count - len(STATE_TERMS)) // 2)
+        return [*STATE_TERMS, *(f"{name} c{column}" for column in columns for name in ("U", "U^2"))]
+
+    @property
+    def rotor_terms(self) -> list[str]:
+        """Names of the terms of the rotors."""
+        numbers = range(1, self.model.rotors + 1)
+        return [
+            "1",
+            *(form.format(number) for form in ("w{0}", "w{0}^2", "w{0}'", "z{0} - w{0}^2") for number in numbers),
+        ]
 
     @property
     def config(self) -> Mapping[str, Any]:
         """The resolved study."""
-        return parse_config(self.record.origin.config, f"{self.file}: /config")
+        return parse_config(self.origin.config, f"{self.file}: /config")
 
-    @property
-    def banner(self) -> list[str]:
-        """Paragraphs that must not be overlooked; none for a complete model that is fit for use."""
-        unfit = ["", DO_NOT_USE] if self.record.verdict_label == "do-not-use" else []
-        if self.record.complete:
-            return unfit
-        why = f" ({self.record.stop_reason})" if self.record.stop_reason else ""
-        return ["", f"INCOMPLETE MODEL: its search did not come to its end{why}. Do not fly with it.", *unfit]
+    @cached_property
+    def references(self) -> References:
+        """States and runs, the same for every form."""
+        rng, found = np.random.default_rng(_SEED), self.identified
+        attitudes = None if found is None else attitude_points(found, np.random.default_rng(_SEED))
+        return References(reference_points(self.model, rng), runs_of(self.model, rng), attitudes)
 
     @property
     def facts(self) -> list[str]:
         """Paragraphs that say what the model is, what it is worth and where it comes from."""
-        return [self._structure, "", *self._worth(), "", *self._origin()]
+        return [*self.told, "", *self._origin()]
 
     @property
-    def _structure(self) -> str:
-        settings, structure = self.model.structure.settings, self.model.structure
-        order = f" of order {settings.harmonic_order}" if settings.consequents == "harmonic" else ""
-        functions = ", ".join(f"{partition.name} {partition.functions}" for partition in structure.partitions)
-        fuzzy = "" if self.fuzzy else " The fuzzy part is off: this is a rigid body."
-        return (
-            f"Structure: {settings.structure}, {settings.input_map} inputs, {settings.consequents} consequents{order}, "
-            f"{settings.products} products; membership functions {functions}; {structure.parameters} coefficients; "
-            f"base {self.record.model.base}.{fuzzy} Training visited {self.region_share:.1%} of the circle of roll and "
-            "pitch."
-        )
+    def told(self) -> list[str]:
+        """What must not be overlooked, what the model is and what it is worth."""
+        return [*self._marks(), *self._structure(), *self.worth]
 
-    def _worth(self) -> Iterator[str]:
-        verdict, judged = self.record.verdict, self.record.judged
-        if verdict is None or verdict.label is None:
-            yield "Verdict: none; the model holds no validation."
-        else:
-            yield f"Verdict: {verdict.label}. {verdict.region or ''}"
-            for reason, speaks in verdict.reasons:
-                yield f"- {_SIGNS.get(speaks, 'note')}: {reason}"
-        for part in judged.parts if MODEL in judged.models else ():
-            worst, r2 = judged.worst(MODEL, part)[0], judged.worst_r2(MODEL, part)
-            error = f"largest error {worst:.3g} of the largest torque"
-            yield f"Judged on {part} ({judged.samples_of(part)} samples), worst axis: {error}, R2 {r2:.4f}"
-        for finding in self.record.findings:
-            yield f"Finding: {finding}"
+    def _marks(self) -> Iterator[str]:
+        if self.stopped is not None:
+            why = f" ({self.stopped})" if self.stopped else ""
+            yield f"INCOMPLETE MODEL: its search did not come to its end{why}. Do not fly with it."
+        if self.verdict == "do-not-use":
+            yield DO_NOT_USE
+
+    def _structure(self) -> Iterator[str]:
+        model, response = self.model, self.model.response
+        yield (
+            f"Vehicle: {model.vehicle.mass_kg:.6g} kg, {model.rotors} rotors; delay {response.delay_s:.4g} s, "
+            f"lag {response.lag_s:.4g} s, slow actuation {response.slow_roll_pitch:.4g} (roll, pitch) and "
+            f"{response.slow_yaw:.4g} (yaw) within {response.slow_s:.4g} s; law of the rotors w^2 + "
+            f"{model.thrust_linear:.4g} w_hover w; {len(self.weights)} weights."
+        )
+        if model.effects:
+            yield f"Effects: {', '.join(CATALOGUE[effect.name].title for effect in model.effects)}."
+        if self.remainder is not None:
+            rows = ", ".join(_ROWS[row] for row in self.remainder.rows)
+            yield f"Learned, without a name: {rows} over the direction of the airflow."
+        if self.identified is not None:
+            yield _inertia_in_words(self.identified, fuzzy=self.rules is not None)
 
     def _origin(self) -> Iterator[str]:
-        header = self.record.origin
+        header = self.origin
         yield f"Model: {self.file}, sha256 {self.sha256}"
         yield f"Made by cpfls {header.version}, seed {header.seed}; exported by cpfls {EXPORTER}"
         for role, source in header.inputs.items():
             yield f"From {role}: {source.name}, sha256 {source.sha256}"
+
+
+def _inertia_in_words(model: Model, *, fuzzy: bool) -> str:
+    settings, structure = model.structure.settings, model.structure
+    order = f" of order {settings.harmonic_order}" if settings.consequents == "harmonic" else ""
+    functions = ", ".join(f"{partition.name} {partition.functions}" for partition in structure.partitions)
+    off = "" if fuzzy else " The fuzzy part is off: this is a rigid body."
+    return (
+        f"Inertia over attitude: {settings.structure}, {settings.input_map} inputs, {settings.consequents} "
+        f"consequents{order}, {settings.products} products; membership functions {functions}; {structure.parameters} "
+        f"coefficients; base {base_of(model)}.{off} Training visited {float(np.mean(model.visited)):.1%} of the circle "
+        "of roll and pitch."
+    )
+
+
+def base_of(model: Model) -> str:
+    """Tell what lies under the fuzzy part: ``rigid-body`` or ``none``."""
+    return "rigid-body" if model.rigid_body.any() else "none"
 
 
 def rule_labels(block: Block, structure: ModelStructure) -> list[str]:

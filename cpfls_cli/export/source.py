@@ -1,16 +1,18 @@
-"""A model as source code without dependencies: C99, which needs its mathematics only, and Python, which needs NumPy."""
+"""A model as source code without dependencies: C99, and modules of Python for NumPy, CasADi and JAX."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.dynamics.rigid_body import VERTICAL, vertical
-from cpfls_cli.export.points import Expected
+from cpfls_cli.effects.polynomial import FACTORS
+from cpfls_cli.export.points import PERIOD, Expected, ReferencePoints, ReferenceRun
 from cpfls_cli.export.sheet import Sheet, rule_labels, rules_along
 from cpfls_cli.export.text import c_row, c_rows, comment_lines, comment_text, filled, literal_text, number, python_rows
 from cpfls_cli.identification.model import Model
@@ -19,6 +21,8 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.structure import ModelStructure
 
 _OUTSIDE, _VERTICAL = 1, 4
+_FASTEST_PERIOD = 1e-3
+_SHORTEST_S = 1e-5
 
 
 @dataclass(frozen=True)
@@ -29,43 +33,59 @@ class CSource:
     header: str
 
 
-def c_source(sheet: Sheet, points: Expected, stem: str) -> CSource:
+def c_source(sheet: Sheet, stem: str, told: Sequence[str] = ()) -> CSource:
     """Write a model as C99.
 
     Parameters
     ----------
-    points : Expected
-        For the self-test.
     stem : str
         Name of both files without ``.c`` and ``.h``.
+    told : sequence of str
+        Further paragraphs of the head.
     """
+    points, runs, attitudes = sheet.references
+    peaks = airflow_peaks(sheet)
     words = {
-        **_common_words(sheet),
+        **_common_words(sheet, told),
         "source": comment_text(f"{stem}.c"),
         "header": comment_text(f"{stem}.h"),
-        **_c_tables(sheet.model),
-        "points": [_c_point(points, index) for index in range(len(points))],
+        "verdict_text": literal_text(sheet.verdict or "none"),
+        "history": int(sheet.model.response.delay_s / _FASTEST_PERIOD * (1 + 1e-9)) + 2,
+        "rigid_rows": [c_row(row) for row in symmetric(sheet.rigid_body)],
+        "factor_rows": filled(", ".join(f"{{{first}, {second}}}" for first, second in FACTORS.tolist()), 4),
+        "weights": [f"{{{row}, {term}, {rotor}, R({number(weight)})}}," for row, term, rotor, weight in _rows(sheet)],
+        "peaks": len(peaks),
+        "rules_of_airflow": max(len(peaks) - 1, 1),
+        "features": 1 + (2 * airflow_order(sheet) or 1),
+        "peak_rows": filled(c_row(peaks), 4),
+        **({} if sheet.rules is None else _c_rules(sheet.rules)),
+        **({} if sheet.identified is None else _c_visited(sheet.identified)),
+        "points": [_c_braces(list(point.values()), 4) for point in points_of(points)],
+        "attitude_points": [_c_braces(list(point.values()), 4) for point in _c_attitudes(attitudes)],
+        "runs": [_c_braces(list(run_of(run).values()), 4) for run in runs],
+        "steps": len(runs[0].rotor) if runs else 0,
     }
     return CSource(fill_template("model.c.j2", words), fill_template("model.h.j2", words))
 
 
-def _c_tables(model: Model) -> dict[str, Any]:
+def _c_rules(model: Model) -> dict[str, Any]:
     structure = model.structure
-    packed = np.packbits(model.visited, axis=1)
+    circular = int(structure.circular)
+    names = {p.name: ("roll", "pitch")[p.input] for p in structure.partitions}
     return {
         "partitions": [
             {
                 "label": p.name,
-                "table": f"{p.function}_{('roll', 'pitch')[p.input]}",
+                "table": f"{p.function}_{names[p.name]}",
                 "functions": p.functions,
                 "rows": filled(c_row(peaks), 4),
             }
             for p, peaks in zip(structure.partitions, model.partitions, strict=True)
         ],
         "rules": {
-            p.name: f"rules_of(&{name}_input, {p.function}_{name}, {p.functions})"
+            p.name: f"rules_of({names[p.name]}_input.membership, {names[p.name]}_input.membership_slope, "
+            f"{p.function}_{names[p.name]}, {p.functions}, {circular})"
             for p in structure.partitions
-            for name in (("roll", "pitch")[p.input],)
         },
         "blocks": [
             {
@@ -80,48 +100,90 @@ def _c_tables(model: Model) -> dict[str, Any]:
             for block in structure.blocks
             if block.partitions
         ],
-        "rigid_rows": [c_row(row) for row in symmetric(model.rigid_body)],
-        "visited_rows": [", ".join(f"0x{byte:02x}" for byte in row) for row in packed],
-        "cell_bytes": packed.shape[1],
     }
 
 
-def _c_point(points: Expected, index: int) -> str:
-    motion = points.motion[index : index + 1]
-    vectors = [motion.attitude[0], motion.rate[0], motion.acceleration[0]]
-    matrices = [points.inertia[index], points.coriolis[index], np.array([points.torque[index], points.body[index]])]
-    parts = [_braced(v) for v in vectors] + [_matrix(m) for m in matrices] + [_braced(points.scale[index])]
-    flags = (0 if points.inside[index] else _OUTSIDE) | (_VERTICAL if vertical(motion.attitude)[0] else 0)
-    return "    {\n" + "\n".join(filled(f"{part},", 8) for part in parts) + f"\n        {flags}u\n    }},"
+def _c_visited(model: Model) -> dict[str, Any]:
+    packed = np.packbits(model.visited, axis=1)
+    rows = [", ".join(f"0x{byte:02x}" for byte in row) for row in packed]
+    return {"visited_rows": rows, "cell_bytes": packed.shape[1]}
 
 
-def _braced(values: Array) -> str:
-    return f"{{{c_row(values)}}}"
+def _c_attitudes(points: Expected | None) -> list[dict[str, Any]]:
+    """Arrange states with the flags that C gives there."""
+    found = []
+    for point in attitudes_of(points):
+        inside, attitude = point.pop("inside"), point["q"][None]
+        flags = (0 if inside else _OUTSIDE) | (_VERTICAL if vertical(attitude)[0] else 0)
+        found.append({name: np.ravel(values) for name, values in point.items()} | {"status": flags})
+    return found
 
 
-def _matrix(values: Array) -> str:
-    return "{ " + ", ".join(_braced(row) for row in values) + " }"
+def _c_braces(values: Any, indent: int) -> str:
+    """Write nested lists of numbers in braces, one part to a line."""
+    parts = [f"{int(part)}," if isinstance(part, int) else _c_part(part, indent + 4) for part in values]
+    blank = " " * indent
+    return "\n".join(
+        [f"{blank}{{", *(part if part.startswith(" ") else f"{blank}    {part}" for part in parts), f"{blank}}},"]
+    )
 
 
-def python_source(sheet: Sheet, points: Expected, file: str) -> str:
+def _c_part(part: Sequence[Any] | Array, indent: int) -> str:
+    if isinstance(part, np.ndarray) and part.ndim == 1:
+        return filled(f"{{{c_row(part)}}},", indent)
+    return _c_braces(part, indent)
+
+
+def python_source(sheet: Sheet, file: str, library: str = "numpy", told: Sequence[str] = ()) -> str:
     """Write a model as a module of Python.
 
     Parameters
     ----------
-    points : Expected
-        For the self-test.
     file : str
         Name of the file.
+    library : {"numpy", "casadi", "jax"}
+        That it computes with.
+    told : sequence of str
+        Further paragraphs of the head.
     """
-    label = sheet.record.verdict_label
+    model, weights, rules = sheet.model, sheet.weights, sheet.rules
+    points, runs, attitudes = sheet.references
+    coefficients = np.zeros(0) if rules is None else rules.coefficients
+    _, *times = response_of(sheet).values()
+    parameters = [model.body.mass, model.body.gravity, *sheet.rigid_body, *times, *weights.weight, *coefficients]
+    tests = library == "numpy"
     words = {
-        **_common_words(sheet),
+        **_common_words(sheet, told),
+        "library": library,
         "source": comment_text(file),
-        "verdict_label": None if label is None else ascii(label),
-        **_python_tables(sheet.model),
-        "points": [_python_point(points, index) for index in range(len(points))],
+        "verdict": None if sheet.verdict is None else ascii(sheet.verdict),
+        "row_rows": _whole(weights.row),
+        "term_rows": _whole(weights.term),
+        "rotor_rows": _whole(weights.rotor),
+        "first_rows": _whole(FACTORS[:, 0]),
+        "second_rows": _whole(FACTORS[:, 1]),
+        "rule_count": len(coefficients),
+        "parameter_rows": filled(", ".join(map(number, parameters)), 4),
+        "peaks": airflow_peaks(sheet).tolist(),
+        **({} if rules is None else _python_rules(rules)),
+        "visited_rows": [] if sheet.identified is None else visited_rows(sheet.identified),
+        "points": [_python_entries(point) for point in points_of(points)] if tests else [],
+        "attitude_points": [_python_entries(point) for point in attitudes_of(attitudes)] if tests else [],
+        "runs": [_python_entries(run_of(run)) for run in runs] if tests else [],
     }
     return fill_template("model.py.j2", words)
+
+
+def _python_rules(model: Model) -> dict[str, Any]:
+    structure = model.structure
+    named = {
+        block.function.name: {
+            structure.partitions[place].input: model.partitions[place].tolist() for place in block.partitions
+        }
+        for block in structure.blocks
+        if block.partitions
+    }
+    return {"rule_peaks": named, "coefficient_rows": python_rows(model.coefficients, 4)}
 
 
 def visited_rows(model: Model) -> list[str]:
@@ -135,40 +197,19 @@ def visited_rows(model: Model) -> list[str]:
     return ["".join(row) for row in np.where(model.visited, "#", ".")]
 
 
-def _python_tables(model: Model) -> dict[str, Any]:
-    structure = model.structure
-    return {
-        "partitions": [
-            {"label": partition.name, "rows": python_rows(peaks, 8)}
-            for partition, peaks in zip(structure.partitions, model.partitions, strict=True)
-        ],
-        "blocks": [
-            {
-                "name": block.function.name,
-                "rows": python_rows(model.coefficients[block.columns].reshape(block.rules, block.features), 8),
-            }
-            for block in structure.blocks
-            if block.partitions
-        ],
-        "rigid_body": python_rows(symmetric(model.rigid_body), 4),
-        "visited_rows": visited_rows(model),
-    }
+def _whole(values: Array | IntArray) -> str:
+    return filled(", ".join(map(str, values.tolist())), 4)
 
 
-def _python_point(points: Expected, index: int) -> str:
-    motion = points.motion[index : index + 1]
-    entries = {
-        "q": motion.attitude[0],
-        "qd": motion.rate[0],
-        "qdd": motion.acceleration[0],
-        "D": points.inertia[index],
-        "C": points.coriolis[index],
-        "torque": points.torque[index],
-        "body": points.body[index],
-        "scale": points.scale[index],
-    }
-    lines = [filled(f'"{name}": {values.tolist()!r},', 8) for name, values in entries.items()]
-    return "\n".join(["    {", *lines, f'        "inside": {bool(points.inside[index])},', "    },"])
+def _python_entries(entries: dict[str, Any]) -> str:
+    lines = [filled(f'"{name}": {_plain(values)!r},', 8) for name, values in entries.items()]
+    return "\n".join(["    {", *lines, "    },"])
+
+
+def _plain(values: Any) -> Any:
+    if isinstance(values, list):
+        return [_plain(value) for value in values]
+    return values.tolist() if isinstance(values, np.ndarray) else values
 
 
 def fill_template(template: str, words: dict[str, Any]) -> str:
@@ -190,41 +231,47 @@ def fill_template(template: str, words: dict[str, Any]) -> str:
     return environment.get_template(template).render(words)
 
 
-def _common_words(sheet: Sheet) -> dict[str, Any]:
-    """Gather what all languages ask for: names, numbers, and which parts of the code the structure needs."""
+def _common_words(sheet: Sheet, told: Sequence[str]) -> dict[str, Any]:
+    """Gather what all languages ask for: names, numbers, and which parts of the code the model needs."""
+    vehicle, rules = sheet.model.vehicle, sheet.rules
     return {
         "name": sheet.name,
         "macro": sheet.name.upper(),
-        "banner": comment_lines(sheet.banner),
-        "facts": comment_lines(sheet.facts),
-        "complete": sheet.record.complete,
-        "verdict_label": literal_text(sheet.record.verdict_label or "none"),
+        "facts": comment_lines([*sheet.facts, *(["", *told] if told else [])]),
+        "complete": sheet.complete,
         "model_sha256": sheet.sha256,
+        "attitude": sheet.identified is not None,
+        "fuzzy": rules is not None,
+        "rigid": bool(sheet.rigid_body.any()),
+        "learned": sheet.remainder is not None,
         "vertical": VERTICAL,
         "cells": CELLS,
         "cell_deg": 360 // CELLS,
-        "fuzzy": sheet.fuzzy,
-        "rigid": sheet.rigid,
-        "constant": number(sheet.model.coefficients[0]),
-        **_structure_words(sheet.model.structure),
-        "ranges": [{"minimum": number(r.minimum), "width": number(r.width)} for r in sheet.model.ranges],
+        "rotors": sheet.model.rotors,
+        "terms": sheet.terms,
+        "factors": FACTORS,
+        "mass": number(vehicle.mass_kg),
+        "gravity": number(vehicle.gravity_m_s2),
+        **{name.removesuffix("_s"): number(value) for name, value in response_of(sheet).items()},
+        "order": airflow_order(sheet),
+        "period": number(PERIOD),
+        **({} if rules is None else _structure_words(rules)),
     }
 
 
-def _structure_words(structure: ModelStructure) -> dict[str, Any]:
-    settings = structure.settings
+def _structure_words(model: Model) -> dict[str, Any]:
+    structure, settings = model.structure, model.structure.settings
     harmonic, data_range = settings.consequents == "harmonic", settings.input_map == "data-range"
     rules_used = any(block.rules > 1 for block in structure.blocks)
-    mapped = not harmonic or rules_used
     features = {len(block.partitions): block.features for block in structure.blocks}
     return {
         "circular": structure.circular,
         "data_range": data_range,
         "harmonic": harmonic,
         "tensor": settings.products == "tensor",
-        "order": settings.harmonic_order,
+        "rule_order": settings.harmonic_order if harmonic else 0,
         "rules_used": rules_used,
-        "seesaw_used": structure.circular and mapped and (data_range or not harmonic),
+        "seesaw_used": structure.circular and (rules_used or not harmonic) and (data_range or not harmonic),
         "features_1": features[1],
         "features_2": features[2],
         "features_text": _features_text(structure),
@@ -233,6 +280,8 @@ def _structure_words(structure: ModelStructure) -> dict[str, Any]:
             for block in structure.blocks
             if len(block.partitions) > 1
         },
+        "constant": number(model.coefficients[0]),
+        "ranges": [{"minimum": number(r.minimum), "width": number(r.width)} for r in model.ranges],
     }
 
 
@@ -248,3 +297,62 @@ def _features_text(structure: ModelStructure) -> list[str]:
     if settings.products == "tensor":
         pairs = "all products of (1, those of roll) and (1, those of pitch), pitch running fastest"
     return comment_lines([f"one input: 1, {single};", f"two inputs: {pairs}."])
+
+
+def response_of(sheet: Sheet) -> dict[str, float]:
+    """Give delay, lag and slow actuation of the rotors, s; 0 for what `cpfls_cli.playback.rotors` takes for none."""
+    response = sheet.model.response
+    lag, slow = (time if time >= _SHORTEST_S else 0.0 for time in (response.lag_s, response.slow_s))
+    return {"delay_s": response.delay_s, "lag_s": lag, "slow_s": slow}
+
+
+def airflow_order(sheet: Sheet) -> int:
+    """Give the order of the harmonics of the learned part; 0 for the seesaw, and without one."""
+    return 0 if sheet.remainder is None else sheet.remainder.harmonic_order
+
+
+def airflow_peaks(sheet: Sheet) -> Array:
+    """Give the peaks of the membership functions of the learned part; none without one."""
+    return np.zeros(0) if sheet.remainder is None else sheet.remainder.breakpoints
+
+
+def points_of(points: ReferencePoints) -> list[dict[str, Any]]:
+    """Give the states with what the model gives there, by name."""
+    columns = points._asdict()
+    return [{name: values[index] for name, values in columns.items()} for index in range(len(points.air))]
+
+
+def attitudes_of(points: Expected | None) -> list[dict[str, Any]]:
+    """Give the states on Euler angles with what the model gives there, by name; none for a constant inertia."""
+    if points is None:
+        return []
+    columns = {
+        "q": points.motion.attitude,
+        "qd": points.motion.rate,
+        "qdd": points.motion.acceleration,
+        "D": points.inertia,
+        "C": points.coriolis,
+        "torque": points.torque,
+        "body_torque": points.body,
+        "scale": points.scale,
+        "inside": points.inside.tolist(),
+    }
+    return [{name: values[index] for name, values in columns.items()} for index in range(len(points))]
+
+
+def run_of(run: ReferenceRun) -> dict[str, Any]:
+    """Give the speeds of a run and where it ends, by name."""
+    start, end = ([part[at] for part in run.states] for at in (0, -1))
+    return {
+        "held": run.hold == "previous",
+        "speed": run.speed,
+        "rotor": run.rotor[-1],
+        "rotor_scale": run.rotor_scale,
+        "scale": run.scale,
+        "start": start,
+        "end": end,
+    }
+
+
+def _rows(sheet: Sheet) -> zip[tuple[int, int, int, float]]:
+    return zip(*(column.tolist() for column in sheet.weights), strict=True)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.scores import MODEL
 from cpfls_cli.export.holding import Missing
 from cpfls_cli.export.registry import TARGETS
 from cpfls_cli.export.verify import AGREES, Verification
@@ -16,6 +17,8 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.report.content import Block, Table, Text
 from cpfls_cli.report.numbers import number
 
+_SIGNS = {1: "for", -1: "against"}
+_SCORE_UNITS = {"mse": "(N m)^2", "max_error": "N m", "relative_error": "1", "r2": "1", "vaf": "1", "r2_body": "1"}
 _SIGNALS = (
     ("position", "m", 1.0),
     ("velocity", "m/s", 1.0),
@@ -24,43 +27,71 @@ _SIGNALS = (
 )
 
 
-def export_answer(model: ModelRecord, path: object, sizes: Mapping[str, int], *, dry_run: bool) -> Iterator[Text]:
-    """Say which files a model was exported to, what it is worth, and what speaks against flying with it.
-
-    Parameters
-    ----------
-    path : Path
-        Of the model.
-    sizes : mapping of str to int
-        Bytes of each file.
-    """
-    yield from _sizes_in_words(sizes, dry_run)
-    yield Text(f"training visited {float(np.mean(model.model.visited)):.1%} of the circle of roll and pitch")
-    yield Text(f"verdict: {model.verdict_label or 'none'}")
-    yield from (Text(warning, "warning") for warning in _export_warnings(model, path))
-
-
-def vehicle_export_answer(told: Sequence[str], sizes: Mapping[str, int], dry_run: bool) -> Iterator[Text]:
-    """Say which files a whole vehicle was exported to, and what stands in them.
+def export_answer(
+    told: Sequence[str], warnings: Sequence[str], sizes: Mapping[str, int], dry_run: bool
+) -> Iterator[Text]:
+    """Say which files a model was exported to, what stands in them, and what speaks against flying with it.
 
     Parameters
     ----------
     told : sequence of str
-        What the vehicle is and what it is worth.
+        What the model is and what it is worth.
     sizes : mapping of str to int
         Bytes of each file.
     """
-    yield from _sizes_in_words(sizes, dry_run)
-    yield from map(Text, told)
-
-
-def _sizes_in_words(sizes: Mapping[str, int], dry_run: bool) -> Iterator[Text]:
     verb = "would be written" if dry_run else "written"
     for file, size in sizes.items():
         yield Text(f"{file}: {verb} ({size} bytes)")
+    yield from map(Text, told)
+    yield from (Text(warning, "warning") for warning in warnings)
 
 
-def _export_warnings(model: ModelRecord, path: object) -> Iterator[str]:
+def identified_worth(record: ModelRecord) -> Iterator[str]:
+    """Say what an identified model is worth that is used elsewhere."""
+    verdict, judged = record.verdict, record.judged
+    if verdict is None or verdict.label is None:
+        yield "Verdict: none; the model holds no validation."
+    else:
+        yield f"Verdict: {verdict.label}. {verdict.region or ''}".rstrip()
+        for reason, speaks in verdict.reasons:
+            yield f"- {_SIGNS.get(speaks, 'note')}: {reason}"
+    for part in judged.parts if MODEL in judged.models else ():
+        worst, r2 = judged.worst(MODEL, part)[0], judged.worst_r2(MODEL, part)
+        error = f"largest error {worst:.3g} of the largest torque"
+        yield f"Judged on {part} ({judged.samples_of(part)} samples), worst axis: {error}, R2 {r2:.4f}"
+    for finding in record.findings:
+        yield f"Finding: {finding}"
+    yield "Rotors, mass and all forces are those of the config."
+
+
+def identified_evidence(record: ModelRecord) -> dict[str, Any]:
+    """Say the same for machines."""
+    verdict, judged = record.verdict, record.judged
+    counts = zip(judged.parts, judged.samples, judged.outside, strict=True)
+    stated = None
+    if verdict is not None and verdict.label is not None:
+        reasons = [{"reason": reason, "speaks": float(speaks)} for reason, speaks in verdict.reasons]
+        stated = {"label": verdict.label, "region": verdict.region or "", "reasons": reasons}
+    return {
+        "stop_reason": record.stop_reason or None,
+        "verdict": stated,
+        "findings": record.findings,
+        "judged": {
+            "units": _SCORE_UNITS,
+            "parts": {part: {"samples": int(samples), "outside": int(outside)} for part, samples, outside in counts},
+            "models": {
+                model: {
+                    part: {measure: judged.of_axes(measure, model, part).tolist() for measure in judged.measures}
+                    for part in judged.parts
+                }
+                for model in judged.models
+            },
+        },
+    }
+
+
+def identified_warnings(model: ModelRecord, path: object) -> Iterator[str]:
+    """Say what speaks against flying with an identified model."""
     if not model.complete:
         yield "the model is incomplete, and marked as such: do not fly with it"
     if model.verdict is None or model.verdict.label is None:

@@ -1,6 +1,6 @@
 """Models of every structure with random coefficients, states that hurt, and sheets to export."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,11 +10,14 @@ from cpfls_cli.artifacts.evidence import VerdictGroup
 from cpfls_cli.artifacts.model import ModelGroup, ModelRecord, SearchGroup
 from cpfls_cli.artifacts.scores import JudgedGroup
 from cpfls_cli.artifacts.spec import Header, InputFile
+from cpfls_cli.commands.vehicle_sheets import identified_sheet
 from cpfls_cli.export import Sheet, expected
 from cpfls_cli.fuzzy import InputRange, breakpoints
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.visited import CELLS
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor import Motion, StructureSettings, model_structure
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 MEASURES = ("mse", "max_error", "relative_error", "r2", "r2_body")
 PAPER = {"consequents": "seesaw", "products": "additive", "membership_functions": 5, "input_map": "data-range"}
@@ -98,6 +101,9 @@ def _special(model: Model, axis: int) -> np.ndarray:
     return np.array(places)
 
 
+VEHICLE = VehicleSettings()
+
+
 def sheet_of(model: Model, **changes) -> Sheet:
     """Put a model on a sheet with evidence in plain words, or with what a test wants."""
     given = {
@@ -121,7 +127,8 @@ def sheet_of(model: Model, **changes) -> Sheet:
         verdict=given["verdict"],
         **dict.fromkeys(("solve", "rules", "front", "history", "baselines", "training_indices")),
     )
-    return Sheet(given["name"], model, record, given["file"], "a" * 64)
+    vehicle = VehicleModel(vehicle=VEHICLE, fuzzy=model)
+    return replace(identified_sheet(record, vehicle), name=given["name"], file=given["file"], sha256="a" * 64)
 
 
 def verdict_of(label: str, region: str, *reasons: tuple[str, int]) -> VerdictGroup:

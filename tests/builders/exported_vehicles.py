@@ -6,8 +6,7 @@ import subprocess
 import numpy as np
 
 from cpfls_cli.artifacts.spec import Header
-from cpfls_cli.export.vehicle_forms import vehicle_c, vehicle_json, vehicle_python
-from cpfls_cli.export.vehicle_sheet import VehicleSheet
+from cpfls_cli.export import Sheet, c_source, json_text, python_source
 from tests.builders.compiled_c import CHECKS, build, written
 
 MAIN = """
@@ -77,7 +76,7 @@ int main(int count, char **words)
 def sheet_of_vehicle(model, name="vehicle", **changed):
     """Put a vehicle on a sheet."""
     given = {"worth": ("It is worth a test.",), "origin": Header("0.1.0", 1, "seed: 1\n"), "file": "vehicle.h5"}
-    return VehicleSheet(name=name, model=model, sha256="a" * 64, **(given | changed))
+    return Sheet(name=name, model=model, sha256="a" * 64, **(given | changed))
 
 
 def flat(state):
@@ -89,7 +88,7 @@ class InC:
     """A vehicle as compiled C."""
 
     def __init__(self, folder, model, *flags):
-        written(folder, "vehicle", vehicle_c(sheet_of_vehicle(model), "vehicle"))
+        written(folder, "vehicle", c_source(sheet_of_vehicle(model), "vehicle"))
         (folder / "main.c").write_text(MAIN)
         self.program = build(folder, ["main.c", "vehicle.c"], *(flags or CHECKS))
 
@@ -127,7 +126,7 @@ class InPython:
 
     def __init__(self, _folder, model):
         self.names = {"__name__": "vehicle"}
-        exec(vehicle_python(sheet_of_vehicle(model), "vehicle.py"), self.names)
+        exec(python_source(sheet_of_vehicle(model), "vehicle.py"), self.names)
 
     def wrench(self, air, rate, rotor):
         return np.hstack(self.names["wrench"](air, rate, rotor))
@@ -146,7 +145,7 @@ class InJson:
     """A vehicle as JSON, evaluated by what its words say and slowly."""
 
     def __init__(self, _folder, model):
-        self.document = json.loads(vehicle_json(sheet_of_vehicle(model)))
+        self.document = json.loads(json_text(sheet_of_vehicle(model)))
         self.mass, self.gravity = self.document["mass_kg"], self.document["gravity_m_s2"]
         self.inertia = np.array(self.document["inertia_kg_m2"])
 

@@ -292,7 +292,7 @@ def test_a_model_without_verdict_is_told(cpfls, model, tmp_path, form):
     assert result.exit_code == 0
     assert result.stderr.startswith(f"cpfls: note: {model}: holds no verdict: ")
     assert len(result.stderr.splitlines()) == 1
-    assert result.stdout.endswith("verdict: none\n")
+    assert "\nVerdict: none; the model holds no validation.\n" in result.stdout
     if form == "c":
         assert '#define M_VERDICT "none"\n' in output.with_suffix(".h").read_text()
     else:

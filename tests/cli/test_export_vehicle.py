@@ -53,7 +53,7 @@ def test_a_vehicle_is_exported(cpfls, vehicle, tmp_path, form):
     assert summary["effects"] == ["linear_damping", "quadratic_damping"]
     if form == "json":
         document = json.loads(output.read_text())
-        assert document["format"] == "cpfls/vehicle-json"
+        assert document["format"] == "cpfls/model-json"
         assert len(document["weights"]["weight"]) == summary["weights"]
     else:
         done = self_test(output)

@@ -3,81 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.effects.polynomial import FACTORS
+from cpfls_cli.arrays import Array
 from cpfls_cli.export.course import Course
-from cpfls_cli.export.holding import Held, Holds
-from cpfls_cli.export.source import fill_template
-from cpfls_cli.export.text import comment_lines, comment_text, filled, number
-from cpfls_cli.export.vehicle_forms import common_words
-from cpfls_cli.identification.model import Model
-from cpfls_cli.inertia import six_parameters
-from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.export.holding import Held
+from cpfls_cli.export.sheet import Sheet
+from cpfls_cli.export.source import python_source
 from cpfls_cli.playback.motion import State
 
-if TYPE_CHECKING:
-    from cpfls_cli.export.vehicle_sheet import VehicleSheet
 
-
-def casadi_text(sheet: VehicleSheet, _held: Held, told: Sequence[str], file: str) -> str:
+def casadi_text(sheet: Sheet, _held: Held, told: Sequence[str], file: str) -> str:
     """Write a vehicle as a module of functions for CasADi; parameters as those of the other targets."""
-    return _functions(sheet, told, file, jax=False)
+    return python_source(sheet, file, "casadi", told)
 
 
-def jax_text(sheet: VehicleSheet, _held: Held, told: Sequence[str], file: str) -> str:
+def jax_text(sheet: Sheet, _held: Held, told: Sequence[str], file: str) -> str:
     """Write a vehicle as a module of functions for JAX; parameters as those of the other targets."""
-    return _functions(sheet, told, file, jax=True)
-
-
-def whole(model: VehicleModel) -> tuple[Held, Holds]:
-    """Take what functions hold of a vehicle, which is everything that is a sum of weights."""
-    return Held.whole(model), lambda weights: weights
-
-
-def _functions(sheet: VehicleSheet, told: Sequence[str], file: str, *, jax: bool) -> str:
-    model, weights = sheet.model, sheet.weights
-    words = common_words(sheet)
-    fuzzy = model.fuzzy
-    assert fuzzy is None or isinstance(fuzzy, Model), "a whole vehicle is that of an identified model, or rigid"
-    rules = np.zeros(0) if fuzzy is None or not fuzzy.coefficients.any() else fuzzy.coefficients
-    inertia = six_parameters(model.vehicle.inertia_kg_m2) if fuzzy is None else fuzzy.rigid_body
-    first = [model.body.mass, model.body.gravity, *inertia.tolist(), float(words["lag"]), float(words["slow"])]
-    words |= {"momentum": fuzzy is not None, "fuzzy": len(rules) > 0, "rule_count": len(rules)}
-    words |= _rule_words(fuzzy) if fuzzy and len(rules) else {}
-    words |= {
-        "jax": jax,
-        "source": comment_text(file),
-        "facts": comment_lines(told),
-        "row_rows": _whole(weights.row),
-        "term_rows": _whole(weights.term),
-        "rotor_rows": _whole(weights.rotor),
-        "parameter_rows": filled(", ".join(map(number, [*first, *weights.weight.tolist(), *rules.tolist()])), 4),
-        "factor_rows": filled(", ".join(f"[{first}, {second}]" for first, second in FACTORS.tolist()), 4),
-        "peak_rows": [] if sheet.remainder is None else sheet.remainder.breakpoints.tolist(),
-    }
-    return fill_template("functions.py.j2", words)
-
-
-def _rule_words(fuzzy: Model) -> dict[str, Any]:
-    structure, settings = fuzzy.structure, fuzzy.structure.settings
-    pairs = zip(structure.partitions, fuzzy.partitions, strict=True)
-    return {
-        "rule_peaks": {partition.name: peaks.tolist() for partition, peaks in pairs},
-        "ranges": [[float(each.minimum), float(each.width)] for each in fuzzy.ranges],
-        "circular": structure.circular,
-        "data_range": settings.input_map == "data-range",
-        "harmonic": settings.consequents == "harmonic",
-        "tensor": settings.products == "tensor",
-        "rule_order": settings.harmonic_order,
-    }
-
-
-def _whole(values: IntArray) -> str:
-    return filled(", ".join(map(str, values.tolist())), 4)
+    return python_source(sheet, file, "jax", told)
 
 
 def _executed(text: str) -> dict[str, Any]:

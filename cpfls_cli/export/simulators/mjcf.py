@@ -8,7 +8,7 @@ square, as two numbers in the file say of each.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -16,14 +16,12 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.polynomial import STATE_TERMS
 from cpfls_cli.export.course import Course
-from cpfls_cli.export.holding import Held, Holds, held_by, of_a_body
+from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
+from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.text import number, xml_text
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
-
-if TYPE_CHECKING:
-    from cpfls_cli.export.vehicle_sheet import VehicleSheet
 
 STEP_S = 0.001
 """Step of the file; verification takes a whole number of steps of at most this."""
@@ -62,19 +60,19 @@ def _holds(table: Array) -> Array:
 def mjcf_held(model: VehicleModel) -> tuple[Held, Holds]:
     """Take what MuJoCo flies of a vehicle; its filter acts on each control by itself."""
     response = RotorResponse(lag_s=model.response.lag_s)
-    return held_by(model, _holds, response, of_a_body(model.body), squares=True), _holds
+    return held_by(model, _holds, response, of_a_body(constant_body(model)), squares=True), _holds
 
 
-def mjcf_text(sheet: VehicleSheet, held: Held, told: Sequence[str], _file: str) -> str:
+def mjcf_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) -> str:
     """Write a vehicle as MJCF.
 
     Parameters
     ----------
     told : sequence of str
-        Paragraphs of the head.
+        What it does not hold.
     """
     root = ElementTree.Element("mujoco", model=sheet.name)
-    root.append(ElementTree.Comment(xml_text([*told, "", *_USE])))
+    root.append(ElementTree.Comment(xml_text([*sheet.facts, "", *told, "", *_USE])))
     drag = -float(held.weights[3, _DRAG[0], 0])
     option = {"timestep": number(STEP_S), "integrator": "RK4", "gravity": f"0 0 {number(-held.body.gravity)}"}
     ElementTree.SubElement(root, "option", option | ({"density": number(_DENSITY)} if drag else {}))
@@ -100,7 +98,7 @@ _USE = (
 )
 
 
-def _body(world: ElementTree.Element, sheet: VehicleSheet, held: Held, drag: float) -> None:
+def _body(world: ElementTree.Element, sheet: Sheet, held: Held, drag: float) -> None:
     body, inertia = ElementTree.SubElement(world, "body", name=sheet.name), held.body.inertia
     ElementTree.SubElement(body, "freejoint", name=f"{sheet.name}_free")
     entries = (inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2])

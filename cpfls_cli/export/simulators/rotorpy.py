@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,16 +12,14 @@ from cpfls_cli.effects.effect import hub_wrench, thrust_wrench, wrench
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.course import Course
-from cpfls_cli.export.holding import Held, Holds, held_by
+from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
 from cpfls_cli.export.numbers import numbers_of, places, spins
+from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.source import fill_template
 from cpfls_cli.export.text import comment_lines, comment_text, number, python_rows
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
-
-if TYPE_CHECKING:
-    from cpfls_cli.export.vehicle_sheet import VehicleSheet
 
 _ROTORS = 4
 _GRAVITY = 9.81
@@ -46,7 +43,7 @@ def rotorpy_held(model: VehicleModel) -> tuple[Held, Holds]:
             "jax and casadi take any number"
         )
     numbers = numbers_of(model, _wrenches, alike=True)
-    body = model.body._replace(gravity=_GRAVITY)
+    body = constant_body(model)._replace(gravity=_GRAVITY)
     held = held_by(model, numbers.holds, RotorResponse(lag_s=model.response.lag_s), body)
     return replace(held, numbers=numbers.of(model.weights)), numbers.holds
 
@@ -65,13 +62,13 @@ def _wrenches(signals: Signals) -> Mapping[str, Array]:
     }
 
 
-def rotorpy_text(sheet: VehicleSheet, held: Held, told: Sequence[str], file: str) -> str:
+def rotorpy_text(sheet: Sheet, held: Held, told: Sequence[str], file: str) -> str:
     """Write a vehicle as a module with RotorPy's dictionary.
 
     Parameters
     ----------
     told : sequence of str
-        Paragraphs of the head.
+        What it does not hold.
     file : str
         Name of the file.
     """
@@ -89,7 +86,7 @@ def rotorpy_text(sheet: VehicleSheet, held: Held, told: Sequence[str], file: str
     }
     words = {
         "source": comment_text(file),
-        "facts": comment_lines(told),
+        "facts": comment_lines([*sheet.facts, "", *told]),
         "lags": held.response.lag_s > 0.0,
         "numbers": {name: number(value) for name, value in given.items()},
         "positions": [python_rows(place, 0) for place in places(model, alike=True)],

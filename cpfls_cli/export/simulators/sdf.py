@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import numpy as np
@@ -22,16 +21,14 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import hub_wrench, wrench
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.export.course import Course
-from cpfls_cli.export.holding import Held, Holds, held_by, of_a_body
+from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
 from cpfls_cli.export.numbers import numbers_of, places, spins
+from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.text import number, xml_text
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
-
-if TYPE_CHECKING:
-    from cpfls_cli.export.vehicle_sheet import VehicleSheet
 
 _PLUGIN = {"filename": "gz-sim-multicopter-motor-model-system", "name": "gz::sim::systems::MulticopterMotorModel"}
 _ROTOR_SHARE = 1e-3
@@ -49,7 +46,7 @@ def sdf_held(model: VehicleModel) -> tuple[Held, Holds]:
     # The links of the rotors take more from the sum of two moments of the body than from the third.
     heights = np.array([rotor.position_m[2] for rotor in model.vehicle.rotors])
     margin = 2.0 * _MARGIN * _ROTOR_SHARE * model.body.mass * float((heights**2).sum())
-    body = of_a_body(model.body, margin)
+    body = of_a_body(constant_body(model), margin)
     held = held_by(model, numbers.holds, RotorResponse(lag_s=model.response.lag_s), body)
     return replace(held, numbers=numbers.of(model.weights)), numbers.holds
 
@@ -64,16 +61,16 @@ def _wrenches(signals: Signals) -> Mapping[str, Array]:
     return found
 
 
-def sdf_text(sheet: VehicleSheet, held: Held, told: Sequence[str], _file: str) -> str:
+def sdf_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) -> str:
     """Write a vehicle as SDF.
 
     Parameters
     ----------
     told : sequence of str
-        Paragraphs of the head.
+        What it does not hold.
     """
     root = ElementTree.Element("sdf", version="1.9")
-    root.append(ElementTree.Comment(xml_text([*told, "", _spin_in_words(sheet, held), *_USE])))
+    root.append(ElementTree.Comment(xml_text([*sheet.facts, "", *told, "", _spin_in_words(sheet, held), *_USE])))
     model = ElementTree.SubElement(root, "model", name=sheet.name)
     hubs = places(sheet.model, alike=False)
     rotor = _rotor_inertia(sheet, held)
@@ -106,7 +103,7 @@ _USE = (
 )
 
 
-def _spin_in_words(sheet: VehicleSheet, held: Held) -> str:
+def _spin_in_words(sheet: Sheet, held: Held) -> str:
     """Tell what Gazebo adds, because the links of the rotors turn."""
     mass, moments = _rotor_inertia(sheet, held)
     speed = sheet.model.vehicle.rotor_speed_max_rad_s / _SLOWER
@@ -116,7 +113,7 @@ def _spin_in_words(sheet: VehicleSheet, held: Held) -> str:
     )
 
 
-def _rotor_inertia(sheet: VehicleSheet, held: Held) -> tuple[float, Array]:
+def _rotor_inertia(sheet: Sheet, held: Held) -> tuple[float, Array]:
     radii = [rotor.radius_m or _RADIUS_M for rotor in sheet.model.vehicle.rotors]
     mass = _ROTOR_SHARE * held.body.mass
     return mass, mass * float(np.mean(radii)) ** 2 * np.array([0.25, 0.25, 0.5])
@@ -142,7 +139,7 @@ def _pose(place: Array) -> str:
     return " ".join([*map(number, place), "0 0 0"])
 
 
-def _motor(sheet: VehicleSheet, held: Held, rotor: int) -> dict[str, str | float]:
+def _motor(sheet: Sheet, held: Held, rotor: int) -> dict[str, str | float]:
     """Give the parameters of the plugin of one rotor."""
     numbers, lag = held.numbers, max(held.response.lag_s, _SHORTEST_S)
     # A rotor that turns counter-clockwise turns the body clockwise.

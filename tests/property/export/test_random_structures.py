@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from cpfls_cli.export import python_source, reference_points
+from cpfls_cli.export import python_source
 from tests.builders.exported_models import Case, errors, model_of, sheet_of, states, wanted_of
 
 functions = st.integers(1, 15)
@@ -28,7 +28,7 @@ def test_any_structure(structure, rigid, zero_width, still, seed):
     model = model_of(Case(structure, rigid=rigid, zero_width=zero_width, still=still), seed)
     motion = states(model, 60, seed)
     names = {"__name__": "vehicle"}
-    exec(python_source(sheet_of(model), reference_points(model, np.random.default_rng(seed)), "vehicle.py"), names)
+    exec(python_source(sheet_of(model), "vehicle.py"), names)
     q, qd, qdd = motion.attitude, motion.rate, motion.acceleration
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import vertical
-from cpfls_cli.export import c_source, reference_points
+from cpfls_cli.export import c_source
 from cpfls_cli.regressor import Motion
 from tests.builders.compiled_c import CHECKS, build, drive, driver, require_gcc, written
 from tests.builders.exported_models import CASES, Case, errors, model_of, sheet_of, states, wanted_of
@@ -23,8 +23,7 @@ def compiler():
 
 
 def exported(folder, model, name="vehicle"):
-    points = reference_points(model, np.random.default_rng(3))
-    source = c_source(sheet_of(model, name=name), points, name)
+    source = c_source(sheet_of(model, name=name), name)
     written(folder, name, source)
     return source
 
@@ -84,7 +83,8 @@ def test_self_test_passes_and_names_the_largest_error(tmp_path, name, flags):
     done = subprocess.run([program], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.startswith("vehicle: largest relative error ")
-    assert done.stdout.endswith(" at 8 states, 0 wrong flags\n")
+    assert " at 16 states and after " in done.stdout
+    assert done.stdout.endswith(" runs, 0 wrong flags\n")
 
 
 COMBINATIONS = [
@@ -154,8 +154,7 @@ def test_the_torque_of_a_rigid_body_is_exact_with_the_nose_up(computed):
 def test_outputs_may_be_the_inputs_and_two_models_live_in_one_program(tmp_path):
     for stem, case in (("first", "paper"), ("second", "default")):
         model = model_of(CASES[case])
-        source = c_source(sheet_of(model, name=stem), reference_points(model, np.random.default_rng(1)), stem)
-        written(tmp_path, stem, source)
+        written(tmp_path, stem, c_source(sheet_of(model, name=stem), stem))
     main = """#include "first.h"
 #include "second.h"
 int main(void)

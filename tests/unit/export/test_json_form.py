@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from cpfls_cli.export import json_text, reference_points
+from cpfls_cli.export import json_text
 from tests.builders.exported_models import CASES, model_of, sheet_of, states, verdict_of
 
 
@@ -15,7 +15,7 @@ def refuse_constant(name):
 
 
 def document_of(model, **changes):
-    text = json_text(sheet_of(model, **changes), reference_points(model, np.random.default_rng(2)))
+    text = json_text(sheet_of(model, **changes))
     assert text.isascii()
     return json.loads(text, parse_constant=refuse_constant)
 
@@ -145,7 +145,6 @@ def test_the_verdict_and_its_reasons_are_there():
 
 
 def test_tables_take_one_line_for_each_rule():
-    text = json_text(
-        sheet_of(model_of(CASES["default"])), reference_points(model_of(CASES["default"]), np.random.default_rng(2))
-    )
-    assert len(text.splitlines()) < 400
+    text = json_text(sheet_of(model_of(CASES["default"])))
+    inertia, _ = text.split('\n "rotors": ')
+    assert len(inertia.splitlines()) < 400

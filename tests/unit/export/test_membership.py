@@ -14,9 +14,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cpfls_cli.export import c_source, python_source, reference_points
-from cpfls_cli.export.json_form import HOW_TO_EVALUATE
-from cpfls_cli.export.vehicle_forms import HOW_TO_EVALUATE as OF_A_VEHICLE
+from cpfls_cli.export import c_source, python_source
+from cpfls_cli.export.json_form import HOW_TO_EVALUATE, HOW_TO_EVALUATE_INERTIA
 from cpfls_cli.fuzzy.membership import Z_FUNCTION, memberships, z_function
 from cpfls_cli.playback import kernels as playback
 from cpfls_cli.playback.model import Remainder, VehicleModel
@@ -98,14 +97,13 @@ def test_the_compiled_loops(case):
 
 def test_the_exported_c(case, tmp_path):
     require_gcc()
-    points = reference_points(case.model, np.random.default_rng(3))
-    written(tmp_path, "vehicle", c_source(sheet_of(case.model), points, "vehicle"))
+    written(tmp_path, "vehicle", c_source(sheet_of(case.model), "vehicle"))
     assert_same(evaluate(tmp_path, "vehicle", case.motion)["torque"], case)
 
 
 def test_the_exported_python(case):
-    points, names = reference_points(case.model, np.random.default_rng(3)), {"__name__": "vehicle"}
-    exec(python_source(sheet_of(case.model), points, "vehicle.py"), names)
+    names = {"__name__": "vehicle"}
+    exec(python_source(sheet_of(case.model), "vehicle.py"), names)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         torque, _ = names["torque"](*vars(case.motion).values())
@@ -163,8 +161,8 @@ def formula(words):
 
 
 WORDS = {
-    "json": next(line for line in HOW_TO_EVALUATE if Z_FUNCTION in line),
-    "json of a vehicle": next(line for line in OF_A_VEHICLE if Z_FUNCTION in line),
+    "json": next(line for line in HOW_TO_EVALUATE_INERTIA if Z_FUNCTION in line),
+    "json of a vehicle": next(line for line in HOW_TO_EVALUATE if Z_FUNCTION in line),
     "method.md": METHOD.read_text(),
 }
 

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from cpfls_cli.export import python_source, reference_points
+from cpfls_cli.export import python_source
 from tests.builders.exported_models import CASES, errors, model_of, sheet_of, states, wanted_of
 
 SAMPLES = {"paper": 20_000, "default": 20_000}
@@ -43,8 +43,7 @@ def evaluated(tmp_path_factory):
     for index, name in enumerate(CASES):
         model, stem = model_of(CASES[name]), f"case_{index}"
         motion = states(model, SAMPLES.get(name, 2000), seed=index)
-        points = reference_points(model, np.random.default_rng(1))
-        (folder / f"{stem}.py").write_text(python_source(sheet_of(model), points, f"{stem}.py"))
+        (folder / f"{stem}.py").write_text(python_source(sheet_of(model), f"{stem}.py"))
         np.save(folder / f"{stem}.npy", np.array([motion.attitude, motion.rate, motion.acceleration]))
         cases[name] = (model, motion, folder / f"{stem}.npz")
     words = [sys.executable, "-I", "-c", DRIVER, str(folder), *(f"case_{index}" for index in range(len(CASES)))]
@@ -66,8 +65,8 @@ def test_the_module_agrees_with_the_library(evaluated, name):
 @pytest.mark.parametrize("name", ["paper", "rigid body alone"])
 def test_as_a_script_the_module_tests_itself(tmp_path, name):
     model, path = model_of(CASES[name]), tmp_path / "vehicle.py"
-    text = python_source(sheet_of(model), reference_points(model, np.random.default_rng(1)), path.name)
-    for content, code in ((text, 0), (text.replace("def _torque(q, qd, qdd):", "def _torque(q, qdd, qd):"), 1)):
+    text = python_source(sheet_of(model), path.name)
+    for content, code in ((text, 0), (text.replace("def _torque(q, qd, qdd, p):", "def _torque(q, qdd, qd, p):"), 1)):
         path.write_text(content)
         done = subprocess.run([sys.executable, "-I", path], capture_output=True, text=True, check=False)
         assert done.returncode == code, done.stderr
@@ -78,7 +77,7 @@ def test_as_a_script_the_module_tests_itself(tmp_path, name):
 def module():
     model = model_of(CASES["default"])
     names = {"__name__": "vehicle"}
-    exec(python_source(sheet_of(model), reference_points(model, np.random.default_rng(1)), "vehicle.py"), names)
+    exec(python_source(sheet_of(model), "vehicle.py"), names)
     return names
 
 

@@ -8,14 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.export.vehicle_forms import vehicle_c, vehicle_json, vehicle_python
-from cpfls_cli.export.vehicle_sheet import reference_points, reference_run, term_sizes
+from cpfls_cli.dynamics.equations_of_motion import identified_turning
+from cpfls_cli.export import c_source, json_text, python_source
+from cpfls_cli.export.points import reference_points, reference_run, term_sizes
 from cpfls_cli.playback.kernels import Motion, errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State, accelerations, step
+from cpfls_cli.playback.player import one_step
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.rotations import rotation_matrix
 from tests.builders.compiled_c import build, require_gcc, written
+from tests.builders.exported_models import CASES, model_of
 from tests.builders.exported_vehicles import FORMS, InC, flat, sheet_of_vehicle
 from tests.builders.vehicle_models import HEXA, QUAD, RESPONSE, polynomial_effects, remainder, whole
 
@@ -90,6 +93,54 @@ def test_accelerations_and_a_step_are_those_of_the_library(exports, name, form):
     assert np.max(np.abs(moved - flat(step(model, state, rotor, PERIOD))) / size) < ALLOWED
 
 
+def over_attitude(name):
+    """A whole vehicle whose inertia depends on the attitude, everywhere that of a body."""
+    fuzzy = model_of(CASES[name])
+    size = 0.02 * np.mean(QUAD.inertia_kg_m2[:3]) / np.abs(fuzzy.coefficients).max()
+    fuzzy = replace(fuzzy, coefficients=size * fuzzy.coefficients, rigid_body=np.array(QUAD.inertia_kg_m2))
+    return whole(effects=(), fuzzy=fuzzy)
+
+
+@pytest.mark.parametrize("form", ["c", "python"])
+@pytest.mark.parametrize("name", ["paper", "rigid body, rules", "harmonic, data-range"])
+def test_a_step_under_an_inertia_over_attitude_is_that_of_the_library(name, form, tmp_path):
+    """Accelerations as by Lagrange's equations on Euler angles, steps as in free runs."""
+    if form == "c":
+        require_gcc()
+    model, rng = over_attitude(name), np.random.default_rng(9)
+    attitude, velocity, rate = rng.uniform(-1.0, 1.0, (3, 200, 3))
+    state = State(np.zeros((200, 3)), velocity, rotation_matrix(attitude), rate)
+    rotor = reference_points(model, rng, 200).rotor
+    found, moved = FORMS[form](tmp_path, model).motion(state, rotor, PERIOD)
+    wanted = flat(one_step(model, state, rotor, PERIOD))
+    constant = flat(one_step(replace(model, fuzzy=None), state, rotor, PERIOD))
+    assert np.max(np.abs(moved - wanted)) < ALLOWED * np.abs(wanted).max()
+    assert np.max(np.abs(constant - wanted)) > 1e-5
+    air = np.einsum("nji,nj->ni", state.rotation, velocity)
+    torque, turning = model.wrench(air, rate, rotor)[:, :3], identified_turning(model.fuzzy)
+    for row, own in enumerate(found[:, 3:]):
+        law = turning(attitude[row], rate[row])
+        left = law.inertia @ own + law.direct - torque[row]
+        assert np.abs(left).max() < ALLOWED * (np.abs(torque[row]).max() + np.abs(law.direct).max())
+
+
+@pytest.mark.parametrize("form", ["c", "python"])
+def test_a_step_under_the_inertia_of_no_body_is_refused(form, tmp_path):
+    if form == "c":
+        require_gcc()
+    fuzzy = model_of(CASES["paper"])
+    model = whole(effects=(), remainder=None, fuzzy=replace(fuzzy, coefficients=-np.abs(fuzzy.coefficients)))
+    state, rotor = states_of(3), reference_points(model, np.random.default_rng(1), 3).rotor
+    exported = FORMS[form](tmp_path, model)
+    if form == "python":
+        assert np.isnan(exported.motion(state, rotor, PERIOD)[1][:, 15:]).all()
+        return
+    rows = np.hstack([flat(state), rotor])
+    out = exported.statuses("s", rows, 26, repr(PERIOD))
+    assert out[:, 24:].tolist() == [[NOT_FINITE] * 2] * 3
+    np.testing.assert_array_equal(out[:, 6:24], rows[:, :18])
+
+
 RESPONSES = {
     "all": RESPONSE,
     "nothing": RotorResponse(),
@@ -143,7 +194,7 @@ def test_steps_along_a_flight_are_those_of_the_compiled_loops(exports, name, for
 @pytest.mark.parametrize("flags", [(), ("-DCPFLS_FLOAT",)], ids=["double", "float"])
 def test_the_self_test_of_c_passes(tmp_path, name, flags):
     require_gcc()
-    written(tmp_path, "vehicle", vehicle_c(sheet_of_vehicle(MODELS[name]), "vehicle"))
+    written(tmp_path, "vehicle", c_source(sheet_of_vehicle(MODELS[name]), "vehicle"))
     program = build(tmp_path, ["vehicle.c"], "-DCPFLS_SELF_TEST", *flags)
     done = subprocess.run([program], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
@@ -157,7 +208,7 @@ def test_the_self_test_of_c_passes(tmp_path, name, flags):
 )
 def test_the_self_test_of_c_fails_where_the_code_was_changed(tmp_path, before, after):
     require_gcc()
-    source = vehicle_c(sheet_of_vehicle(MODELS["harmonic"]), "vehicle")
+    source = c_source(sheet_of_vehicle(MODELS["harmonic"]), "vehicle")
     changed = source.source.replace(before, after)
     (tmp_path / "vehicle.c").write_text(changed)
     (tmp_path / "vehicle.h").write_text(source.header)
@@ -168,8 +219,8 @@ def test_the_self_test_of_c_fails_where_the_code_was_changed(tmp_path, before, a
 
 @pytest.mark.parametrize("name", MODELS)
 def test_the_self_test_of_python_passes_and_fails(tmp_path, name):
-    source = vehicle_python(sheet_of_vehicle(MODELS[name]), "vehicle.py")
-    changed = source.replace("GRAVITY = 0.9, 9.81", "GRAVITY = 0.9, 9.8100001").replace("2.0, 9.81", "2.0, 9.8100001")
+    source = python_source(sheet_of_vehicle(MODELS[name]), "vehicle.py")
+    changed = source.replace("    0.9, 9.81,", "    0.9, 9.8100001,").replace("    2.0, 9.81,", "    2.0, 9.8100001,")
     for text, code in ((source, 0), (changed, 1)):
         (tmp_path / "vehicle.py").write_text(text)
         command = [sys.executable, "-I", tmp_path / "vehicle.py"]
@@ -187,7 +238,7 @@ def test_the_comparison_would_notice_a_wrong_weight(exports):
 
 def test_references_of_json_are_what_it_says(exports):
     exported = exports("harmonic", "json")
-    for point in exported.document["reference_points"]:
+    for point in exported.document["reference_wrenches"]:
         air, rate, rotor, wanted, scale = (
             np.array(point[name]) for name in ("air", "rate", "rotor", "wrench", "scale")
         )
@@ -199,8 +250,8 @@ def test_references_of_json_are_what_it_says(exports):
 
 def test_json_is_the_same_each_time_and_strict():
     sheet = sheet_of_vehicle(MODELS["harmonic"], worth=("caf\u00e9", "\ud800"))
-    text = vehicle_json(sheet)
-    assert text == vehicle_json(sheet)
+    text = json_text(sheet)
+    assert text == json_text(sheet)
     assert text.isascii()
     assert json.loads(text)["worth"] == ["caf\u00e9", "?"]
 
