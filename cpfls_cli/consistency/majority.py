@@ -165,7 +165,7 @@ def _mended(flights: tuple[Signals, ...], checks: Sequence[PairCheck], windows: 
             return _told(*tuned, [*witnesses, NAMES["thrust"]], checks)
         # Noise on both sides can look like one contradiction, not like two.
         if sure and tuned is None and len(set(witnesses)) > 1:
-            return (_left_out(channel, witnesses),)
+            return (_left_out(channel, witnesses, checks),)
     return ()
 
 
@@ -386,13 +386,18 @@ def _told(
         f"{who} {joined([*what, *clock])}, judged by the {joined(witnesses)}",
         f"mend the log, or {KEYS[repair.channel]}",
         (NAMES[repair.channel], *witnesses),
-        contradiction=bool(what),
+        contradiction=bool(what) and _grave(repair.channel, checks),
         repairable=True,
     )
     return (first.told(finding, "It is set right before the balance"), *others)
 
 
-def _left_out(channel: str, witnesses: Sequence[str]) -> ChannelRepair:
+def _grave(channel: str, checks: Sequence[PairCheck]) -> bool:
+    """Tell whether more than a delay or a small scale is wrong with a channel: in a hover a few ms look like axes."""
+    return any(problem.contradiction for check in checks if channel in check.pair for problem in check.problems)
+
+
+def _left_out(channel: str, witnesses: Sequence[str], checks: Sequence[PairCheck]) -> ChannelRepair:
     without = {
         "velocity": "effects of the air are not tested",
         "acceleration": "the force comes from other channels, if there are any",
@@ -403,6 +408,7 @@ def _left_out(channel: str, witnesses: Sequence[str]) -> ChannelRepair:
         "explains it",
         f"check {KEYS[channel]}",
         (NAMES[channel], *witnesses),
+        contradiction=_grave(channel, checks),
         repairable=True,
     )
     return ChannelRepair(channel, dropped=True).told(finding, f"It is left out: {without}")

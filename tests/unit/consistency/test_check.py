@@ -183,3 +183,28 @@ def test_each_stretch_is_looked_at(flight):
     faulty = [replace(half, velocity=3.6 * half.velocity) for half in halves]
     assert check(halves, SETTINGS) == ()
     assert "km/h" in " ".join(finding.what for finding in check(faulty, SETTINGS))
+
+
+CONTRADICTED = {
+    "velocity in km/h",
+    "velocity down",
+    "world down",
+    "rotors in another order",
+    "hanging",
+    "speeds in rpm",
+}
+ONLY_TOLD = {"twice the mass", "gyroscope late"}
+
+
+@pytest.mark.parametrize("fault", sorted(CONTRADICTED | ONLY_TOLD))
+def test_axes_signs_and_units_are_contradictions_and_clocks_and_numbers_are_not(flight, fault):
+    made, words = FAULTS[fault]
+    (found, *_) = [finding for finding in check([made(flight)], SETTINGS) if words in finding.sentence]
+    assert found.contradiction == (fault in CONTRADICTED)
+    assert found.channels
+    assert found.remedy
+
+
+def test_a_delay_of_the_velocity_is_told_and_contradicts_nothing(flight):
+    late = replace(flight, velocity=np.roll(flight.velocity, 3, axis=0))
+    assert not any(finding.contradiction for finding in check([late], SETTINGS))
