@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.interpolate import CubicSpline
 from scipy.linalg import polar
 from scipy.spatial.transform import Rotation
 
@@ -18,6 +18,9 @@ from cpfls_cli.effects.hooks import FaultFit
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.weak_form.resampling import BLOCK_S, blocks_of, folds
 from cpfls_cli.weak_form.windows import Windows
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 FEWEST_BLOCKS = 7
 """Blocks below which a jackknife says too little about significance of one in a thousand."""
@@ -327,6 +330,8 @@ def kinematics(signals: Signals, windows: Windows) -> Kinematics | None:
     Kinematics or None
         None where the flight is shorter than a window.
     """
+    from scipy.interpolate import CubicSpline
+
     margin = int(np.ceil(LONGEST_DELAY_S / windows.period))
     inside = slice(margin, len(signals) - margin)
     length = len(windows.weight)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from math import ceil, log, pi, sqrt
 
 import numpy as np
-from scipy.interpolate import BPoly
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import TorqueModel
@@ -83,6 +82,8 @@ def plan_of(time: Array, planned: Mapping[str, Array], control_rate: float) -> P
     q, qd, qdd = (planned[name] for name in _SIGNALS)
     at = time
     if parts > 1:
+        from scipy.interpolate import BPoly
+
         at = np.append((time[:-1, None] + sample * np.arange(parts) / parts).ravel(), time[-1])
         between = BPoly.from_derivatives(time, np.stack([q, qd, qdd], axis=1))
         q, qd, qdd = (between(at, nu=order) for order in range(3))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError, SettingError
@@ -247,6 +246,8 @@ def _orthonormal(regressor: Array) -> Array:
 
 
 def _refine(fit: _Fit, delays: Array, best: int) -> float:
+    from scipy.optimize import minimize_scalar
+
     low, high = delays[max(best - 1, 0)], delays[min(best + 1, len(delays) - 1)]
     minimum = minimize_scalar(lambda delay: -fit.r2(float(delay))[0], bounds=(low, high), method="bounded")
     refined, on_grid = float(minimum.x), float(delays[best])

@@ -8,7 +8,6 @@ from math import pi
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
@@ -213,6 +212,8 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
     time = smooth.time
     report = replace(signals.report, lowpass_hz=settings.lowpass_hz)
     if settings.rate_hz is not None:
+        from scipy.interpolate import CubicSpline
+
         time = _clock(time, settings.rate_hz, report.log_rate_hz)
         arrays = {name: CubicSpline(smooth.time, values)(time) for name, values in arrays.items()}
         report = replace(

@@ -5,8 +5,6 @@ from __future__ import annotations
 from math import ceil
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
@@ -37,6 +35,8 @@ def low_pass(values: Array, rate_hz: float, cutoff_hz: float | None, order: int)
     SettingError
         If the cut-off is not below half of the sampling rate.
     """
+    from scipy.signal import butter, sosfiltfilt
+
     if cutoff_hz is None:
         return values
     if cutoff_hz >= rate_hz / 2:
@@ -63,6 +63,8 @@ def derivative(time: Array, values: Array) -> Array:
     -------
     array, shape (time, column), 1/s
     """
+    from scipy.interpolate import CubicSpline
+
     slopes: Array = CubicSpline(time, values).derivative()(time)
     return slopes
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.audit import Audit
@@ -192,7 +191,7 @@ class ExtendedModel:
         array, shape (time, 3), N m, body frame
         """
         balance = rotation_balance(signals, self.base)
-        torque = balance.direct + CubicSpline(signals.time, balance.momentum)(signals.time, 1)
+        torque = balance.direct + _change(balance.momentum, signals.time)
         refitted = instantaneous(columns_of(nuisance(), signals), self.parameters, signals.time)
         return np.asarray(torque - refitted[:, :3])
 
@@ -255,7 +254,7 @@ def inertial_force(signals: Signals) -> Array:
     array, shape (time, 3), N, body frame
     """
     balance = translation_balance(signals)
-    return np.asarray(balance.direct + CubicSpline(signals.time, balance.momentum)(signals.time, 1))
+    return np.asarray(balance.direct + _change(balance.momentum, signals.time))
 
 
 def instantaneous(columns: Columns, coefficients: Array, time: Array) -> Array:
@@ -275,7 +274,14 @@ def instantaneous(columns: Columns, coefficients: Array, time: Array) -> Array:
     direct = columns.direct @ coefficients
     if columns.momentum is None:
         return np.asarray(direct)
-    return np.asarray(direct + CubicSpline(time, columns.momentum @ coefficients)(time, 1))
+    return np.asarray(direct + _change(columns.momentum @ coefficients, time))
+
+
+def _change(momentum: Array, time: Array) -> Array:
+    """Differentiate a momentum by the cubic spline through its samples."""
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(time, momentum)(time, 1))
 
 
 def _require(signals: Signals, chosen: Sequence[Candidate], name: str) -> None:

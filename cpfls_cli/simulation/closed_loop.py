@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from math import ceil, cos, pi
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
@@ -72,6 +71,8 @@ def reference(planned: Mapping[str, Array], time: Array, at: Array) -> Reference
     Reference
         Of shape (step, 3) each.
     """
+    from scipy.interpolate import CubicSpline
+
     names = ("position", "velocity", "acceleration", "attitude", "attitude_rate", "attitude_acceleration")
     splines = CubicSpline(time, np.stack([planned[name] for name in names], axis=1))
     position, velocity, acceleration, q, qd, qdd = np.moveaxis(splines(at), 1, 0)

@@ -72,3 +72,10 @@ def test_a_report_loads_neither_compiled_loops_nor_what_of_scipy_is_slow_to_load
     slow = "{'numba', 'scipy.signal', 'scipy.stats'}"
     code = f"import sys, cpfls_cli.commands.report; print(sorted({slow} & set(sys.modules)))"
     assert subprocess.check_output([sys.executable, "-c", code], text=True) == "[]\n"
+
+
+def test_a_search_loads_nothing_of_scipy_that_only_logs_need():
+    """Splines and filters take a third of the start of a command, and no flight of `cpfls import` needs them again."""
+    slow = "{'scipy.interpolate', 'scipy.optimize', 'scipy.signal', 'scipy.stats'}"
+    code = f"import sys; from cpfls_cli.commands import identify, reduce, sweep; print({slow} & set(sys.modules))"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True) == "set()\n"
