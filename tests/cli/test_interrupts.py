@@ -1,11 +1,14 @@
 """Interrupts and closed pipes, with real processes."""
 
+import importlib
 import os
 import signal
 import subprocess
 import sys
 
 import pytest
+
+from tests.builders.forked import Forked, finished
 
 MESSAGE = "cpfls: error: interrupted: no half-written file is left\n"
 PROGRAM = [sys.executable, "-m", "cpfls_cli"]
@@ -36,37 +39,21 @@ def environment():
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_signal_during_the_search_keeps_what_can_be_resumed(pipeline, study, tmp_path, number, code):
+def test_signal_during_the_search_keeps_what_can_be_resumed(pipeline, study, tmp_path, tmp_path_factory, number, code):
     output = tmp_path / "model.h5"
     words = ["identify", str(study), str(pipeline.flight), "-o", str(output), "-v"]
     endless = ["--set", "identification.population=50", "--set", "identification.generations=100000"]
-    with subprocess.Popen(
-        [*PROGRAM, *words, *endless], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment()
-    ) as process:
-        assert any(line.startswith("identify: ") and "generation 2" in line for line in process.stderr)
-        process.send_signal(number)
-        _, messages = process.communicate(timeout=60)
-    assert process.returncode == code
+    reading, writing = os.pipe()
+    process = Forked([*words, *endless], tmp_path_factory.mktemp("printed") / "stdout", writing)
+    os.close(writing)
+    with open(reading) as said:
+        assert any(line.startswith("identify: ") and "generation 2" in line for line in said)
+        process.send(number)
+        messages = said.read()
+    assert process.wait().returncode == code
     assert messages.endswith("the search was interrupted; the same command with --resume goes on\n")
     assert "Traceback" not in messages
     assert sorted(path.name for path in tmp_path.iterdir()) == ["model.h5", "model.h5.checkpoint"]
-
-
-# Sends the signal the moment a function is called that comes after the search.
-SIGNAL_AFTER_THE_SEARCH = """
-import importlib, os, sys
-
-module = importlib.import_module({module!r})
-was = module.{function}
-def signalled(*given, **named):
-    os.kill(os.getpid(), {number})
-    return was(*given, **named)
-
-module.{function} = signalled
-sys.argv = {words!r}
-from cpfls_cli.cli.main import run
-run()
-"""
 
 
 @pytest.mark.parametrize(
@@ -81,10 +68,21 @@ run()
         ("cpfls_cli.validation.validate", "replay_steps", signal.SIGTERM, "is complete but was not judged, because of"),
     ],
 )
-def test_signal_while_a_model_is_judged(pipeline, study, tmp_path, module, function, number, said):
-    words = ["cpfls", "identify", str(study), str(pipeline.flight), "-o", str(tmp_path / "model.h5")]
-    code = SIGNAL_AFTER_THE_SEARCH.format(module=module, function=function, number=int(number), words=words)
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment())
+def test_signal_while_a_model_is_judged(pipeline, study, tmp_path, tmp_path_factory, module, function, number, said):
+    """The signal comes the moment a function is called that comes after the search."""
+
+    def signalling():
+        home = importlib.import_module(module)
+        was = getattr(home, function)
+
+        def signalled(*given, **named):
+            os.kill(os.getpid(), number)
+            return was(*given, **named)
+
+        setattr(home, function, signalled)
+
+    words = ("identify", study, pipeline.flight, "-o", tmp_path / "model.h5")
+    result = finished(words, tmp_path_factory.mktemp("printed"), patch=signalling)
     assert (result.returncode, said in result.stderr) == (128 + number, True), result.stderr
     assert "Traceback" not in result.stderr
     assert len(list(tmp_path.iterdir())) == 1

@@ -11,21 +11,26 @@ import pytest
 from cpfls_cli import compiling
 from cpfls_cli.cli.options import Common
 from cpfls_cli.cli.terminal import progress_bar
+from tests.builders.forked import Forked
 
 
-def on_terminal(*words, columns=200):
+@pytest.fixture
+def on_terminal(tmp_path_factory):
     """Run a command with standard error on a terminal; give exit code, output and what was shown."""
-    ours, theirs = pty.openpty()
-    environment = {**os.environ, "TERM": "xterm", "COLUMNS": str(columns)}
-    command = [sys.executable, "-m", "cpfls_cli", *map(str, words)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs, env=environment) as process:
+
+    def call(*words, columns=200):
+        ours, theirs = pty.openpty()
+        printed = tmp_path_factory.mktemp("printed") / "stdout"
+        process = Forked(words, printed, theirs, environment={"TERM": "xterm", "COLUMNS": str(columns)})
         os.close(theirs)
         shown = b""
         while part := _read(ours):
             shown += part
         os.close(ours)
-        printed = process.stdout.read().decode()
-    return process.returncode, printed, re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown.decode())
+        done = process.wait()
+        return done.returncode, done.stdout, re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown.decode())
+
+    return call
 
 
 def _read(descriptor):
@@ -41,7 +46,7 @@ def identify(pipeline, study, tmp_path):
     return ("identify", study, pipeline.flight, "-o", tmp_path / "model.h5", "--json", *search)
 
 
-def test_bar_shows_the_generation_and_the_time_left(identify):
+def test_bar_shows_the_generation_and_the_time_left(on_terminal, identify):
     code, printed, shown = on_terminal(*identify)
     assert code == 0, shown
     assert printed.startswith("{")
@@ -49,7 +54,7 @@ def test_bar_shows_the_generation_and_the_time_left(identify):
     assert "reads" not in shown
 
 
-def test_verbose_speaks_on_a_terminal_too(identify, tmp_path):
+def test_verbose_speaks_on_a_terminal_too(on_terminal, identify, tmp_path):
     code, _, shown = on_terminal(*identify, "-v")
     assert code == 0, shown
     assert "identify: reads " in shown
@@ -57,11 +62,11 @@ def test_verbose_speaks_on_a_terminal_too(identify, tmp_path):
     assert "generation" in shown
 
 
-def test_quiet_shows_nothing(identify):
+def test_quiet_shows_nothing(on_terminal, identify):
     assert on_terminal(*identify[:5], "-q") == (0, "", "")
 
 
-def test_bar_and_time_stay_whole_on_a_terminal_of_80_columns(identify):
+def test_bar_and_time_stay_whole_on_a_terminal_of_80_columns(on_terminal, identify):
     code, _, shown = on_terminal(*identify, columns=80)
     assert code == 0, shown
     lines = [line.rstrip() for line in re.split(r"[\r\n]+", shown) if line.startswith("identify ")]
@@ -126,11 +131,18 @@ def test_a_name_with_control_characters_stays_on_its_line(refuse, tmp_path, monk
     assert line.isprintable()
 
 
-@pytest.mark.parametrize("closed", ["stdin", "stdout", "stderr", "stdin stdout stderr"])
-def test_streams_that_the_caller_closed(study, tmp_path, closed):
+@pytest.mark.parametrize("closed", ["stdin", "stdout", "stderr"])
+def test_a_stream_that_the_caller_closed(study, tmp_path, closed):
     output = tmp_path / "trajectory.h5"
-    shell = " ".join({"stdin": "<&-", "stdout": ">&-", "stderr": "2>&-"}[name] for name in closed.split())
-    command = f'"$1" -m cpfls_cli trajectory "$2" -o "$3" {shell}'
+    streams = {"stdin": 0, "stdout": tmp_path / "out", "stderr": tmp_path / "err"} | {closed: None}
+    done = Forked(("trajectory", study, "-o", output), **streams).wait()
+    assert (done.returncode, getattr(done, "stderr", "")) == (0, "")
+    assert output.read_bytes().startswith(b"\x89HDF")
+
+
+def test_streams_that_the_caller_closed(study, tmp_path):
+    output = tmp_path / "trajectory.h5"
+    command = '"$1" -m cpfls_cli trajectory "$2" -o "$3" <&- >&- 2>&-'
     done = subprocess.run(["sh", "-c", command, "sh", sys.executable, study, output], capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (0, b"")
     assert output.read_bytes().startswith(b"\x89HDF")

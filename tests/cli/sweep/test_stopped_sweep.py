@@ -3,8 +3,6 @@
 import os
 import random
 import signal
-import subprocess
-import sys
 import time
 
 import h5py
@@ -13,6 +11,7 @@ import pytest
 
 from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.store import read_artifact
+from tests.builders.forked import Forked
 
 PARTIAL, CHECKPOINT = "sweep.h5.partial", "sweep.h5.checkpoint"
 
@@ -26,11 +25,6 @@ def finished(path):
         return len(file["run/seed"])
 
 
-def start(words, output, *options):
-    called = [sys.executable, "-m", "cpfls_cli", *map(str, words), "-o", str(output), *options]
-    return subprocess.Popen(called, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-
-
 def wait_for_change(process, path):
     """Wait until a file is replaced, or the process has ended."""
 
@@ -42,10 +36,11 @@ def wait_for_change(process, path):
         time.sleep(0.001)
 
 
-def test_killed_in_processes_of_its_own_it_ends_the_same(words, whole, tmp_path):
+def test_killed_in_processes_of_its_own_it_ends_the_same(words, whole, tmp_path, tmp_path_factory):
+    printed = tmp_path_factory.mktemp("printed")
     output, moments, options, kills = tmp_path / "sweep.h5", random.Random(3), (), 0
     for watched in (PARTIAL, CHECKPOINT, None):
-        process = start(words, output, *options)
+        process = Forked([*words, "-o", output, *options], printed / "stdout", printed / "stderr")
         if watched is not None:
             wait_for_change(process, tmp_path / watched)
             time.sleep(moments.uniform(0.0, 0.03))
