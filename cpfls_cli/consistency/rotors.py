@@ -105,13 +105,15 @@ def misplaced(part: Signals) -> Finding | None:
     moved = airframe_from_motion(part.body_rate, part.rotor_speed, 1 / part.period, part.commanded)
     stated = [RotorPlace("", each.position_m[:2], each.spin) for each in part.vehicle.rotors]
     elsewhere = "" if moved is None else _elsewhere(moved, stated)
-    if not elsewhere:
+    if moved is None or not elsewhere:
         return None
     return Finding(
         f"by the motion the rotors are, in the order of their columns: {elsewhere}. vehicle.rotors says otherwise",
         "check position_m and spin there, the order of the columns, the axes of gyroscope (or attitude), and "
         "import.body_frame",
         ("rotors", "gyroscope", "vehicle.rotors"),
+        # In a hover the axes may say it and single rotors not: enough for a word, not for a verdict.
+        contradiction=moved.clear,
     )
 
 
@@ -130,7 +132,7 @@ def _elsewhere(moved: MovedBy, stated: Sequence[RotorPlace]) -> str:
     """
     told = [(rotor.name, rotor.spin) for rotor in moved.airframe.rotors]
     known = [(place_of(rotor.direction), rotor.spin) for rotor in stated]
-    if not moved.clear or told == known or {name for name, _ in told} != {name for name, _ in known}:
+    if not moved.by_axes or told == known or {name for name, _ in told} != {name for name, _ in known}:
         return ""
     words = "; ".join(f"{name}, {'counter-clockwise' if spin > 0 else 'clockwise'}" for name, spin in told)
     shares = ", ".join(f"{100 * share:.0f} %" for share in moved.explained)

@@ -232,12 +232,15 @@ class MovedBy:
     airframe : Airframe
     explained : tuple of float
         Share of the angular acceleration about roll, pitch and yaw that they explain.
-    clear : bool
+    by_axes : bool
         Whether every axis says it.
+    clear : bool
+        Whether every rotor by itself says it too.
     """
 
     airframe: Airframe
     explained: tuple[float, float, float]
+    by_axes: bool
     clear: bool
 
 
@@ -281,16 +284,16 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     moved += [] if is_command else [delayed(squared, rate_hz * seconds) for seconds in _SHIFTS_S]
     tried = [_shares(acceleration, rate, low_pass(own, rate_hz, cutoff, 2)) for own in moved]
     shares, weights = max(tried, key=lambda found: max(sum(share) for _, share in found[0]))
-    layout, explained, clear = _chosen(shares, ("X", "plus"))
-    if not clear:
-        layout, explained, clear = _chosen(shares, ("X",))
-    clear = clear and _push_alike(layout, weights)
+    layout, explained, by_axes = _chosen(shares, ("X", "plus"))
+    if not by_axes:
+        layout, explained, by_axes = _chosen(shares, ("X",))
+    clear = by_axes and _push_alike(layout, weights)
     if sum(explained[:2]) < 2 * _LEAST_EXPLAINED:
         return None
     words = ", ".join(f"{100 * share:.0f} % of {axis}" for share, axis in zip(explained, _TURNS, strict=True))
     form = "an X" if layout.form == "X" else "a plus"
     reason = f"the motion: as {form} in this order the rotors explain {words} acceleration"
-    return MovedBy(Airframe(layout.rotors, False, reason, "data" if clear else "guess"), explained, clear)
+    return MovedBy(Airframe(layout.rotors, False, reason, "data" if clear else "guess"), explained, by_axes, clear)
 
 
 def _chosen(
