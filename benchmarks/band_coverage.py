@@ -34,12 +34,12 @@ from scipy import signal
 from benchmarks.shared.full_circle import INERTIA, random_flight
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, newton_euler_torque
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import TorqueData, axis_scale
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
-from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.samples import Ready
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
@@ -80,7 +80,9 @@ class Case:
         learned, chromosome = evaluator.solver.learned, uniform_chromosome(evaluator.structure)
         fit = evaluator.fit(chromosome)
         partitions = decode(learned.structure, chromosome.astype(float))
-        model = Model(learned.structure, learned.ranges, partitions, fit.coefficients, fit.rigid_body, NOWHERE)
+        model = InertiaFunctions(
+            learned.structure, learned.ranges, partitions, fit.coefficients, fit.rigid_body, NOWHERE
+        )
         return evaluator, training, model, fit
 
     def inertia(self) -> Array:
@@ -220,7 +222,7 @@ def compared(case: Case, coloured: bool, runs: int, seed: int) -> dict[str, Arra
     return {name: np.mean(inside, axis=0) for name, inside in counts.items()}
 
 
-def block_scores(evaluator, training: TorqueData, model: Model) -> BlockScores:
+def block_scores(evaluator, training: TorqueData, model: InertiaFunctions) -> BlockScores:
     """Sum by block, without a ridge and without a rigid body."""
     learned = evaluator.solver.learned
     label = time_blocks(training, None).labels(learned.ready.source)
@@ -229,7 +231,7 @@ def block_scores(evaluator, training: TorqueData, model: Model) -> BlockScores:
     return BlockScores(products.gram, products.moment, np.zeros(len(model.coefficients)), model.coefficients)
 
 
-def unit_inertias(model: Model, attitude: Array) -> Array:
+def unit_inertias(model: InertiaFunctions, attitude: Array) -> Array:
     """Evaluate the inertia matrix of each coefficient by itself, shape (parameters, attitudes, 3, 3)."""
     units = np.eye(len(model.coefficients))
     return np.stack([replace(model, coefficients=unit).inertia(attitude).value for unit in units])

@@ -21,10 +21,10 @@ pin_threads()
 
 import numpy as np
 
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.export import c_source
 from cpfls_cli.fuzzy import InputRange
-from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
 from tests.builders.exported_models import sheet_of
 
@@ -79,16 +79,16 @@ def main() -> None:
     table("export_size", stored, sizes)
 
 
-def random_model(settings: StructureSettings) -> Model:
+def random_model(settings: StructureSettings) -> InertiaFunctions:
     """Draw coefficients; every angle lies in the range of the inputs, where most rules fire."""
     rng, structure = np.random.default_rng(1), model_structure(settings)
     ranges = (InputRange(-1.0, 1.0), InputRange(-1.0, 1.0))
     coefficients = rng.normal(0.0, 1.0, structure.parameters)
     visited = np.ones((CELLS, CELLS), dtype=bool)
-    return Model(structure, ranges, uniform_breakpoints(structure), coefficients, np.zeros(6), visited)
+    return InertiaFunctions(structure, ranges, uniform_breakpoints(structure), coefficients, np.zeros(6), visited)
 
 
-def write(model: Model, folder: Path) -> None:
+def write(model: InertiaFunctions, folder: Path) -> None:
     """Export a model, and compile it in both precisions."""
     source = c_source(sheet_of(model, name="m"), "m")
     (folder / "m.c").write_text(source.source)
@@ -104,7 +104,7 @@ def gcc(*words: str | Path) -> None:
     subprocess.run(["gcc", "-std=c99", "-O2", *words], check=True)
 
 
-def timed(name: str, model: Model, folder: Path, call: str) -> tuple:
+def timed(name: str, model: InertiaFunctions, folder: Path, call: str) -> tuple:
     """Time one function in C and in the library, in turn."""
     rng = np.random.default_rng(2)
     states = np.hstack([rng.uniform(-np.pi, np.pi, (BATCH, 3)), rng.normal(0, 3, (BATCH, 6))])
@@ -147,7 +147,7 @@ def compiled(path: Path, call: str, states: np.ndarray):
     return run
 
 
-def library(model: Model, call: str, states: np.ndarray):
+def library(model: InertiaFunctions, call: str, states: np.ndarray):
     """Evaluate states together."""
     q, qd, qdd = np.split(states, 3, axis=1)
     if call == "torque":
@@ -155,7 +155,7 @@ def library(model: Model, call: str, states: np.ndarray):
     return partial(model.inertia, q) if call == "inertia" else partial(model.coriolis, q, qd)
 
 
-def ones(model: Model, call: str, states: np.ndarray):
+def ones(model: InertiaFunctions, call: str, states: np.ndarray):
     """Evaluate states one after the other."""
     calls = [library(model, call, states[i : i + 1]) for i in range(SINGLES)]
 
@@ -166,7 +166,7 @@ def ones(model: Model, call: str, states: np.ndarray):
     return run
 
 
-def size(model: Model, folder: Path) -> tuple[int, int, int, int, int]:
+def size(model: InertiaFunctions, folder: Path) -> tuple[int, int, int, int, int]:
     """Count numbers of the tables, the bytes of the object file and, roughly, the arithmetic of a torque."""
     structure = model.structure
     used = any(block.rules > 1 for block in structure.blocks)

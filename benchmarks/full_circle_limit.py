@@ -33,9 +33,9 @@ from benchmarks.shared.full_circle import (
 )
 from benchmarks.shared.studies import paper_flight
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.identification.data import joined
-from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor.structure import INERTIA_FUNCTIONS
 
@@ -80,7 +80,7 @@ def main() -> None:
     table("full_circle_functions", ("function", "seesaw", "its slopes", "harmonic", "their slopes"), by_function)
 
 
-def shape_errors(model: Model) -> dict[str, tuple[float, float]]:
+def shape_errors(model: InertiaFunctions) -> dict[str, tuple[float, float]]:
     """Error of each inertia function and of its slopes by roll and pitch, as shares of their root mean squares."""
     turn = np.linspace(0, 2 * np.pi, 200, endpoint=False) + 0.01
     roll, pitch = np.meshgrid(turn, turn)

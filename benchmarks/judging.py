@@ -21,12 +21,12 @@ import numpy as np
 
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import generator
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.flights.training import read_training
 from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import score_of
-from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.search import search
 
@@ -53,7 +53,7 @@ def relative_error(evaluator: Evaluator, chromosome) -> float:
     assert fit is not None
     judge, nowhere = evaluator.judge, np.zeros((0, 0), dtype=bool)
     partitions = decode(judge.structure, chromosome.astype(float))
-    model = Model(judge.structure, judge.ranges, partitions, fit.coefficients, fit.rigid_body, nowhere)
+    model = InertiaFunctions(judge.structure, judge.ranges, partitions, fit.coefficients, fit.rigid_body, nowhere)
     return score_of(judge.ready.source, model.torque).worst_relative_error
 
 

@@ -19,7 +19,7 @@ from benchmarks.paper.printed import (
     TABLE_4,
 )
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import MODEL, TRAINING
 from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns
@@ -163,7 +163,7 @@ def _relative_error(sources: Sources) -> Measurement:
     return _small_enough([*_relative_errors(searches(sources)), identified], _elsewhere(sources))
 
 
-def _is_periodic(model: Source[ModelRecord]) -> bool:
+def _is_periodic(model: Source[IdentifiedRecord]) -> bool:
     return bool(model.config["identification"]["structure"] == "cpfls")
 
 
@@ -448,17 +448,17 @@ def _continuity(sources: Sources) -> Measurement:
     return decided(worst < _SEAM_JUMP, f"{number(worst, 2)} of the torque there", why)
 
 
-def _jump(model: Source[ModelRecord]) -> float:
+def _jump(model: Source[IdentifiedRecord]) -> float:
     """Find by how much torque changes across 2 pi, as a share of the largest there."""
     from cpfls_cli.regressor.motion import Motion
 
     rng = np.random.default_rng(0)
     attitude, rate, acceleration = rng.uniform(-1.0, 1.0, (3, _SEAM_STATES, 3))
-    rebuilt, worst = model.record.rebuilt(model.label), 0.0
+    functions, worst = model.record.functions.inertia(), 0.0
     for angle in (0, 1):
         before, after = attitude.copy(), attitude.copy()
         before[:, angle], after[:, angle] = 2.0 * np.pi - _SEAM_STEP, _SEAM_STEP
-        torque = [rebuilt.torque(Motion(side, rate, acceleration)) for side in (before, after)]
+        torque = [functions.torque(Motion(side, rate, acceleration)) for side in (before, after)]
         worst = max(worst, float(np.max(np.abs(torque[1] - torque[0])) / np.max(np.abs(torque))))
     return worst
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.excitation import optimised_rotation
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
@@ -17,7 +18,6 @@ from cpfls_cli.identification.data import TorqueData, TorqueSource
 from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import score_of
-from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.search import choose, search
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor import Motion, StructureSettings
@@ -98,7 +98,7 @@ def optimised_flight(structure: StructureSettings, seed: int = 1) -> TorqueData:
 class Solved:
     """A model with what its system was worth."""
 
-    model: Model
+    model: InertiaFunctions
     rank: int
     condition_number: float
 
@@ -120,7 +120,9 @@ def solved(evaluator: Evaluator, chromosome: Array) -> Solved:
     assert fit is not None
     partitions = decode(learned.structure, chromosome.astype(float))
     exact, system = evaluator.solver.exact(partitions, fit)
-    model = Model(learned.structure, learned.ranges, partitions, exact.coefficients, exact.rigid_body, _NOWHERE)
+    model = InertiaFunctions(
+        learned.structure, learned.ranges, partitions, exact.coefficients, exact.rigid_body, _NOWHERE
+    )
     return Solved(model, system.rank, system.condition_number)
 
 

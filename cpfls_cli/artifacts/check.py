@@ -29,6 +29,10 @@ _FIXED = {"axis": 3}
 _KINDS = {"U": "text", "S": "text", "i": "numbers", "u": "numbers", "f": "numbers"}
 _LARGEST = 1e150
 """Nothing that is measured or computed comes near; the square of a larger number is none."""
+_MODEL, _MODELS_SINCE = "cpfls/model", 2
+"""Schema version since which all models are of one format."""
+_FORMER = {"cpfls/extended": "extend", "cpfls/vehicle": "vehicle"}
+"""Formats that models had before, and the commands that make them."""
 _BLOCK = 1 << 18
 """Numbers that are checked at a time."""
 
@@ -183,9 +187,10 @@ def opened(path: Path, *wanted: ArtifactSpec) -> Iterator[Stored]:
         with h5py.File(path, "r") as file:
             _refuse_links(file)
             stored = stored_of(path, file)
-            if wanted and stored.spec not in wanted:
+            if wanted and not any(each.includes(stored.spec) for each in wanted):
                 asked = " or ".join(f"{w.format} (made by {w.makers})" for w in wanted)
-                raise InputError(f"{path}: is a {stored.spec.format}; this command needs a {asked}")
+                made = f" made by {stored.spec.makers}" if stored.spec.kind else ""
+                raise InputError(f"{path}: is a {stored.spec.format}{made}; this command needs a {asked}")
             yield stored
     except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
         raise InputError(f"{path}: damaged: {one_line(error)}") from None
@@ -250,7 +255,12 @@ def _identify(path: Path, file: h5py.File) -> ArtifactSpec:
         raise InputError(
             f"{path}: schema_version = {version}: written by a newer cpfls; this one reads up to {SCHEMA_VERSION}"
         )
-    known = record_of_format(name)
+    if name in _FORMER or (name == _MODEL and version < _MODELS_SINCE):
+        raise InputError(
+            f"{path}: a model that an earlier cpfls wrote, before all models had one format; make it again with "
+            f"`cpfls {_FORMER.get(name, 'identify')}`"
+        )
+    known = record_of_format(name, _text_attribute(file, "kind") or "")
     if known is None:
         raise InputError(f"{path}: format = '{name}': this cpfls does not know it")
     return known.spec()
@@ -274,7 +284,7 @@ def require_all(path: Path, stored: Stored) -> None:
     ------
     InputError
     """
-    record = record_of_format(stored.spec.format)
+    record = record_of_format(stored.spec.format, stored.spec.kind)
     assert record is not None, "its format is known"
     missing = record.lacking(stored.data)
     if missing:

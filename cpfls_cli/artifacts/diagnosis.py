@@ -20,10 +20,10 @@ from cpfls_cli.artifacts.gap_flights import (
     HELD_OUT,
     TRAINING,
     AuditGroup,
-    BaseGroup,
     FlightsGroup,
     NotExcitedGroup,
 )
+from cpfls_cli.artifacts.model import VehicleGroup
 from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from cpfls_cli.gap.extended import ExtendedModel
     from cpfls_cli.gap.naming.held_out import HeldOut
     from cpfls_cli.gap.naming.results import Alternative, Unexplained
+    from cpfls_cli.playback.model import VehicleModel
     from cpfls_cli.weak_form.windows import Recording
 
 KINDS = ("torque", "force")
@@ -270,7 +271,7 @@ class DiagnosisRecord(Record):
         default=(),
     )
     warning: tuple[str, ...] = dataset("warning", "what to know about the flights", "warning", default=())
-    base: BaseGroup = group("base")
+    base: VehicleGroup = group("base")
     flights: FlightsGroup = group("")
     difference: tuple[str, ...] | None = dataset(
         "difference", "what differs between the flights that trained and those held out", "difference", default=None
@@ -293,7 +294,7 @@ class DiagnosisRecord(Record):
         held: Sequence[Recording],
         split: str,
         warnings: Sequence[str],
-        base: BaseGroup,
+        base: VehicleModel,
     ) -> Self:
         """Arrange a diagnosis.
 
@@ -305,7 +306,7 @@ class DiagnosisRecord(Record):
             Why these flights trained and those were held out.
         warnings : sequence of str
             What to know about the flights.
-        base : BaseGroup
+        base : VehicleModel
             The identified model that misses something, or the vehicle.
         """
         diagnosis = diagnosed.diagnosis
@@ -333,7 +334,7 @@ class DiagnosisRecord(Record):
             note=diagnosis.notes,
             contradiction=diagnosis.contradictions,
             warning=tuple(warnings),
-            base=base,
+            base=VehicleGroup.of(base),
             flights=FlightsGroup.of([*training, *held], [TRAINING] * len(training) + [HELD_OUT] * len(held)),
             difference=diagnosis.differences,
             shares=np.array([diagnosis.shares.get(kind, np.nan) for kind in KINDS]),

@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.gap_effects import StretchGroup, above_noise, gap_summary
-from cpfls_cli.artifacts.gap_flights import AuditGroup, BaseGroup, FlightsGroup, NotExcitedGroup
+from cpfls_cli.artifacts.gap_flights import AuditGroup, FlightsGroup, NotExcitedGroup
+from cpfls_cli.artifacts.model import VehicleGroup
 from cpfls_cli.artifacts.replay import PlaybackGroup
 from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.compare import Disagreement, WorstChannel
     from cpfls_cli.gap.residual.dependence import Dependence
+    from cpfls_cli.playback.model import VehicleModel
+    from cpfls_cli.vehicle.settings import VehicleSettings
     from cpfls_cli.weak_form.windows import Recording
 
 _SIGNIFICANT = 0.05
@@ -167,12 +168,12 @@ class DisagreementRecord(Record):
     not_excited: NotExcitedGroup = group("not_excited")
     audit: AuditGroup = group("")
     warning: tuple[str, ...] = dataset("warning", "what to know about the flights", "warning")
-    base: BaseGroup = group("base")
+    base: VehicleGroup = group("base")
     flights: FlightsGroup = group("")
 
     @classmethod
     def of(
-        cls, disagreement: Disagreement, recordings: Sequence[Recording], warnings: tuple[str, ...], base: BaseGroup
+        cls, disagreement: Disagreement, recordings: Sequence[Recording], warnings: tuple[str, ...], base: VehicleModel
     ) -> Self:
         """Arrange a comparison.
 
@@ -180,8 +181,8 @@ class DisagreementRecord(Record):
         ----------
         warnings : tuple of str
             What to know about the flights.
-        base : BaseGroup
-            The identified model that was compared, or the vehicle.
+        base : VehicleModel
+            That was compared.
         """
         from cpfls_cli.playback.replay import PREDICTIONS
 
@@ -200,15 +201,16 @@ class DisagreementRecord(Record):
             not_excited=NotExcitedGroup.of(disagreement.not_excited),
             audit=AuditGroup.of(disagreement.audit),
             warning=(*disagreement.audit.filtered, *warnings),
-            base=base,
+            base=VehicleGroup.of(base),
             flights=FlightsGroup.of(recordings, ["given"] * len(recordings)),
         )
 
-    @property
-    def has_effects(self) -> bool:
-        """Whether the model that was compared has effects already, which `cpfls diagnose` cannot start from."""
-        model = self.origin.inputs.get("model")
-        return model is not None and model.format in {kind.FORMAT.name for kind in (ExtendedRecord, VehicleRecord)}
+    def is_base(self, stated: VehicleSettings) -> bool:
+        """Tell whether it was made with the vehicle of a config and no effects, which `cpfls diagnose` starts from."""
+        from cpfls_cli.playback.model import VehicleModel
+
+        model, rigid = self.base.vehicle_model(), VehicleGroup.of(VehicleModel(vehicle=stated))
+        return model.is_rigid_body and model.vehicle == rigid.vehicle()
 
     @property
     def summary(self) -> dict[str, Any]:

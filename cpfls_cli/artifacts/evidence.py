@@ -74,7 +74,7 @@ class UncertaintyGroup:
     blocks: int = dataset("blocks", "contiguous blocks of samples that were drawn")
     block_duration: float = dataset("block_duration", "duration of a block", units="s")
     coefficients: Array = dataset(
-        "coefficients", "coefficients of each bootstrap draw", "draw", "parameter", units="kg m^2", frame=EULER
+        "coefficients", "coefficients of each bootstrap draw", "draw", "rule_coefficient", units="kg m^2", frame=EULER
     )
     rigid_body: Array = dataset(
         "rigid_body", "rigid body under the fuzzy part, each draw", "draw", "6", units="kg m^2", frame=BODY

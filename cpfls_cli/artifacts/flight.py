@@ -13,8 +13,8 @@ from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset
 
 if TYPE_CHECKING:
     from cpfls_cli.control import Plan, Scores
+    from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
     from cpfls_cli.flightlog.results import ImportedFlight
-    from cpfls_cli.identification.model import Model
     from cpfls_cli.regressor.motion import Motion
     from cpfls_cli.simulation.model import SimulatedEffects
 
@@ -170,7 +170,9 @@ class TrackingGroup:
     not_positive_definite: int = dataset("not_positive_definite", "samples of the flight where no body has the D(q)")
 
     @classmethod
-    def of(cls, plan: Plan, controllers: Sequence[str], scores: Scores, model: Model, attitude: Array) -> Self:
+    def of(
+        cls, plan: Plan, controllers: Sequence[str], scores: Scores, model: InertiaFunctions, attitude: Array
+    ) -> Self:
         """Arrange a comparison.
 
         Parameters

@@ -12,7 +12,7 @@ from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.replay import ReplayRecord
 from cpfls_cli.artifacts.selection import SelectionRecord
@@ -25,7 +25,7 @@ RECORDS: tuple[type[Record], ...] = (
     TrajectoryRecord,
     FlightRecord,
     SelectionRecord,
-    ModelRecord,
+    IdentifiedRecord,
     CheckpointRecord,
     SweepRecord,
     PredictionRecord,
@@ -43,9 +43,9 @@ _WIDTH = 120
 _HEAD = "| dataset | dimensions | units | frame | required | description |\n|---|---|---|---|---|---|"
 
 
-def record_of_format(name: str) -> type[Record] | None:
-    """Look up a format by the value of the root attribute ``format``."""
-    return next((record for record in RECORDS if record.FORMAT.name == name), None)
+def record_of_format(name: str, kind: str = "") -> type[Record] | None:
+    """Look up a format by the values of the root attributes ``format`` and ``kind``."""
+    return next((each for each in RECORDS if (each.FORMAT.name, each.FORMAT.kind) == (name, kind)), None)
 
 
 def format_tables() -> str:
@@ -63,7 +63,8 @@ def _section(spec: ArtifactSpec) -> str:
     inputs = ", ".join(f"`/inputs/{role}`" for role in spec.inputs) or "none"
     rows = "\n".join(_row(dataset) for dataset in spec.datasets)
     words = fill(f"Made by {spec.makers}: {spec.description}. Inputs: {inputs}.", _WIDTH, break_on_hyphens=False)
-    return f"### `{spec.format}`\n\n{words}\n\n{_HEAD}\n{rows}\n"
+    kind = f", kind `{spec.kind}`" if spec.kind else ""
+    return f"### `{spec.format}`{kind}\n\n{words}\n\n{_HEAD}\n{rows}\n"
 
 
 def _row(dataset: DatasetSpec) -> str:

@@ -14,9 +14,6 @@ from cpfls_cli.gap.settings import CLEAR
 
 if TYPE_CHECKING:
     # Reading a record does not need the numerics that fit a gap.
-    from cpfls_cli.artifacts.gap_flights import AuditGroup
-    from cpfls_cli.dynamics.equations_of_motion import InertiaModel
-    from cpfls_cli.gap.extended import ExtendedModel
     from cpfls_cli.gap.naming.results import Estimate, GapSize, NamedEffect
     from cpfls_cli.gap.residual.views import Stretch
     from cpfls_cli.playback.replay import Played, Replay
@@ -288,21 +285,6 @@ class NamedEffectsGroup:
         for name in self.effect.name:
             effect(name)
         return self.listed
-
-    def model(self, base: InertiaModel | None, audit: AuditGroup) -> ExtendedModel:
-        """Rebuild the model with the effects in it.
-
-        Parameters
-        ----------
-        base : InertiaModel or None
-            None for the rigid body of the vehicle.
-        audit : AuditGroup
-            Faults of the sensors that it repairs.
-        """
-        from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
-
-        fitted = (FittedEffect(each.candidate, each.linear) for each in self.effects() if each.candidate is not None)
-        return ExtendedModel(base, self.parameter.value, tuple(fitted), audit.audit())
 
     @property
     def listed(self) -> tuple[NamedEffect, ...]:

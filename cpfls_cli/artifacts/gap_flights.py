@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.model import ModelRecord, rebuilt_model
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, columns_of, dataset, group, record, rows_of
-from cpfls_cli.inertia import six_parameters
 
 if TYPE_CHECKING:
     # Reading a record does not need the compiled kernels that evaluate a model.
@@ -21,8 +19,6 @@ if TYPE_CHECKING:
     from cpfls_cli.consistency.repairs import ChannelRepair
     from cpfls_cli.effects.signals import Signals
     from cpfls_cli.gap.naming.results import NotExcited
-    from cpfls_cli.identification.model import Model
-    from cpfls_cli.vehicle.settings import VehicleSettings
     from cpfls_cli.weak_form.windows import Recording
 
 RIGID_BODY = "rigid-body"
@@ -225,84 +221,6 @@ def _grouped(pairs: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
     for name, reason in pairs:
         reasons.setdefault(reason, []).append(name)
     return reasons
-
-
-@record
-class BaseGroup:
-    """The model that the flights were compared with."""
-
-    kind: str = dataset("kind", "rigid-body: the vehicle of /config; model: an identified model")
-    config: str | None = dataset("config", "the study that the model was identified with, as YAML", default=None)
-    weights: Any = dataset("weights", "as /model/weights of cpfls/model", "gene", default=None)
-    coefficients: Array | None = dataset(
-        "coefficients",
-        "as /model/coefficients of cpfls/model",
-        "base_parameter",
-        units="kg m^2",
-        frame=EULER,
-        default=None,
-    )
-    rigid_body: Array | None = dataset(
-        "rigid_body", "as /model/rigid_body of cpfls/model", "6", units="kg m^2", frame=BODY, default=None
-    )
-    input_range: Array | None = dataset("input_range", "as /model/input_range of cpfls/model", "2", "2", default=None)
-    visited: BoolArray | None = dataset(
-        "visited", "as /model/visited of cpfls/model", "cell", "cell", frame=EULER, default=None
-    )
-
-    @classmethod
-    def of(cls, identified: ModelRecord | None) -> Self:
-        """Arrange a base.
-
-        Parameters
-        ----------
-        identified : ModelRecord or None
-            None for the rigid body of the vehicle.
-        """
-        if identified is None:
-            return cls(kind=RIGID_BODY)
-        model = identified.model
-        return cls(
-            kind="model",
-            config=identified.origin.config,
-            weights=np.asarray(model.weights, dtype=np.int64),
-            coefficients=model.coefficients,
-            rigid_body=model.rigid_body,
-            input_range=model.input_range,
-            visited=model.visited,
-        )
-
-    @property
-    def is_vehicle(self) -> bool:
-        """Whether it is the rigid body of the vehicle of /config, and no identified model."""
-        return self.kind == RIGID_BODY
-
-    def constant_inertia(self, vehicle: VehicleSettings) -> Array | None:
-        """Give its inertia, shape (6,), kg m^2; None where it depends on the attitude.
-
-        Parameters
-        ----------
-        vehicle : VehicleSettings
-            Of /config.
-        """
-        if self.is_vehicle:
-            return six_parameters(vehicle.inertia_kg_m2)
-        return None if np.any(self.coefficients) else self.rigid_body
-
-    def rebuilt(self, path: object) -> Model | None:
-        """Rebuild the identified model.
-
-        Parameters
-        ----------
-        path : Path
-            For messages.
-
-        Returns
-        -------
-        Model or None
-            None for the rigid body of the vehicle.
-        """
-        return None if self.is_vehicle else rebuilt_model(str(self.config), self, path)
 
 
 @record

@@ -1,433 +1,301 @@
-"""The artifact of an identified model."""
+"""The artifact of a model: a vehicle, all that is needed to evaluate it, and how it was found."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.checkpoint import HistoryGroup
-from cpfls_cli.artifacts.evidence import (
-    CurvesGroup,
-    PeriodGroup,
-    PhysicsGroup,
-    ResidualsGroup,
-    RoundTripGroup,
-    StepsGroup,
-    StructuresGroup,
-    UncertaintyGroup,
-    VerdictGroup,
-    evidence_groups,
-    group_of,
-)
-from cpfls_cli.artifacts.scores import MODEL, TRAINING, JudgedGroup
-from cpfls_cli.artifacts.spec import BODY, EULER, Format, Record, dataset, group, record
-from cpfls_cli.artifacts.vehicle_model import VehicleGroup
-from cpfls_cli.errors import InputError
+from cpfls_cli.artifacts.gap_flights import AuditGroup
+from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, InputFile, Record, dataset, group, record
+from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 
 if TYPE_CHECKING:
-    # What evaluates a model loads compiled kernels, which nobody waits for who only reads one.
-    from cpfls_cli.config.study import Study
-    from cpfls_cli.identification.identify import Identification
-    from cpfls_cli.identification.model import Model
+    # Reading a record does not need the compiled loops that evaluate a model.
+    from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+    from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
+    from cpfls_cli.playback.rotors import RotorResponse
     from cpfls_cli.regressor.structure import ModelStructure
-    from cpfls_cli.validation.bootstrap import Draws
-    from cpfls_cli.validation.validate import Validation
-    from cpfls_cli.vehicle.settings import VehicleSettings
+    from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
-WELL_CONDITIONED = 100.0
-"""Largest condition number of a model whose coefficients are all known."""
+_USUAL = "usual"
 
 
 @record
-class ModelGroup:
-    """The chosen model: partitions, coefficients, and the attitudes that training visited."""
+class RotorsGroup:
+    """Rotors, in the order of their speeds."""
 
-    weights: Array = dataset("weights", "partition weights a_i of the chosen chromosome", "gene")
-    partition: tuple[str, ...] = dataset("partition", "partition each breakpoint belongs to", "breakpoint")
-    breakpoints: Array = dataset("breakpoints", "peaks of the membership functions on [0, 1]", "breakpoint")
-    coefficients: Array = dataset(
-        "coefficients", "coefficients of the rule consequents", "parameter", units="kg m^2", frame=EULER
+    position: Array = dataset("position", "hubs relative to the centre of mass", "rotor", "axis", units="m", frame=BODY)
+    spin: IntArray = dataset("spin", "1 turns counter-clockwise seen from above, -1 clockwise", "rotor")
+    thrust_factor: Array = dataset("thrust_factor", "thrust over squared speed", "rotor", units="N s^2")
+    drag_factor: Array = dataset("drag_factor", "reaction torque over squared speed", "rotor", units="N m s^2")
+    radius: Array = dataset("radius", "of the propellers", "rotor", units="m", gaps=True)
+    speed_max: float = dataset("speed_max", "largest speed of a rotor", units="rad/s")
+    thrust_linear: float = dataset(
+        "thrust_linear", "a: thrust and drag follow w^2 + a w_h w, w_h the speed that hovers under the square alone"
     )
-    parameter: tuple[str, ...] = dataset("parameter", "inertia function, rule and feature", "parameter")
-    rigid_body: Array = dataset(
-        "rigid_body", "Ixx Iyy Izz Ixy Ixz Iyz under the fuzzy part; zero for none", "6", units="kg m^2", frame=BODY
-    )
-    base: str = dataset("base", "none or rigid-body")
-    input_range: Array = dataset("input_range", "minimum and maximum of roll and pitch inputs", "2", "2")
-    visited: BoolArray = dataset(
-        "visited", "cells of roll and pitch that training visited", "cell", "cell", frame=EULER
-    )
-    ridge_weight: float = dataset("ridge_weight", "chosen; infinite means the fuzzy part is off", gaps=True)
-
-
-@record
-class SolveGroup:
-    """How well the training samples determine the coefficients."""
-
-    singular_values: Array = dataset(
-        "singular_values", "of the regressor of the parameters in use, without penalty", "value", units="SI"
-    )
-    rank: int = dataset("rank", "numerical rank")
-    condition_number: float = dataset("condition_number", "over the kept singular values", least=1.0)
-    parameters: int = dataset("parameters", "number of linear parameters in use")
-
-
-@record
-class RulesGroup:
-    """Excitation of each rule in training."""
-
-    name: tuple[str, ...] = dataset("name", "inertia function and rule", "rule")
-    firing: Array = dataset("firing", "largest firing strength in training", "rule")
-    determined: Array = dataset("determined", "share of the rule's coefficients that data determine", "rule")
-    excited: BoolArray = dataset("excited", "1 where the rule is excited, else 0", "rule")
-
-
-@record
-class FrontGroup:
-    """Pareto front of the search."""
-
-    chromosomes: IntArray = dataset("chromosomes", "Pareto front, 16-bit weights", "member", "gene")
-    objectives: Array = dataset(
-        "objectives",
-        "MSE (rigid-body base: cross-validated, scaled by axis), largest error, condition number",
-        "member",
-        "3",
-        units="SI",
-    )
-    chosen: int = dataset("chosen", "index of the chosen member", into="member")
-    held_out: Array | None = dataset(
-        "held_out",
-        "mean squared error on the flights kept for the choice; objective 1 of them",
-        "member",
-        units="SI",
-        gaps=True,
-        default=None,
-    )
-
-
-@record
-class SearchGroup:
-    """How the search ended."""
-
-    stop_reason: str | None = dataset("stop_reason", "generations, converged, time-limit or interrupted", default=None)
-    complete: bool | None = dataset(
-        "complete", "1 where the search came to its end, 0 where `--resume` goes on", default=None
-    )
-
-
-@record
-class BaselinesGroup:
-    """Inertia parameters of the baselines."""
-
-    rigid_body: Array = dataset(
-        "rigid_body", "six inertia parameters by least squares", "6", units="kg m^2", frame=BODY
-    )
-    constant_inertia: Array = dataset(
-        "constant_inertia", "J11 J22 J33 J12 J13 J23, constant", "6", units="kg m^2", frame=EULER
-    )
-
-
-@record
-class RidgeGroup:
-    """Cross-validation of the ridge weight."""
-
-    weight: Array = dataset("weight", "ridge weights tried", "tried", gaps=True)
-    error: Array = dataset("error", "cross-validated error", "tried")
-    standard_error: Array = dataset("standard_error", "its standard error", "tried")
-
-
-@record
-class ModelRecord(Record):
-    """The artifact `cpfls/model`."""
-
-    FORMAT: ClassVar = Format(
-        "cpfls/model",
-        "an identified model, how it was found and how it was judged",
-        "identify",
-        ("flight", "selection", "validate", "choose-on"),
-    )
-
-    model: ModelGroup = group("model")
-    solve: SolveGroup = group("solve")
-    rules: RulesGroup = group("rules")
-    front: FrontGroup = group("front")
-    history: HistoryGroup = group("history")
-    search: SearchGroup | None = group("search", default=None)
-    judged: JudgedGroup = group("judged")
-    baselines: BaselinesGroup = group("baselines")
-    ridge: RidgeGroup | None = group("ridge", default=None)
-    training_indices: IntArray = dataset("training/indices", "samples of the flight that trained", "sample")
-    findings: tuple[str, ...] = dataset("findings", "what failed or was not excited, in words", "finding")
-    structures: StructuresGroup | None = group("structures", default=None)
-    residuals: ResidualsGroup | None = group("residuals", default=None)
-    uncertainty: UncertaintyGroup | None = group("uncertainty", default=None)
-    curves: CurvesGroup | None = group("curves", default=None)
-    round_trip: RoundTripGroup | None = group("round_trip", default=None)
-    steps: StepsGroup | None = group("steps", default=None)
-    physics: PhysicsGroup | None = group("physics", default=None)
-    period: PeriodGroup | None = group("period", default=None)
-    verdict: VerdictGroup | None = group("verdict", default=None)
-    vehicle: VehicleGroup | None = group("vehicle", default=None)
 
     @classmethod
-    def of(
-        cls,
-        result: Identification,
-        base: str,
-        learned: IntArray,
-        evidence: Validation | None,
-        vehicle: VehicleSettings,
-    ) -> Self:
-        """Arrange an identification and the evidence on it.
-
-        Parameters
-        ----------
-        base : str
-            ``none`` or ``rigid-body``.
-        learned : array of int
-            Indices of the samples that trained.
-        evidence : Validation or None
-            None where it was not gathered.
-        vehicle : VehicleSettings
-            As stated: what was identified is its inertia.
-        """
-        from cpfls_cli.playback.model import VehicleModel
-
-        baselines = {baseline.name: baseline.parameters for baseline in result.baselines}
+    def of(cls, vehicle: VehicleSettings, thrust_linear: float) -> Self:
+        """Arrange the rotors of a vehicle."""
+        rotors = vehicle.rotors
         return cls(
-            model=_model(result, base),
-            solve=SolveGroup(
-                singular_values=result.system.singular_values,
-                rank=result.system.rank,
-                condition_number=result.system.condition_number,
-                parameters=result.system.parameters,
-            ),
-            rules=group_of(RulesGroup, result.excitation),
-            front=group_of(FrontGroup, result.front),
-            history=group_of(HistoryGroup, result.history),
-            search=SearchGroup(stop_reason=result.stop_reason, complete=result.complete),
-            judged=JudgedGroup.of(result),
-            baselines=BaselinesGroup(
-                rigid_body=baselines["rigid-body"], constant_inertia=baselines["constant-inertia"]
-            ),
-            ridge=None if result.ridge is None else group_of(RidgeGroup, result.ridge),
-            training_indices=learned,
-            findings=tuple(result.findings),
-            **({} if evidence is None else evidence_groups(evidence)),
-            vehicle=VehicleGroup.of(VehicleModel(vehicle=vehicle)),
+            position=np.array([rotor.position_m for rotor in rotors], dtype=float),
+            spin=np.array([rotor.spin for rotor in rotors], dtype=np.int64),
+            thrust_factor=np.array([rotor.thrust_factor_n_s2 for rotor in rotors], dtype=float),
+            drag_factor=np.array([rotor.drag_factor_n_m_s2 for rotor in rotors], dtype=float),
+            radius=np.array([np.nan if rotor.radius_m is None else rotor.radius_m for rotor in rotors], dtype=float),
+            speed_max=vehicle.rotor_speed_max_rad_s,
+            thrust_linear=thrust_linear,
         )
 
-    @cached_property
-    def study(self) -> Study:
-        """The study that it was identified with."""
-        return _study(self.origin.config, self.FORMAT.name)
+    def rotors(self) -> tuple[RotorSettings, ...]:
+        """Rebuild them."""
+        from cpfls_cli.vehicle.settings import RotorSettings
 
-    def rebuilt(self, path: object) -> Model:
-        """Rebuild the model.
+        columns = (self.position, self.spin, self.thrust_factor, self.drag_factor, self.radius)
+        return tuple(
+            RotorSettings(
+                position_m=tuple(position),
+                spin=1 if spin > 0 else -1,
+                thrust_factor_n_s2=thrust,
+                drag_factor_n_m_s2=drag,
+                radius_m=None if np.isnan(radius) else radius,
+            )
+            for position, spin, thrust, drag, radius in zip(*(column.tolist() for column in columns), strict=True)
+        )
 
-        Parameters
-        ----------
-        path : Path
-            For messages.
+
+@record
+class ResponseGroup:
+    """How rotors follow their logged speed."""
+
+    delay: float = dataset("delay", "pure delay", units="s")
+    lag: float = dataset("lag", "time constant of the first-order lag; 0 for none", units="s")
+    slow_roll_pitch: float = dataset(
+        "slow_roll_pitch", "share by which roll and pitch torque of the rotors come back after a change; below 0: fade"
+    )
+    slow_yaw: float = dataset("slow_yaw", "the same of the yaw torque")
+    slow: float = dataset("slow", "time constant with which they do", units="s")
+    commanded: bool = dataset(
+        "commanded", "1 where delay and lag lie behind commands, which measured speeds have already; 0 behind any speed"
+    )
+    hold: str = dataset("hold", "what a command is between samples: linear, previous, or usual for the flight")
+
+    @classmethod
+    def of(cls, model: VehicleModel) -> Self:
+        """Arrange the response of a model."""
+        response = model.response
+        return cls(
+            delay=response.delay_s,
+            lag=response.lag_s,
+            slow_roll_pitch=response.slow_roll_pitch,
+            slow_yaw=response.slow_yaw,
+            slow=response.slow_s,
+            commanded=model.commanded,
+            hold=model.hold or _USUAL,
+        )
+
+    def response(self) -> RotorResponse:
+        """Rebuild it."""
+        from cpfls_cli.playback.rotors import RotorResponse
+
+        return RotorResponse(
+            delay_s=self.delay,
+            lag_s=self.lag,
+            slow_roll_pitch=self.slow_roll_pitch,
+            slow_yaw=self.slow_yaw,
+            slow_s=self.slow,
+        )
+
+
+@record
+class EffectsGroup:
+    """Effects of the catalogue in the model."""
+
+    name: tuple[str, ...] = dataset("name", "identifier, see `cpfls effects`", "vehicle_effect")
+    linear_effect: tuple[str, ...] = dataset(
+        "linear_effect", "effect that each linear coefficient belongs to", "vehicle_linear"
+    )
+    linear: Array = dataset(
+        "linear", "linear coefficients, by effect in the order of its columns", "vehicle_linear", units="SI"
+    )
+    shape_effect: tuple[str, ...] = dataset("shape_effect", "effect that each shape belongs to", "vehicle_shape")
+    shape_name: tuple[str, ...] = dataset("shape_name", "what the effect depends on nonlinearly", "vehicle_shape")
+    shape: Array = dataset("shape", "value of the shape", "vehicle_shape", units="SI")
+
+    @classmethod
+    def of(cls, effects: Sequence[ModelEffect]) -> Self:
+        """Arrange effects."""
+        shapes = [(one.name, name, value) for one in effects for name, value in one.shape.items()]
+        return cls(
+            name=tuple(one.name for one in effects),
+            linear_effect=tuple(one.name for one in effects for _ in one.coefficients),
+            linear=np.array([value for one in effects for value in one.coefficients], dtype=float),
+            shape_effect=tuple(effect for effect, _, _ in shapes),
+            shape_name=tuple(name for _, name, _ in shapes),
+            shape=np.array([value for _, _, value in shapes], dtype=float),
+        )
+
+    def effects(self) -> tuple[ModelEffect, ...]:
+        """Rebuild them.
 
         Raises
         ------
         InputError
-            If the config and the numbers of the artifact do not fit each other.
+            If this program does not know one of them.
         """
-        return rebuilt_model(self.origin.config, self.model, path)
+        from cpfls_cli.effects.registry import effect
+        from cpfls_cli.playback.model import ModelEffect
 
-    def draws(self) -> Draws | None:
-        """Give the bootstrap draws behind its bands; None for a model without."""
-        from cpfls_cli.validation.bootstrap import Draws
+        return tuple(ModelEffect(effect(name).name, self._shape_of(name), self.linear_of(name)) for name in self.name)
 
-        if self.uncertainty is None:
-            return None
-        drawn = self.uncertainty
-        return Draws(drawn.coefficients, drawn.rigid_body, drawn.best_rigid_body, drawn.blocks, drawn.block_duration)
+    def linear_of(self, effect: str) -> Array:
+        """Give the linear coefficients of an effect, shape (coefficient,)."""
+        return np.asarray(self.linear[[name == effect for name in self.linear_effect]])
 
-    @property
-    def complete(self) -> bool:
-        """Whether the search came to its end; models of before searches could be stopped did."""
-        return self.search is None or self.search.complete is not False
-
-    @property
-    def stop_reason(self) -> str:
-        """Why the search ended; empty where that is not known."""
-        return (self.search and self.search.stop_reason) or ""
-
-    @property
-    def searched(self) -> bool:
-        """Whether it has partitions to search for; without, one chromosome was evaluated."""
-        return bool(np.size(self.model.weights))
-
-    @property
-    def on_rigid_body(self) -> bool:
-        """Whether a rigid body lies under the fuzzy part."""
-        return self.model.base == "rigid-body"
-
-    @property
-    def fuzzy_part_off(self) -> bool:
-        """Whether cross-validation switched the fuzzy part off."""
-        return bool(np.isinf(self.model.ridge_weight))
-
-    @property
-    def same_everywhere(self) -> bool:
-        """Whether one rule acts at all attitudes, and training went all the way round in roll and in pitch."""
-        functions = [name.split(" rule ")[0] for name in self.rules.name]
-        visited = np.asarray(self.model.visited, dtype=bool)
-        return len(set(functions)) == len(functions) and all(bool(visited.any(axis=axis).all()) for axis in (0, 1))
-
-    @property
-    def known_everywhere(self) -> bool:
-        """Whether its one rule is known well enough to hold at attitudes that training did not visit."""
-        full = self.solve.rank == self.solve.parameters
-        return self.same_everywhere and full and self.solve.condition_number <= WELL_CONDITIONED
-
-    @property
-    def verdict_label(self) -> str | None:
-        """How far to trust it, as `Verdict` names it; None where that was not judged."""
-        return None if self.verdict is None else self.verdict.label
-
-    @property
-    def validated(self) -> bool:
-        """Whether any evidence was gathered for it."""
-        evidence = (self.structures, self.residuals, self.uncertainty, self.curves, self.round_trip, self.steps)
-        return any(part is not None for part in (*evidence, self.physics, self.period, self.verdict))
-
-    @property
-    def summary(self) -> dict[str, Any]:
-        """The model for machines.
-
-        ``not_positive_definite`` is None: only the identification itself counts the training samples at which D(q) is
-        not positive definite.
-        """
-        judged, solve = self.judged, self.solve
-        stated = six_parameters(self.study.vehicle.inertia_kg_m2)
-        return {
-            **judged.summary_of(MODEL, TRAINING),
-            "condition_number": solve.condition_number,
-            "rank": solve.rank,
-            "parameters": solve.parameters,
-            "generations": len(self.history.evaluations) - 1,
-            "evaluations": int(self.history.evaluations[-1]),
-            "stop_reason": self.stop_reason,
-            "complete": self.complete,
-            "front": len(self.front.objectives),
-            "choice_error": None if self.front.held_out is None else float(np.min(self.front.held_out)),
-            "samples": judged.samples_of(TRAINING),
-            "learned": len(self.training_indices),
-            "ridge_weight": self.model.ridge_weight,
-            "fuzzy_part": "off" if self.fuzzy_part_off else "on",
-            "inertia_kg_m2": {
-                "found": dict(zip(INERTIA_PARAMETERS, self.baselines.rigid_body.tolist(), strict=True)),
-                "stated": dict(zip(INERTIA_PARAMETERS, stated.tolist(), strict=True)),
-            },
-            "not_positive_definite": None,
-            "baselines": {name: judged.summary_of(name, TRAINING) for name in judged.baselines},
-            "held_out": {part: self._held_out_summary(part) for part in judged.held_out},
-            "findings": list(self.findings),
-            "verdict": None if self.verdict is None or self.verdict.label is None else self.verdict.summary,
-        }
-
-    def _held_out_summary(self, part: str) -> dict[str, Any]:
-        judged = self.judged
-        return {
-            **judged.summary_of(MODEL, part),
-            "samples": judged.samples_of(part),
-            "outside": int(judged.outside[judged.parts.index(part)]),
-            "baselines": {name: judged.summary_of(name, part) for name in judged.baselines},
-        }
+    def _shape_of(self, effect: str) -> dict[str, float]:
+        shapes = zip(self.shape_effect, self.shape_name, self.shape.tolist(), strict=True)
+        return {name: value for of, name, value in shapes if of == effect}
 
 
-class StoredModel(Protocol):
-    """The numbers that a model is rebuilt from, as an artifact holds them."""
+@record
+class RemainderGroup:
+    """What has no name: torque and force over the direction of the airflow."""
 
-    @property
-    def weights(self) -> Array | None:
-        """Of the chromosome, shape (gene,)."""
-        ...
-
-    @property
-    def coefficients(self) -> Array | None:
-        """Of the rule consequents, shape (parameter,), kg m^2."""
-        ...
-
-    @property
-    def rigid_body(self) -> Array | None:
-        """Inertia under the fuzzy part, shape (6,), kg m^2."""
-        ...
-
-    @property
-    def input_range(self) -> Array | None:
-        """Minimum and maximum of roll and pitch inputs, shape (2, 2)."""
-        ...
-
-    @property
-    def visited(self) -> BoolArray | None:
-        """Cells of roll and pitch that training visited, shape (cell, cell)."""
-        ...
-
-
-def rebuilt_model(config: str, stored: StoredModel, path: object) -> Model:
-    """Rebuild a model from the study that made it and its stored numbers.
-
-    Parameters
-    ----------
-    config : str
-        The study as YAML.
-    path : Path
-        For messages.
-
-    Raises
-    ------
-    InputError
-        If the study and the numbers do not fit each other.
-    """
-    from cpfls_cli.fuzzy.inputs import InputRange
-    from cpfls_cli.identification.chromosome import decode
-    from cpfls_cli.identification.model import Model
-    from cpfls_cli.regressor.structure import model_structure
-
-    structure = model_structure(_study(config, path).identification)
-    numbers = (stored.weights, stored.coefficients, stored.rigid_body, stored.input_range, stored.visited)
-    weights, coefficients, rigid_body, ranges, visited = map(np.asarray, numbers)
-    if len(weights) != structure.genes or len(coefficients) != structure.parameters:
-        raise InputError(
-            f"{path}: holds {len(weights)} weights and {len(coefficients)} coefficients; its config asks for "
-            f"{structure.genes} and {structure.parameters}"
-        )
-    roll, pitch = (InputRange(*map(float, row)) for row in ranges)
-    return Model(structure, (roll, pitch), decode(structure, weights), coefficients, rigid_body, visited.astype(bool))
-
-
-def _study(config: str, path: object) -> Study:
-    from cpfls_cli.config.load import parse_config, validate
-
-    source = f"{path}: /config"
-    return validate(parse_config(config, source), source)
-
-
-def _model(result: Identification, base: str) -> ModelGroup:
-    model = result.model
-    names = [p.name for p, peaks in zip(model.structure.partitions, model.partitions, strict=True) for _ in peaks]
-    return ModelGroup(
-        weights=result.front.chromosomes[result.front.chosen],
-        partition=tuple(names),
-        breakpoints=np.concatenate(model.partitions),
-        coefficients=model.coefficients,
-        parameter=tuple(_parameter_names(model.structure)),
-        rigid_body=model.rigid_body,
-        base=base,
-        input_range=np.array([[r.minimum, r.maximum] for r in model.ranges]),
-        visited=model.visited,
-        ridge_weight=result.fit.ridge_weight,
+    breakpoints: Array = dataset(
+        "breakpoints", "peaks of the membership functions over the direction, share of a turn", "direction_breakpoint"
     )
+    harmonic_order: int = dataset("harmonic_order", "of the consequents; 0 for the seesaw")
+    rows: IntArray = dataset("rows", "which of torque (0 to 2) and force (3 to 5) it adds to", "remainder_row")
+    coefficients: Array = dataset(
+        "coefficients",
+        "of each column: by speed in the rotor plane times mean rotor speed, and by that speed squared",
+        "remainder_row",
+        "remainder_column",
+        "2",
+        units="SI",
+    )
+
+    @classmethod
+    def of(cls, remainder: Remainder) -> Self:
+        """Arrange a remainder."""
+        return cls(
+            breakpoints=remainder.breakpoints,
+            harmonic_order=remainder.harmonic_order,
+            rows=remainder.rows,
+            coefficients=remainder.coefficients,
+        )
+
+    def remainder(self) -> Remainder:
+        """Rebuild it."""
+        from cpfls_cli.playback.model import Remainder
+
+        return Remainder(
+            breakpoints=self.breakpoints,
+            harmonic_order=self.harmonic_order,
+            rows=self.rows.astype(np.int64),
+            coefficients=self.coefficients,
+        )
+
+
+@record
+class InertiaFunctionsGroup:
+    """Inertia over attitude by fuzzy systems, all that is needed to evaluate it, and where it was found."""
+
+    structure: str = dataset("structure", "cpfls: first and last rule joined; fls: classic TSK system")
+    input_map: str = dataset("input_map", "full-circle or data-range")
+    consequents: str = dataset("consequents", "harmonic or seesaw")
+    harmonic_order: int = dataset("harmonic_order", "highest harmonic of harmonic consequents")
+    products: str = dataset("products", "features of two inputs: additive or tensor")
+    membership_functions: IntArray = dataset(
+        "membership_functions", "of D13(pitch) D22(roll) D23(roll) D23(pitch) D33(roll) D33(pitch)", "6"
+    )
+    partition: tuple[str, ...] = dataset("partition", "partition each breakpoint belongs to", "breakpoint")
+    breakpoints: Array = dataset("breakpoints", "peaks of the membership functions on [0, 1]", "breakpoint")
+    coefficients: Array = dataset(
+        "coefficients", "coefficients of the rule consequents", "rule_coefficient", units="kg m^2", frame=EULER
+    )
+    parameter: tuple[str, ...] = dataset("parameter", "inertia function, rule and feature", "rule_coefficient")
+    rigid_body: Array = dataset(
+        "rigid_body", "Ixx Iyy Izz Ixy Ixz Iyz under the fuzzy part; zero for none", "6", units="kg m^2", frame=BODY
+    )
+    input_range: Array = dataset("input_range", "minimum and maximum of roll and pitch inputs", "2", "2")
+    visited: BoolArray = dataset(
+        "visited", "cells of roll and pitch that training visited", "cell", "cell", frame=EULER
+    )
+
+    @classmethod
+    def of(cls, model: InertiaFunctions) -> Self:
+        """Arrange an inertia over attitude."""
+        structure = model.structure
+        names = [p.name for p, peaks in zip(structure.partitions, model.partitions, strict=True) for _ in peaks]
+        return cls(
+            structure=structure.settings.structure,
+            input_map=structure.settings.input_map,
+            consequents=structure.settings.consequents,
+            harmonic_order=structure.settings.harmonic_order,
+            products=structure.settings.products,
+            membership_functions=np.array([each.functions for each in structure.partitions]),
+            partition=tuple(names),
+            breakpoints=np.concatenate(model.partitions),
+            coefficients=model.coefficients,
+            parameter=tuple(_parameter_names(structure)),
+            rigid_body=model.rigid_body,
+            input_range=np.array([[r.minimum, r.maximum] for r in model.ranges]),
+            visited=model.visited,
+        )
+
+    def inertia(self) -> InertiaFunctions:
+        """Rebuild the inertia over attitude.
+
+        Raises
+        ------
+        InputError
+            If the numbers do not fit the structure.
+        """
+        from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+        from cpfls_cli.fuzzy.inputs import InputRange
+        from cpfls_cli.regressor.structure import StructureSettings, model_structure
+
+        try:
+            structure = model_structure(
+                StructureSettings(
+                    structure=self.structure,  # type: ignore[arg-type]  # checked there
+                    input_map=self.input_map,  # type: ignore[arg-type]
+                    consequents=self.consequents,  # type: ignore[arg-type]
+                    harmonic_order=self.harmonic_order,
+                    products=self.products,  # type: ignore[arg-type]
+                    membership_functions=tuple(self.membership_functions.tolist()),
+                )
+            )
+        except SettingError as error:
+            raise InputError(f"vehicle/inertia_functions/{error}") from None
+        names = np.array(self.partition)
+        partitions = tuple(np.asarray(self.breakpoints[names == each.name]) for each in structure.partitions)
+        peaks = [len(each) for each in partitions]
+        wanted = [each.functions for each in structure.partitions]
+        if peaks != wanted or len(self.coefficients) != structure.parameters:
+            raise InputError(
+                f"vehicle/inertia_functions holds {peaks} breakpoints and {len(self.coefficients)} coefficients; its "
+                f"structure asks for {wanted} and {structure.parameters}"
+            )
+        roll, pitch = (InputRange(*map(float, row)) for row in self.input_range)
+        return InertiaFunctions(
+            structure, (roll, pitch), partitions, self.coefficients, self.rigid_body, self.visited.astype(bool)
+        )
+
+
+def _inertia_functions(model: VehicleModel) -> InertiaFunctionsGroup | None:
+    from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+
+    if model.fuzzy is None:
+        return None
+    assert isinstance(model.fuzzy, InertiaFunctions), "what is written was identified"
+    return InertiaFunctionsGroup.of(model.fuzzy)
 
 
 def _parameter_names(structure: ModelStructure) -> Iterator[str]:
@@ -435,3 +303,138 @@ def _parameter_names(structure: ModelStructure) -> Iterator[str]:
         for rule in range(block.rules):
             for feature in range(block.features):
                 yield f"{block.function.name} rule {rule + 1} c{feature}"
+
+
+@record
+class VehicleGroup:
+    """The model of a vehicle, all that is needed to evaluate it."""
+
+    mass: float = dataset("mass", "mass", units="kg")
+    gravity: float = dataset("gravity", "gravitational acceleration", units="m/s^2")
+    inertia: Array = dataset("inertia", "Ixx Iyy Izz Ixy Ixz Iyz", "6", units="kg m^2", frame=BODY)
+    rotor: RotorsGroup = group("rotor")
+    response: ResponseGroup = group("response")
+    effect: EffectsGroup = group("effect")
+    remainder: RemainderGroup | None = group("remainder", default=None)
+    wind: Array | None = dataset(
+        "steady_wind",
+        "of its flights; no part of the vehicle",
+        "3",
+        units="m/s",
+        frame=WORLD,
+        default=None,
+    )
+    inertia_functions: InertiaFunctionsGroup | None = group("inertia_functions", default=None)
+    repair: AuditGroup | None = group("repair", default=None)
+
+    @classmethod
+    def of(cls, model: VehicleModel) -> Self:
+        """Arrange a model."""
+        vehicle = model.vehicle
+        return cls(
+            mass=vehicle.mass_kg,
+            gravity=vehicle.gravity_m_s2,
+            inertia=six_parameters(vehicle.inertia_kg_m2),
+            rotor=RotorsGroup.of(vehicle, model.thrust_linear),
+            response=ResponseGroup.of(model),
+            effect=EffectsGroup.of(model.effects),
+            remainder=None if model.remainder is None else RemainderGroup.of(model.remainder),
+            wind=np.array(model.wind) if any(model.wind) else None,
+            inertia_functions=_inertia_functions(model),
+            repair=None if model.repairs is None else AuditGroup.of(model.repairs),
+        )
+
+    def vehicle(self) -> VehicleSettings:
+        """Rebuild mass, inertia and rotors."""
+        from cpfls_cli.vehicle.settings import VehicleSettings
+
+        first, second, third, *products = self.inertia.tolist()
+        return VehicleSettings(
+            gravity_m_s2=self.gravity,
+            mass_kg=self.mass,
+            inertia_kg_m2=(first, second, third, *products) if any(products) else (first, second, third),
+            rotors=self.rotor.rotors(),
+            rotor_speed_max_rad_s=self.rotor.speed_max,
+        )
+
+    def vehicle_model(self) -> VehicleModel:
+        """Rebuild the model.
+
+        Raises
+        ------
+        InputError
+            If this program does not know one of its effects.
+        """
+        from cpfls_cli.playback.model import VehicleModel
+
+        return VehicleModel(
+            vehicle=self.vehicle(),
+            response=self.response.response(),
+            thrust_linear=self.rotor.thrust_linear,
+            effects=self.effect.effects(),
+            remainder=None if self.remainder is None else self.remainder.remainder(),
+            wind=(0.0, 0.0, 0.0) if self.wind is None else tuple(self.wind.tolist()),
+            fuzzy=None if self.inertia_functions is None else self.inertia_functions.inertia(),
+            commanded=self.response.commanded,
+            hold=None if self.response.hold == _USUAL else self.response.hold,  # type: ignore[arg-type]
+            repairs=None if self.repair is None else self.repair.audit(),
+        )
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The vehicle for machines."""
+        return {
+            "mass_kg": self.mass,
+            "inertia_kg_m2": dict(zip(INERTIA_PARAMETERS, self.inertia.tolist(), strict=True)),
+            "thrust_factor_n_s2": self.rotor.thrust_factor.tolist(),
+            "drag_factor_n_m_s2": self.rotor.drag_factor.tolist(),
+            "thrust_linear": self.rotor.thrust_linear,
+            "response": {
+                "delay_s": self.response.delay,
+                "lag_s": self.response.lag,
+                "slow_roll_pitch": self.response.slow_roll_pitch,
+                "slow_yaw": self.response.slow_yaw,
+                "slow_s": self.response.slow,
+            },
+            "effects": {name: self.effect.linear_of(name).tolist() for name in self.effect.name},
+            "remainder": None if self.remainder is None else self.remainder.rows.tolist(),
+            "steady_wind_m_s": [0.0, 0.0, 0.0] if self.wind is None else self.wind.tolist(),
+            "not_held": list(self.vehicle_model().beside_table),
+        }
+
+
+@record
+class ModelRecord(Record):
+    """What every artifact `cpfls/model` holds, whoever found it."""
+
+    FORMAT: ClassVar = Format(
+        "cpfls/model", "a model of a vehicle, and how it was found", "identify, extend, gap, vehicle"
+    )
+
+    vehicle: VehicleGroup = group("vehicle")
+
+    def vehicle_model(self) -> VehicleModel:
+        """Rebuild the model.
+
+        Raises
+        ------
+        InputError
+            If this program does not know one of its effects, or its numbers do not fit each other.
+        """
+        return self.vehicle.vehicle_model()
+
+    @property
+    def learned(self) -> dict[str, InputFile]:
+        """Flights that it was found in, by hash."""
+        roles = self.origin.inputs.items()
+        return {file.sha256: file for role, file in roles if role == "flight" or role.startswith("flight-")}
+
+    @property
+    def verdict_label(self) -> str | None:
+        """How far to trust it, as its kind is judged; None where that was not judged."""
+        return None
+
+    @property
+    def stopped(self) -> str:
+        """Why the search for it ended before its end; empty where it did not."""
+        return ""

@@ -12,8 +12,8 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.spec import BODY, EULER, PART, Format, Record, dataset, record
 
 if TYPE_CHECKING:
+    from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
     from cpfls_cli.identification.judge import Score
-    from cpfls_cli.identification.model import Model
     from cpfls_cli.regressor.motion import Motion
     from cpfls_cli.validation.bootstrap import Draws
 
@@ -94,7 +94,9 @@ class PredictionRecord(Record):
     outside: BoolArray = dataset("outside", "1 where the attitude lies outside the excited region", "time")
 
     @classmethod
-    def of(cls, model: Model, time: Array, motion: Motion, measured: Array | None, draws: Draws | None) -> Self:
+    def of(
+        cls, model: InertiaFunctions, time: Array, motion: Motion, measured: Array | None, draws: Draws | None
+    ) -> Self:
         """Predict along a flight.
 
         Parameters

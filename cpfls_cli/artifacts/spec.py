@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple, Self, TypeVar, dataclass_transform
 
 import numpy as np
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 """Raised when a dataset is renamed, removed or changes its meaning; new optional datasets do not raise it."""
 
 CONFIG = "config"
@@ -84,7 +84,8 @@ class DatasetSpec:
 class Format(NamedTuple):
     """Name of an artifact format, what it holds, the commands that write it, and the roles of their inputs.
 
-    One that is compressed is written some samples at a time.
+    One that is compressed is written some samples at a time. A format of several kinds has one record for each, which
+    adds sections of its own to what all of them hold.
     """
 
     name: str
@@ -92,6 +93,7 @@ class Format(NamedTuple):
     made_by: str
     inputs: tuple[str, ...] = ()
     compressed: bool = False
+    kind: str = ""
 
 
 @dataclass(frozen=True)
@@ -112,6 +114,8 @@ class ArtifactSpec:
         Roles of the files it was made from.
     compressed : bool
         Whether what has a value for each sample is compressed.
+    kind : str
+        Value of the root attribute ``kind``; empty for a format of one kind, and for what all kinds hold.
     """
 
     format: str
@@ -120,6 +124,11 @@ class ArtifactSpec:
     datasets: tuple[DatasetSpec, ...]
     inputs: tuple[str, ...] = ()
     compressed: bool = False
+    kind: str = ""
+
+    def includes(self, other: ArtifactSpec) -> bool:
+        """Tell whether an artifact of another specification is one of this."""
+        return self.format == other.format and self.kind in ("", other.kind)
 
     @property
     def makers(self) -> str:
@@ -375,7 +384,7 @@ def _specs(cls: Any, prefix: str, optional: bool) -> Iterator[DatasetSpec]:
 def _artifact_spec(cls: Any) -> ArtifactSpec:
     own = cls.FORMAT
     datasets = tuple(_specs(cls, "", False))
-    return ArtifactSpec(own.name, own.description, own.made_by, datasets, own.inputs, own.compressed)
+    return ArtifactSpec(own.name, own.description, own.made_by, datasets, own.inputs, own.compressed, own.kind)
 
 
 def _data(owner: Any, prefix: str) -> Iterator[tuple[str, Any]]:

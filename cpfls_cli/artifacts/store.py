@@ -105,7 +105,9 @@ def read_record(path: Path, wanted: type[R], *needed: str) -> R:
         raise InputError(f"{path}: lacks {', '.join(missing)}; this stage needs {', '.join(names)}")
     if any(np.size(artifact.data[name]) == 0 for name in names):
         raise InputError(f"{path}: holds no samples")
-    return _record(path, artifact, wanted)
+    kind = record_of_format(artifact.spec.format, artifact.spec.kind)
+    # Of a format of several kinds the record of the kind, which is one of what was asked for.
+    return _record(path, artifact, kind if kind is not None and issubclass(kind, wanted) else wanted)
 
 
 def read_any(path: Path) -> Record:
@@ -117,7 +119,7 @@ def read_any(path: Path) -> Record:
         If the file is not a good artifact.
     """
     artifact = read_artifact(path)
-    wanted = record_of_format(artifact.spec.format)
+    wanted = record_of_format(artifact.spec.format, artifact.spec.kind)
     assert wanted is not None, "its format is known"
     return _record(path, artifact, wanted)
 
@@ -242,8 +244,12 @@ def format_name(path: Path) -> str | None:
 
 
 def holds(path: Path, wanted: type[Record]) -> bool:
-    """Tell whether a file is an artifact of one format, without reading it whole."""
-    return format_name(path) == wanted.FORMAT.name
+    """Tell whether a file is an artifact of one format, and of its kind, without reading it whole."""
+    try:
+        with opened(path) as stored:
+            return wanted.spec().includes(stored.spec)
+    except InputError:
+        return False
 
 
 def read_header(path: Path) -> Header:
@@ -341,6 +347,8 @@ def _in_parts(artifact: Artifact, spec: DatasetSpec) -> bool:
 def _write_header(file: h5py.File, artifact: Artifact) -> None:
     header = artifact.header
     file.attrs["format"] = artifact.spec.format
+    if artifact.spec.kind:
+        file.attrs["kind"] = artifact.spec.kind
     file.attrs["schema_version"] = SCHEMA_VERSION
     file.attrs["cpfls_version"] = header.version
     file.attrs["seed"] = header.seed

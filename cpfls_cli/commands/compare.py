@@ -8,8 +8,6 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
-from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.gap_flights import BaseGroup
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
@@ -19,12 +17,12 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.recordings import Flights, read_flights
-from cpfls_cli.flights.same_vehicle import base_of, read_of_vehicle, read_vehicle
+from cpfls_cli.flights.same_vehicle import read_model
 from cpfls_cli.gap.compare import compare
-from cpfls_cli.gap.extended import ExtendedModel, plain
-from cpfls_cli.gap.whole_vehicle import of_vehicle, with_effects
+from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.pages.disagreement import answer
 from cpfls_cli.pages.source import source_of
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.outcome import Outcome, nothing_written
 
 
@@ -41,38 +39,32 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     inputs = begin(job, numbered_roles("flight", flights) | ({} if model is None else {"model": model}))
     check_ignored(job.study)
     require_known(job.study, "compare", whole=model is not None and holds(model, VehicleRecord))
-    given, extended, base = _with_model(read_flights(flights, job.study), model, job.study)
+    given, base = _with_model(read_flights(flights, job.study), model, job.study)
     if job.dry_run:
         return nothing_written(job)
-    record = finish(job, compared(job.study, given, extended, base, progress_of(job.progress)), inputs)
+    record = finish(job, compared(job.study, given, base, progress_of(job.progress)), inputs)
     return Outcome(record.summary, tuple(answer(source_of(job, record))))
 
 
-def _with_model(given: Flights, path: Path | None, study: Study) -> tuple[Flights, ExtendedModel, BaseGroup]:
-    """Read a model, with or without effects, and the identified model under it; flights are those of its vehicle."""
-    if path is not None and holds(path, VehicleRecord):
-        whole = read_vehicle(path, study).vehicle.vehicle_model()
-        recordings = tuple(of_vehicle(flight, whole) for flight in given.recordings)
-        return replace(given, recordings=recordings), with_effects(whole), BaseGroup.of(None)
-    if path is not None and holds(path, ExtendedRecord):
-        record = read_of_vehicle(path, ExtendedRecord, study)
-        return given, record.rebuilt(path), record.base
-    base = base_of(path, study)
-    return given, plain(base.rebuilt(path)), base
+def _with_model(given: Flights, path: Path | None, study: Study) -> tuple[Flights, VehicleModel]:
+    """Read a model; flights become those of its vehicle."""
+    model = VehicleModel(vehicle=study.vehicle) if path is None else read_model(path, study)
+    recordings = tuple(of_vehicle(given.recordings, model))
+    return replace(given, recordings=recordings), model
 
 
 def compared(
-    study: Study, given: Flights, model: ExtendedModel, base: BaseGroup, progress: Callable[[float, str], None]
+    study: Study, given: Flights, model: VehicleModel, progress: Callable[[float, str], None]
 ) -> DisagreementRecord:
     """Compare a model with flights.
 
     Parameters
     ----------
-    base : BaseGroup
-        The identified model under it, or the vehicle.
+    model : VehicleModel
+        Flights are those of its vehicle.
     """
     disagreement = compare(given.recordings, model, study.gap, generator(study, "compare"), progress)
-    return DisagreementRecord.of(disagreement, given.recordings, given.warnings, base)
+    return DisagreementRecord.of(disagreement, given.recordings, given.warnings, model)
 
 
 def check_ignored(study: Study) -> None:

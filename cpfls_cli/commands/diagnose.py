@@ -9,7 +9,6 @@ from typing import Any
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.gap_effects import effect_summary, estimate_summary
-from cpfls_cli.artifacts.gap_flights import BaseGroup
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.commands.compare import check_ignored, progress_of
 from cpfls_cli.config.study import Study, generator
@@ -24,6 +23,7 @@ from cpfls_cli.pages.diagnosis import answer
 from cpfls_cli.pages.effects import closest_sentence
 from cpfls_cli.pages.first_screen import counted_notes, next_steps, verdict_box
 from cpfls_cli.pages.source import Source, source_of
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Block, Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
 
@@ -41,7 +41,7 @@ def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
     inputs = begin(job, {"disagreement": disagreement} | numbered_roles("held-out", held_out))
     check_ignored(job.study)
     compared = read_of_vehicle(disagreement, DisagreementRecord, job.study)
-    if compared.has_effects:
+    if not compared.is_base(job.study.vehicle):
         raise InputError(
             f"{disagreement}: was made with a model that has effects already; `cpfls diagnose` names what a base model "
             "misses, so compare without --model, or with an identified model"
@@ -52,7 +52,7 @@ def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
         return nothing_written(job)
     warnings = (*compared.warning, *held.warnings)
     progress = progress_of(job.progress)
-    diagnosis, record = diagnosed(job.study, split, warnings, compared.base, disagreement, progress)
+    diagnosis, record = diagnosed(job.study, split, warnings, compared.base.vehicle_model(), progress)
     record = finish(job, record, inputs)
     learned = [file for role, file in compared.origin.inputs.items() if role.startswith("flight")]
     twice = seen_twice(learned, [file for role, file in inputs.items() if role.startswith("held-out")])
@@ -66,8 +66,7 @@ def diagnosed(
     study: Study,
     split: FlightSplit,
     warnings: Sequence[str],
-    base: BaseGroup,
-    path: Path,
+    base: VehicleModel,
     progress: Callable[[float, str], None],
 ) -> tuple[Diagnosis, DiagnosisRecord]:
     """Diagnose flights.
@@ -76,12 +75,10 @@ def diagnosed(
     ----------
     warnings : sequence of str
         What to know about the flights.
-    base : BaseGroup
-        The identified model that misses something, or the vehicle.
-    path : Path
-        Of the file with the base, for messages.
+    base : VehicleModel
+        That misses something: the rigid body, or inertia functions.
     """
-    model = base.rebuilt(path)
+    model = base.fuzzy
     rng = generator(study, "diagnose")
     result = diagnose(split.training, split.held_out, study.gap, rng, model=model, progress=progress)
     extended = result.model(model)

@@ -8,16 +8,18 @@ from pathlib import Path
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.gap_effects import PlaybackChangeGroup
-from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING, BaseGroup
+from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.flights.same_vehicle import base_of, read_of_vehicle
+from cpfls_cli.flights.same_vehicle import read_base, read_of_vehicle
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
-from cpfls_cli.gap.playback import errors_by_horizon, played_pairs
+from cpfls_cli.gap.playback import errors_by_horizon, left_out, played_pairs
+from cpfls_cli.gap.whole_vehicle import require_body, whole_vehicle
 from cpfls_cli.pages.extended import answer, warnings
 from cpfls_cli.pages.source import source_of
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.weak_form.windows import Recording
 
@@ -41,12 +43,12 @@ def run(job: Job, diagnosis: Path, model: Path | None) -> Outcome:
     """
     inputs = begin(job, {"diagnosis": diagnosis} | ({} if model is None else {"model": model}))
     diagnosed = read_of_vehicle(diagnosis, DiagnosisRecord, job.study)
-    base = diagnosed.base if model is None else base_of(model, job.study)
+    base = diagnosed.base.vehicle_model() if model is None else read_base(model, job.study)
     named_effects(diagnosed)
     if job.dry_run:
         return nothing_written(job)
     training, held = (diagnosed.flights.recordings(job.study, role) for role in (TRAINING, HELD_OUT))
-    record = extended(job.study, training, held, diagnosed, base, model or diagnosis)
+    record = extended(job.study, training, held, diagnosed, base)
     record = finish(job, record, inputs)
     summary = {**record.summary, "warnings": warnings(record)}
     return Outcome(summary, tuple(answer(source_of(job, record))))
@@ -89,25 +91,24 @@ def extended(
     training: Sequence[Recording],
     held: Sequence[Recording],
     diagnosis: DiagnosisRecord,
-    base: BaseGroup,
-    path: Path,
+    base: VehicleModel,
 ) -> ExtendedRecord:
     """Put the effects that a diagnosis names into a model.
 
     Parameters
     ----------
-    base : BaseGroup
-        The identified model to extend, or the vehicle.
-    path : Path
-        Of the file with the base, for messages.
+    base : VehicleModel
+        To extend: the rigid body, or inertia functions.
 
     Raises
     ------
     ComputationError
         If the diagnosis names nothing, or the gap on the held-out flights does not shrink.
     """
-    model = base.rebuilt(path)
-    extension = extend(training, held, named_effects(diagnosis), diagnosis.audit.audit(), study.gap, model)
-    played = played_pairs(held, extension.model, plain(model))
+    extension = extend(training, held, named_effects(diagnosis), diagnosis.audit.audit(), study.gap, base.fuzzy)
+    whole, given = (whole_vehicle(each, study.vehicle) for each in (extension.model, plain(base.fuzzy)))
+    require_body(extension.model, study.vehicle)
+    played = played_pairs(held, whole, given)
     playback = PlaybackChangeGroup.of_pairs(played, errors_by_horizon(played, study.gap.horizon_s))
-    return ExtendedRecord.of(extension, study.vehicle, playback, base).sized(extension.model, held)
+    missing = left_out(whole, whole.beside_table, held)
+    return ExtendedRecord.of(extension, study.vehicle, whole, playback, missing)

@@ -10,7 +10,6 @@ from pathlib import Path
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.gap_flights import BaseGroup
 from cpfls_cli.artifacts.job import Job, finish, input_file, take_inputs
 from cpfls_cli.artifacts.output import check_folder, filled_folder, refuse_inputs, write_text
 from cpfls_cli.artifacts.spec import InputFile
@@ -21,12 +20,12 @@ from cpfls_cli.commands.extend import extended
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.recordings import Flights, FlightSplit, read_flights, seen_twice, split_flights
-from cpfls_cli.flights.same_vehicle import base_of
-from cpfls_cli.gap.extended import plain as without_effects
+from cpfls_cli.flights.same_vehicle import read_base
 from cpfls_cli.gap.naming.results import Diagnosis
 from cpfls_cli.pages.disagreement import where
 from cpfls_cli.pages.extended import model_with, warnings
 from cpfls_cli.pages.source import source_of
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Block, Text
 from cpfls_cli.report.outcome import Outcome, plain
 
@@ -40,8 +39,7 @@ class _Given:
 
     flights: Flights
     split: FlightSplit
-    base: BaseGroup
-    path: Path
+    base: VehicleModel
     inputs: Mapping[str, InputFile]
 
     def inputs_of(self, role: str) -> dict[str, InputFile]:
@@ -104,19 +102,17 @@ def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: P
     read = read_flights([*flights, *held_out], job.study)
     given, held = read.recordings[: len(flights)], read.recordings[len(flights) :]
     split = split_flights(given, held, job.study.gap)
-    return _Given(Flights(given, read.warnings), split, base_of(model, job.study), model or Path(), inputs)
+    base = read_base(model, job.study)
+    return _Given(Flights(given, read.warnings), split, base, inputs)
 
 
 def _answers(job: Job, given: _Given) -> _Answers:
     study, base, split = job.study, given.base, given.split
-    model = without_effects(base.rebuilt(given.path))
-    disagreement = compared(study, given.flights, model, base, progress_of(job.progress, 0.0, 0.15))
-    diagnosis, record = diagnosed(
-        study, split, given.flights.warnings, base, given.path, progress_of(job.progress, 0.15, 0.85)
-    )
+    disagreement = compared(study, given.flights, base, progress_of(job.progress, 0.0, 0.15))
+    diagnosis, record = diagnosed(study, split, given.flights.warnings, base, progress_of(job.progress, 0.15, 0.85))
     job.progress(0.85, 1, "extend")
     try:
-        extension = extended(study, split.training, split.held_out, record, base, given.path)
+        extension = extended(study, split.training, split.held_out, record, base)
     except ComputationError as error:
         return _Answers(disagreement, diagnosis, record, None, str(error))
     return _Answers(disagreement, diagnosis, record, extension, "")

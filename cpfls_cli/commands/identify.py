@@ -9,8 +9,8 @@ from functools import partial
 from pathlib import Path
 from signal import SIGINT
 
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job, finish
-from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.commands.stopped import stopped, without_model
 from cpfls_cli.config.study import Study, generator, settings_of
@@ -79,7 +79,7 @@ def run(
     with search.kept():
         evidence, signal = _evidence(job, result, data, held_out, wrong, watch.signal)
         base, vehicle = job.study.identification.base, job.study.vehicle
-        record = finish(job, ModelRecord.of(result, base, data.indices, evidence, vehicle), inputs)
+        record = finish(job, IdentifiedRecord.of(result, base, data.indices, evidence, vehicle), inputs)
     search.end(result.stop_reason)
     seconds = round(time.perf_counter() - clock, 3)
     summary = {**record.summary, "not_positive_definite": result.indefinite, "seconds": seconds}

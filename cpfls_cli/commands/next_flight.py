@@ -175,7 +175,7 @@ _NO_NOISE = (
 def _left_open(study: Study, path: Path) -> Case:
     """Ask what a diagnosis leaves open, or for the effects that the config names with what the diagnosis knows."""
     record = read_of_vehicle(path, DiagnosisRecord, study)
-    base = record.base.rebuilt(path)
+    base = record.base.vehicle_model().fuzzy
     recordings = record.flights.recordings(study, TRAINING)
     prepared = Preparation(common_windows(recordings, study.gap), base, study.gap, record.audit.audit())
     flights = tuple(prepared.repaired(recordings))

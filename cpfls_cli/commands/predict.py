@@ -11,10 +11,9 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.flight import FlightRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish_parts
-from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.spec import PART
 from cpfls_cli.artifacts.store import count_rows, holds, read_header, read_record
@@ -23,20 +22,21 @@ from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
 from cpfls_cli.config.unknown import require_known
 from cpfls_cli.consistency.findings import contradictions
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel, coriolis_matrix
+from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.flight_source import Stretch, Stretches, check_file, flight_source, flight_stretches
-from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles, read_of_vehicle, read_vehicle
-from cpfls_cli.gap.extended import ExtendedModel, inertial_force
-from cpfls_cli.gap.whole_vehicle import of_vehicle, with_effects
+from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles, read_model, rebuilt
+from cpfls_cli.gap.extended import inertial_force, inertial_torque
+from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.identification.data import TorqueSource
-from cpfls_cli.identification.model import Model
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.pages.model import trust_notes
 from cpfls_cli.pages.prediction import answer
 from cpfls_cli.pages.sensors import contradicted
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
@@ -59,32 +59,32 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
     """
     inputs = begin(job, {"model": model, "flight": flight})
     require_known(job.study, "predict", whole=holds(model, VehicleRecord))
-    with_more = {ExtendedRecord: _with_effects, VehicleRecord: _of_vehicle}
-    predicting = next((kind for record, kind in with_more.items() if holds(model, record)), None)
-    found, wrong = Findings(), contradictions(check_file(flight, job.study, driven=predicting is not None))
+    whole = not holds(model, IdentifiedRecord)
+    found, wrong = Findings(), contradictions(check_file(flight, job.study, driven=whole))
     said = [Text(contradicted(each), "warning") for each in wrong]
-    if predicting is not None:
-        predicted, stretches = predicting(model, flight, job.study), flight_stretches(flight, job.study)
+    if whole:
+        predicted, stretches = _of_vehicle(model, flight, job.study), flight_stretches(flight, job.study)
         if job.dry_run:
             predicted(next(iter(stretches)))
             return nothing_written(job)
         finish_parts(job, _by_stretches(predicted, stretches, found, job.progress), len(stretches), inputs)
         about = (Text(f"{stretches.name}: {warning}", "warning") for warning in stretches.warnings)
         return Outcome(found.summary | {"contradictions": list(wrong)}, (*said, *about, *answer(found)))
-    identified = read_record(model, ModelRecord)
-    rebuilt = identified.rebuilt(model)
+    identified = read_record(model, IdentifiedRecord)
+    functions = rebuilt(model, identified).fuzzy
+    assert isinstance(functions, InertiaFunctions), "what is identified"
     torque = count_rows(flight, FlightRecord.spec(), FlightRecord.path("torque")) is not None
     flown = flight_source(flight, torque=torque)
     if job.dry_run:
         return nothing_written(job)
-    finish_parts(job, _along(rebuilt, identified.draws(), flown, torque, found, job.progress), len(flown), inputs)
+    finish_parts(job, _along(functions, identified.draws(), flown, torque, found, job.progress), len(flown), inputs)
     others = (*model_of_another(model, job.study), *other_vehicles([flight], job.study))
     notes = (*trust_notes(identified, model), *(Text(note, "warning") for note in others))
     return Outcome(found.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(found, identified)))
 
 
 def _along(
-    model: Model, draws: Draws | None, flown: TorqueSource, torque: bool, found: Findings, progress: Progress
+    model: InertiaFunctions, draws: Draws | None, flown: TorqueSource, torque: bool, found: Findings, progress: Progress
 ) -> Iterator[PredictionRecord]:
     """Predict part by part, and take note of what is found."""
     for data in flown.chunks():
@@ -108,44 +108,24 @@ def _by_stretches(
             yield part
 
 
-def _with_effects(path: Path, flight: Path, study: Study) -> _Predicted:
-    """Predict the rotors' torque of a model with effects: what is measured less that is the gap that remains.
-
-    A stretch raises an InputError if the flight lacks the attitude or a signal that an effect needs.
-    """
-    model = read_of_vehicle(path, ExtendedRecord, study).rebuilt(path)
-
-    def predicted(stretch: Stretch) -> PredictionRecord:
-        logged = stretch.signals
-        if logged.attitude is None or logged.torque is None:
-            raise InputError(f"{flight}: lacks the attitude; a prediction is in Euler coordinates")
-        signals = model.repaired(logged)
-        prediction = _prediction(signals, model, model.rotor_torque(signals), logged.torque)
-        if not isinstance(model.base, Model):
-            return prediction
-        return replace(prediction, outside=model.base.outside(logged.attitude))
-
-    return predicted
-
-
 def _of_vehicle(path: Path, flight: Path, study: Study) -> _Predicted:
     """Predict torque and force on a whole vehicle; they are held against what the motion takes.
 
     A torque that was logged beside the rotor speeds is taken in its place. A stretch raises an InputError if the flight
     lacks the attitude or a signal that the model needs.
     """
-    model = read_vehicle(path, study).vehicle.vehicle_model()
-    extended, told = with_effects(model), _tells_torque(flight, study)
+    model, told = read_model(path, study), _tells_torque(flight, study)
 
     def predicted(stretch: Stretch) -> PredictionRecord:
-        signals = of_vehicle(Recording(flight.name, stretch.signals), model).signals
-        if signals.attitude is None:
+        (recording,) = of_vehicle([Recording(flight.name, stretch.signals)], model)
+        if recording.signals.attitude is None:
             raise InputError(f"{flight}: lacks the attitude; a prediction is in Euler coordinates")
-        wrench = signals.wrench + extended.effect_wrench(signals)
+        signals = model.acting(model.repaired(recording.signals))
+        wrench = model.wrench_along(signals)
         recorded = stretch.known.get("body_torque") if told else None
-        against = extended.inertial_torque(signals) if recorded is None else recorded
+        against = inertial_torque(signals, model.fuzzy) if recorded is None else recorded
         return replace(
-            _prediction(signals, extended, wrench[:, :3], against),
+            _prediction(signals, model, wrench[:, :3], against),
             held_against="motion" if recorded is None else "recorded",
             force=wrench[:, 3:],
             measured_force=inertial_force(signals) if signals.has_force else None,
@@ -163,12 +143,12 @@ def _tells_torque(path: Path, study: Study) -> bool:
     return "log" in made.inputs and config["import"]["torque_source"] == "column"
 
 
-def _prediction(signals: Signals, model: ExtendedModel, body_torque: Array, measured: Array) -> PredictionRecord:
+def _prediction(signals: Signals, model: VehicleModel, body_torque: Array, measured: Array) -> PredictionRecord:
     """Arrange torques along a flight with attitude, shape (time, 3) each, N m, body frame."""
     attitude = signals.attitude
     assert attitude is not None, "checked before"
     torque, given = (rotations.generalised_torque(attitude, each) for each in (body_torque, measured))
-    inertia = _inertia(model.inertia(signals), attitude)
+    inertia = _inertia(model, attitude)
     return PredictionRecord(
         time=signals.time,
         attitude=attitude,
@@ -178,11 +158,12 @@ def _prediction(signals: Signals, model: ExtendedModel, body_torque: Array, meas
         error=given - torque,
         inertia=inertia.value,
         coriolis=coriolis_matrix(inertia, rotations.attitude_rate(attitude, signals.body_rate)),
-        outside=np.zeros(len(attitude), dtype=bool),
+        outside=np.zeros(len(attitude), dtype=bool) if model.fuzzy is None else model.fuzzy.outside(attitude),
     )
 
 
-def _inertia(inertia: Array | InertiaModel, attitude: Array) -> InertiaValues:
-    if isinstance(inertia, np.ndarray):
-        return InertiaValues(inertia_matrix(attitude, inertia), inertia_matrix_gradient(attitude, inertia))
-    return inertia.inertia(attitude)
+def _inertia(model: VehicleModel, attitude: Array) -> InertiaValues:
+    if model.fuzzy is not None:
+        return model.fuzzy.inertia(attitude)
+    tensor = model.body.inertia
+    return InertiaValues(inertia_matrix(attitude, tensor), inertia_matrix_gradient(attitude, tensor))

@@ -12,11 +12,13 @@ from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.config.unknown import require_known
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import numbered_roles
-from cpfls_cli.flights.playback import ModelToPlay, flights_to_play, is_vehicle, model_to_play
+from cpfls_cli.flights.playback import flights_to_play, played, repairs_of
 from cpfls_cli.flights.recordings import seen_twice
+from cpfls_cli.flights.same_vehicle import is_vehicle, read_model
 from cpfls_cli.pages.replay import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.replay import Played, ReplayOptions, replay
 from cpfls_cli.report.numbers import joined
 from cpfls_cli.report.outcome import Outcome, nothing_written
@@ -35,22 +37,22 @@ def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) 
     require_known(job.study, "replay", whole=not is_vehicle(model))
     of_model = {} if is_vehicle(model) else {"model": model}
     inputs = begin(job, of_model | numbered_roles("flight", flights))
-    to_play = model_to_play(model, job.study)
+    to_play = read_model(model, job.study)
     given = flights_to_play(flights, job.study, options.hold)
-    played = [to_play.played(flight) for flight in given]
+    pairs = [played(to_play, flight, job.study.vehicle) for flight in given]
     horizon = _samples(options.horizon_s, given[0])
-    for each in played:
+    for each in pairs:
         each.flight.starts(horizon, options.every)
     if job.dry_run:
         return nothing_written(job)
-    errors = replay(played, horizon, options.every, lambda done: job.progress(done, 1))
+    errors = replay(pairs, horizon, options.every, lambda done: job.progress(done, 1))
     warnings = [
         *seen_twice((file for role, file in inputs.items() if role not in of_model), ()),
         *(_learned_from(model, inputs) if of_model else ()),
         *(warning for flight in given for warning in flight.warnings),
-        *_warnings(model.name, to_play, played),
+        *_warnings(model.name, to_play, pairs),
     ]
-    record = finish(job, ReplayRecord.of(model.name, options, given, played, errors, warnings), inputs)
+    record = finish(job, ReplayRecord.of(model.name, options, given, pairs, errors, warnings), inputs)
     return Outcome(record.summary, tuple(answer(source_of(job, record))))
 
 
@@ -62,11 +64,11 @@ def _learned_from(model: Path, inputs: Mapping[str, InputFile]) -> Iterator[str]
             yield f"{file.name}: {model.name} has learned from it, so it shows nothing of flights not seen"
 
 
-def _warnings(name: str, model: ModelToPlay, played: Sequence[Played]) -> Iterator[str]:
+def _warnings(name: str, model: VehicleModel, pairs: Sequence[Played]) -> Iterator[str]:
     """Say what a model does to flights, and what it lacks in them."""
-    for repair in model.repairs:
+    for repair in repairs_of(model):
         yield f"{name} takes a fault of the sensors out of the flights first: {repair}"
-    still = [each.flight.name for each in played if each.model.feels_air and not each.flight.translates]
+    still = [each.flight.name for each in pairs if each.model.feels_air and not each.flight.translates]
     if still:
         yield f"{name} depends on the velocity through the air, which is taken as 0 in {joined(still)}"
 

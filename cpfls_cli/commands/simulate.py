@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.flight import MOTION, FlightRecord
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.spec import InputFile
@@ -20,18 +19,18 @@ from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands import tracking
 from cpfls_cli.config.study import Study, generator, settings_of
-from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.registry import effect as find
-from cpfls_cli.errors import ComputationError, InputError, SettingError
-from cpfls_cli.flights.same_vehicle import base_of, read_of_vehicle, read_vehicle
+from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.flights.same_vehicle import read_model
 from cpfls_cli.pages.flight import answer, autopilot_text
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trajectory import violation_sentence
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.simulation.inverse import SimulatedFlight, simulate
 from cpfls_cli.simulation.measured import MeasuredFlight, measure
-from cpfls_cli.simulation.model import SimulatedModel, simulated_effects, simulated_model, simulated_vehicle
+from cpfls_cli.simulation.model import simulated_effects, with_effects
 from cpfls_cli.simulation.settings import Mode
 
 _MOVED = ("position", "velocity", "acceleration")
@@ -71,9 +70,9 @@ def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None 
         )
     inputs = begin(job, {"trajectory": trajectory} | ({} if model is None else {"model": model}))
     time, planned = _plan(trajectory, closed)
-    flown = SimulatedModel() if model is None else _modelled(model, job.study)
+    flown = None if model is None else read_model(model, job.study)
     with settings_of("simulation", job.study):
-        flown.with_effects(simulated_effects(job.study.simulation.closed_loop.effects, job.study.vehicle))
+        with_effects(flown, simulated_effects(job.study.simulation.closed_loop.effects, job.study.vehicle))
     if job.dry_run:
         return nothing_written(job)
     if closed:
@@ -93,30 +92,6 @@ def _required(model: Path | None) -> Path:
     if model is None:
         raise InputError("simulation.mode = computed-torque: controls the attitude with a model; add --model MODEL")
     return model
-
-
-def _modelled(path: Path, study: Study) -> SimulatedModel:
-    """Read the model that is to be flown in place of the vehicle: whole, one with effects, or an identified one.
-
-    Raises
-    ------
-    InputError
-        If the file is none, was made with another vehicle, or has an effect that cannot be flown.
-    """
-    if holds(path, VehicleRecord):
-        whole = read_vehicle(path, study)
-        return simulated_vehicle(whole.vehicle.vehicle_model(), commanded=bool(whole.commanded))
-    if not holds(path, ExtendedRecord):
-        return SimulatedModel(base_of(path, study).rebuilt(path))
-    record = read_of_vehicle(path, ExtendedRecord, study)
-    effects = {effect.name: {c.name: c.value for c in effect.coefficients} for effect in record.effects.effects()}
-    # Refitted numbers of the vehicle are those of all that is flown.
-    effects[VEHICLE_NUMBERS.name] = record.effects.parameter.values
-    try:
-        return simulated_model(record.base.rebuilt(path), effects, study.vehicle)
-    except SettingError as error:
-        name = error.key.rsplit(".", 1)[-1]
-        raise InputError(f"{path}: its effect {name} cannot be flown: {error}") from None
 
 
 def _plan(trajectory: Path, closed: bool) -> tuple[Array, dict[str, Array]]:
@@ -148,7 +123,7 @@ def _inverse(
 
 
 def _closed_loop(
-    job: Job, inputs: Mapping[str, InputFile], time: Array, planned: dict[str, Array], model: SimulatedModel
+    job: Job, inputs: Mapping[str, InputFile], time: Array, planned: dict[str, Array], model: VehicleModel | None
 ) -> Outcome:
     rng = generator(job.study, "simulate")
     flight = measure(time, planned, job.study.vehicle, job.study.simulation, rng, job.progress, model)

@@ -9,13 +9,12 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.flight import MOTION, FlightRecord, TrackingGroup
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.control import (
     AttitudeLoop,
@@ -33,9 +32,10 @@ from cpfls_cli.control import (
     track,
 )
 from cpfls_cli.dynamics.equations_of_motion import RigidBody, TorqueModel, model_plant, rigid_plant
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import body_torque, inertia_matrix, inertia_tensor
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.flights.same_vehicle import read_of_vehicle
+from cpfls_cli.flights.same_vehicle import read_of_vehicle, rebuilt
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.pages.model import trust_notes
 from cpfls_cli.pages.source import source_of
@@ -66,33 +66,34 @@ def run(job: Job, trajectory: Path, model: Path) -> Outcome:
     """
     inputs = begin(job, {"trajectory": trajectory, "model": model})
     identified = _identified(model, job.study)
-    rebuilt = identified.rebuilt(model)
+    functions = rebuilt(model, identified).fuzzy
+    assert isinstance(functions, InertiaFunctions), "what is identified"
     plan = _plan(trajectory, job.study)
     if job.dry_run:
         return nothing_written(job)
     settings, vehicle = job.study.simulation.computed_torque, job.study.vehicle
     rng = generator(job.study, "simulate")
-    controllers = _controllers(plan, rebuilt, identified.baselines.rigid_body, vehicle)
-    loop = _loop(plan, settings, rebuilt, vehicle, rng)
+    controllers = _controllers(plan, functions, identified.baselines.rigid_body, vehicle)
+    loop = _loop(plan, settings, functions, vehicle, rng)
     error = np.array(settings.initial_error_rad)
     tracked = track(plan, controllers, loop, error, _planned_torque(plan, vehicle), job.progress)
     names = [controller.name for controller in controllers]
     exact = flown_signals(plan, tracked, names.index("model"), loop.plant)
     tracking_scores = scores(plan, tracked, loop.gains.settling_time)
-    comparison = TrackingGroup.of(plan, names, tracking_scores, rebuilt, exact["attitude"])
+    comparison = TrackingGroup.of(plan, names, tracking_scores, functions, exact["attitude"])
     signals, noise = _logged(exact, job.study, rng)
     record = finish(job, FlightRecord.of_simulation(signals, noise, tracking=comparison), inputs)
     summary = {"samples": len(record.time), "noise": sorted(noise), **record.summary}
     return Outcome(summary, (*trust_notes(identified, model), *answer(source_of(job, record), identified)))
 
 
-def _identified(path: Path, study: Study) -> ModelRecord:
-    if holds(path, ExtendedRecord) or holds(path, VehicleRecord):
+def _identified(path: Path, study: Study) -> IdentifiedRecord:
+    if holds(path, ModelRecord) and not holds(path, IdentifiedRecord):
         raise InputError(
             f"{path}: a model with effects is flown in closed loop only; add --mode closed-loop, or give a model that "
             "`cpfls identify` made"
         )
-    return read_of_vehicle(path, ModelRecord, study)
+    return read_of_vehicle(path, IdentifiedRecord, study)
 
 
 def _plan(trajectory: Path, study: Study) -> Plan:

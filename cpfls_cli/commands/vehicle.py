@@ -19,7 +19,7 @@ from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.flights.inputs import numbered_roles
-from cpfls_cli.flights.playback import flights_to_play, whole
+from cpfls_cli.flights.playback import flights_to_play, played
 from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.vehicle_model import answer
@@ -160,12 +160,12 @@ def _found(
 
 def _judged(found: FoundVehicle, flights: Sequence[LoggedFlight], job: Job) -> HeldOutGroup:
     """Play a vehicle back along flights that it was not found in, from every sample."""
-    to_play = {group: whole(model) for group, model in {"": found.model, **found.others}.items()}
-    played = [to_play[flight.group].played(flight) for flight in flights]
+    models = {"": found.model, **found.others}
+    pairs = [played(models[flight.group], flight, job.study.vehicle) for flight in flights]
     errors = replay(
-        played, _horizon(job, flights[0]), 1, lambda done: job.progress(done, 1, "plays back the flights held out")
+        pairs, _horizon(job, flights[0]), 1, lambda done: job.progress(done, 1, "plays back the flights held out")
     )
-    return HeldOutGroup.judged(played, errors)
+    return HeldOutGroup.judged(pairs, errors)
 
 
 def _grouped(

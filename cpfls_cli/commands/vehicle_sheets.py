@@ -8,24 +8,24 @@ from pathlib import Path
 
 import numpy as np
 
-from cpfls_cli.artifacts.extended import FUZZY_INERTIA, ExtendedRecord
+from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.spec import InputFile, rows_of
-from cpfls_cli.artifacts.store import holds, read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleGroup, VehicleRecord
+from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
-from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Missing, Off, sized
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.visited import CELLS
-from cpfls_cli.inertia import six_parameters
+from cpfls_cli.flights.same_vehicle import rebuilt
 from cpfls_cli.pages.export import identified_evidence, identified_warnings, identified_worth
 from cpfls_cli.pages.extended import worth_in_words
 from cpfls_cli.pages.vehicle_model import worth_in_words as vehicle_worth
-from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
 
 
 def sheet_of(path: Path, name: str, file: InputFile, *, force: bool) -> Sheet:
@@ -43,14 +43,9 @@ def sheet_of(path: Path, name: str, file: InputFile, *, force: bool) -> Sheet:
     InputError
         If it is no good model, or one that needs `force`.
     """
-    if holds(path, VehicleRecord):
-        sheet = _vehicle_sheet(path, read_record(path, VehicleRecord))
-    elif holds(path, ExtendedRecord):
-        sheet = _extended_sheet(path, read_record(path, ExtendedRecord))
-    else:
-        record = read_record(path, ModelRecord)
-        model = VehicleModel(vehicle=record.study.vehicle, fuzzy=_usable(record.rebuilt(path), path))
-        sheet = replace(identified_sheet(record, model), warnings=tuple(identified_warnings(record, path)))
+    sheet = _bare_sheet(path, read_record(path, ModelRecord))
+    if isinstance(sheet.model.fuzzy, InertiaFunctions):
+        _require_usable(sheet.model.fuzzy, path)
     if not (sheet.complete or force):
         raise InputError(
             f"{path}: the search for this model did not come to its end ({sheet.stopped or 'unknown'}); "
@@ -67,7 +62,7 @@ def study_of(sheet: Sheet) -> Study:
     return validate(parse_config(sheet.origin.config, source), source)
 
 
-def identified_sheet(record: ModelRecord, model: VehicleModel) -> Sheet:
+def identified_sheet(record: IdentifiedRecord, model: VehicleModel) -> Sheet:
     """Put an identified model on a sheet that has no name yet."""
     return Sheet(
         "",
@@ -82,76 +77,47 @@ def identified_sheet(record: ModelRecord, model: VehicleModel) -> Sheet:
     )
 
 
-def _usable(model: Model, path: Path) -> Model:
+def _require_usable(functions: InertiaFunctions, path: Path) -> None:
     """Refuse what no other program could evaluate."""
-    if model.visited.shape != (CELLS, CELLS):
-        raise InputError(f"{path}: model/visited: is {model.visited.shape}, not {(CELLS, CELLS)}; identify it again")
-    for partition, peaks in zip(model.structure.partitions, model.partitions, strict=True):
+    where = f"{path}: vehicle/inertia_functions"
+    if functions.visited.shape != (CELLS, CELLS):
+        raise InputError(f"{where}/visited: is {functions.visited.shape}, not {(CELLS, CELLS)}; identify it again")
+    for partition, peaks in zip(functions.structure.partitions, functions.partitions, strict=True):
         if not (np.all(np.diff(peaks) >= 0.0) and np.all((peaks >= 0.0) & (peaks <= 1.0))):
-            raise InputError(f"{path}: model/weights: those of {partition.name} make no partition; identify it again")
-    return model
+            raise InputError(f"{where}/breakpoints: those of {partition.name} make no partition; identify it again")
 
 
-def _vehicle_sheet(path: Path, record: VehicleRecord) -> Sheet:
-    model, outside = _whole(path, record.vehicle), tuple(_unsized(record.vehicle.not_held))
-    still, worth = replace(model, wind=(0.0, 0.0, 0.0)), tuple(vehicle_worth(record))
+def _bare_sheet(path: Path, record: ModelRecord) -> Sheet:
+    """Put a model on a sheet that has no name yet, without what no table of weights holds and without the wind."""
+    model = rebuilt(path, record)
+    beside = model.beside_table
+    held = tuple(each for each in model.effects if each.name not in beside)
+    still = replace(model, effects=held, wind=(0.0, 0.0, 0.0))
+    if isinstance(record, IdentifiedRecord):
+        return replace(identified_sheet(record, still), warnings=tuple(identified_warnings(record, path)))
+    outside = tuple(_missing(record, (*model.filters, *model.along)))
+    if isinstance(record, ExtendedRecord):
+        worth, floor = tuple(worth_in_words(record)), tuple(record.gap.floor.tolist())
+        return Sheet("", still, worth, record.origin, "", "", outside=outside, wind=model.wind, floor=floor)
+    assert isinstance(record, VehicleRecord), "the third kind"
+    worth = tuple(vehicle_worth(record))
     return Sheet("", still, worth, record.origin, "", "", record.verdict, outside=outside, wind=model.wind)
 
 
-def _extended_sheet(path: Path, record: ExtendedRecord) -> Sheet:
-    if record.vehicle is None:
-        raise InputError(
-            f"{path}: was made before models with effects could be exported; make it again with `cpfls extend` or "
-            "`cpfls gap`"
-        )
-    model = _whole(path, record.vehicle)
-    wind, still = model.wind, replace(model, wind=(0.0, 0.0, 0.0))
-    if FUZZY_INERTIA in record.vehicle.not_held:
-        still = replace(still, fuzzy=_refitted(path, record, model))
-    worth, outside = tuple(worth_in_words(record)), tuple(_sized(record, record.vehicle.not_held))
-    floor = tuple(record.gap.floor.tolist())
-    return Sheet("", still, worth, record.origin, "", "", outside=outside, wind=wind, floor=floor)
+def _missing(record: ModelRecord, effects: tuple[ModelEffect, ...]) -> Iterator[Missing]:
+    """List effects that no table of weights holds, with their sizes along held-out flights where these are known."""
+    left_out = record.left_out if isinstance(record, ExtendedRecord) else None
+    known = {} if left_out is None else {row["name"]: row for row in rows_of(left_out)}
+    for effect in effects:
+        if isinstance(record, ExtendedRecord) and effect.name in known:
+            size, ends = (np.array(known[effect.name][key]) for key in ("wrench", "ends"))
+            yield sized(_in_numbers(effect), size, record.gap.floor, Off.of(ends), "along its held-out flights")
+        else:
+            yield Missing(_in_numbers(effect), np.nan, np.nan, np.nan, None)
 
 
-def _whole(path: Path, group: VehicleGroup) -> VehicleModel:
-    try:
-        return group.vehicle_model()
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-
-
-def _refitted(path: Path, record: ExtendedRecord, model: VehicleModel) -> Model:
-    """Give an identified inertia with what the refit adds to the rigid body under it."""
-    identified = record.base.rebuilt(path)
-    assert identified is not None, "the inertia of a vehicle is constant"
-    source = f"{path.name}: /config"
-    stated = validate(parse_config(record.origin.config, source), source).vehicle
-    added = six_parameters(model.vehicle.inertia_kg_m2) - six_parameters(stated.inertia_kg_m2)
-    return replace(_usable(identified, path), rigid_body=identified.rigid_body + added)
-
-
-def _sized(record: ExtendedRecord, names: tuple[str, ...]) -> Iterator[Missing]:
-    """List the effects that no table of weights holds, with their sizes along the held-out flights."""
-    known = {} if record.left_out is None else {row["name"]: row for row in rows_of(record.left_out)}
-    for name in names:
-        if name in known:
-            size, ends = (np.array(known[name][key]) for key in ("wrench", "ends"))
-            title = _in_numbers(record, name)
-            yield sized(title, size, record.gap.floor, Off.of(ends), "along its held-out flights")
-        elif name != FUZZY_INERTIA:
-            yield from _unsized((name,))
-
-
-def _unsized(names: tuple[str, ...]) -> Iterator[Missing]:
-    for name in names:
-        yield Missing(CATALOGUE[name].title if name in CATALOGUE else name, np.nan, np.nan, np.nan, None)
-
-
-def _in_numbers(record: ExtendedRecord, name: str) -> str:
+def _in_numbers(effect: ModelEffect) -> str:
     """Say what an effect is and which numbers it has, so that others can add it."""
-    (effect,) = (each for each in record.effects.named if each.name == name)
-    units = {"": "", "1": ""}
-    numbers = ", ".join(
-        f"{each.name} = {each.value:.4g}{units.get(each.unit, f' {each.unit}')}" for each in effect.coefficients
-    )
-    return f"{CATALOGUE[name].title} ({CATALOGUE[name].formula}; {numbers})"
+    units = {each.name: "" if each.unit in ("", "1") else f" {each.unit}" for each in effect.known.numbers}
+    numbers = ", ".join(f"{name} = {value:.4g}{units[name]}" for name, value in effect.values.items())
+    return f"{effect.known.title} ({effect.known.formula}; {numbers})"

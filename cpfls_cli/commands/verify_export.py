@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.job import input_file
-from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.commands.vehicle_sheets import sheet_of, study_of
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.registry import exported, require_package
 from cpfls_cli.export.text import identifier
 from cpfls_cli.export.verify import verified
-from cpfls_cli.flights.playback import flights_to_play, model_to_play
+from cpfls_cli.flights.playback import flights_to_play
+from cpfls_cli.flights.same_vehicle import read_model
 from cpfls_cli.pages.export import verification_answer, verification_summary
-from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_flight
+from cpfls_cli.playback.flight import playback_flight
+from cpfls_cli.playback.player import made_ready
 from cpfls_cli.playback.rotors import Hold
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome
@@ -60,23 +60,15 @@ def run(model: Path, flight: Path, options: Options, *, force: bool, dry_run: bo
     sheet = sheet_of(model, identifier(model.stem), input_file(model), force=force)
     made = exported(sheet, options.form, f"{sheet.name}.py")
     study = study_of(sheet)
-    to_play = model_to_play(model, study)
+    read = read_model(model, study)
     (logged,) = flights_to_play([flight], study, options.hold)
-    played = to_play.played(logged)
+    along, player = made_ready(read, logged)
     if dry_run:
         line = Text(f"{model}: would be flown along {flight}, in {options.form}; model and flight are good")
         return Outcome({"dry_run": True}, (line,))
-    horizon = max(1, round(options.horizon_s / played.flight.motion.period))
-    found = verified(
-        options.form, made, _as_logged(model, logged), (played.flight, played.model), horizon, options.windows
-    )
+    horizon = max(1, round(options.horizon_s / along.motion.period))
+    # With its logged rotor speeds, but without the faults of sensors that a model knows of.
+    repaired = playback_flight(logged.name, [read.repaired(part) for part in logged.parts], logged.hold)
+    found = verified(options.form, made, repaired, (along, player), horizon, options.windows)
     blocks = verification_answer(options.form, made.told, logged, found)
     return Outcome(verification_summary(options.form, made.missing, found), tuple(blocks), int(not found.agrees))
-
-
-def _as_logged(model: Path, logged: LoggedFlight) -> PlaybackFlight:
-    """Give a flight with its logged rotor speeds, but without the faults of sensors that a model knows of."""
-    if not holds(model, ExtendedRecord):
-        return logged.playback
-    extended = read_record(model, ExtendedRecord).rebuilt(model)
-    return playback_flight(logged.name, [extended.repaired(part) for part in logged.parts], logged.hold)

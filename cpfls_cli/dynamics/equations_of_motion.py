@@ -33,6 +33,14 @@ class InertiaModel(Protocol):
         """Evaluate J(q) and its gradient."""
         ...
 
+    def corrected(self, added: Array) -> InertiaModel:
+        """Add an inertia tensor, shape (3, 3), kg m^2, body frame."""
+        ...
+
+    def outside(self, attitude: Array) -> BoolArray:
+        """Flag attitudes that it was not found at, shape (samples,)."""
+        ...
+
 
 class TorqueModel(Protocol):
     """A model that knows the generalised torque of a motion, ``D(q) qdd + C(q, qd) qd``."""

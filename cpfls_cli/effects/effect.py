@@ -110,6 +110,26 @@ class Columns:
     direct: Array
     momentum: Array | None = None
 
+    def at_samples(self, coefficients: Array, time: Array) -> Array:
+        """Evaluate ``direct @ c + d/dt (momentum @ c)`` sample by sample; noise of what is differentiated shows in it.
+
+        Parameters
+        ----------
+        coefficients : array, shape (coefficient,)
+        time : array, shape (time,), s
+
+        Returns
+        -------
+        array, shape (time, 6)
+        """
+        direct = np.asarray(self.direct @ coefficients)
+        if self.momentum is None:
+            return direct
+        # Slow to load, and who lists or shows effects differentiates nothing.
+        from scipy.interpolate import CubicSpline
+
+        return np.asarray(direct + CubicSpline(time, self.momentum @ coefficients)(time, 1))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Effect:

@@ -10,13 +10,13 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.effects.polynomial import STATE_TERMS
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.points import body_inertia
-from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Body, Motion
 from cpfls_cli.playback.model import Remainder, VehicleModel, body_of
@@ -181,7 +181,7 @@ def constant_body(model: VehicleModel) -> Body:
     """
     if model.fuzzy is None:
         return model.body
-    assert isinstance(model.fuzzy, Model), "an inertia over attitude is that of an identified model"
+    assert isinstance(model.fuzzy, InertiaFunctions), "an inertia over attitude is that of an identified model"
     cell = 2 * np.pi / CELLS
     roll, pitch = ((np.argwhere(model.fuzzy.visited) + 0.5) * cell - np.pi).T
     attitude = np.column_stack([roll, pitch, np.zeros_like(roll)])

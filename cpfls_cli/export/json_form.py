@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import VERTICAL
+from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.effects.polynomial import FACTORS
 from cpfls_cli.export.points import PERIOD
 from cpfls_cli.export.sheet import EXPORTER, Sheet, base_of, rule_labels, rules_along
@@ -24,8 +26,6 @@ from cpfls_cli.export.source import (
 from cpfls_cli.export.text import strict_json
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.fuzzy.membership import Z_FUNCTION
-from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric
 from cpfls_cli.regressor.structure import Block
 
@@ -154,7 +154,7 @@ def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
     return strict_json({**document, **sheet.evidence})
 
 
-def _structure(model: Model) -> dict[str, Any]:
+def _structure(model: InertiaFunctions) -> dict[str, Any]:
     structure, settings = model.structure, model.structure.settings
     return {
         "structure": settings.structure,
@@ -168,7 +168,7 @@ def _structure(model: Model) -> dict[str, Any]:
     }
 
 
-def _fuzzy(model: Model) -> dict[str, Any]:
+def _fuzzy(model: InertiaFunctions) -> dict[str, Any]:
     return {
         "inputs": {name: _range(r) for name, r in zip(_ANGLES, model.ranges, strict=True)},
         "breakpoints": {p.name: b for p, b in zip(model.structure.partitions, model.partitions, strict=True)},
@@ -181,7 +181,7 @@ def _range(data: InputRange) -> dict[str, float]:
     return {"minimum": data.minimum, "maximum": data.maximum, "width": data.width}
 
 
-def _function(model: Model, block: Block) -> dict[str, Any]:
+def _function(model: InertiaFunctions, block: Block) -> dict[str, Any]:
     structure, function = model.structure, block.function
     labels = rule_labels(block, structure) if block.partitions else ["constant"]
     coefficients = model.coefficients[block.columns].reshape(block.rules, block.features)
@@ -194,12 +194,12 @@ def _function(model: Model, block: Block) -> dict[str, Any]:
     }
 
 
-def _rigid_body(model: Model) -> dict[str, Any]:
+def _rigid_body(model: InertiaFunctions) -> dict[str, Any]:
     values = dict(zip(INERTIA_PARAMETERS, model.rigid_body.tolist(), strict=True))
     return {"unit": "kg m^2", "frame": BODY, "tensor": values}
 
 
-def _region(model: Model) -> dict[str, Any]:
+def _region(model: InertiaFunctions) -> dict[str, Any]:
     return {
         "description": "'#' where training visited roll and pitch; a line for each roll, pitch along it, from -180 deg",
         "cell_deg": 360 / CELLS,

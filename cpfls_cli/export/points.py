@@ -12,10 +12,10 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, coriolis_matrix
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import body_torque
+from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.effects.scales import hover_speed
-from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.model import VehicleModel, wrench_of
 from cpfls_cli.playback.motion import State
@@ -63,7 +63,7 @@ class Expected:
         return len(self.motion)
 
 
-def expected(model: Model, motion: Motion) -> Expected:
+def expected(model: InertiaFunctions, motion: Motion) -> Expected:
     """Compute what an export has to give along a motion.
 
     Returns
@@ -85,7 +85,7 @@ def expected(model: Model, motion: Motion) -> Expected:
     )
 
 
-def _fuzzy_torque(model: Model, motion: Motion) -> Array:
+def _fuzzy_torque(model: InertiaFunctions, motion: Motion) -> Array:
     return Regressor(model.structure, motion, model.ranges).torque(model.partitions, model.coefficients)
 
 
@@ -99,7 +99,7 @@ def _scale(inertia: InertiaValues, motion: Motion, fuzzy: bool) -> Array:
     return np.where(scale > 0.0, scale, 1.0)
 
 
-def attitude_points(model: Model, rng: np.random.Generator) -> Expected:
+def attitude_points(model: InertiaFunctions, rng: np.random.Generator) -> Expected:
     """Draw a few states, half of them where training went, and compute what the model gives there.
 
     Returns

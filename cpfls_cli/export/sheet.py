@@ -12,11 +12,11 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.config.load import parse_config
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.effects.polynomial import STATE_TERMS
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.export.holding import Missing
 from cpfls_cli.export.points import Expected, ReferencePoints, ReferenceRun, attitude_points, reference_points, runs_of
-from cpfls_cli.identification.model import Model
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.playback.model import Remainder, VehicleModel
 from cpfls_cli.regressor.structure import Block, ModelStructure
@@ -105,10 +105,12 @@ class Sheet:
     warnings: tuple[str, ...] = ()
 
     @property
-    def identified(self) -> Model | None:
+    def identified(self) -> InertiaFunctions | None:
         """The identified model that its inertia over attitude is that of; None for a constant inertia."""
         fuzzy = self.model.fuzzy
-        assert fuzzy is None or isinstance(fuzzy, Model), "an inertia over attitude is that of an identified model"
+        assert fuzzy is None or isinstance(fuzzy, InertiaFunctions), (
+            "an inertia over attitude is that of an identified model"
+        )
         return fuzzy
 
     @property
@@ -118,7 +120,7 @@ class Sheet:
         return six_parameters(self.model.vehicle.inertia_kg_m2) if found is None else found.rigid_body
 
     @property
-    def rules(self) -> Model | None:
+    def rules(self) -> InertiaFunctions | None:
         """The identified model where its fuzzy part does anything, or is all there is."""
         found = self.identified
         return found if found and (found.coefficients.any() or not found.rigid_body.any()) else None
@@ -207,7 +209,7 @@ class Sheet:
             yield f"From {role}: {source.name}, sha256 {source.sha256}"
 
 
-def _inertia_in_words(model: Model, *, fuzzy: bool) -> str:
+def _inertia_in_words(model: InertiaFunctions, *, fuzzy: bool) -> str:
     settings, structure = model.structure.settings, model.structure
     order = f" of order {settings.harmonic_order}" if settings.consequents == "harmonic" else ""
     functions = ", ".join(f"{partition.name} {partition.functions}" for partition in structure.partitions)
@@ -220,7 +222,7 @@ def _inertia_in_words(model: Model, *, fuzzy: bool) -> str:
     )
 
 
-def base_of(model: Model) -> str:
+def base_of(model: InertiaFunctions) -> str:
     """Tell what lies under the fuzzy part: ``rigid-body`` or ``none``."""
     return "rigid-body" if model.rigid_body.any() else "none"
 

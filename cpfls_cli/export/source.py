@@ -10,13 +10,13 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import VERTICAL, vertical
+from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.effects.polynomial import FACTORS
 from cpfls_cli.export.points import PERIOD, Expected, ReferencePoints, ReferenceRun
 from cpfls_cli.export.sheet import Sheet, rule_labels, rules_along
 from cpfls_cli.export.text import c_row, c_rows, comment_lines, comment_text, filled, literal_text, number, python_rows
-from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.structure import ModelStructure
 
@@ -68,7 +68,7 @@ def c_source(sheet: Sheet, stem: str, told: Sequence[str] = ()) -> CSource:
     return CSource(fill_template("model.c.j2", words), fill_template("model.h.j2", words))
 
 
-def _c_rules(model: Model) -> dict[str, Any]:
+def _c_rules(model: InertiaFunctions) -> dict[str, Any]:
     structure = model.structure
     circular = int(structure.circular)
     names = {p.name: ("roll", "pitch")[p.input] for p in structure.partitions}
@@ -103,7 +103,7 @@ def _c_rules(model: Model) -> dict[str, Any]:
     }
 
 
-def _c_visited(model: Model) -> dict[str, Any]:
+def _c_visited(model: InertiaFunctions) -> dict[str, Any]:
     packed = np.packbits(model.visited, axis=1)
     rows = [", ".join(f"0x{byte:02x}" for byte in row) for row in packed]
     return {"visited_rows": rows, "cell_bytes": packed.shape[1]}
@@ -174,7 +174,7 @@ def python_source(sheet: Sheet, file: str, library: str = "numpy", told: Sequenc
     return fill_template("model.py.j2", words)
 
 
-def _python_rules(model: Model) -> dict[str, Any]:
+def _python_rules(model: InertiaFunctions) -> dict[str, Any]:
     structure = model.structure
     named = {
         block.function.name: {
@@ -186,7 +186,7 @@ def _python_rules(model: Model) -> dict[str, Any]:
     return {"rule_peaks": named, "coefficient_rows": python_rows(model.coefficients, 4)}
 
 
-def visited_rows(model: Model) -> list[str]:
+def visited_rows(model: InertiaFunctions) -> list[str]:
     """Draw the region that training visited.
 
     Returns
@@ -259,7 +259,7 @@ def _common_words(sheet: Sheet, told: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def _structure_words(model: Model) -> dict[str, Any]:
+def _structure_words(model: InertiaFunctions) -> dict[str, Any]:
     structure, settings = model.structure, model.structure.settings
     harmonic, data_range = settings.consequents == "harmonic", settings.input_map == "data-range"
     rules_used = any(block.rules > 1 for block in structure.blocks)

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.replay import VEHICLE
-from cpfls_cli.artifacts.store import holds
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import check
 from cpfls_cli.consistency.findings import contradictions, doubts
@@ -34,16 +29,14 @@ from cpfls_cli.flights.recordings import (
     signals_of,
     with_voltage,
 )
-from cpfls_cli.flights.same_vehicle import read_of_vehicle, read_vehicle
-from cpfls_cli.gap.extended import ExtendedModel
-from cpfls_cli.gap.playback import extended_player
 from cpfls_cli.logs.formats import is_log
-from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
+from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.player import Player, player_of
+from cpfls_cli.playback.player import made_ready, player_of
 from cpfls_cli.playback.replay import Played
 from cpfls_cli.playback.rotors import Hold
 from cpfls_cli.vehicle.rotors import require_control
+from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
 
 _STATE = ("body_rate", "attitude", "velocity", "position")
@@ -190,97 +183,24 @@ def _of_full_battery(flights: Sequence[LoggedFlight], read: Sequence[ReadFlight]
     return [replace(flight, parts=tuple(own)) for flight, own in zip(flights, parts, strict=True)]
 
 
-@dataclass(frozen=True)
-class ModelToPlay:
-    """A model that plays flights back.
-
-    Attributes
-    ----------
-    made : callable
-        From a flight to what is played back, faults of sensors taken out, and the model made ready for it.
-    needs_attitude : bool
-    is_stated : bool
-        Whether it is the vehicle that the config states.
-    repairs : tuple of str
-        Faults of sensors that it takes out of a flight first.
-    """
-
-    made: Callable[[LoggedFlight], tuple[PlaybackFlight, Player]]
-    needs_attitude: bool = False
-    is_stated: bool = False
-    repairs: tuple[str, ...] = ()
-
-    def played(self, flight: LoggedFlight) -> Played:
-        """Make a flight and the model ready for playback, beside the vehicle that the config states.
-
-        Raises
-        ------
-        InputError
-            If the flight lacks a signal that the model needs.
-        """
-        if self.needs_attitude and flight.parts[0].attitude is None:
-            raise InputError(f"{flight.name}: lacks the attitude, which the model needs: its inertia depends on it")
-        along, player = self.made(flight)
-        if self.is_stated:
-            return Played(along, player, player)
-        stated = player_of(VehicleModel(vehicle=flight.parts[0].vehicle), _with_speed_as_logged(along, flight))
-        return Played(along, player, stated)
-
-
-def _with_speed_as_logged(along: PlaybackFlight, flight: LoggedFlight) -> PlaybackFlight:
-    """Undo the lag of a model: the stated vehicle has none."""
-    logged = flight.playback
-    return replace(along, speed=logged.speed, wrench=logged.wrench, hold=logged.hold)
-
-
-def model_to_play(path: Path, study: Study) -> ModelToPlay:
-    """Read any model.
-
-    Parameters
-    ----------
-    path : Path
-        An artifact, or the word `VEHICLE`.
+def played(model: VehicleModel, flight: LoggedFlight, stated: VehicleSettings) -> Played:
+    """Make a flight and a model ready for playback, beside the vehicle that the config states.
 
     Raises
     ------
     InputError
-        If it is none, or of another vehicle than that of the config.
+        If the flight lacks a signal that the model needs.
     """
-    if is_vehicle(path):
-        return whole(VehicleModel(vehicle=study.vehicle), stated=True)
-    if holds(path, ExtendedRecord):
-        return _extended(read_of_vehicle(path, ExtendedRecord, study).rebuilt(path))
-    if holds(path, VehicleRecord):
-        return whole(read_vehicle(path, study).vehicle.vehicle_model())
-    identified = read_of_vehicle(path, ModelRecord, study).rebuilt(path)
-    return whole(VehicleModel(vehicle=study.vehicle, fuzzy=identified))
+    along, player = made_ready(model, flight)
+    if model.is_rigid_body and model.vehicle == stated and model.fuzzy is None:
+        return Played(along, player, player)
+    # The stated vehicle has no lag and no filter.
+    logged = flight.playback
+    as_logged = replace(along, speed=logged.speed, wrench=logged.wrench, hold=logged.hold)
+    return Played(along, player, player_of(VehicleModel(vehicle=stated), as_logged))
 
 
-def is_vehicle(path: Path) -> bool:
-    """Tell whether the vehicle of the config is meant; a file of that name has to be given with its folder."""
-    return str(path) == VEHICLE
-
-
-def whole(model: VehicleModel, *, stated: bool = False) -> ModelToPlay:
-    """Play back the model of a whole vehicle.
-
-    Parameters
-    ----------
-    stated : bool
-        Whether it is the vehicle of the config itself.
-    """
-
-    def made(flight: LoggedFlight) -> tuple[PlaybackFlight, Player]:
-        logged = flight.playback
-        return logged, player_of(model, logged)
-
-    return ModelToPlay(made, needs_attitude=model.fuzzy is not None, is_stated=stated)
-
-
-def _extended(model: ExtendedModel) -> ModelToPlay:
-    def made(flight: LoggedFlight) -> tuple[PlaybackFlight, Player]:
-        return extended_player(model, flight.name, [model.repaired(part) for part in flight.parts], flight.hold)
-
-    audit = model.audit
-    repairs = () if audit is None else (*audit.settled, *(finding.sentence for finding in audit.named))
-    return ModelToPlay(made, needs_attitude=model.base is not None, repairs=repairs)
+def repairs_of(model: VehicleModel) -> tuple[str, ...]:
+    """Say which faults of sensors a model takes out of a flight first."""
+    audit = model.repairs
+    return () if audit is None else (*audit.settled, *(finding.sentence for finding in audit.named))

@@ -7,15 +7,16 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TypeVar
 
-from cpfls_cli.artifacts.gap_flights import BaseGroup
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.artifacts.store import read_header, read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
 from cpfls_cli.config.unknown import KEYS
 from cpfls_cli.errors import ConfigError, InputError
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 R = TypeVar("R", bound=Record)
@@ -53,45 +54,64 @@ def read_of_vehicle(path: Path, wanted: type[R], study: Study) -> R:
         If it is no good artifact of the format, or was made with another vehicle.
     """
     record = read_record(path, wanted)
-    require_same_vehicle(path, _vehicle_of(path, record.origin), study.vehicle)
+    made_with = _with_what_was_open(_vehicle_of(path, record.origin), study.vehicle)
+    require_same_vehicle(path, made_with, study.vehicle)
     return record
 
 
-def base_of(path: Path | None, study: Study) -> BaseGroup:
-    """Read the base of a comparison.
+def read_model(path: Path, study: Study) -> VehicleModel:
+    """Read any model of the vehicle of a study.
 
     Parameters
     ----------
-    path : Path or None
-        An identified model; None for the rigid body of the vehicle.
+    path : Path
+        An artifact, or the word `VEHICLE`.
 
     Raises
     ------
     InputError
-        If it was identified with another vehicle.
+        If it is none, or of another vehicle than that of the config.
     """
-    return BaseGroup.of(None if path is None else read_of_vehicle(path, ModelRecord, study))
+    if is_vehicle(path):
+        return VehicleModel(vehicle=study.vehicle)
+    return rebuilt(path, read_of_vehicle(path, ModelRecord, study))
 
 
-def read_vehicle(path: Path, study: Study) -> VehicleRecord:
-    """Read a whole vehicle, all of which stands in its table of weights.
+def read_base(path: Path | None, study: Study) -> VehicleModel:
+    """Read what effects are sought for: an identified model, or the rigid body of the vehicle where there is none.
 
     Raises
     ------
     InputError
-        If it is no good artifact, was made with another vehicle, or has parts that the table does not hold.
+        If it is no identified model, or one of another vehicle.
     """
-    record = read_record(path, VehicleRecord)
-    made_with = _with_what_was_open(_vehicle_of(path, record.origin), study.vehicle)
-    require_same_vehicle(path, made_with, study.vehicle)
-    if record.vehicle.not_held:
-        parts = ", ".join(record.vehicle.not_held)
-        raise InputError(f"{path}: has {parts} beside its table of weights, which is all that is evaluated")
-    return record
+    rigid = VehicleModel(vehicle=study.vehicle)
+    if path is None:
+        return rigid
+    return replace(rigid, fuzzy=rebuilt(path, read_of_vehicle(path, IdentifiedRecord, study)).fuzzy)
+
+
+def rebuilt(path: Path, record: ModelRecord) -> VehicleModel:
+    """Rebuild the model of a record; the path is for messages.
+
+    Raises
+    ------
+    InputError
+        If this program does not know an effect, or numbers do not fit each other.
+    """
+    try:
+        return record.vehicle_model()
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def is_vehicle(path: Path) -> bool:
+    """Tell whether the vehicle of the config is meant; a file of that name has to be given with its folder."""
+    return str(path) == VEHICLE
 
 
 def _with_what_was_open(given: VehicleSettings, wanted: VehicleSettings) -> VehicleSettings:
-    """Take from the config what the one of a whole vehicle left open: the model has numbers of its own."""
+    """Take from the config what the one of a model left open: the model has numbers of its own."""
     rotors = given.rotors
     if len(rotors) == len(wanted.rotors):
         open_ = [KEYS[name] for name in given.unknown if name != "inertia"]

@@ -14,6 +14,7 @@ from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.playback import PlayedPair, WorstStretch, errors_by_horizon, played_pairs, worst_stretch
 from cpfls_cli.gap.residual.views import Stretch, Whiteness, stretches, whiteness
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.whole_vehicle import whole_vehicle
 from cpfls_cli.playback.replay import Replay
 from cpfls_cli.weak_form.windows import Recording, Windows, common_windows
 
@@ -96,7 +97,9 @@ def before_after(
     centres = [windows.centres(recording.signals.time) for recording in held]
     index = np.repeat(np.arange(len(held)), [len(each) for each in centres])
     stride = -(-len(windows.weight) // windows.hop)
-    played = played_pairs(held, model, plain(model.base))
+    stated = held[0].signals.vehicle
+    with_effects, given = (whole_vehicle(each, stated) for each in (model, plain(model.base)))
+    played = played_pairs(held, with_effects, given)
     in_floors = unseen.before * unseen.known / unseen.floor
     found = stretches(in_floors, np.concatenate(centres), index, level=0.0)
     return BeforeAfter(

@@ -12,7 +12,6 @@ from cpfls_cli.consistency.audit import Audit, audit
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight, weak_flight
-from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.leftover import not_excited
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import NotExcited
@@ -20,6 +19,8 @@ from cpfls_cli.gap.playback import PlayedPair, errors_by_horizon, played_pairs
 from cpfls_cli.gap.residual.dependence import Dependence, joined_states, rank_dependence, state_signals
 from cpfls_cli.gap.residual.views import HeatMap, Stretch, heat_map, stretches
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.whole_vehicle import with_effects
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.replay import Replay
 from cpfls_cli.weak_form.windows import Recording, common_windows
 
@@ -88,7 +89,7 @@ class Disagreement:
 
 def compare(
     recordings: Sequence[Recording],
-    model: ExtendedModel,
+    model: VehicleModel,
     settings: GapSettings,
     rng: np.random.Generator,
     progress: Callable[[float, str], None] = lambda _done, _note: None,
@@ -100,7 +101,8 @@ def compare(
     Parameters
     ----------
     recordings : sequence of Recording
-    model : ExtendedModel
+    model : VehicleModel
+        Its rigid body is what `recordings` state as their vehicle, see `of_vehicle`.
     settings : GapSettings
     rng : numpy.random.Generator
         Of the shifts that say what chance explains.
@@ -114,15 +116,16 @@ def compare(
     """
     windows = common_windows(recordings, settings)
     progress(0.0, "sensor audit")
-    audited = model.audit or audit([recording.signals for recording in recordings], windows)
+    extended = with_effects(model)
+    audited = model.repairs or audit([recording.signals for recording in recordings], windows)
     flights = [
-        weak_flight(r.name, audited.repaired(r.signals), windows, model.base, settings.force, settings.axes)
+        weak_flight(r.name, audited.repaired(r.signals), windows, model.fuzzy, settings.force, settings.axes)
         for r in recordings
     ]
     progress(0.3, "noise floor")
-    hypothesis = model.system(flights)
+    hypothesis = extended.system(flights)
     floor = best_floor(hypothesis)
-    residual = model.residual(flights)
+    residual = extended.residual(flights)
     progress(0.5, "what the gap follows")
     states = joined_states([state_signals(f, s) for f, s in zip(flights, hypothesis.signals, strict=True)])
     block = block_index(hypothesis, settings)
@@ -132,7 +135,7 @@ def compare(
     known = _known(flights)
     rms = _rms(residual, known)
     effects = [effect for name, effect in CATALOGUE.items() if name not in settings.ignore]
-    repairing = replace(model, audit=audited)
+    repairing = replace(model, repairs=audited)
     played = played_pairs(recordings, repairing, repairing)
     return Disagreement(
         audited,

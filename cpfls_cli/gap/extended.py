@@ -11,20 +11,16 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
-from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient, inertia_tensor
-from cpfls_cli.effects.catalogue.parameter_error import inertia_correction
 from cpfls_cli.effects.effect import Columns
-from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.gap.balance.balance_system import System, is_free, scatter_size, scatter_variance, system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import (
     CHANNELS,
+    Balance,
     Candidate,
     WeakFlight,
-    actuated,
-    columns_of,
     nuisance,
     rotation_balance,
     translation_balance,
@@ -35,7 +31,6 @@ from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.preparation import Preparation
 from cpfls_cli.gap.settings import CLEAR, VISIBLE, WORSE, GapSettings
-from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.weak_form.windows import Recording, common_windows
 
 
@@ -51,14 +46,6 @@ class FittedEffect(NamedTuple):
 
     candidate: Candidate
     linear: Array
-
-    @property
-    def in_still_air(self) -> FittedEffect:
-        """The effect that a wind is on a vehicle in still air; any other effect itself."""
-        effect = self.candidate.effect
-        if not (effect.still and effect.apply):
-            return self
-        return FittedEffect(Candidate(CATALOGUE[effect.still], {}), self.linear)
 
 
 @dataclass(frozen=True)
@@ -122,123 +109,27 @@ class ExtendedModel:
         hypothesis = self.system(flights)
         return np.asarray(hypothesis.residual - hypothesis.base @ self.linear)
 
-    def effect_wrench(self, signals: Signals) -> Array:
-        """Compute the wrench of the effects, sample by sample.
-
-        Momentum parts are differentiated by a cubic spline, so noise of the signals shows in them.
-
-        Parameters
-        ----------
-        signals : Signals
-            With the faults of sensors taken out.
-
-        Returns
-        -------
-        array, shape (time, 6), N m and N
-            Body torque and force beyond those of the rotors as logged.
-        """
-        _require(signals, self.chosen, "the flight")
-        moved = actuated(signals, self.chosen)
-        total = moved.wrench - signals.wrench
-        for candidate, linear in self.effects:
-            if candidate.effect.kind == "wrench":
-                coefficients = linear if is_free(candidate) else np.ones(1)
-                total = total + instantaneous(columns_of(candidate, moved), coefficients, signals.time)
-        return np.asarray(total)
-
-    def correction(self, signals: Signals) -> Array:
-        """Compute what the refit adds to the inertia of the base.
-
-        Parameters
-        ----------
-        signals : Signals
-            Of the vehicle.
-
-        Returns
-        -------
-        array, shape (3, 3), kg m^2
-        """
-        return inertia_correction(self.parameters, signals.vehicle)
-
-    def inertia(self, signals: Signals) -> Array | InertiaModel:
-        """Give the refitted inertia.
-
-        Parameters
-        ----------
-        signals : Signals
-            Of the vehicle.
-
-        Returns
-        -------
-        array, shape (3, 3), kg m^2, or InertiaModel
-            A tensor for a rigid body.
-        """
-        correction = self.correction(signals)
-        if self.base is None:
-            return inertia_tensor(signals.vehicle) + correction
-        return Corrected(self.base, correction)
-
-    def inertial_torque(self, signals: Signals) -> Array:
-        """Compute the inertial torque of the motion with the refitted inertia.
-
-        Parameters
-        ----------
-        signals : Signals
-            With the faults of sensors taken out.
-
-        Returns
-        -------
-        array, shape (time, 3), N m, body frame
-        """
-        balance = rotation_balance(signals, self.base)
-        torque = balance.direct + _change(balance.momentum, signals.time)
-        refitted = instantaneous(columns_of(nuisance(), signals), self.parameters, signals.time)
-        return np.asarray(torque - refitted[:, :3])
-
-    def rotor_torque(self, signals: Signals) -> Array:
-        """Compute the body torque of the rotors that the motion requires.
-
-        Parameters
-        ----------
-        signals : Signals
-            With the faults of sensors taken out.
-
-        Returns
-        -------
-        array, shape (time, 3), N m, body frame
-        """
-        return np.asarray(self.inertial_torque(signals) - self.effect_wrench(signals)[:, :3])
-
-
-@dataclass(frozen=True)
-class Corrected:
-    """An inertia model plus a correction of its inertia tensor.
-
-    Attributes
-    ----------
-    correction : array, shape (3, 3), kg m^2
-    """
-
-    base: InertiaModel
-    correction: Array
-
-    def inertia(self, attitude: Array) -> InertiaValues:
-        """Evaluate J(q) and its gradient.
-
-        Parameters
-        ----------
-        attitude : array, shape (samples, 3), rad
-        """
-        values = self.base.inertia(attitude)
-        return InertiaValues(
-            values.value + inertia_matrix(attitude, self.correction),
-            values.gradient + inertia_matrix_gradient(attitude, self.correction),
-        )
-
 
 def plain(base: InertiaModel | None) -> ExtendedModel:
     """Make a model without effects."""
     return ExtendedModel(base, np.zeros(len(nuisance().effect.coefficients)))
+
+
+def inertial_torque(signals: Signals, model: InertiaModel | None) -> Array:
+    """Compute the body torque that the motion takes.
+
+    Parameters
+    ----------
+    signals : Signals
+        With the faults of sensors taken out.
+    model : InertiaModel or None
+        None for the rigid body of the vehicle.
+
+    Returns
+    -------
+    array, shape (time, 3), N m, body frame
+    """
+    return _at_samples(rotation_balance(signals, model), signals.time)
 
 
 def inertial_force(signals: Signals) -> Array:
@@ -253,35 +144,11 @@ def inertial_force(signals: Signals) -> Array:
     -------
     array, shape (time, 3), N, body frame
     """
-    balance = translation_balance(signals)
-    return np.asarray(balance.direct + _change(balance.momentum, signals.time))
+    return _at_samples(translation_balance(signals), signals.time)
 
 
-def instantaneous(columns: Columns, coefficients: Array, time: Array) -> Array:
-    """Evaluate columns sample by sample, ``direct @ c + d/dt (momentum @ c)``.
-
-    Parameters
-    ----------
-    columns : Columns
-        Of shape (time, 6, coefficient).
-    coefficients : array, shape (coefficient,)
-    time : array, shape (time,), s
-
-    Returns
-    -------
-    array, shape (time, 6)
-    """
-    direct = columns.direct @ coefficients
-    if columns.momentum is None:
-        return np.asarray(direct)
-    return np.asarray(direct + _change(columns.momentum @ coefficients, time))
-
-
-def _change(momentum: Array, time: Array) -> Array:
-    """Differentiate a momentum by the cubic spline through its samples."""
-    from scipy.interpolate import CubicSpline
-
-    return np.asarray(CubicSpline(time, momentum)(time, 1))
+def _at_samples(balance: Balance, time: Array) -> Array:
+    return Columns(balance.direct[:, :, None], balance.momentum[:, :, None]).at_samples(np.ones(1), time)
 
 
 def _require(signals: Signals, chosen: Sequence[Candidate], name: str) -> None:

@@ -1,21 +1,20 @@
-"""Between a model with effects and the model of a whole vehicle: each as the other, as far as it goes."""
+"""Between what a balance is fitted with and the model of a whole vehicle: each as the other."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.effects.catalogue.parameter_error import coupling, inertia_correction
+from cpfls_cli.dynamics.rigid_body import inertia_tensor
+from cpfls_cli.effects.catalogue.parameter_error import inertia_correction
 from cpfls_cli.effects.effect import Columns, Effect
-from cpfls_cli.effects.polynomial import Probe, polynomial
-from cpfls_cli.effects.registry import VEHICLE_NUMBERS
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.errors import InputError
-from cpfls_cli.gap.balance.weak_flight import Candidate, actuated
+from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
 from cpfls_cli.inertia import INERTIA_ENTRIES
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
@@ -23,72 +22,102 @@ from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
 
-
-class WholeVehicle(NamedTuple):
-    """A model with effects as one table of weights, as far as it is one.
-
-    Attributes
-    ----------
-    model : VehicleModel
-    not_held : tuple of str
-        Effects that are no polynomials of motion and rotor speeds.
-    """
-
-    model: VehicleModel
-    not_held: tuple[str, ...]
+_INERTIA, _COUPLING = slice(0, 3), slice(3, 6)
 
 
-def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings, inertia: Array) -> WholeVehicle:
+def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings, inertia: Array | None = None) -> VehicleModel:
     """Turn a model with effects into that of a whole vehicle.
 
     Parameters
     ----------
     vehicle : VehicleSettings
         That the effects were fitted with.
-    inertia : array, shape (3, 3), kg m^2
-        Of the base, where it does not depend on the attitude.
+    inertia : array, shape (3, 3), kg m^2, or None
+        Of the base, where it does not depend on the attitude; None for that of the vehicle, or a base that does.
+
+    Returns
+    -------
+    VehicleModel
+        With the inertia of before where the one that comes with the effects is that of no body.
     """
-    acting = [one for one in extended.effects if one.candidate.effect.kind in ("wrench", "actuator")]
-    corrected = inertia + inertia_correction(extended.parameters, vehicle)
-    effects = list(_numbers(extended.parameters, vehicle, corrected))
-    probe, times, not_held = Probe.of(vehicle), {"delay_s": 0.0, "lag_s": 0.0}, []
-    for fitted in acting:
-        (known, shape), linear = fitted.in_still_air
+    constant = extended.base is None or inertia is not None
+    given = inertia_tensor(vehicle) if inertia is None else inertia
+    correction = inertia_correction(extended.parameters, vehicle)
+    # Found in still air, a wind is no part of the vehicle, and what it blows against is one.
+    wind = _wind(extended)
+    effects, times = list(_numbers(extended.parameters, vehicle, given + correction)), {"delay_s": 0.0, "lag_s": 0.0}
+    for (known, shape), linear in extended.effects:
         hooks = known.actuation
-        if known.vehicle is not None:
+        if known.kind not in ("wrench", "actuator"):
+            continue
+        if known.still and known.apply:
+            effects.append(ModelEffect(CATALOGUE[known.still].name, {}, linear))
+        elif known.vehicle is not None:
             vehicle = known.vehicle(vehicle, shape)
         elif known.inertia is not None:
-            corrected = corrected + known.inertia(linear)
+            correction = correction + known.inertia(linear)
         elif hooks is not None and (hooks.lag or hooks.delay):
             times |= {"lag_s": hooks.lag(shape)} if hooks.lag else {}
             times |= {"delay_s": hooks.delay(shape)} if hooks.delay else {}
-        elif known.carried is None and polynomial(known, probe, shape) is not None:
-            effects.append(ModelEffect(known.name, dict(shape), linear))
         else:
-            not_held.append(known.name)
-    xx, yy, zz, xy, xz, yz = (float(corrected[entry]) for entry in INERTIA_ENTRIES)
-    if np.linalg.eigvalsh(corrected).min() > 0:
-        vehicle = replace(vehicle, inertia_kg_m2=(xx, yy, zz, xy, xz, yz))
-    else:
-        not_held.append("inertia, which is not positive definite")
-    return WholeVehicle(
-        VehicleModel(
-            vehicle=vehicle,
-            response=RotorResponse(**times),
-            effects=tuple(effects),
-            wind=actuated(probe.signals, extended.chosen).steady_wind,
-        ),
-        tuple(not_held),
+            effects.append(ModelEffect(known.name, dict(shape), linear))
+    fuzzy = extended.base if not constant else None
+    return VehicleModel(
+        vehicle=_with_inertia(vehicle, given + correction),
+        response=RotorResponse(**times),
+        effects=tuple(effects),
+        fuzzy=fuzzy.corrected(correction) if fuzzy is not None and correction.any() else fuzzy,
+        wind=wind,
+        # The lag and the delay of the catalogue are those behind a command.
+        commanded=any(times.values()),
+        hold="linear" if any(times.values()) else None,
+        repairs=extended.audit,
     )
 
 
+def _with_inertia(vehicle: VehicleSettings, inertia: Array) -> VehicleSettings:
+    if not is_body(inertia):
+        return vehicle
+    xx, yy, zz, xy, xz, yz = (float(inertia[entry]) for entry in INERTIA_ENTRIES)
+    moments = (xx, yy, zz, xy, xz, yz) if xy or xz or yz else (xx, yy, zz)
+    return vehicle if moments == vehicle.inertia_kg_m2 else replace(vehicle, inertia_kg_m2=moments)
+
+
+def is_body(inertia: Array) -> bool:
+    """Tell whether an inertia tensor, shape (3, 3), is positive definite."""
+    return bool(np.linalg.eigvalsh(inertia).min() > 0)
+
+
+def require_body(extended: ExtendedModel, vehicle: VehicleSettings) -> None:
+    """Refuse effects with which the inertia is that of no body.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+        That they were fitted with.
+
+    Raises
+    ------
+    ComputationError
+    """
+    added = (known.inertia(linear) for (known, _), linear in extended.effects if known.inertia is not None)
+    inertia = inertia_tensor(vehicle) + sum(added, start=inertia_correction(extended.parameters, vehicle))
+    if extended.base is None and not is_body(inertia):
+        raise ComputationError("not extended: with the effects that are named the inertia is that of no body")
+
+
+def _wind(extended: ExtendedModel) -> tuple[float, float, float]:
+    shapes = [shape for (known, shape), _ in extended.effects if known.still and known.apply]
+    return (shapes[0]["W_x"], shapes[0]["W_y"], 0.0) if shapes else (0.0, 0.0, 0.0)
+
+
 def _numbers(parameters: Array, vehicle: VehicleSettings, corrected: Array) -> tuple[ModelEffect, ...]:
-    """Keep what no inertia holds: coupling of the rates, scale of the thrust; nothing where there is none of it."""
-    stated, found = np.array(vehicle.inertia_kg_m2[:3]), np.diag(corrected)
-    kept = coupling(parameters)
+    """Take the numbers that no inertia tensor holds: coupling of rates, scale of thrust, place of the sensor."""
+    stated, refitted = np.array(vehicle.inertia_kg_m2[:3]), np.diag(corrected)
+    kept = parameters.copy()
+    kept[_INERTIA] = 0.0
     # A coupling multiplies the mean of two moments of inertia, which are now the corrected ones.
-    kept[3:6] *= [stated[list(pair)].sum() / found[list(pair)].sum() for pair in ((1, 2), (2, 0), (0, 1))]
-    kept[6] = parameters[6]
+    kept[_COUPLING] *= [stated[list(pair)].sum() / refitted[list(pair)].sum() for pair in ((1, 2), (2, 0), (0, 1))]
     return (ModelEffect(VEHICLE_NUMBERS.name, {}, kept),) if kept.any() else ()
 
 
@@ -98,25 +127,36 @@ def with_effects(model: VehicleModel) -> ExtendedModel:
     Parameters
     ----------
     model : VehicleModel
-        Of constant inertia; signals have to be those of its vehicle, see `of_vehicle`.
+        Signals have to be those of its vehicle, see `of_vehicle`.
     """
+    base = replace(plain(model.fuzzy), audit=model.repairs)
+    if model.is_rigid_body:
+        return base
+    numbers = next((one.coefficients for one in model.effects if one.name == VEHICLE_NUMBERS.name), base.parameters)
+    # Where a sensor sits moves nothing, and is no part of torque and force.
+    of_log = np.array([coefficient.of_log for coefficient in VEHICLE_NUMBERS.coefficients])
     whole = FittedEffect(Candidate(_beyond_rigid_body(model), {}), np.zeros(0))
-    return replace(plain(None), effects=(whole,))
+    return replace(base, parameters=np.where(of_log, numbers, 0.0), effects=(whole,))
 
 
-def of_vehicle(recording: Recording, model: VehicleModel) -> Recording:
-    """Exchange the stated vehicle of a flight for that of a model.
+def of_vehicle(recordings: Sequence[Recording], model: VehicleModel) -> list[Recording]:
+    """Exchange the stated vehicle of flights for that of a model.
 
     Raises
     ------
     InputError
-        If the flight lacks a signal that the model needs.
+        If a flight lacks a signal that the model needs.
     """
-    (whole,) = with_effects(model).chosen
-    missing = whole.effect.missing(recording.signals)
+    return [_of_vehicle(recording, model) for recording in recordings]
+
+
+def _of_vehicle(recording: Recording, model: VehicleModel) -> Recording:
+    missing = tuple(sorted(model.needs - recording.signals.available))
     if missing:
         lacking = " and ".join(name.replace("_", " ") for name in missing)
         raise InputError(f"{recording.name}: lacks {lacking}, which the model of the whole vehicle needs")
+    if recording.signals.vehicle == model.vehicle:
+        return recording
     return replace(recording, signals=replace(recording.signals, vehicle=model.vehicle))
 
 
@@ -124,10 +164,7 @@ def _beyond_rigid_body(model: VehicleModel) -> Effect:
     """Make an effect of what a vehicle does beyond squared rotor speeds: response, law, effects and remainder."""
 
     def columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-        rotor = model.rotor_terms_at(signals.speed, signals.period, "previous" if signals.commanded else "linear")
-        velocity = signals.air_velocity if model.needs_velocity else np.zeros_like(signals.body_rate)
-        wrench = model.wrench(velocity, signals.body_rate, rotor)
-        return Columns((wrench - signals.wrench)[:, :, None])
+        return Columns((model.wrench_along(model.acting(signals)) - signals.wrench)[:, :, None])
 
     return Effect(
         name="whole_vehicle",
@@ -136,7 +173,7 @@ def _beyond_rigid_body(model: VehicleModel) -> Effect:
         formula="(M, F) = G(rotors) x(R'v, omega) - (M, F) of squared rotor speeds",
         sentence="The vehicle is as a whole model of it says.",
         coefficients=(),
-        needs=frozenset({"rotor_speed", *(("velocity",) if model.needs_velocity else ())}),
+        needs=frozenset(),
         excitation="",
         rivals={},
         source="`cpfls vehicle`",

@@ -8,7 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
+from cpfls_cli.dynamics.visited import visited_cells
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.state import History
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
@@ -19,12 +21,10 @@ from cpfls_cli.identification.excitation import RuleExcitation, axis_evidence, r
 from cpfls_cli.identification.findings import FitDiagnostics, findings
 from cpfls_cli.identification.judge import Baseline, Score, fit_baselines, score_of
 from cpfls_cli.identification.least_squares import LeastSquares
-from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.search import UNWATCHED, Front, SearchRun, StopReason, is_end, search
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.identification.solver import Fit, Solver
-from cpfls_cli.identification.visited import visited_cells
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import data_ranges, joined_ranges
 from cpfls_cli.regressor.structure import model_structure
@@ -39,7 +39,7 @@ class Identification(FitDiagnostics):
 
     Attributes
     ----------
-    model : Model
+    model : InertiaFunctions
     front : Front
     history : History
     stop_reason : str
@@ -52,7 +52,7 @@ class Identification(FitDiagnostics):
         Warnings: what failed or was not excited.
     """
 
-    model: Model
+    model: InertiaFunctions
     front: Front
     history: History
     stop_reason: StopReason
@@ -176,7 +176,7 @@ def model_evaluator(training: TorqueSource, learned: TorqueSource, settings: Ide
 
 def _solve(
     evaluator: Evaluator, training: TorqueSource, chromosome: IntArray
-) -> tuple[Model, Fit, LeastSquares] | None:
+) -> tuple[InertiaFunctions, Fit, LeastSquares] | None:
     """Solve one chromosome in full precision; None where it has no finite model."""
     fit = evaluator.fit(chromosome)
     if fit is None:
@@ -185,7 +185,9 @@ def _solve(
     partitions = decode(learned.structure, chromosome.astype(float))
     exact, system = evaluator.solver.exact(partitions, fit)
     visited = visited_cells(data.motion.attitude for data in training.chunks())
-    model = Model(learned.structure, learned.ranges, partitions, exact.coefficients, exact.rigid_body, visited)
+    model = InertiaFunctions(
+        learned.structure, learned.ranges, partitions, exact.coefficients, exact.rigid_body, visited
+    )
     return model, exact, system
 
 
@@ -199,7 +201,7 @@ def _count(source: TorqueSource, flag: Callable[[Array], BoolArray]) -> int:
 
 def _excitation(
     evaluator: Evaluator,
-    model: Model,
+    model: InertiaFunctions,
     rigid_body: Baseline,
     scores: Mapping[str, Score],
     settings: IdentificationSettings,

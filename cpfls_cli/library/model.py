@@ -63,16 +63,12 @@ def load_model(path: str | os.PathLike[str], config: str | os.PathLike[str] | No
     InputError
         If the file is no good model; the message says why.
     """
-    from cpfls_cli.artifacts.extended import ExtendedRecord
     from cpfls_cli.artifacts.model import ModelRecord
-    from cpfls_cli.artifacts.vehicle_model import VehicleRecord
     from cpfls_cli.config.load import load_study, validate
 
     artifact = read(path)
-    models = (ModelRecord, ExtendedRecord, VehicleRecord)
-    if artifact.format not in {kind.FORMAT.name for kind in models}:
-        makers = ", ".join(kind.spec().makers for kind in models)
-        raise InputError(f"{path}: is a {artifact.format}, not a model; models are made by {makers}")
+    if artifact.format != ModelRecord.FORMAT.name:
+        raise InputError(f"{path}: is a {artifact.format}, not a model; models are made by {ModelRecord.spec().makers}")
     study = validate(artifact.config, f"{path}: /config") if config is None else load_study(Path(config))
     return Model(artifact.path, study, artifact)
 
@@ -301,20 +297,16 @@ class Model:
     @cached_property
     def _whole(self) -> VehicleModel:
         """The model with its rotors, as far as a state and rotor speeds alone give its motion."""
-        from cpfls_cli.artifacts.model import ModelRecord
+        from cpfls_cli.flights.same_vehicle import rebuilt
         from cpfls_cli.playback.model import VehicleModel
 
-        record: Any = None if self.artifact is None else self.artifact._record
-        if record is None:
+        if self.artifact is None:
             return VehicleModel(vehicle=self._study.vehicle)
-        if isinstance(record, ModelRecord):
-            return VehicleModel(vehicle=self._study.vehicle, fuzzy=record.rebuilt(self._path))
-        if record.vehicle is None:
-            raise InputError(f"{self._path}: was made before models with effects held their vehicle; make it again")
-        if record.vehicle.not_held:
-            parts = ", ".join(record.vehicle.not_held)
+        record: Any = self.artifact._record
+        model = rebuilt(self._path, record)
+        if model.beside_table:
+            parts = ", ".join(model.beside_table)
             raise InputError(f"{self._path}: holds {parts}, which no state alone gives; Model.replay plays it back")
-        model: VehicleModel = record.vehicle.vehicle_model()
         return model
 
     def _require_rotors(self, speed: Any) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING
 from cpfls_cli.pages.model import SHORT_VERDICTS, TORQUE
 from cpfls_cli.pages.source import Source, Sources
@@ -43,7 +43,7 @@ _ABSENT = "not there"
 # What a page looks like does not change a model.
 _LEFT_OUT = ("report",)
 
-_Model = Source[ModelRecord]
+_Model = Source[IdentifiedRecord]
 
 
 @dataclass(frozen=True)

@@ -86,7 +86,7 @@ def verdict_box(disagreement: Source[DisagreementRecord]) -> Box:
     follows = [f"It follows {joined(signals)} most."] if signals else []
     on = (
         "The model has effects already; `cpfls diagnose` needs a comparison without them."
-        if record.has_effects
+        if not record.is_base(disagreement.vehicle)
         else "Run `cpfls diagnose` to learn what is missing."
     )
     return Box("GAP", title, [*follows, on])

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.evidence import PeriodGroup, PhysicsGroup, StepsGroup, StructuresGroup
-from cpfls_cli.artifacts.model import ModelRecord, RidgeGroup
+from cpfls_cli.artifacts.identified import IdentifiedRecord, RidgeGroup
 from cpfls_cli.artifacts.scores import AXES, MODEL
 from cpfls_cli.pages.model import TORQUE, verdict
 from cpfls_cli.pages.source import Source, Sources, section_of_each
@@ -59,7 +59,7 @@ def steps_section(sources: Sources) -> Section | None:
     return section_of_each("steps", "Prediction by horizon", models, _steps)
 
 
-def _validation(model: Source[ModelRecord], index: int) -> Iterator[Block]:
+def _validation(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
     record = model.record
     yield Heading(model.label)
     yield from verdict(model)
@@ -75,7 +75,7 @@ def _validation(model: Source[ModelRecord], index: int) -> Iterator[Block]:
         yield _structures(record.structures, index)
 
 
-def _scores(model: Source[ModelRecord], index: int) -> Table:
+def _scores(model: Source[IdentifiedRecord], index: int) -> Table:
     judged = model.record.judged
     rows: list[list[str | Cell]] = []
     for part in judged.parts:
@@ -102,7 +102,7 @@ def _scores(model: Source[ModelRecord], index: int) -> Table:
     return Table(f"scores-{index}", caption, ("Part", "Axis", *_SCORES), rows, frozenset({0, 1}))
 
 
-def _period(record: ModelRecord, period: PeriodGroup, index: int) -> Table:
+def _period(record: IdentifiedRecord, period: PeriodGroup, index: int) -> Table:
     rows: list[list[str]] = []
     for part, mse, largest in zip(period.parts, period.mse, period.max_error, strict=True):
         here, largest_here = (record.judged.of_axes(measure, MODEL, part) for measure in ("mse", "max_error"))
@@ -162,7 +162,7 @@ def ridge_sentence(ridge: RidgeGroup) -> str:
     return f"{reduction}, {number(ratio, 2)} standard errors: the flight holds evidence for a fuzzy part."
 
 
-def _ridge_figure(name: str, model: Source[ModelRecord], ridge: RidgeGroup) -> Plot:
+def _ridge_figure(name: str, model: Source[IdentifiedRecord], ridge: RidgeGroup) -> Plot:
     """Draw the cross-validated error with its standard error; the last point has no fuzzy part at all.
 
     References
@@ -240,7 +240,7 @@ def _structures(structures: StructuresGroup, index: int) -> Table:
     return Table(f"structures-{index}", caption, header, rows, frozenset({0}), frozenset({0}))
 
 
-def _steps(model: Source[ModelRecord], index: int) -> Iterator[Block]:
+def _steps(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
     steps = model.record.steps
     assert steps is not None, "only models that hold them are shown"
     yield Heading(model.label)

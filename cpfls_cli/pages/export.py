@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import MODEL
 from cpfls_cli.export.holding import Missing
 from cpfls_cli.export.registry import TARGETS
@@ -46,7 +46,7 @@ def export_answer(
     yield from (Text(warning, "warning") for warning in warnings)
 
 
-def identified_worth(record: ModelRecord) -> Iterator[str]:
+def identified_worth(record: IdentifiedRecord) -> Iterator[str]:
     """Say what an identified model is worth that is used elsewhere."""
     verdict, judged = record.verdict, record.judged
     if verdict is None or verdict.label is None:
@@ -64,7 +64,7 @@ def identified_worth(record: ModelRecord) -> Iterator[str]:
     yield "Rotors, mass and all forces are those of the config."
 
 
-def identified_evidence(record: ModelRecord) -> dict[str, Any]:
+def identified_evidence(record: IdentifiedRecord) -> dict[str, Any]:
     """Say the same for machines."""
     verdict, judged = record.verdict, record.judged
     counts = zip(judged.parts, judged.samples, judged.outside, strict=True)
@@ -90,7 +90,7 @@ def identified_evidence(record: ModelRecord) -> dict[str, Any]:
     }
 
 
-def identified_warnings(model: ModelRecord, path: object) -> Iterator[str]:
+def identified_warnings(model: IdentifiedRecord, path: object) -> Iterator[str]:
     """Say what speaks against flying with an identified model."""
     if not model.complete:
         yield "the model is incomplete, and marked as such: do not fly with it"

@@ -86,7 +86,10 @@ def _section(extended: Source[ExtendedRecord], index: int, alone: bool) -> Itera
     yield Heading(extended.label)
     yield Facts(
         [
-            ("Built on", "the rigid body of the vehicle" if record.base.is_vehicle else "an identified model"),
+            (
+                "Built on",
+                "the rigid body of the vehicle" if record.vehicle.inertia_functions is None else "an identified model",
+            ),
             ("Extended by", _by(record)),
             ("Thrust, relative to the vehicle", number(record.thrust_scale, 5)),
         ]
@@ -103,7 +106,7 @@ def _inertia_table(extended: Source[ExtendedRecord], index: int) -> Table:
     record = extended.record
     given = [*extended.vehicle.inertia_kg_m2, *[0.0] * 6][:6]
     # Without a rigid body underneath, the six numbers are what the model gets on top of its own.
-    whole = record.base.is_vehicle
+    whole = record.vehicle.inertia_functions is None
     before = [number(value) if whole else "" for value in given]
     rows = [list(row) for row in zip(INERTIA_PARAMETERS, before, map(number, record.inertia), strict=True)]
     header = ("kg m²", "Vehicle", "Extended model" if whole else "Added")

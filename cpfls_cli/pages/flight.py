@@ -9,7 +9,6 @@ import numpy as np
 
 from cpfls_cli.artifacts.flight import DelayGroup, FlightRecord
 from cpfls_cli.artifacts.scores import AXES
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.pages.trajectory import attitude_figure, rotation_figure
@@ -136,9 +135,8 @@ def _effects(flight: Source[FlightRecord]) -> Iterator[Text]:
     if flight.made_from("trajectory") and flight.config["simulation"]["mode"] == "closed-loop":
         effects = {} if flight.record.effects is None else flight.record.effects.by_name
         model = flight.header.inputs.get("model")
-        whole = model is not None and model.format == VehicleRecord.FORMAT.name
-        beside = " beside those of the whole vehicle" if whole else ""
-        yield Text(f"effects{beside}: {', '.join(f'{name} = {value:g}' for name, value in effects.items()) or 'none'}")
+        own = ", those of the model among them" if model is not None else ""
+        yield Text(f"effects{own}: {', '.join(f'{name} = {value:g}' for name, value in effects.items()) or 'none'}")
 
 
 def flight_section(sources: Sources) -> Section | None:

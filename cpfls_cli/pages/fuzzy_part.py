@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.model import ModelGroup, ModelRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.model import InertiaFunctionsGroup
 from cpfls_cli.fuzzy.membership import join_ends, memberships
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source, Sources, section_of_each
@@ -51,11 +52,11 @@ def rules_section(sources: Sources) -> Section | None:
     return section_of_each("rules", "Excitation of the rules", sources.models, _rules)
 
 
-def _partitions(model: Source[ModelRecord], index: int) -> Iterator[Block]:
+def _partitions(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
     record = model.record
     if record.fuzzy_part_off:
         yield Text(f"The fuzzy part of {model.label} is off: no membership function takes part in it.", "note")
-    elif max(len(peaks) for peaks in _breakpoints(record.model).values()) > 1:
+    elif max(len(peaks) for peaks in _breakpoints(record.functions).values()) > 1:
         yield partitions_figure(f"figure-6-partitions-{index}", model)
     else:
         yield Text(f"{model.label} has one rule per input: its one membership function is 1 everywhere.", "note")
@@ -63,42 +64,42 @@ def _partitions(model: Source[ModelRecord], index: int) -> Iterator[Block]:
     yield Folded(f"Chromosome, breakpoints, inertia and coefficients of {model.label}", tables)
 
 
-def _breakpoints(model: ModelGroup) -> dict[str, Array]:
+def _breakpoints(model: InertiaFunctionsGroup) -> dict[str, Array]:
     """Group the breakpoints of a model by partition."""
     names = np.array(model.partition)
     return {name: model.breakpoints[names == name] for name in dict.fromkeys(model.partition)}
 
 
-def _chromosome_table(record: ModelRecord, index: int) -> Table:
+def _chromosome_table(record: IdentifiedRecord, index: int) -> Table:
     weights = [count(weight) for weight in record.model.weights]
     rows = []
-    for name, peaks in _breakpoints(record.model).items():
+    for name, peaks in _breakpoints(record.functions).items():
         genes, weights = weights[: len(peaks) - 1], weights[len(peaks) - 1 :]
         rows.append([name, " ".join(genes), " ".join(number(float(peak), 5) for peak in peaks)])
     header = ("Partition", "Weights (16 bit)", "Breakpoints")
     return Table(f"chromosome-{index}", "Chromosome and the partitions that it encodes.", header, rows)
 
 
-def _inertia_table(record: ModelRecord, index: int) -> Table:
+def _inertia_table(record: IdentifiedRecord, index: int) -> Table:
     rows = [
         [name, number(float(under)) if record.on_rigid_body else "none", number(float(alone))]
         for name, under, alone in zip(
-            INERTIA_PARAMETERS, record.model.rigid_body, record.baselines.rigid_body, strict=True
+            INERTIA_PARAMETERS, record.functions.rigid_body, record.baselines.rigid_body, strict=True
         )
     ]
     header = ("kg m²", "Under the fuzzy part", "Rigid body alone")
     return Table(f"inertia-{index}", "Inertia found by least squares.", header, rows)
 
 
-def _coefficients_table(record: ModelRecord, index: int) -> Table:
-    pairs = zip(record.model.parameter, record.model.coefficients, strict=True)
+def _coefficients_table(record: IdentifiedRecord, index: int) -> Table:
+    pairs = zip(record.functions.parameter, record.functions.coefficients, strict=True)
     rows = [[name, number(float(value), 5)] for name, value in pairs]
     return Table(
         f"coefficients-{index}", "Coefficients of the rule consequents, kg m².", ("Coefficient", "Value"), rows
     )
 
 
-def _rules(model: Source[ModelRecord], index: int) -> Iterator[Block]:
+def _rules(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
     rules, solve = model.record.rules, model.record.solve
     yield Heading(model.label)
     yield Facts(
@@ -124,14 +125,14 @@ def _rules(model: Source[ModelRecord], index: int) -> Iterator[Block]:
     yield Table(f"silent-rules-{index}", caption, ("Rule", "Largest firing", "Determined"), rows)
 
 
-def partitions_figure(name: str, model: Source[ModelRecord]) -> Plot:
+def partitions_figure(name: str, model: Source[IdentifiedRecord]) -> Plot:
     """Draw the membership functions of all partitions, side by side.
 
     References
     ----------
     Figure 6 of the paper; equation (8).
     """
-    partitions = _breakpoints(model.record.model)
+    partitions = _breakpoints(model.record.functions)
     joined = model.config["identification"]["structure"] == "cpfls"
     rows = -(-len(partitions) // _COLUMNS)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup
 from cpfls_cli.pages.model import MODELS, SQUARED_TORQUE, TORQUE
 from cpfls_cli.pages.source import Source, Sources, section_of_each
@@ -69,7 +69,7 @@ def _table(sources: Sources) -> Table:
     return Table("table-5-identification", caption, header, rows, sentences=frozenset(range(1, len(header))))
 
 
-def _column(model: Source[ModelRecord]) -> list[str]:
+def _column(model: Source[IdentifiedRecord]) -> list[str]:
     record, settings, judged = model.record, model.config["identification"], model.record.judged
     return [
         {"cpfls": "cpFLS", "fls": "FLS"}[settings["structure"]] + (" on rigid body" if record.on_rigid_body else ""),
@@ -84,7 +84,7 @@ def _column(model: Source[ModelRecord]) -> list[str]:
     ]
 
 
-def _baselines(model: Source[ModelRecord], index: int) -> Iterator[Block]:
+def _baselines(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
     judged = model.record.judged
     yield Heading(f"{model.label} and its baselines")
     yield Text(
@@ -124,7 +124,7 @@ def search_section(sources: Sources) -> Section | None:
     return section_of_each("search", "Search", sources.models, _search)
 
 
-def _search(model: Source[ModelRecord], index: int) -> Iterator[Block]:
+def _search(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
     if not model.record.searched:
         yield Text(
             f"No search: one chromosome. {model.label} has one rule per input, so there is no partition to search for.",
@@ -141,7 +141,7 @@ def _search(model: Source[ModelRecord], index: int) -> Iterator[Block]:
     yield front_figure(f"pareto-front-{index}", model)
 
 
-def convergence_figure(name: str, model: Source[ModelRecord]) -> Plot:
+def convergence_figure(name: str, model: Source[IdentifiedRecord]) -> Plot:
     """Draw the best of each objective found so far, by generation."""
     history = model.record.history
     generation = np.arange(len(history.best))
@@ -168,7 +168,7 @@ def convergence_figure(name: str, model: Source[ModelRecord]) -> Plot:
     return plot(name, caption, f"Best {error}, largest error and condition number by generation", 4.6, draw)
 
 
-def front_figure(name: str, model: Source[ModelRecord]) -> Plot:
+def front_figure(name: str, model: Source[IdentifiedRecord]) -> Plot:
     """Draw the members of the Pareto front and mark the chosen one."""
     objectives, chosen = model.record.front.objectives, model.record.front.chosen
     error, unit = _first_objective(model.record)
@@ -196,7 +196,7 @@ def front_figure(name: str, model: Source[ModelRecord]) -> Plot:
     return plot(name, caption, f"Scatter of {error} against condition number, the chosen member marked", 3.0, draw)
 
 
-def _first_objective(record: ModelRecord) -> tuple[str, str]:
+def _first_objective(record: IdentifiedRecord) -> tuple[str, str]:
     """Name the error that the search minimised, and its unit.
 
     Over a rigid body it is the error on blocks left out in turn, every axis divided by its own scale.

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, JudgedGroup
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source
@@ -50,7 +50,7 @@ _SCORES = (
 )
 
 
-def answer(model: Source[ModelRecord]) -> Iterator[Block]:
+def answer(model: Source[IdentifiedRecord]) -> Iterator[Block]:
     """Say what was found, how good it is beside its baselines, how far to trust it and where, and what to distrust."""
     yield from solution(model)
     yield scores_table(model, 1)
@@ -58,7 +58,7 @@ def answer(model: Source[ModelRecord]) -> Iterator[Block]:
     yield from (Text(finding, "warning") for finding in model.record.findings)
 
 
-def solution(model: Source[ModelRecord]) -> Iterator[Text]:
+def solution(model: Source[IdentifiedRecord]) -> Iterator[Text]:
     """Say how many parameters were found from how much, how the search ended, and the rigid body beside them."""
     record = model.record
     solve, evaluations = record.solve, record.history.evaluations
@@ -83,7 +83,7 @@ def solution(model: Source[ModelRecord]) -> Iterator[Text]:
     yield Text(f"rigid body that fits best, kg m²: {moments}")
 
 
-def scores_table(model: Source[ModelRecord], index: int) -> Table:
+def scores_table(model: Source[IdentifiedRecord], index: int) -> Table:
     """Show the errors of a model and its baselines on every part of the data.
 
     Parameters
@@ -117,7 +117,7 @@ def _row(judged: JudgedGroup, part: str, name: str) -> list[str | Cell]:
     ]
 
 
-def verdict(model: Source[ModelRecord]) -> Iterator[Block]:
+def verdict(model: Source[IdentifiedRecord]) -> Iterator[Block]:
     """Say how far to trust a model, where, and why; or how to find out."""
     record = model.record
     if record.verdict is not None and record.verdict.label is not None:
@@ -134,7 +134,7 @@ def verdict(model: Source[ModelRecord]) -> Iterator[Block]:
         )
 
 
-def verdict_line(model: Source[ModelRecord]) -> Text:
+def verdict_line(model: Source[IdentifiedRecord]) -> Text:
     """Say in one line how far to trust a model, and whether its search came to its end."""
     record = model.record
     incomplete = (
@@ -155,7 +155,7 @@ def _verdict_words(label: str) -> tuple[str, Tone]:
     return _VERDICTS.get(label, (label, "note"))
 
 
-def trust_notes(model: ModelRecord, path: object) -> Iterator[Text]:
+def trust_notes(model: IdentifiedRecord, path: object) -> Iterator[Text]:
     """Say what speaks against the use of a model: its search was stopped, it was judged unfit, or not judged at all.
 
     Parameters

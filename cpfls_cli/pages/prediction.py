@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.artifacts.spec import Record
@@ -88,7 +88,7 @@ def trust_along(outside: int, not_positive_definite: int, samples: int, model: R
 
 
 def _outside_words(model: Record | None) -> str:
-    if isinstance(model, ModelRecord) and model.known_everywhere:
+    if isinstance(model, IdentifiedRecord) and model.known_everywhere:
         condition = number(model.solve.condition_number, 3)
         return (
             "the same coefficients hold there, if the structure does: one rule holds everywhere and all its "

@@ -11,7 +11,7 @@ from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.replay import USUAL, VEHICLE, ReplayRecord
 from cpfls_cli.artifacts.selection import SelectionRecord
@@ -85,7 +85,7 @@ _COMMANDS: dict[type[Record], _Command] = {
     TrajectoryRecord: _Command("trajectory", (), ("waypoints",)),
     FlightRecord: _Command("simulate", ("trajectory",), ("model",)),
     SelectionRecord: _Command("reduce", ("flight",)),
-    ModelRecord: _Command("identify", ("flight",), ("selection", "validate", "choose-on")),
+    IdentifiedRecord: _Command("identify", ("flight",), ("selection", "validate", "choose-on")),
     SweepRecord: _Command("sweep", ("flight",), ("validate", "choose-on")),
     PredictionRecord: _Command("predict", ("model", "flight")),
     ReplayRecord: _Command("replay", ("model", "flight")),
@@ -146,7 +146,7 @@ def _lines(source: Source, paths: dict[str, str]) -> Iterator[str]:
     if command is None:
         yield f"# {output}: no command is known that makes it"
         return
-    if isinstance(source.record, ModelRecord | VehicleRecord) and not source.record.complete:
+    if isinstance(source.record, IdentifiedRecord | VehicleRecord) and not source.record.complete:
         yield f"# the search for {output} was stopped before its end; this one goes on to it"
     words = ["cpfls", command.name, _config_name(source)]
     for role in command.arguments:
@@ -190,7 +190,7 @@ _LACKS: tuple[_Lack, ...] = (
         "cpfls simulate CONFIG trajectory.h5 -o flight.h5, or cpfls import CONFIG LOG -o flight.h5",
     ),
     (SelectionRecord, "Table 4 and Figure 5", "cpfls reduce CONFIG flight.h5 -o selection.h5"),
-    (ModelRecord, "Table 5, the baselines, Figure 6 and the rules", "cpfls identify CONFIG flight.h5 -o model.h5"),
+    (IdentifiedRecord, "Table 5, the baselines, Figure 6 and the rules", "cpfls identify CONFIG flight.h5 -o model.h5"),
     (
         PredictionRecord,
         "Figure 7 and the inertia matrix along a flight",

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.evidence import ResidualsGroup
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, plain_ticks, plot, stacked, style_of
@@ -42,7 +42,7 @@ def residuals_section(sources: Sources) -> Section | None:
     return section_of_each("residuals", "What the model leaves over", models, _residuals)
 
 
-def _residuals(model: Source[ModelRecord], index: int) -> Iterator[Block]:
+def _residuals(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
     residuals = model.record.residuals
     assert residuals is not None, "only models that hold them are shown"
     yield Heading(model.label)

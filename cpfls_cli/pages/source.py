@@ -13,8 +13,8 @@ from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.flight import FlightRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job
-from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.replay import ReplayRecord
 from cpfls_cli.artifacts.selection import SelectionRecord
@@ -103,9 +103,9 @@ class Sources:
         return self._of(SelectionRecord)
 
     @property
-    def models(self) -> list[Source[ModelRecord]]:
+    def models(self) -> list[Source[IdentifiedRecord]]:
         """Identified models."""
-        return self._of(ModelRecord)
+        return self._of(IdentifiedRecord)
 
     @property
     def sweeps(self) -> list[Source[SweepRecord]]:

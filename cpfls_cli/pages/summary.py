@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
 from cpfls_cli.pages.diagnosis import gap_blocks
 from cpfls_cli.pages.model import scores_table, solution, verdict_line
@@ -59,7 +59,7 @@ def _flight_warnings(flight: Source[FlightRecord]) -> Iterator[Block]:
         yield Text(f"{flight.label}: {warning}.", "warning")
 
 
-def _model(model: Source[ModelRecord], sources: Sources, index: int) -> Iterator[Block]:
+def _model(model: Source[IdentifiedRecord], sources: Sources, index: int) -> Iterator[Block]:
     record = model.record
     yield Heading(f"Model {model.label}")
     yield Facts(_facts(model))
@@ -77,7 +77,7 @@ def _model(model: Source[ModelRecord], sources: Sources, index: int) -> Iterator
         )
 
 
-def _facts(model: Source[ModelRecord]) -> list[tuple[str, str]]:
+def _facts(model: Source[IdentifiedRecord]) -> list[tuple[str, str]]:
     record = model.record
     learned, training = len(record.training_indices), record.judged.samples_of(TRAINING)
     file = record.origin.inputs.get("flight")
@@ -92,7 +92,7 @@ def _facts(model: Source[ModelRecord]) -> list[tuple[str, str]]:
     ]
 
 
-def _structure(model: Source[ModelRecord]) -> str:
+def _structure(model: Source[IdentifiedRecord]) -> str:
     settings = model.config["identification"]
     kind = {"cpfls": "continuous periodic fuzzy system", "fls": "classic TSK fuzzy system"}[settings["structure"]]
     functions = settings["membership_functions"]
@@ -106,8 +106,8 @@ def _structure(model: Source[ModelRecord]) -> str:
     )
 
 
-def _parameters(record: ModelRecord) -> str:
-    fuzzy = f"{len(record.model.coefficients)} of the fuzzy part"
+def _parameters(record: IdentifiedRecord) -> str:
+    fuzzy = f"{len(record.functions.coefficients)} of the fuzzy part"
     if not record.on_rigid_body:
         return fuzzy
     if record.fuzzy_part_off:
@@ -115,7 +115,7 @@ def _parameters(record: ModelRecord) -> str:
     return f"6 of inertia and {fuzzy}, held by a ridge of {plain(record.model.ridge_weight)}"
 
 
-def _search(model: Source[ModelRecord]) -> str:
+def _search(model: Source[IdentifiedRecord]) -> str:
     if not model.record.searched:
         return "no search: one chromosome"
     settings = model.config["identification"]
@@ -123,7 +123,7 @@ def _search(model: Source[ModelRecord]) -> str:
     return f"population {settings['population']}, {number} generation{'' if number == 1 else 's'}"
 
 
-def _beside_rigid_body(model: Source[ModelRecord], sources: Sources) -> Iterator[Text]:
+def _beside_rigid_body(model: Source[IdentifiedRecord], sources: Sources) -> Iterator[Text]:
     """Compare a model with the rigid body with six inertia parameters, part by part."""
     judged = model.record.judged
     if model.record.fuzzy_part_off:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.evidence import CurvesGroup, RoundTripGroup, UncertaintyGroup
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, band, legend_over, named, plain_ticks, plot, runs, style_of
@@ -49,7 +49,7 @@ def uncertainty_section(sources: Sources) -> Section | None:
     return section_of_each("uncertainty", "How sure the inertia is", models, _uncertainty)
 
 
-def _uncertainty(model: Source[ModelRecord], index: int) -> Iterator[Block]:
+def _uncertainty(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
     record = model.record
     yield Heading(model.label)
     if record.uncertainty is not None:
@@ -63,10 +63,10 @@ def _uncertainty(model: Source[ModelRecord], index: int) -> Iterator[Block]:
         yield Text(_round_trip_sentence(record.round_trip))
 
 
-def _parameters(model: Source[ModelRecord], draws: UncertaintyGroup, index: int) -> Table:
+def _parameters(model: Source[IdentifiedRecord], draws: UncertaintyGroup, index: int) -> Table:
     record = model.record
     pairs = [(record.baselines.rigid_body, draws.best_rigid_body)]
-    pairs += [(record.model.rigid_body, draws.rigid_body)] if record.on_rigid_body else []
+    pairs += [(record.functions.rigid_body, draws.rigid_body)] if record.on_rigid_body else []
     columns = [(value, *interval(value, drawn, draws.blocks)) for value, drawn in pairs]
     stated = [*model.vehicle.inertia_kg_m2, *[0.0] * 6][:6]
     rows: list[list[str | Cell]] = []

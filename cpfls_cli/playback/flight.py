@@ -116,6 +116,11 @@ class LoggedFlight:
     contradictions: tuple[str, ...] = ()
     group: str = ""
 
+    @classmethod
+    def of(cls, name: str, signals: Signals) -> LoggedFlight:
+        """Take a flight without pauses; commands stay until the next sample."""
+        return cls(name, (signals,), "previous" if signals.commanded else "linear", "", ())
+
     @property
     def time(self) -> Array:
         """Time of all samples, s."""

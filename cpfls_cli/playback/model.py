@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial, state_terms
 from cpfls_cli.effects.registry import CENTRE_OF_MASS, VEHICLE_NUMBERS, effect
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.fuzzy.basis import Consequents
 from cpfls_cli.fuzzy.periodic_system import PeriodicStructure
 from cpfls_cli.inertia import symmetric
@@ -46,6 +47,52 @@ class ModelEffect(NamedTuple):
     def is_lever(self) -> bool:
         """Whether it has a lever for the forces of all other parts."""
         return self.name == CENTRE_OF_MASS.name and len(self.coefficients) == _AXES
+
+    @property
+    def known(self) -> Effect:
+        """What it is in the catalogue, in the form that has these numbers."""
+        return effect(self.name).form(len(self.coefficients), self.shape)
+
+    @property
+    def effect(self) -> Effect:
+        """What it does: of the vehicle's own numbers what is no inertia, of others all."""
+        return _wrench_of_numbers() if self.known.kind == "parameter" else self.known
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Its numbers by name, as the catalogue has them."""
+        known = self.known
+        physical = self.coefficients if known.physical is None else known.physical(self.coefficients)
+        values = zip((each.name for each in known.coefficients), physical.tolist(), strict=True)
+        # Of the vehicle's own numbers those that stand in the vehicle are 0 here.
+        return {name: value for name, value in values if value or known.kind != "parameter"} | dict(self.shape)
+
+    @property
+    def is_filter(self) -> bool:
+        """Whether it acts on what drives the rotors."""
+        return self.effect.kind == "actuator" and self.effect.apply is not None
+
+    @property
+    def linear(self) -> Array:
+        """Coefficients of the columns; 1 where everything is in the shape."""
+        return np.ones(1) if self.effect.unit_coefficient else self.coefficients
+
+    def wrench(self, signals: Signals) -> Array:
+        """Evaluate torque and force along a measured motion, shape (time, 6), N m and N, body frame."""
+        columns = self.effect.columns
+        assert columns is not None, "what only an audit sees is in no model"
+        return columns(signals, self.shape).at_samples(self.linear, signals.time)
+
+    def weights(self, probe: Probe) -> Array | None:
+        """Weigh the terms, shape (6, 34, 1 + 4 rotors); None for what is no polynomial of motion and rotor speeds."""
+        known = self.effect
+        # A body with a state of its own: the random motions of the probe, a second apart, may make it diverge.
+        found = None if self.is_filter or known.carried is not None else polynomial(known, probe, self.shape)
+        return None if found is None else np.tensordot(self.linear, _with_slow(found, probe), axes=1)
+
+    def missing(self, signals: Signals) -> tuple[str, ...]:
+        """Name the signals that it needs and a flight lacks; a filter may lack the command: it leaves speeds alone."""
+        return tuple(each for each in self.effect.missing(signals) if not (self.is_filter and each == "command"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,12 +132,19 @@ class VehicleModel:
         Law of the rotors: thrust and drag follow ``w^2 + thrust_linear w_h w``, with the speed w_h that hovers under
         the square alone.
     effects : tuple of ModelEffect
-        Polynomials of motion and rotor speeds.
+        Polynomials of motion and rotor speeds stand in `weights`; others are evaluated along a measured motion
+        (`along`), or act on what drives the rotors (`filters`).
     remainder : Remainder or None
     fuzzy : InertiaModel or None
         Inertia that depends on the attitude; it then stands in the place of the vehicle's.
     wind : tuple of float, m/s, world frame
         Of its flights, steady; no part of the vehicle.
+    commanded : bool
+        Whether lag and delay of the response lie behind commands: measured speeds have them already.
+    hold : {"linear", "previous"} or None
+        What a command is between samples, where the response was found so; None: as a flight is usually taken.
+    repairs : Audit or None
+        Faults of the sensors, which are taken out of signals first.
     """
 
     vehicle: VehicleSettings
@@ -100,6 +154,9 @@ class VehicleModel:
     remainder: Remainder | None = None
     fuzzy: InertiaModel | None = None
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    commanded: bool = False
+    hold: Hold | None = None
+    repairs: Audit | None = None
 
     @property
     def rotors(self) -> int:
@@ -128,18 +185,154 @@ class VehicleModel:
             raise ComputationError(f"a remainder of {columns} columns is too large; {MOST_COLUMNS} are possible")
         parts = {"rotors": np.zeros((6, self.term_count, 1 + 4 * self.rotors))}
         parts["rotors"][:, 0] = rotor_weights(self.vehicle, self.thrust_linear, self.response)
-        probe = Probe.of(self.vehicle)
-        for known in self.effects:
-            if known.is_lever:
-                continue
-            weights = np.tensordot(known.coefficients, effect_weights(known.name, known.shape, probe), axes=1)
+        for name, weights in self._polynomials.items():
             more = np.zeros((6, self.term_count - len(STATE_TERMS), weights.shape[2]))
-            parts[known.name] = np.concatenate([weights, more], axis=1)
+            parts[name] = np.concatenate([weights, more], axis=1)
         if self.remainder is not None:
             parts["remainder"] = remainder_weights(self.remainder, self.rotors)
         levers = [known for known in self.effects if known.is_lever]
         forces = sum(parts.values()) if levers else np.zeros(6)
         return parts | {known.name: lever_weights(known.coefficients, np.asarray(forces)) for known in levers}
+
+    @cached_property
+    def _polynomials(self) -> dict[str, Array]:
+        """Weights of the effects that are polynomials, by name."""
+        probe = Probe.of(self.vehicle) if self.effects else None
+        found = {one.name: one.weights(probe) for one in self.effects if probe is not None and not one.is_lever}
+        return {name: weights for name, weights in found.items() if weights is not None}
+
+    @property
+    def along(self) -> tuple[ModelEffect, ...]:
+        """Effects that are evaluated along a measured motion, being no polynomials."""
+        elsewhere = self._polynomials
+        return tuple(one for one in self.effects if not (one.is_lever or one.is_filter or one.name in elsewhere))
+
+    @property
+    def filters(self) -> tuple[ModelEffect, ...]:
+        """Effects on what drives the rotors, beside the response."""
+        return tuple(one for one in self.effects if one.is_filter)
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """What a flight has to have for all of its parts, as `Signals.available` names it."""
+        of_effects = (one.effect.needs - ({"command"} if one.is_filter else set()) for one in self.effects)
+        learned = {"rotor_speed", "velocity"} if self.remainder else {"rotor_speed"} if self.thrust_linear else set()
+        needs = frozenset(learned).union(*of_effects)
+        return needs - {"torque", "thrust"} if "rotor_speed" in needs else needs
+
+    @property
+    def is_rigid_body(self) -> bool:
+        """Whether it is mass, inertia and squared rotor speeds alone."""
+        return not (self.effects or self.remainder or self.thrust_linear or any(self.wind)) and self.response == (
+            RotorResponse()
+        )
+
+    @property
+    def beside_table(self) -> tuple[str, ...]:
+        """Effects that no table of weights holds, by name."""
+        return tuple(one.name for one in (*self.filters, *self.along))
+
+    @property
+    def centre(self) -> Array:
+        """Centre of mass, from where all forces have their levers from, shape (3,), m."""
+        return next((one.coefficients for one in self.effects if one.is_lever), np.zeros(_AXES))
+
+    def require(self, signals: Signals, name: str) -> None:
+        """Refuse a flight that lacks what an effect beside the table needs.
+
+        Parameters
+        ----------
+        name : str
+            Of the flight.
+
+        Raises
+        ------
+        InputError
+        """
+        for one in (*self.along, *self.filters):
+            if missing := one.missing(signals):
+                lacking = ", ".join(each.replace("_", " ") for each in missing)
+                raise InputError(f"{name}: lacks {lacking}, which the model's effect {one.name} needs")
+        if self.fuzzy is not None and signals.attitude is None:
+            raise InputError(f"{name}: lacks the attitude, which the model needs: its inertia depends on it")
+
+    def repaired(self, signals: Signals) -> Signals:
+        """Take the faults of the sensors out of a flight."""
+        return signals if self.repairs is None else self.repairs.repaired(signals)
+
+    def acting(self, signals: Signals) -> Signals:
+        """Give a repaired flight as the model meets it: of its own vehicle, in its wind, past its filters."""
+        if signals.vehicle != self.vehicle:
+            signals = replace(signals, vehicle=self.vehicle)
+        if any(self.wind):
+            signals = replace(signals, wind=np.array(self.wind))
+        for one in self.filters:
+            apply = one.effect.apply
+            if apply is not None and not one.effect.missing(signals):
+                signals = apply(signals, one.shape)
+        return signals
+
+    def response_to(self, signals: Signals) -> RotorResponse:
+        """Give the response to the rotor speeds of a flight."""
+        if self.commanded and not signals.commanded:
+            return replace(self.response, delay_s=0.0, lag_s=0.0)
+        return self.response
+
+    def hold_of(self, signals: Signals, usual: Hold) -> Hold:
+        """Tell what a speed of a flight is between samples for this model."""
+        return self.hold if self.hold is not None and signals.commanded else usual
+
+    def wrench_along(self, signals: Signals) -> Array:
+        """Compute torque and force on the body at the samples of a flight, without weight.
+
+        Parameters
+        ----------
+        signals : Signals
+            See `acting`.
+
+        Returns
+        -------
+        array, shape (time, 6), N m and N, body frame
+        """
+        beside = self.wrench_beside(signals)
+        if signals.rotor_speed is None:
+            rotor = np.zeros((len(signals), self.weights.shape[2]))
+            rotor[:, 0] = 1.0
+            beside = beside + signals.wrench
+        else:
+            hold = self.hold_of(signals, "previous" if signals.commanded else "linear")
+            response = self.response_to(signals)
+            rotor = rotor_terms_at_samples(signals.rotor_speed, signals.period, hold, response)
+        table = self.wrench(self._air(signals), signals.body_rate, rotor)
+        return np.asarray(table + beside + lever_weights(self.centre, beside.T).T)
+
+    def wrench_beside(self, signals: Signals) -> Array:
+        """Evaluate what the table of weights does not hold, at the samples of a flight.
+
+        That is what is no polynomial; of a flight that states torque and thrust also what depends on rotor speeds.
+
+        Parameters
+        ----------
+        signals : Signals
+            See `acting`.
+
+        Returns
+        -------
+        array, shape (time, 6), N m and N, body frame
+            Without the lever of the centre of mass.
+        """
+        total = np.zeros((len(signals), 6))
+        for one in self.along:
+            total += one.wrench(signals)
+        for one in self.effects if signals.rotor_speed is None else ():
+            weights = self._polynomials.get(one.name)
+            if weights is not None and weights[:, :, 1:].any() and not one.missing(signals):
+                held = state_terms(self._air(signals), signals.body_rate) @ weights[:, :, 0].T
+                total += one.wrench(signals) - held
+        return total
+
+    def _air(self, signals: Signals) -> Array:
+        return signals.air_velocity if self.needs_velocity else np.zeros_like(signals.body_rate)
 
     @property
     def airflow(self) -> Airflow:
@@ -318,10 +511,16 @@ def effect_weights(name: str, shape: Mapping[str, float], probe: Probe) -> Array
     found = polynomial(_wrench_of_numbers() if known.kind == "parameter" else known, probe, shape)
     if found is None:
         raise ComputationError(f"the effect {name} is no polynomial of motion and rotor speeds")
-    slow = np.zeros((*found.shape[:3], len(probe.signals.vehicle.rotors)))
-    return np.concatenate([found, slow], axis=3)
+    return _with_slow(found, probe)
 
 
+def _with_slow(weights: Array, probe: Probe) -> Array:
+    """Add the columns of slow actuation, in which no effect of the catalogue has weights."""
+    slow = np.zeros((*weights.shape[:3], len(probe.signals.vehicle.rotors)))
+    return np.concatenate([weights, slow], axis=3)
+
+
+@cache
 def _wrench_of_numbers() -> Effect:
     """Make an effect of the numbers of the vehicle that are no inertia: scale of the thrust, coupling of the rates."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -11,12 +12,14 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, momentum_form
 from cpfls_cli.effects.polynomial import STATE_TERMS, state_terms
-from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_flight
 from cpfls_cli.playback.kernels import Body, Motion, Terms, errors_of_runs
 from cpfls_cli.playback.model import (
     Remainder,
     VehicleModel,
     airflow_of,
+    lever_weights,
     remainder_terms,
     used_terms,
     weights_by_step,
@@ -89,23 +92,63 @@ class Player:
         return wrench if self.along is None else wrench + self.along
 
 
-def player_of(model: VehicleModel, flight: PlaybackFlight) -> Player:
+def player_of(model: VehicleModel, flight: PlaybackFlight, parts: Sequence[Signals] = ()) -> Player:
     """Make a model ready for a flight.
 
     Parameters
     ----------
     model : VehicleModel
         A flight without rotor speeds plays what its log states, late by the response of the model's rotors.
+    parts : sequence of Signals
+        Stretches of the flight as the model meets them (`VehicleModel.acting`), along which effects that are no
+        polynomials are evaluated; none for a model without such effects and a flight with rotor speeds.
     """
+    response = model.response_to(parts[0]) if parts else model.response
     return Player(
         table=model.weights,
-        rotor=rotor_terms_along(flight, model.response),
+        rotor=rotor_terms_along(flight, response),
         body=model.body,
-        along=stated_along(flight, model.response),
+        along=_along(model, stated_along(flight, response), parts),
         remainder=model.remainder,
         fuzzy=model.fuzzy,
         wind=model.wind,
     )
+
+
+def _along(model: VehicleModel, stated: Array | None, parts: Sequence[Signals]) -> Array | None:
+    """Give what acts over each step beside the table, shape (time, 6); None for nothing."""
+    if stated is None and not model.along:
+        return None
+    beside = [_by_step(model.wrench_beside(part)) for part in parts]
+    total = np.asarray(sum(each for each in (stated, np.concatenate(beside) if beside else None) if each is not None))
+    return np.asarray(total + lever_weights(model.centre, total.T).T)
+
+
+def _by_step(values: Array) -> Array:
+    """Take the mean over each step, shape (time, 6); the last one has no end."""
+    return np.asarray(0.5 * (values + np.concatenate([values[1:], values[-1:]])))
+
+
+def made_ready(model: VehicleModel, flight: LoggedFlight) -> tuple[PlaybackFlight, Player]:
+    """Make a flight and a model ready for each other.
+
+    Faults of the sensors are taken out, and filters act on what drives the rotors. Effects that are polynomials of
+    motion and rotor speeds are simulated with the state; all others, such as a payload, are evaluated along the
+    measured motion.
+
+    Raises
+    ------
+    InputError
+        If the flight lacks a signal that an effect evaluated along it, a filter, or the inertia needs.
+    """
+    repaired = [model.repaired(part) for part in flight.parts]
+    for part in repaired:
+        model.require(part, flight.name)
+    parts = [model.acting(part) for part in repaired]
+    filtered = any(not one.effect.missing(part) for one in model.filters for part in repaired)
+    # What a filter leaves of a speed that stays until the next sample is nearer to a straight line.
+    made = playback_flight(flight.name, parts, "linear" if filtered else model.hold_of(parts[0], flight.hold))
+    return replace(made, group=flight.group), player_of(model, made, parts)
 
 
 def rotor_terms_along(flight: PlaybackFlight, response: RotorResponse) -> Array:

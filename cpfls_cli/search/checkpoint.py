@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from cpfls_cli.artifacts.checkpoint import CheckpointRecord, StoppedSearch, VehicleCheckpointRecord
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.artifacts.store import format_name, read_any, read_record, write_record
 from cpfls_cli.artifacts.sweep import SweepRecord
@@ -49,7 +49,7 @@ class Leftover:
     header: Header
     WORK: ClassVar[str]
     SUFFIX: ClassVar[str]
-    OUTPUT: ClassVar[type[ModelRecord | SweepRecord | VehicleRecord]]
+    OUTPUT: ClassVar[type[IdentifiedRecord | SweepRecord | VehicleRecord]]
 
     @classmethod
     def beside(cls, output: Path, header: Header) -> Self:
@@ -133,7 +133,7 @@ class Leftover:
         except (ValueError, LookupError, TypeError) as error:
             raise InputError(f"{self.path}: damaged: {error}; {_START_AGAIN}") from None
 
-    def _written(self) -> ModelRecord | SweepRecord | VehicleRecord | None:
+    def _written(self) -> IdentifiedRecord | SweepRecord | VehicleRecord | None:
         """Read the output; None where there is none, or another file."""
         if not self.output.is_file() or format_name(self.output) != self.OUTPUT.FORMAT.name:
             return None
@@ -157,7 +157,7 @@ class Checkpoint(Leftover):
 
     WORK: ClassVar = "search"
     SUFFIX: ClassVar = ".checkpoint"
-    OUTPUT: ClassVar = ModelRecord
+    OUTPUT: ClassVar = IdentifiedRecord
 
     def write(self, state: EvolutionState) -> None:
         """Replace what was there by this state, or leave it as it was.

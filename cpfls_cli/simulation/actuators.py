@@ -15,7 +15,7 @@ from cpfls_cli.effects.hooks import Link, RotorMotion
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.lag import HeldLag
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.simulation.model import SimulatedModel
+from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.vehicle.rotors import rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -251,7 +251,8 @@ class Actuators:
 
 
 def actuators(
-    model: SimulatedModel,
+    effects: SimulatedEffects,
+    response: RotorResponse,
     vehicle: VehicleSettings,
     settings: ClosedLoopSettings,
     speed: Array,
@@ -262,14 +263,16 @@ def actuators(
 
     Parameters
     ----------
-    model : SimulatedModel
+    effects : SimulatedEffects
+    response : RotorResponse
+        Behind the speeds that are logged.
     vehicle : VehicleSettings
     settings : ClosedLoopSettings
     speed : array, shape (rotor,), rad/s
         At the start.
     step, duration : float, s
     """
-    listed = model.effects.ordered
+    listed = effects.ordered
     acting = [(one.effect.actuation, one.values) for one in listed if one.effect.actuation is not None]
     lags = [each.lag(values) for each, values in acting if each.lag is not None]
     hover = len(vehicle.rotors) * hover_speed(vehicle) ** 3
@@ -279,5 +282,5 @@ def actuators(
         supplies=tuple(partial(each.supply, values) for each, values in acting if each.supply is not None),
         battery=Battery(settings.battery_use, settings.battery_load, duration, hover),
         step=step,
-        response=Response.of(RotorResponse() if model.whole is None else model.whole.response, step, speed),
+        response=Response.of(response, step, speed),
     )

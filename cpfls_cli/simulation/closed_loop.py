@@ -14,8 +14,10 @@ from cpfls_cli.dynamics.equations_of_motion import identified_turning, rigid_tur
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.hooks import CarriedBody
 from cpfls_cli.errors import ComputationError
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulation.actuators import Actuators, Mixer, Rotors, actuators, mixer
-from cpfls_cli.simulation.model import SimulatedModel
+from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.plant import (
     ATTITUDE,
     BODY_RATE,
@@ -308,7 +310,8 @@ def fly(
     planned: Mapping[str, Array],
     vehicle: VehicleSettings,
     settings: ClosedLoopSettings,
-    model: SimulatedModel,
+    model: VehicleModel | None,
+    effects: SimulatedEffects,
     progress: Callable[[float, int], None],
 ) -> SimulatedMotion:
     """Integrate a closed-loop flight along a planned motion.
@@ -322,7 +325,10 @@ def fly(
         (time, 3) each.
     vehicle : VehicleSettings
     settings : ClosedLoopSettings
-    model : SimulatedModel
+    model : VehicleModel or None
+        In place of the vehicle, as far as its table of weights gives it.
+    effects : SimulatedEffects
+        That the autopilot does not know.
     progress : callable
         Takes steps done and steps in all.
 
@@ -332,7 +338,7 @@ def fly(
         If the plan is not sampled uniformly, or the vehicle leaves the path or overturns.
     """
     clock = clock_of(time, settings.integration_rate_hz)
-    flight = _loop(vehicle, settings, model, planned, time, clock)
+    flight = _loop(vehicle, settings, model, effects, planned, time, clock)
     states, steps = [flight.state], []
     # A vehicle that is lost may reach infinity before the next sample, where it is told.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -351,25 +357,26 @@ def fly(
 def _loop(
     vehicle: VehicleSettings,
     settings: ClosedLoopSettings,
-    model: SimulatedModel,
+    model: VehicleModel | None,
+    effects: SimulatedEffects,
     planned: Mapping[str, Array],
     time: Array,
     clock: Clock,
 ) -> Loop:
     """Set up the loop at the start of the plan, with the rotors at their commanded speed."""
     autopilot = Autopilot(vehicle, settings, reference(planned, time, clock.instants))
-    flown = vehicle if model.whole is None else model.whole.vehicle
-    carried = tuple(
-        one.effect.carried(flown, one.values) for one in model.effects.ordered if one.effect.carried is not None
-    )
+    flown = vehicle if model is None else model.vehicle
+    carried = tuple(one.effect.carried(flown, one.values) for one in effects.ordered if one.effect.carried is not None)
     state = _start(planned, carried)
     mix = mixer(vehicle)
     speed = mix.command(_wrench(autopilot, 0, state))
-    turning = rigid_turning(inertia_tensor(flown)) if model.base is None else identified_turning(model.base)
-    effects = effect_wrench(model.effects, instant(flown, state, speed))
-    plant = Plant(flown, turning, effects, carried, model.whole)
+    fuzzy = None if model is None else model.fuzzy
+    turning = rigid_turning(inertia_tensor(flown)) if fuzzy is None else identified_turning(fuzzy)
+    wrench = effect_wrench(effects, instant(flown, state, speed))
+    plant = Plant(flown, turning, wrench, carried, None if model is None or model.is_rigid_body else model)
     change = plant.derivative(state, Rotors.settled(speed))
-    chain = actuators(model, vehicle, settings, speed, clock.step, float(time[-1] - time[0]))
+    response = RotorResponse() if model is None else model.response
+    chain = actuators(effects, response, vehicle, settings, speed, clock.step, float(time[-1] - time[0]))
     return Loop(autopilot, mix, chain, plant, state, change)
 
 

@@ -10,8 +10,9 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.hooks import TrueMotion
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.simulation.closed_loop import SimulatedMotion, fly
-from cpfls_cli.simulation.model import SimulatedEffects, SimulatedModel, simulated_effects
+from cpfls_cli.simulation.model import SimulatedEffects, in_table, simulated_effects, with_effects
 from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, POSITION, VELOCITY
 from cpfls_cli.simulation.settings import SimulationSettings
 from cpfls_cli.vehicle.rotors import RotorViolation, body_wrench, violations
@@ -51,7 +52,7 @@ def measure(
     settings: SimulationSettings,
     rng: np.random.Generator,
     progress: Callable[[float, int], None] = lambda _done, _total: None,
-    model: SimulatedModel | None = None,
+    model: VehicleModel | None = None,
 ) -> MeasuredFlight:
     """Simulate a planned motion in closed loop and log it.
 
@@ -69,7 +70,7 @@ def measure(
         Source of the noise.
     progress : callable
         Takes steps done and steps in all.
-    model : SimulatedModel or None
+    model : VehicleModel or None
         In place of the vehicle; effects of the settings come on top of its own.
 
     Raises
@@ -82,14 +83,14 @@ def measure(
         If the plan is not sampled uniformly, or the vehicle leaves the path or overturns.
     """
     asked = simulated_effects(settings.closed_loop.effects, vehicle)
-    simulated = (model or SimulatedModel()).with_effects(asked)
-    motion = fly(time, planned, vehicle, settings.closed_loop, simulated, progress)
-    signals, noise_std = _logged(time, motion, vehicle, settings, simulated.effects, rng)
+    held, effects = with_effects(model, asked)
+    motion = fly(time, planned, vehicle, settings.closed_loop, held, effects, progress)
+    signals, noise_std = _logged(time, motion, vehicle, settings, effects, rng)
     return MeasuredFlight(
         signals,
         noise_std,
         violations(motion.demand, vehicle.rotor_speed_max_rad_s),
-        simulated.effects,
+        effects if held is None else SimulatedEffects((*in_table(held).listed, *effects.listed)),
         motion.state[:, POSITION] - planned["position"],
         motion.state[:, ATTITUDE] - planned["attitude"],
     )

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Coefficient, Effect, Shape
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.registry import effect as find
@@ -102,62 +101,60 @@ def simulated_effects(
     return chosen
 
 
-@dataclass(frozen=True)
-class SimulatedModel:
-    """A vehicle as described by a model with effects.
+def in_the_loop(model: VehicleModel) -> tuple[VehicleModel, SimulatedEffects]:
+    """Divide a model into what its table of weights gives and what is simulated by itself.
 
-    Attributes
-    ----------
-    base : InertiaModel or None
-        None for the rigid body of the vehicle.
-    effects : SimulatedEffects
-    whole : VehicleModel or None
-        Of constant inertia; flown in place of the vehicle, with the effects beside its own.
+    Lag and delay of a model that was found from commands stand between command and rotors, as effects do, and the
+    commands are logged; of another one they stand behind the speeds that are logged.
     """
-
-    base: InertiaModel | None = None
-    effects: SimulatedEffects = field(default_factory=SimulatedEffects)
-    whole: VehicleModel | None = None
-
-    def with_effects(self, asked: SimulatedEffects) -> SimulatedModel:
-        """Add effects to those of the model; errors of the vehicle's own numbers add up.
-
-        Raises
-        ------
-        SettingError
-            If the model has one of them already, or two of them do not go together.
-        """
-        by_name = {one.effect.name: one for one in self.effects.listed}
-        own = () if self.whole is None else tuple(effect.name for effect in self.whole.effects)
-        for one in asked.listed:
-            name = one.effect.name
-            if name in own:
-                raise SettingError(_key(name), "the model has it already; leave it out")
-            by_name[name] = _added(by_name[name], one) if name in by_name else one
-        effects = SimulatedEffects(tuple(by_name.values()))
-        _refuse_conflict(effects)
-        return replace(self, effects=effects)
+    apart = [SimulatedEffect(one.known, one.values) for one in (*model.filters, *model.along)]
+    kept = tuple(one for one in model.effects if one.name not in model.beside_table)
+    response = model.response
+    if model.commanded:
+        late = ((effect, value) for effect, value in _late(response) if value > 0)
+        apart += [SimulatedEffect(effect, {effect.shapes[0].name: value}) for effect, value in late]
+        response = replace(response, delay_s=0.0, lag_s=0.0)
+    # What repairs the log of its flights, and the wind in them, is no part of a vehicle.
+    held = replace(model, effects=kept, response=response, wind=(0.0, 0.0, 0.0), repairs=None)
+    return held, SimulatedEffects(tuple(apart))
 
 
-def simulated_vehicle(model: VehicleModel, *, commanded: bool) -> SimulatedModel:
-    """Build the model of a whole vehicle for the simulation.
+def in_table(model: VehicleModel) -> SimulatedEffects:
+    """List the effects that the table of weights of a model holds."""
+    held = (one for one in model.effects if one.name not in model.beside_table)
+    return SimulatedEffects(tuple(SimulatedEffect(one.known, one.values) for one in held))
+
+
+def with_effects(model: VehicleModel | None, asked: SimulatedEffects) -> tuple[VehicleModel | None, SimulatedEffects]:
+    """Add effects to those of a model.
 
     Parameters
     ----------
-    model : VehicleModel
-        Of constant inertia.
-    commanded : bool
-        Whether it was found from commands: lag and delay then stand between command and rotors, as effects do, and the
-        commands are logged. Otherwise they stand behind the speeds that are logged.
+    model : VehicleModel or None
+        None for the vehicle that the autopilot knows.
+
+    Returns
+    -------
+    VehicleModel or None
+        What its table of weights gives.
+    SimulatedEffects
+        All that is simulated by itself.
+
+    Raises
+    ------
+    SettingError
+        If the model has one of them already, or two of them do not go together.
     """
-    if not commanded:
-        return SimulatedModel(whole=model)
-    response = model.response
-    late = [(effect, value) for effect, value in _late(response) if value > 0]
-    effects = tuple(SimulatedEffect(effect, {effect.shapes[0].name: value}) for effect, value in late)
-    return SimulatedModel(
-        effects=SimulatedEffects(effects), whole=replace(model, response=replace(response, delay_s=0.0, lag_s=0.0))
-    )
+    held, own = (None, SimulatedEffects()) if model is None else in_the_loop(model)
+    taken = {one.effect.name: one.values for one in (*own.listed, *(in_table(held).listed if held else ()))}
+    for one in asked.listed:
+        # A number that is wrong may be wrong by more.
+        if one.effect.name in taken and one.effect.kind != "parameter":
+            has = ", ".join(f"{name} = {value:.4g}" for name, value in taken[one.effect.name].items())
+            raise SettingError(_key(one.effect.name), f"the model has it already{': ' + has if has else ''}")
+    effects = SimulatedEffects((*own.listed, *asked.listed))
+    _refuse_conflict(effects)
+    return held, effects
 
 
 def _late(response: RotorResponse) -> Iterator[tuple[Effect, float]]:
@@ -167,29 +164,6 @@ def _late(response: RotorResponse) -> Iterator[tuple[Effect, float]]:
             yield effect, response.lag_s
         elif effect.actuation is not None and effect.actuation.delay is not None:
             yield effect, response.delay_s
-
-
-def simulated_model(
-    base: InertiaModel | None, fitted: Mapping[str, Mapping[str, float]], vehicle: VehicleSettings
-) -> SimulatedModel:
-    """Build a model with its effects for the simulation.
-
-    Parameters
-    ----------
-    base : InertiaModel or None
-        None for the rigid body of the vehicle.
-    fitted : mapping
-        By name of the effect: its values by name.
-    vehicle : VehicleSettings
-
-    Raises
-    ------
-    InputError
-        If there is no such effect.
-    SettingError
-        If a value is missing or impossible, or effects do not go together.
-    """
-    return SimulatedModel(base, simulated_effects(fitted, vehicle))
 
 
 def _refuse_conflict(chosen: SimulatedEffects) -> None:
@@ -253,11 +227,3 @@ def _refuse_outside(effect: Effect, number: Coefficient | Shape, value: float, b
 
 def _key(name: str) -> str:
     return f"closed_loop.effects.{name}"
-
-
-def _added(known: SimulatedEffect, asked: SimulatedEffect) -> SimulatedEffect:
-    name = known.effect.name
-    if known.effect.kind != "parameter":
-        has = ", ".join(f"{key} = {value:.4g}" for key, value in known.values.items())
-        raise SettingError(f"closed_loop.effects.{name}", f"the model has it already{': ' + has if has else ''}")
-    return SimulatedEffect(known.effect, {key: value + asked.values[key] for key, value in known.values.items()})

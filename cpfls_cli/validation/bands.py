@@ -9,8 +9,8 @@ import numpy as np
 from scipy.special import stdtrit
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, rigid_columns
-from cpfls_cli.identification.model import Model
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.regressor.motion import RIGID, Motion
 from cpfls_cli.regressor.regressor import Regressor
@@ -47,7 +47,9 @@ def band(estimate: Array, drawn: Array, blocks: int) -> tuple[Array, Array]:
     return estimate - half, estimate + half
 
 
-def inertia_band(model: Model, draws: Draws, attitude: Array, value: Array | None = None) -> tuple[Array, Array]:
+def inertia_band(
+    model: InertiaFunctions, draws: Draws, attitude: Array, value: Array | None = None
+) -> tuple[Array, Array]:
     """Put a band around the inertia matrix of a model, entry by entry.
 
     Of a model without a ridge, attitudes that training did not visit have a band of what its structure does there, not
@@ -55,7 +57,7 @@ def inertia_band(model: Model, draws: Draws, attitude: Array, value: Array | Non
 
     Parameters
     ----------
-    model : Model
+    model : InertiaFunctions
     draws : Draws
     attitude : array, shape (samples, 3), rad
     value : array, shape (samples, 3, 3), or None
@@ -76,7 +78,9 @@ def inertia_band(model: Model, draws: Draws, attitude: Array, value: Array | Non
     return value - half, value + half
 
 
-def torque_band(model: Model, draws: Draws, motion: Motion, value: Array | None = None) -> tuple[Array, Array]:
+def torque_band(
+    model: InertiaFunctions, draws: Draws, motion: Motion, value: Array | None = None
+) -> tuple[Array, Array]:
     """Put a band around the torque that a model predicts.
 
     It is the band of the prediction; a measured torque has its own noise beside it.
@@ -102,7 +106,7 @@ def torque_band(model: Model, draws: Draws, motion: Motion, value: Array | None 
     return value - half, value + half
 
 
-def _inertia_rows(model: Model, attitude: Array) -> Iterator[tuple[tuple[int, int], Array, IntArray]]:
+def _inertia_rows(model: InertiaFunctions, attitude: Array) -> Iterator[tuple[tuple[int, int], Array, IntArray]]:
     """Yield the entries of the inertia matrix: row and column, basis, shape (samples, columns), and which columns."""
     still = Motion(attitude, np.zeros_like(attitude), np.zeros_like(attitude))
     regressor = Regressor(model.structure, still, model.ranges)
@@ -118,7 +122,7 @@ def _inertia_rows(model: Model, attitude: Array) -> Iterator[tuple[tuple[int, in
         yield entry, rows, columns
 
 
-def _deviations(model: Model, draws: Draws) -> Array:
+def _deviations(model: InertiaFunctions, draws: Draws) -> Array:
     """Deviations of the draws from the model, rigid body first, shape (6 + parameters, draws)."""
     return np.hstack([draws.rigid_body - model.rigid_body, draws.coefficients - model.coefficients]).T
 
@@ -135,7 +139,7 @@ def _batches(samples: int) -> Iterator[slice]:
     return (slice(start, start + _BATCH) for start in range(0, samples, _BATCH))
 
 
-def definite_share(model: Model, draws: Draws) -> float | None:
+def definite_share(model: InertiaFunctions, draws: Draws) -> float | None:
     """Compute the share of draws whose D(q) is positive definite at the centres of all cells that training visited.
 
     Cells within 17 degrees of a vertical pitch are left out, as they are from the windows replayed: there the smallest

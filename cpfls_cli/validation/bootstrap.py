@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.identification.data import TorqueData, TorqueSource
 from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.least_squares import SMALLEST_SINGULAR_SHARE
-from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.samples import Products, Ready
 from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.identification.solver import Fit
@@ -122,7 +122,7 @@ class MissedTorque:
     """The motion of a source with the torque that a model misses: measured minus predicted."""
 
     source: TorqueSource
-    model: Model
+    model: InertiaFunctions
 
     def __len__(self) -> int:
         """Count the samples."""
@@ -164,7 +164,7 @@ class Draws:
 def bootstrap(
     evaluator: Evaluator,
     training: TorqueSource,
-    model: Model,
+    model: InertiaFunctions,
     fit: Fit,
     settings: ValidationSettings,
     rng: np.random.Generator,
@@ -202,7 +202,7 @@ def bootstrap(
         Of the data that the model was identified from.
     training : TorqueSource
         The whole training part, which the blocks divide.
-    model : Model
+    model : InertiaFunctions
     fit : Fit
         Gives the ridge.
     settings : ValidationSettings
@@ -243,7 +243,9 @@ def bootstrap(
     )
 
 
-def _model_scores(products: Products, model: Model, fit: Fit, *, over_rigid_body: bool) -> tuple[BlockScores, slice]:
+def _model_scores(
+    products: Products, model: InertiaFunctions, fit: Fit, *, over_rigid_body: bool
+) -> tuple[BlockScores, slice]:
     """Select the columns that the model has, scaled as the ridge holds them, and return which they are."""
     off = np.isinf(fit.ridge_weight)
     parameters = slice(0 if over_rigid_body else RIGID, RIGID if off else None)
@@ -256,7 +258,7 @@ def _model_scores(products: Products, model: Model, fit: Fit, *, over_rigid_body
     return scores, parameters
 
 
-def _rigid_scores(products: Products, model: Model, rank_tolerance: float) -> tuple[BlockScores, Array]:
+def _rigid_scores(products: Products, model: InertiaFunctions, rank_tolerance: float) -> tuple[BlockScores, Array]:
     """Fit a rigid body in place of the model, from products with the torque that the model misses."""
     rigid, x = slice(0, RIGID), np.concatenate([model.rigid_body, model.coefficients])
     gram = products.gram[:, rigid, rigid]

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.fuzzy.inputs import wrap
 from cpfls_cli.identification.data import TorqueData, TorqueSource
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.structure import PITCH, ROLL
@@ -72,7 +72,7 @@ class Curves:
         return np.asarray(np.max(ratio[~self.outside], axis=0, initial=0.0))
 
 
-def curves(model: Model, draws: Draws, best_rigid_body: Array, training: TorqueSource) -> Curves:
+def curves(model: InertiaFunctions, draws: Draws, best_rigid_body: Array, training: TorqueSource) -> Curves:
     """Evaluate a model over roll, at the median pitch of the training data, and over pitch, at their median roll.
 
     Each curve runs from -180 to 180 degrees; where training kept within 60 degrees, over what it visited and a quarter
@@ -80,7 +80,7 @@ def curves(model: Model, draws: Draws, best_rigid_body: Array, training: TorqueS
 
     Parameters
     ----------
-    model : Model
+    model : InertiaFunctions
     draws : Draws
     best_rigid_body : array, shape (6,), kg m^2
     training : TorqueSource
@@ -129,14 +129,14 @@ class SimulatedTorque:
     Attributes
     ----------
     source : TorqueSource
-    model : Model
+    model : InertiaFunctions
     blocks : TimeBlocks
     factor : array, shape (blocks,)
         What the errors of each block are multiplied with.
     """
 
     source: TorqueSource
-    model: Model
+    model: InertiaFunctions
     blocks: TimeBlocks
     factor: Array
 
@@ -173,7 +173,7 @@ def round_trip(
     training: TorqueSource,
     learned: TorqueSource,
     settings: IdentificationSettings,
-    model: Model,
+    model: InertiaFunctions,
     curves: Curves,
     rng: np.random.Generator,
 ) -> RoundTrip:
@@ -194,7 +194,7 @@ def round_trip(
     training, learned : TorqueSource
         What the model was identified from.
     settings : IdentificationSettings
-    model : Model
+    model : InertiaFunctions
     curves : Curves
     rng : numpy.random.Generator
 
@@ -212,7 +212,7 @@ def _simulated(
     training: TorqueSource,
     learned: TorqueSource,
     settings: IdentificationSettings,
-    model: Model,
+    model: InertiaFunctions,
     rng: np.random.Generator,
 ) -> tuple[TorqueSource, TorqueSource]:
     blocks = time_blocks(training, settings.validation.block_s)
@@ -224,8 +224,8 @@ def _simulated(
 
 
 def _identified_again(
-    sources: tuple[TorqueSource, TorqueSource], settings: IdentificationSettings, model: Model
-) -> Model:
+    sources: tuple[TorqueSource, TorqueSource], settings: IdentificationSettings, model: InertiaFunctions
+) -> InertiaFunctions:
     solver = model_evaluator(*sources, settings).solver
     fit = solver.fit(model.partitions)
     if fit is None:

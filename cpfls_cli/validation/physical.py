@@ -9,11 +9,11 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
+from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.judge import score_of
-from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues
 
@@ -53,12 +53,12 @@ class Physics:
     every_cell: int
 
 
-def physical_sense(model: Model, rng: np.random.Generator) -> Physics:
+def physical_sense(model: InertiaFunctions, rng: np.random.Generator) -> Physics:
     """Check the plausibility of a model at the cells that training visited, and its D(q) at all cells.
 
     Parameters
     ----------
-    model : Model
+    model : InertiaFunctions
     rng : numpy.random.Generator
         Draws an attitude rate for every cell.
 
@@ -144,12 +144,12 @@ class PeriodErrors:
     max_error: Array
 
 
-def one_period_away(model: Model, parts: Mapping[str, TorqueSource]) -> PeriodErrors | None:
+def one_period_away(model: InertiaFunctions, parts: Mapping[str, TorqueSource]) -> PeriodErrors | None:
     """Compute the errors of a model with roll one turn on, and with pitch one turn back, against the same torque.
 
     Parameters
     ----------
-    model : Model
+    model : InertiaFunctions
     parts : mapping of str to TorqueSource
         By name.
 
@@ -168,5 +168,5 @@ def one_period_away(model: Model, parts: Mapping[str, TorqueSource]) -> PeriodEr
     )
 
 
-def _moved(model: Model, shift: Array) -> Callable[[Motion], Array]:
+def _moved(model: InertiaFunctions, shift: Array) -> Callable[[Motion], Array]:
     return lambda motion: model.torque(replace(motion, attitude=motion.attitude + shift))

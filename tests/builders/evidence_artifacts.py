@@ -69,8 +69,8 @@ def uncertainty(artifact, rng):
     return {
         "uncertainty/blocks": 40,
         "uncertainty/block_duration": 1.25,
-        "uncertainty/coefficients": around("model/coefficients", 1e-3),
-        "uncertainty/rigid_body": around("model/rigid_body", 2e-3),
+        "uncertainty/coefficients": around("vehicle/inertia_functions/coefficients", 1e-3),
+        "uncertainty/rigid_body": around("vehicle/inertia_functions/rigid_body", 2e-3),
         "uncertainty/best_rigid_body": around("baselines/rigid_body", 2e-3),
     }
 

@@ -7,14 +7,15 @@ import numpy as np
 import yaml
 
 from cpfls_cli.artifacts.evidence import VerdictGroup
-from cpfls_cli.artifacts.model import ModelGroup, ModelRecord, SearchGroup
+from cpfls_cli.artifacts.identified import ChosenGroup, IdentifiedRecord, SearchGroup
+from cpfls_cli.artifacts.model import VehicleGroup
 from cpfls_cli.artifacts.scores import JudgedGroup
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.commands.vehicle_sheets import identified_sheet
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.export import Sheet, expected
 from cpfls_cli.fuzzy import InputRange, breakpoints
-from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor import Motion, StructureSettings, model_structure
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -59,7 +60,7 @@ CASES = {
 }
 
 
-def model_of(case: Case, seed: int = 0) -> Model:
+def model_of(case: Case, seed: int = 0) -> InertiaFunctions:
     rng = np.random.default_rng(seed)
     structure = model_structure(StructureSettings(**case.settings))
     partitions = []
@@ -73,10 +74,10 @@ def model_of(case: Case, seed: int = 0) -> Model:
     ranges = [InputRange(low[0], low[0] if case.still else low[1]), InputRange(high[0], high[1])]
     coefficients = rng.normal(0, 1, structure.parameters) * case.fuzzy
     visited = rng.random((CELLS, CELLS)) < 0.3
-    return Model(structure, tuple(ranges), tuple(partitions), coefficients, RIGID * case.rigid, visited)
+    return InertiaFunctions(structure, tuple(ranges), tuple(partitions), coefficients, RIGID * case.rigid, visited)
 
 
-def states(model: Model, count: int, seed: int = 0) -> Motion:
+def states(model: InertiaFunctions, count: int, seed: int = 0) -> Motion:
     """Draw states over several turns; a quarter of the angles are seams, breakpoints, zeros, or beside them."""
     rng = np.random.default_rng(seed)
     attitude = rng.uniform(-20, 20, (count, 3))
@@ -90,7 +91,7 @@ def states(model: Model, count: int, seed: int = 0) -> Motion:
     return Motion(attitude, rng.normal(0, 3, (count, 3)), rng.normal(0, 10, (count, 3)))
 
 
-def _special(model: Model, axis: int) -> np.ndarray:
+def _special(model: InertiaFunctions, axis: int) -> np.ndarray:
     places = [0.0, -0.0, *(np.arange(-8, 9) * np.pi / 2)]
     data = model.ranges[axis]
     for partition, peaks in zip(model.structure.partitions, model.partitions, strict=True):
@@ -104,7 +105,7 @@ def _special(model: Model, axis: int) -> np.ndarray:
 VEHICLE = VehicleSettings()
 
 
-def sheet_of(model: Model, **changes) -> Sheet:
+def sheet_of(model: InertiaFunctions, **changes) -> Sheet:
     """Put a model on a sheet with evidence in plain words, or with what a test wants."""
     given = {
         "name": "vehicle",
@@ -118,9 +119,10 @@ def sheet_of(model: Model, **changes) -> Sheet:
         **changes,
     }
     inputs = {"flight": InputFile(given["source"], "0" * 64, "cpfls/flight")}
-    record = ModelRecord(
+    record = IdentifiedRecord(
         header=Header("0.1.0", 1, yaml.safe_dump(given["config"]), inputs),
-        model=_stored(model),
+        vehicle=VehicleGroup.of(VehicleModel(vehicle=VEHICLE, fuzzy=model)),
+        model=ChosenGroup(base="rigid-body" if model.rigid_body.any() else "none", weights=None, ridge_weight=None),
         judged=_judged(),
         search=SearchGroup(stop_reason=given["stop_reason"], complete=given["complete"]),
         findings=given["findings"],
@@ -137,13 +139,6 @@ def verdict_of(label: str, region: str, *reasons: tuple[str, int]) -> VerdictGro
     return VerdictGroup(label=label, region=region, reason=texts, speaks=np.array(speaks, dtype=float))
 
 
-def _stored(model: Model) -> ModelGroup:
-    numbers = dict.fromkeys(("weights", "partition", "breakpoints", "parameter", "input_range", "ridge_weight"))
-    base = "rigid-body" if model.rigid_body.any() else "none"
-    own = {name: getattr(model, name) for name in ("coefficients", "rigid_body", "visited")}
-    return ModelGroup(base=base, **numbers, **own)
-
-
 def _judged() -> JudgedGroup:
     scores = {"relative_error": [0.1, np.nan, 0.2], "r2": [0.9, -np.inf, 0.5]}
     measures = {name: np.array([[scores.get(name, [1.0, 2.0, 3.0])]]) for name in MEASURES}
@@ -151,7 +146,7 @@ def _judged() -> JudgedGroup:
     return JudgedGroup(models=("model",), parts=("training",), samples=samples, outside=outside, **measures)
 
 
-def wanted_of(model: Model, motion: Motion, step: int = 1000) -> SimpleNamespace:
+def wanted_of(model: InertiaFunctions, motion: Motion, step: int = 1000) -> SimpleNamespace:
     """Ask the library, in parts that stay in the cache."""
     parts = [vars(expected(model, motion[slice(start, start + step)])) for start in range(0, len(motion), step)]
     names = ("inertia", "coriolis", "torque", "body", "inside", "scale")

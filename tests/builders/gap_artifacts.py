@@ -5,8 +5,11 @@ import numpy as np
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import Artifact
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 CHANNELS = np.array([f"{kind} {axis}" for kind in ("torque", "force") for axis in "xyz"])
 WINDOWS, HORIZON, LAGS = 60, 50, 10
@@ -52,6 +55,12 @@ def audit(findings=()):
         "audit/warning": texts(),
         "audit/note": texts("The motion follows the rotors by 12 ms."),
     }
+
+
+def vehicle(prefix):
+    """Give the datasets of the stated vehicle as a model."""
+    data = ModelRecord(vehicle=VehicleGroup.of(VehicleModel(vehicle=VehicleSettings()))).data
+    return {path.replace("vehicle", prefix, 1): values for path, values in data.items()}
 
 
 def flights(names=("one.csv", "two.csv"), roles=("training", "held-out")):
@@ -121,7 +130,7 @@ def disagreement(force=True, **changed):
         **table("not_excited", ("'name", "'reason"), [("ground_effect", "fly near the ground")]),
         **audit(),
         "warning": texts("one.csv: rotor 2 looks saturated"),
-        "base/kind": np.array("rigid-body"),
+        **vehicle("base"),
         **flights(roles=("given", "given")),
     }
     return Artifact(DisagreementRecord.spec(), Header("0", 1, "seed: 1\n"), data | changed)
@@ -213,7 +222,7 @@ def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), alo
         **table("not_excited", ("'name", "'reason"), [("ground_effect", "fly near the ground")]),
         **audit(),
         "note": texts("A note that readers need."),
-        "base/kind": np.array("rigid-body"),
+        **vehicle("base"),
         **flights(),
     }  # fmt: skip
     return Artifact(DiagnosisRecord.spec(), Header("0", 1, "seed: 1\n"), data | changed)
@@ -226,8 +235,8 @@ def extended(diagnosis_sha256="", **changed):
         **effects({}),
         **sizes(),
         **played_pair(),
-        **audit(),
-        "base/kind": np.array("rigid-body"),
+        **vehicle("vehicle"),
+        **{f"vehicle/repair/{path}": values for path, values in audit().items()},
     }
     source = InputFile("diagnosis.h5", diagnosis_sha256 or "0" * 64, "cpfls/diagnosis")
     return Artifact(ExtendedRecord.spec(), Header("0", 1, "seed: 1\n", {"diagnosis": source}), data | changed)

@@ -6,13 +6,13 @@ from functools import cache
 import numpy as np
 
 import cpfls_cli
+from cpfls_cli.artifacts.model import VehicleGroup
 from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.vehicle_model import (
     FoundNumbersGroup,
     SharesGroup,
     StructuresTriedGroup,
     TradesGroup,
-    VehicleGroup,
     VehicleRecord,
 )
 from cpfls_cli.effects.polynomial import Probe, polynomial
@@ -90,14 +90,14 @@ def whole(vehicle=QUAD, *, order=2, **changed):
     return replace(model, **changed)
 
 
-def record_of(model, not_held=(), config="seed: 1\n"):
+def record_of(model, config="seed: 1\n"):
     """The artifact of a vehicle, as if it had been found by a search over two structures."""
     none, text = np.zeros(0), ()
     names = ("chosen", "best", "greedy", "everything", "nothing", "front", "front")
     worse = np.array([0.0, 0.0, 0.0, 0.1, 0.4, 0.0, 0.4])
     return VehicleRecord(
         header=Header(cpfls_cli.__version__, 1, config),
-        vehicle=VehicleGroup.of(model, not_held),
+        vehicle=VehicleGroup.of(model),
         found=FoundNumbersGroup(
             name=("inertia.Ixx", "linear_damping.d_x"),
             unit=("kg m^2", "N m s/rad"),

@@ -170,11 +170,11 @@ def test_flight_of_no_samples(refuse, changed, study, tmp_path):
     ("path", "value"),
     [
         ("model/weights", np.zeros(3)),
-        ("model/coefficients", np.zeros(5)),
-        ("model/coefficients", np.full(113, np.nan)),
-        ("model/rigid_body", np.zeros(2)),
-        ("model/input_range", np.zeros(2)),
-        ("model/visited", np.zeros((2, 3))),
+        ("vehicle/inertia_functions/coefficients", np.zeros(5)),
+        ("vehicle/inertia_functions/coefficients", np.full(113, np.nan)),
+        ("vehicle/inertia_functions/rigid_body", np.zeros(2)),
+        ("vehicle/inertia_functions/input_range", np.zeros(2)),
+        ("vehicle/inertia_functions/visited", np.zeros((2, 3))),
         ("model/base", 3),
     ],
 )

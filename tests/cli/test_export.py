@@ -175,9 +175,18 @@ def test_not_a_good_model(refuse, pipeline, model, study, tmp_path):
             {"model__weights": -np.arange(24.0)},
             "model/weights: those of D13(pitch) make no partition; identify it again",
         ),
-        ({"model__visited": np.zeros((71, 71))}, "model/visited: is (71, 71), not (72, 72); identify it again"),
-        ({"model__coefficients": np.full(113, np.inf)}, "model/coefficients: 113 samples are not finite"),
-        ({"model__rigid_body": None}, "the cpfls/model lacks model/rigid_body; make it again"),
+        (
+            {"vehicle__inertia_functions__visited": np.zeros((71, 71))},
+            "vehicle/inertia_functions/visited: is (71, 71), not (72, 72); identify it again",
+        ),
+        (
+            {"vehicle__inertia_functions__coefficients": np.full(113, np.inf)},
+            "vehicle/inertia_functions/coefficients: 113 samples are not finite",
+        ),
+        (
+            {"vehicle__inertia_functions__rigid_body": None},
+            "the cpfls/model lacks vehicle/inertia_functions/rigid_body; make it again",
+        ),
     ],
 )
 def test_a_model_of_wrong_content(refuse, model, tmp_path, values, message):

@@ -3,7 +3,6 @@
 import h5py
 import numpy as np
 import pytest
-import yaml
 
 from tests.builders.artifacts import edited
 
@@ -48,12 +47,17 @@ class Stored:
 
     def __init__(self, path):
         with h5py.File(path) as file:
-            self.settings = yaml.safe_load(file["config"][()])["identification"]
-            self.coefficients = file["model/coefficients"][:]
-            self.rigid_body = file["model/rigid_body"][:]
-            self.range = file["model/input_range"][:]
-            names = file["model/partition"].asstr()[:]
-            self.peaks = {name: file["model/breakpoints"][names == name] for name in dict.fromkeys(names)}
+            group = file["vehicle/inertia_functions"]
+            texts = ("structure", "input_map", "consequents", "products")
+            self.settings = {name: group[name].asstr()[()] for name in texts}
+            self.settings["harmonic_order"] = int(group["harmonic_order"][()])
+            self.coefficients = file["vehicle/inertia_functions/coefficients"][:]
+            self.rigid_body = file["vehicle/inertia_functions/rigid_body"][:]
+            self.range = file["vehicle/inertia_functions/input_range"][:]
+            names = file["vehicle/inertia_functions/partition"].asstr()[:]
+            self.peaks = {
+                name: file["vehicle/inertia_functions/breakpoints"][names == name] for name in dict.fromkeys(names)
+            }
         self.circular = self.settings["structure"] == "cpfls"
 
     def inputs(self, attitude, axis):
@@ -159,8 +163,10 @@ def test_inertia_and_torque_of_a_stored_model_follow_from_its_datasets(cpfls, pi
     with edited(model) as file:
         # Other numbers than those identified, or a fuzzy part that is switched off would prove nothing.
         numbers = np.random.default_rng(11)
-        for key in ("model/coefficients", "model/rigid_body"):
-            file[key][:] = numbers.uniform(0.5, 1.5, file[key].shape) * (key != "model/rigid_body" or "rigid" in name)
+        for key in ("vehicle/inertia_functions/coefficients", "vehicle/inertia_functions/rigid_body"):
+            file[key][:] = numbers.uniform(0.5, 1.5, file[key].shape) * (
+                key != "vehicle/inertia_functions/rigid_body" or "rigid" in name
+            )
     assert cpfls("predict", study, model, pipeline.flight, "-o", prediction).exit_code == 0
     stored = Stored(model)
     with h5py.File(pipeline.flight) as flight, h5py.File(prediction) as predicted:

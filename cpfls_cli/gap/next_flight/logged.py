@@ -18,8 +18,8 @@ from cpfls_cli.gap.next_flight.rivals import physical_values
 from cpfls_cli.gap.next_flight.room import Room, squared_speeds
 from cpfls_cli.gap.next_flight.separation import SizedEffect
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.simulation.measured import measure, noisy
-from cpfls_cli.simulation.model import SimulatedModel, simulated_effects
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.planning import Trajectory
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -166,11 +166,14 @@ def flown_signals(
     ComputationError
         If the vehicle leaves the path or overturns.
     """
-    asked = simulated_effects({each.candidate.effect.name: physical_values(each) for each in effects}, vehicle)
-    loop = SimulationSettings(mode="closed-loop", closed_loop=replace(settings, effects={}))
+    hidden: dict[str, tuple[float, ...] | dict[str, float]] = {
+        each.candidate.effect.name: dict(physical_values(each)) for each in effects
+    }
+    loop = SimulationSettings(mode="closed-loop", closed_loop=replace(settings, effects=hidden))
     # Without noise nothing is drawn.
     rng = np.random.default_rng(0)
-    flight = measure(planned.time, vars(planned), vehicle, loop, rng, model=SimulatedModel(logging.base, asked))
+    model = None if logging.base is None else VehicleModel(vehicle=vehicle, fuzzy=logging.base)
+    flight = measure(planned.time, vars(planned), vehicle, loop, rng, model=model)
     logged = flight.signals
     signals = Signals(
         time=planned.time,

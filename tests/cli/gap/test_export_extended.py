@@ -9,10 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.extended import FUZZY_INERTIA, ExtendedRecord, LeftOutGroup
-from cpfls_cli.artifacts.gap_flights import BaseGroup
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.extended import ExtendedRecord, LeftOutGroup
+from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.model import VehicleGroup
 from cpfls_cli.artifacts.store import read_record, write_record
+from cpfls_cli.playback.model import ModelEffect
 from tests.builders.artifacts import edited
 
 
@@ -22,7 +23,7 @@ def test_an_extended_model_holds_the_vehicle_with_its_effects(extended):
     effects = {one.name: one.coefficients for one in vehicle.effects}
     # The height, which the thrust alone does not show, is left open.
     assert effects["com_offset"] == pytest.approx([0.008, -0.005, 0.0], rel=0.05)
-    assert record.vehicle.not_held == ()
+    assert vehicle.beside_table == ()
     np.testing.assert_allclose(record.vehicle.inertia, record.inertia, rtol=1e-12)
 
 
@@ -47,28 +48,27 @@ def test_it_is_exported(cpfls, extended, tmp_path):
 def test_what_a_table_does_not_hold_is_told_with_numbers_and_size(cpfls, extended, tmp_path):
     record = read_record(extended, ExtendedRecord)
     size, ends = np.array([[0.0, 0.4, 0.0, 0.0, 0.0, 0.0]]), np.array([[0.1, 0.2, 0.3, 0.4]])
-    outside = replace(record.vehicle, not_held=("com_offset",))
+    model = record.vehicle.vehicle_model()
+    sag = ModelEffect("battery_sag", {"exponent": 1.5}, np.zeros(0))
+    outside = VehicleGroup.of(replace(model, effects=(*model.effects, sag)))
     path, output = tmp_path / "outside.h5", tmp_path / "m.c"
-    sizes = LeftOutGroup(name=("com_offset",), wrench=size, ends=ends)
+    sizes = LeftOutGroup(name=("battery_sag",), wrench=size, ends=ends)
     write_record(path, replace(record, vehicle=outside, left_out=sizes))
     said = cpfls("export", path, "-o", output).stdout.splitlines()[-1]
-    assert said.startswith(
-        "Not held, or not whole: offset of the centre of mass (M = -c x F,  F the force without weight, as measured, "
-        "or else the thrust; c_x = 0.00"
-    )
+    assert said.startswith("Not held, or not whole: battery sag (")
     floors = 0.4 / record.gap.floor[1]
     assert said.endswith(
-        f" m): 0.4 N m and 0 N along its held-out flights, {floors:.3g} noise floors; half a second without it ends "
-        "0.4 rad/s, 17.2 degrees, 0.2 m/s and 0.1 m off."
+        f"; exponent = 1.5): 0.4 N m and 0 N along its held-out flights, {floors:.3g} noise floors; half a second "
+        "without it ends 0.4 rad/s, 17.2 degrees, 0.2 m/s and 0.1 m off."
     )
     assert "along its held-out flights" in " ".join(output.read_text().split())
 
 
 def test_an_identified_inertia_under_effects(cpfls, extended, pipeline, tmp_path):
-    record, identified = read_record(extended, ExtendedRecord), read_record(pipeline.model, ModelRecord)
+    record, identified = read_record(extended, ExtendedRecord), read_record(pipeline.model, IdentifiedRecord)
     path = tmp_path / "over.h5"
-    vehicle = replace(record.vehicle, not_held=(FUZZY_INERTIA,))
-    write_record(path, replace(record, base=BaseGroup.of(identified), vehicle=vehicle))
+    vehicle = replace(record.vehicle, inertia_functions=identified.functions)
+    write_record(path, replace(record, vehicle=vehicle))
     said = cpfls("export", path, "--format", "casadi", "-o", tmp_path / "over_casadi.py").stdout
     assert said.splitlines()[-1] == "CasADi holds all of it."
     assert cpfls("export", path, "-o", tmp_path / "over.json").exit_code == 0
@@ -76,17 +76,22 @@ def test_an_identified_inertia_under_effects(cpfls, extended, pipeline, tmp_path
     assert any("Not held, or not whole: inertia that depends on the attitude" in each for each in document["worth"])
 
 
-def test_one_of_before_is_refused(refuse, extended, tmp_path):
+@pytest.mark.parametrize(("name", "command"), [("extended", "extend"), ("vehicle", "vehicle"), ("model", "identify")])
+def test_one_of_before_is_refused(refuse, extended, tmp_path, name, command):
     old = tmp_path / "old.h5"
     shutil.copy(extended, old)
     with edited(old) as file:
-        del file["vehicle"]
+        file.attrs["format"] = f"cpfls/{name}"
+        file.attrs["schema_version"] = 1
     (line,) = refuse("export", old, "-o", tmp_path / "m.c")
-    assert line.startswith(f"{old}: was made before models with effects could be exported; make it again with ")
+    assert line == (
+        f"{old}: a model that an earlier cpfls wrote, before all models had one format; make it again with "
+        f"`cpfls {command}`"
+    )
 
 
 def test_an_identified_model_holds_the_stated_vehicle(pipeline):
-    record = read_record(pipeline.model, ModelRecord)
+    record = read_record(pipeline.model, IdentifiedRecord)
     assert record.vehicle.vehicle() == record.study.vehicle
     assert record.vehicle.effect.name == ()
 

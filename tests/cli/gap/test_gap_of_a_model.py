@@ -20,8 +20,8 @@ def answer(cpfls, gap_config, pipeline, with_attitude, tmp_path_factory):
 def test_artifacts_carry_the_model(answer, pipeline):
     folder, _ = answer
     with h5py.File(folder / "diagnosis.h5") as file, h5py.File(pipeline.model) as model:
-        assert file["base/kind"][()] == b"model"
-        assert (file["base/coefficients"][()] == model["model/coefficients"][()]).all()
+        functions = model["vehicle/inertia_functions/coefficients"][()]
+        assert (file["base/inertia_functions/coefficients"][()] == functions).all()
 
 
 def test_offset_is_found_beside_the_model(answer):

@@ -8,13 +8,13 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.report.numbers import sentence
 from cpfls_cli.validation import validate
 from tests.builders.artifacts import edited
 
 EVIDENCE = ("structures", "residuals", "uncertainty", "curves", "round_trip", "steps", "physics", "period", "verdict")
-VALIDATION = [spec for spec in ModelRecord.spec().datasets if spec.path.split("/")[0] in EVIDENCE]
+VALIDATION = [spec for spec in IdentifiedRecord.spec().datasets if spec.path.split("/")[0] in EVIDENCE]
 WORDS = {
     "good-for-control": "Good for control",
     "good-inside-region": "Good inside the region that training visited, and only there",
@@ -97,7 +97,7 @@ def test_without_evidence_a_model_and_its_prediction_are_the_same_but_for_it(
     assert json.loads(result.stdout)["verdict"] is None
     with h5py.File(model) as plain, h5py.File(validated[0]) as whole:
         assert not any(spec.path in plain for spec in VALIDATION)
-        for name in ("model/coefficients", "model/weights", "judged/mse", "history/best"):
+        for name in ("vehicle/inertia_functions/coefficients", "model/weights", "judged/mse", "history/best"):
             np.testing.assert_array_equal(plain[name][()], whole[name][()])
     assert cpfls("predict", study, model, pipeline.flight, "-o", prediction).exit_code == 0
     with h5py.File(prediction) as file:
@@ -129,7 +129,9 @@ def test_an_interrupt_while_evidence_is_gathered_leaves_the_whole_model(
     with h5py.File(output) as plain, h5py.File(validated[0]) as whole:
         assert plain["search/complete"][()] == 1
         assert "verdict/label" not in plain
-        np.testing.assert_array_equal(plain["model/coefficients"][()], whole["model/coefficients"][()])
+        np.testing.assert_array_equal(
+            plain["vehicle/inertia_functions/coefficients"][()], whole["vehicle/inertia_functions/coefficients"][()]
+        )
 
 
 def test_use_of_a_model_that_was_not_judged_or_judged_unfit_is_told(validated, cpfls, study, pipeline, tmp_path):

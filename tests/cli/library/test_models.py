@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import cpfls_cli
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.store import file_sha256, read_record, write_record
 from cpfls_cli.errors import InputError
+from cpfls_cli.playback.model import ModelEffect
 from tests.builders import vehicle_models
 from tests.builders.playback_flights import STATED
 
@@ -45,7 +46,7 @@ def test_a_prediction_and_a_replay_are_what_the_commands_write(cpfls, pipeline, 
 
 def test_what_a_command_notes_is_a_warning_of_the_caller(cpfls, pipeline, study, tmp_path):
     unjudged = tmp_path / "unjudged.h5"
-    write_record(unjudged, replace(read_record(pipeline.model, ModelRecord), verdict=None))
+    write_record(unjudged, replace(read_record(pipeline.model, IdentifiedRecord), verdict=None))
     noted = cpfls("predict", study, unjudged, pipeline.flight, "-o", tmp_path / "p.h5").stderr
     model = cpfls_cli.load_model(unjudged)
     with pytest.warns(UserWarning, match="has no verdict") as warned:
@@ -143,7 +144,9 @@ def test_what_cannot_be_done_is_said(whole, pipeline, tmp_path):
     with pytest.raises(InputError, match="at least one flight"):
         whole.replay()
     partial = tmp_path / "partial.h5"
-    write_record(partial, vehicle_models.record_of(vehicle_models.whole(), not_held=("wind",)))
+    write_record(
+        partial, vehicle_models.record_of(vehicle_models.whole(effects=(ModelEffect("wind", {}, np.ones(3)),)))
+    )
     with pytest.raises(InputError, match="holds wind, which no state alone gives"):
         cpfls_cli.load_model(partial).step(whole.state(), [HOVER] * 4, PERIOD)
 

@@ -246,7 +246,11 @@ def test_one_rule_that_training_determined_holds_everywhere(cpfls, report, pipel
     options = ("--set", "identification.membership_functions=1", "--set", "identification.validation.enabled=false")
     cpfls("identify", study, pipeline.flight, "-o", single, *options)
     model = read_artifact(single)
-    all_round = {"model/visited": np.eye(len(model.array("model/visited")), dtype=np.uint8)}
+    all_round = {
+        "vehicle/inertia_functions/visited": np.eye(
+            len(model.array("vehicle/inertia_functions/visited")), dtype=np.uint8
+        )
+    }
     full = {"solve/rank": model.number("solve/parameters"), "solve/condition_number": condition}
     write_artifact(known, replace(model, data={**model.data, **all_round, **full}))
     cpfls("predict", study, known, pipeline.flight, "-o", prediction)

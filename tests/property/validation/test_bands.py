@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
 from cpfls_cli.validation import bands
 from cpfls_cli.validation.bands import band, inertia_band, torque_band
@@ -33,7 +33,7 @@ def case(keys, base, seed, noise):
     chosen, m = IdentificationSettings(**keys, base=base), random_motion(rng, SAMPLES)
     shape = model_evaluator(data := TorqueData(0.01 * np.arange(SAMPLES), m, np.ones((SAMPLES, 3))), data, chosen)
     partitions = decode(shape.structure, rng.uniform(0.2, 1.0, shape.structure.genes))
-    truth = Model(
+    truth = InertiaFunctions(
         shape.structure,
         shape.judge.ranges,
         partitions,

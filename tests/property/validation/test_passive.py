@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.identification.model import Model
 from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
 from cpfls_cli.validation.physical import energy_share, physical_sense
 
@@ -29,7 +29,7 @@ def drawn(structure, seed):
     ranges = (InputRange(-0.9, 0.8), InputRange(-0.7, 0.9))
     coefficients, rigid_body = rng.standard_normal(counted.parameters), rng.standard_normal(6)
     visited = rng.random((72, 72)) < 0.05
-    return Model(counted, ranges, uniform_breakpoints(counted), coefficients, rigid_body, visited), rng
+    return InertiaFunctions(counted, ranges, uniform_breakpoints(counted), coefficients, rigid_body, visited), rng
 
 
 def attitudes(rng, samples=40):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque, rigid_columns
 from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.validation.bands import band, inertia_band
@@ -83,7 +83,7 @@ def test_the_known_inertia_of_a_vehicle_lies_within_its_bands(base):
     )
     evaluator = model_evaluator(training, training, IdentificationSettings(base=base))
     fit, partitions = evaluator.fit(uniform_chromosome(evaluator.structure)), uniform_breakpoints(evaluator.structure)
-    model = Model(
+    model = InertiaFunctions(
         evaluator.structure,
         evaluator.judge.ranges,
         partitions,

@@ -8,9 +8,9 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.model import Model
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
 from cpfls_cli.validation.replay import replay_steps
@@ -25,7 +25,7 @@ def bent_model(seed=81, size=0.004):
     structure = model_structure(StructureSettings())
     coefficients = size * np.random.default_rng(seed).standard_normal(structure.parameters)
     visited = np.ones((72, 72), dtype=bool)
-    return Model(structure, (RANGE, RANGE), uniform_breakpoints(structure), coefficients, INERTIA, visited)
+    return InertiaFunctions(structure, (RANGE, RANGE), uniform_breakpoints(structure), coefficients, INERTIA, visited)
 
 
 def motion(samples, seed=82):

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics.visited import visited_cells
 from cpfls_cli.identification import data
 from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
-from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.identification.visited import visited_cells
 from cpfls_cli.regressor import uniform_breakpoints
 from cpfls_cli.validation.bootstrap import MissedTorque, bootstrap
 from cpfls_cli.validation.curves import SimulatedTorque, curves, round_trip
@@ -34,7 +34,7 @@ def tripped(base, noise, every=1, changed=None):
     exact, _ = evaluator.solver.exact(partitions, fit)
     visited = visited_cells([training.motion.attitude])
     ranges = evaluator.judge.ranges
-    model = Model(evaluator.structure, ranges, partitions, exact.coefficients, exact.rigid_body, visited)
+    model = InertiaFunctions(evaluator.structure, ranges, partitions, exact.coefficients, exact.rigid_body, visited)
     draws = bootstrap(evaluator, training, model, exact, settings.validation, np.random.default_rng(14))
     best = fit_baselines(learned, exact.row_scale, settings.rank_tolerance)[0].parameters
     drawn = curves(model, draws, best, training)
@@ -72,7 +72,7 @@ def test_the_noise_is_what_the_model_missed_turned_over_block_by_block(monkeypat
     training = bending_flight(0.05)
     evaluator = model_evaluator(training, training, IdentificationSettings(base="none"))
     fit, partitions = evaluator.fit(uniform_chromosome(evaluator.structure)), uniform_breakpoints(evaluator.structure)
-    model = Model(
+    model = InertiaFunctions(
         evaluator.structure,
         evaluator.judge.ranges,
         partitions,

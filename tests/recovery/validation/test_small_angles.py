@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
 from cpfls_cli.regressor import Motion, uniform_breakpoints
 from cpfls_cli.validation.bands import inertia_band
@@ -44,7 +44,9 @@ def held(m, torque, attitude, rng):
     training = TorqueData(0.01 * np.arange(SAMPLES), m, torque)
     evaluator = model_evaluator(training, training, IdentificationSettings())
     fit, partitions = evaluator.fit(uniform_chromosome(evaluator.structure)), uniform_breakpoints(evaluator.structure)
-    model = Model(evaluator.structure, evaluator.judge.ranges, partitions, fit.coefficients, fit.rigid_body, NOWHERE)
+    model = InertiaFunctions(
+        evaluator.structure, evaluator.judge.ranges, partitions, fit.coefficients, fit.rigid_body, NOWHERE
+    )
     draws = bootstrap(evaluator, training, model, fit, ValidationSettings(draws=100), rng)
     low, high = inertia_band(model, draws, attitude)
     truth = bent_inertia(attitude)

@@ -17,12 +17,12 @@ def test_tables_on_the_page_are_those_of_the_code():
 
 def test_page_names_the_schema_version_and_every_root_attribute():
     assert f"| `schema_version` | version of this page; {SCHEMA_VERSION} |" in PAGE
-    assert all(f"| `{name}` |" in PAGE for name in ("format", "cpfls_version", "seed", "config_sha256"))
+    assert all(f"| `{name}` |" in PAGE for name in ("format", "kind", "cpfls_version", "seed", "config_sha256"))
 
 
 @pytest.mark.parametrize("spec", [record.spec() for record in RECORDS], ids=lambda spec: spec.format)
 def test_every_dataset_is_described(spec):
-    assert record_of_format(spec.format).spec() is spec
+    assert record_of_format(spec.format, spec.kind).spec() is spec
     assert len({dataset.path for dataset in spec.datasets}) == len(spec.datasets)
     assert {"config", "inputs"}.isdisjoint(dataset.path.split("/")[0] for dataset in spec.datasets)
     for dataset in spec.datasets:

@@ -1,23 +1,44 @@
 """Facts that follow from the datasets of a model, each in one place."""
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.evidence import VerdictGroup
-from cpfls_cli.artifacts.model import ModelGroup, ModelRecord, RulesGroup, SearchGroup, SolveGroup
+from cpfls_cli.artifacts.identified import ChosenGroup, IdentifiedRecord, RulesGroup, SearchGroup, SolveGroup
+from cpfls_cli.artifacts.model import InertiaFunctionsGroup, VehicleGroup
 from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.vehicle.settings import VehicleSettings
 
-GROUPS = ("model", "solve", "rules", "front", "history", "judged", "baselines", "training_indices", "findings")
+GROUPS = (
+    "vehicle",
+    "model",
+    "solve",
+    "rules",
+    "front",
+    "history",
+    "judged",
+    "baselines",
+    "training_indices",
+    "findings",
+)
 ALL_ROUND = np.eye(72, dtype=bool)
 
 
 def record(**groups):
-    return ModelRecord(header=Header("0.1.0", 1, "seed: 1\n"), **{**dict.fromkeys(GROUPS), **groups})
+    return IdentifiedRecord(header=Header("0.1.0", 1, "seed: 1\n"), **{**dict.fromkeys(GROUPS), **groups})
+
+
+def vehicle(**values):
+    names = (each.name for each in fields(InertiaFunctionsGroup))
+    functions = InertiaFunctionsGroup(**{**dict.fromkeys(names), **values})
+    return replace(VehicleGroup.of(VehicleModel(vehicle=VehicleSettings())), inertia_functions=functions)
 
 
 def model(**values):
-    names = ("weights", "partition", "breakpoints", "coefficients", "parameter", "rigid_body", "base", "input_range")
-    return ModelGroup(**{**dict.fromkeys((*names, "visited", "ridge_weight")), **values})
+    return ChosenGroup(**{**dict.fromkeys(("weights", "base", "ridge_weight")), **values})
 
 
 def rules(*names):
@@ -57,7 +78,7 @@ def test_a_search_is_complete_unless_the_model_says_otherwise(search, complete, 
 def test_one_rule_holds_everywhere_where_training_went_all_round_and_determined_it(
     names, visited, rank, condition, same, known
 ):
-    own = record(rules=rules(*names), model=model(visited=visited), solve=solve(rank, condition))
+    own = record(rules=rules(*names), vehicle=vehicle(visited=visited), solve=solve(rank, condition))
     assert (own.same_everywhere, own.known_everywhere) == (same, known)
 
 

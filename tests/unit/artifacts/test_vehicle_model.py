@@ -7,11 +7,15 @@ import pytest
 
 from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
 from cpfls_cli.artifacts.store import read_artifact, read_record, write_record
-from cpfls_cli.artifacts.vehicle_model import VehicleGroup, VehicleRecord
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.errors import InputError
-from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.flights.same_vehicle import rebuilt
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from tests.builders import exported_models
 from tests.builders.vehicle_models import HEXA, QUAD, record_of, remainder, whole
 
 MODELS = {
@@ -25,7 +29,7 @@ MODELS = {
 @pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
 def test_the_round_trip_is_exact(model, tmp_path):
     path = tmp_path / "vehicle.h5"
-    write_record(path, record_of(model, ("wind",)))
+    write_record(path, record_of(model))
     assert check_artifact(read_artifact(path)) == []
     record = read_record(path, VehicleRecord)
     again = record.vehicle.vehicle_model()
@@ -34,7 +38,6 @@ def test_the_round_trip_is_exact(model, tmp_path):
     assert [(one.name, one.shape) for one in again.effects] == [(one.name, one.shape) for one in model.effects]
     assert np.array_equal(again.weights, model.weights)
     assert all(np.array_equal(new, old) for new, old in zip(again.airflow, model.airflow, strict=True))
-    assert record.vehicle.not_held == ("wind",)
 
 
 def test_an_effect_that_nobody_knows_is_refused():
@@ -44,18 +47,33 @@ def test_an_effect_that_nobody_knows_is_refused():
         unknown.vehicle_model()
 
 
-@pytest.mark.parametrize("kind", [ModelRecord, ExtendedRecord])
-def test_other_models_may_lack_the_vehicle(kind):
-    paths = [spec for spec in kind.spec().datasets if spec.path.startswith("vehicle/")]
-    assert paths
-    assert not any(spec.required for spec in paths)
+@pytest.mark.parametrize("kind", [IdentifiedRecord, ExtendedRecord, VehicleRecord])
+def test_every_model_holds_the_vehicle(kind):
+    assert kind.FORMAT.name == ModelRecord.FORMAT.name
+    needed = {spec.path for spec in ModelRecord.spec().datasets if spec.required}
+    assert "vehicle/mass" in needed
+    assert needed <= {spec.path for spec in kind.spec().datasets if spec.required}
+
+
+def test_inertia_functions_filters_and_repairs_come_back(tmp_path):
+    functions = exported_models.model_of(exported_models.CASES["paper"])
+    audit = Audit((), {"gyro_bias": "no attitude"}, (), ("late",), None, (), None)
+    sag = ModelEffect("battery_sag", {"exponent": 1.5}, np.zeros(0))
+    model = VehicleModel(vehicle=QUAD, effects=(sag,), fuzzy=functions, commanded=True, hold="linear", repairs=audit)
+    write_record(tmp_path / "m.h5", record_of(model))
+    again = rebuilt(tmp_path / "m.h5", read_record(tmp_path / "m.h5", ModelRecord))
+    assert (again.commanded, again.hold, again.beside_table) == (True, "linear", ("battery_sag",))
+    assert (again.repairs.untested, again.repairs.notes) == (audit.untested, audit.notes)
+    attitude = np.random.default_rng(1).uniform(-1, 1, (5, 3))
+    np.testing.assert_array_equal(again.fuzzy.inertia(attitude).value, functions.inertia(attitude).value)
+    np.testing.assert_array_equal(again.fuzzy.outside(attitude), functions.outside(attitude))
 
 
 def test_the_summary_names_what_the_model_has():
-    summary = record_of(MODELS["quad"], ("wind",)).summary
+    summary = record_of(MODELS["quad"]).summary
     assert summary["mass_kg"] == 0.9
     assert summary["inertia_kg_m2"]["Ixz"] == -2e-4
     assert summary["response"]["lag_s"] == 0.035
     assert list(summary["effects"]) == [one.name for one in MODELS["quad"].effects]
     assert summary["remainder"] == [0, 2, 5]
-    assert summary["not_held"] == ["wind"]
+    assert summary["not_held"] == []

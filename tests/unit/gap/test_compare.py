@@ -12,9 +12,11 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.before_after import before_after
 from cpfls_cli.gap.compare import compare
-from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, extend, plain
+from cpfls_cli.gap.extended import ExtendedModel, extend, inertial_torque, plain
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.whole_vehicle import of_vehicle, whole_vehicle
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
 
@@ -50,12 +52,15 @@ def damping(_time, rate):
 
 
 def compared(recordings, model=None):
-    return compare(recordings, model or plain(None), SETTINGS, np.random.default_rng(0))
+    return compare(recordings, model or VehicleModel(vehicle=VEHICLE), SETTINGS, np.random.default_rng(0))
 
 
-def with_effect(name, *linear, shape=None):
-    effect = FittedEffect(Candidate(CATALOGUE[name], shape or {}), np.array(linear))
-    return replace(plain(None), effects=(effect,))
+def with_effect(name, *linear):
+    return VehicleModel(vehicle=VEHICLE, effects=(ModelEffect(name, {}, np.array(linear)),))
+
+
+def effect_wrench(model, signals):
+    return model.wrench_along(model.acting(signals)) - signals.wrench
 
 
 def test_gap_is_the_missing_torque():
@@ -109,7 +114,7 @@ def test_model_with_the_effect_leaves_the_noise():
 
 def test_effect_wrench_is_the_torque_by_hand():
     signals = recording_of_sines(3).signals
-    torque = with_effect("linear_damping", 0.1, 0.2, 0.3).effect_wrench(signals)
+    torque = effect_wrench(with_effect("linear_damping", 0.1, 0.2, 0.3), signals)
     assert torque[:, :3] == pytest.approx(-signals.body_rate * [0.1, 0.2, 0.3])
     assert not torque[:, 3:].any()
 
@@ -119,7 +124,8 @@ def test_momentum_of_an_effect_is_differentiated():
     time = signals.time
     speed = 350 + 20 * np.sin(2 * np.pi * 0.7 * time)[:, None] * [1.0, -1.0, 1.0, -1.0]
     turning = replace(signals, rotor_speed=speed, stated_torque=None)
-    found = with_effect("rotor_acceleration", 5e-4).effect_wrench(turning)
+    (effect,) = with_effect("rotor_acceleration", 5e-4).effects
+    found = effect.wrench(turning)
     slope = 20 * 2 * np.pi * 0.7 * np.cos(2 * np.pi * 0.7 * time)
     # Spins are + - + -, so all four rotors add up.
     assert found[5:-5, 2] == pytest.approx(-5e-4 * 4 * slope[5:-5], abs=1e-5)
@@ -130,22 +136,24 @@ def test_required_rotor_torque_is_that_of_the_motion_less_the_effect():
     model = with_effect("linear_damping", 0.12, 0.12, 0.12)
     exact = replace(recording.signals, body_rate=_exact_rate(4))
     inside = slice(10, -10)
-    assert model.rotor_torque(exact)[inside] == pytest.approx(exact.stated_torque[inside], abs=2e-4)
+    required = inertial_torque(exact, None) - effect_wrench(model, exact)[:, :3]
+    assert required[inside] == pytest.approx(exact.stated_torque[inside], abs=2e-4)
 
 
 def test_refitted_inertia_changes_the_inertial_torque_in_proportion():
     signals = replace(recording_of_sines(5).signals, body_rate=np.zeros((2400, 3)))
     spun = replace(signals, body_rate=np.column_stack([0.4 * np.sin(2 * signals.time), *[0 * signals.time] * 2]))
-    base = plain(None)
-    heavier = replace(base, parameters=np.where(np.arange(len(base.parameters)) == 0, 0.1, 0.0))
-    assert heavier.inertial_torque(spun)[:, 0] == pytest.approx(1.1 * base.inertial_torque(spun)[:, 0])
-    assert heavier.inertia(spun) == pytest.approx(np.diag([0.66, 0.6, 1.2]))
+    parameters = np.where(np.arange(len(plain(None).parameters)) == 0, 0.1, 0.0)
+    model = whole_vehicle(ExtendedModel(None, parameters), VEHICLE)
+    heavier, stated = (inertial_torque(replace(spun, vehicle=each), None) for each in (model.vehicle, VEHICLE))
+    assert heavier[:, 0] == pytest.approx(1.1 * stated[:, 0])
+    assert model.body.inertia == pytest.approx(np.diag([0.66, 0.6, 1.2]))
 
 
 def test_a_missing_signal_is_named():
-    model = with_effect("rotor_drag", 1e-3, 5e-5)
-    with pytest.raises(InputError, match=r"lacks .*velocity.*, which the model's effect rotor_drag needs"):
-        model.effect_wrench(recording_of_sines(1).signals)
+    model = with_effect("rotor_drag", 1e-3)
+    with pytest.raises(InputError, match=r"lacks rotor speed and velocity, which the model of the whole vehicle needs"):
+        of_vehicle([recording_of_sines(1)], model)
 
 
 def named(name):
@@ -207,10 +215,3 @@ def _exact_rate(seed):
         for frequency in rng.uniform(0.2, 1.2, 4):
             rate[:, axis] += 0.3 * np.sin(2 * np.pi * frequency * time + rng.uniform(0, 6))
     return rate
-
-
-def test_plain_model_has_no_effects():
-    model = plain(None)
-    assert isinstance(model, ExtendedModel)
-    assert not model.chosen
-    assert not model.effect_wrench(recording_of_sines(1).signals).any()

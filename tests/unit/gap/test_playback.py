@@ -1,6 +1,7 @@
 """A model with effects played back along a flight that has them: true numbers predict it, whatever the effect."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -9,9 +10,11 @@ from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
-from cpfls_cli.gap.playback import errors_by_horizon, extended_player, played_pairs, worst_stretch
+from cpfls_cli.gap.playback import errors_by_horizon, played_pairs, worst_stretch
+from cpfls_cli.gap.whole_vehicle import whole_vehicle
+from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.player import player_of
+from cpfls_cli.playback.player import made_ready, player_of
 from cpfls_cli.playback.replay import Played, replay
 from cpfls_cli.simulation.model import simulated_effects
 from cpfls_cli.weak_form.windows import Recording
@@ -37,11 +40,20 @@ def model_of(asked):
     """The true model of a simulated flight."""
     flying = simulated_effects(asked, VEHICLE).listed
     fitted = [FittedEffect(Candidate(one.effect, one.shape), np.asarray(one.linear)) for one in flying]
-    return ExtendedModel(None, np.zeros(len(PARAMETERS)), tuple(fitted))
+    return whole(*fitted)
 
 
-def played_back(model, signals, horizon=30, hold="linear"):
-    flight, player = extended_player(model, "flight", [signals], hold)
+def whole(*fitted, **numbers):
+    parameters = np.array([numbers.get(name, 0.0) for name in PARAMETERS])
+    return whole_vehicle(ExtendedModel(None, parameters, fitted), VEHICLE)
+
+
+def logged(*parts):
+    return replace(LoggedFlight.of("flight", parts[0]), parts=parts)
+
+
+def played_back(model, signals, horizon=30):
+    flight, player = made_ready(model, logged(signals))
     found = replay([Played(flight, player, player_of(VehicleModel(vehicle=VEHICLE), flight))], horizon, 5)
     return {name: errors.mae.sum(axis=1) for name, errors in found.errors.items()}, flight
 
@@ -62,8 +74,7 @@ def test_a_load_on_a_short_cable_is_evaluated_along_the_motion():
     signals = signals_of(flown())
     shape = {"length_m": 0.3, "damping_1_s": 0.6, "depth_m": 0.05}
     load = FittedEffect(Candidate(CATALOGUE["payload"], shape), np.array([0.03, 0.0, 0.0, 0.3]))
-    with_load = ExtendedModel(None, np.zeros(len(PARAMETERS)), (load,))
-    _, player = extended_player(with_load, "flight", [signals], "linear")
+    _, player = made_ready(whole(load), logged(signals))
     assert np.isfinite(player.along).all()
     assert np.abs(player.along[:, 5]).max() > 1.0
 
@@ -76,9 +87,7 @@ def test_without_effects_it_is_the_vehicle_of_the_config():
 
 def test_wrong_numbers_of_the_vehicle_are_in_inertia_and_thrust():
     signals = signals_of(flown())
-    model = model_of({})
-    model.parameters[[PARAMETERS.index(name) for name in ("inertia_x", "coupling_y", "thrust_scale")]] = 0.2, 0.3, 0.1
-    flight, player = extended_player(model, "flight", [signals], "linear")
+    flight, player = made_ready(whole(inertia_x=0.2, coupling_y=0.3, thrust_scale=0.1), logged(signals))
     np.testing.assert_allclose(player.body.inertia, np.diag([0.72, 0.6, 1.2]))
     used, weights = player.step_weights(slice(0, 5))
     plain, stated = player_of(VehicleModel(vehicle=VEHICLE), flight).step_weights(slice(0, 5))
@@ -100,8 +109,12 @@ def test_a_lag_leaves_measured_speeds_as_they_are():
 def test_what_the_flight_lacks_is_named():
     signals = signals_of(flown())
     blind = type(signals)(time=signals.time, body_rate=signals.body_rate, vehicle=VEHICLE, rotor_speed=signals.speed)
-    with pytest.raises(InputError, match="flight: lacks velocity, which the model's effect rotor_drag needs"):
-        extended_player(model_of({"rotor_drag": [3e-4]}), "flight", [blind], "linear")
+    ground = whole(FittedEffect(Candidate(CATALOGUE["ground_effect"], {"G": 1.0}), np.zeros(0)))
+    with pytest.raises(InputError, match="flight: lacks height, which the model's effect ground_effect needs"):
+        made_ready(ground, logged(blind))
+    # Air that nobody measured is taken as still, which `replay` says.
+    _, player = made_ready(model_of({"rotor_drag": [3e-4]}), logged(blind))
+    assert player.feels_air
 
 
 def test_stretches_are_played_apart():
@@ -112,7 +125,7 @@ def test_stretches_are_played_apart():
         type(signals)(vehicle=VEHICLE, **{name: getattr(signals, name)[part] for name in names})
         for part in (slice(0, 120), slice(150, 300))
     ]
-    flight, player = extended_player(model, "flight", parts, "linear")
+    flight, player = made_ready(model, logged(*parts))
     assert [part.stop - part.start for part in flight.stretches] == [120, 150]
     found = replay([Played(flight, player, player)], 30, 5)
     whole, _ = played_back(model, signals)
@@ -120,8 +133,8 @@ def test_stretches_are_played_apart():
     assert rates[0] < 2 * whole["body_rate"][0]
 
 
-class Repairing(ExtendedModel):
-    """A model that takes a constant error out of the gyroscope first."""
+class Repairing(NamedTuple):
+    """A model's knowledge of a constant error of the gyroscope."""
 
     def repaired(self, signals):
         return replace(signals, body_rate=signals.body_rate - BIAS)
@@ -143,9 +156,9 @@ def test_before_and_after_are_those_of_each_model_alone():
 
 def test_the_model_as_given_takes_the_log_with_its_faults():
     exact = signals_of(flown())
-    logged = replace(exact, body_rate=exact.body_rate + BIAS)
-    model = Repairing(None, np.zeros(len(PARAMETERS)), ())
-    pairs = played_pairs([Recording("flight", logged)], model, model_of({}))
+    faulty = replace(exact, body_rate=exact.body_rate + BIAS)
+    model = replace(model_of({}), repairs=Repairing())
+    pairs = played_pairs([Recording("flight", faulty)], model, model_of({}))
     after, _, _, before = errors_by_horizon(pairs, 0.3).errors["attitude"].mae[:, -1]
     assert before == pytest.approx(np.linalg.norm(BIAS) * 0.3, rel=0.2)
     assert after < 0.02 * before

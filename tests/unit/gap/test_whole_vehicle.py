@@ -5,17 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.effects.catalogue.parameter_error import coupling
+from cpfls_cli.effects.catalogue.parameter_error import coupling, inertia_correction
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS, effect
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Off
 from cpfls_cli.gap.balance.weak_flight import Candidate, actuated, columns_of, nuisance
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
-from cpfls_cli.gap.playback import extended_player, left_out
+from cpfls_cli.gap.playback import left_out
 from cpfls_cli.gap.whole_vehicle import of_vehicle, whole_vehicle, with_effects
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.playback.player import free_runs, player_of
+from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.player import free_runs, made_ready, player_of
 from cpfls_cli.weak_form.windows import Recording
 from tests.builders import vehicle_models
 from tests.builders.vehicle_models import QUAD
@@ -43,45 +45,50 @@ def signals(samples=60):
     )
 
 
+def _columns(extended, flown):
+    return [(each.candidate, flown, each.linear) for each in extended.effects if each.candidate.effect.kind == "wrench"]
+
+
 def test_torque_force_and_inertia_are_those_of_the_effects():
     numbers = parameters(inertia_x=0.3, inertia_z=-0.2, coupling_y=0.4, thrust_scale=0.1, reference_x=0.2)
     effects = (fitted("com_offset", 0.004, -0.002), fitted("linear_damping", 1e-3, 2e-3, 3e-3))
     effects += (fitted("drag_factor_error", error=0.3),)
     extended, flown = ExtendedModel(None, numbers, effects), signals()
-    whole = whole_vehicle(extended, QUAD, STATED)
-    assert whole.not_held == ()
+    whole = whole_vehicle(extended, QUAD)
+    assert whole.beside_table == ()
     steady = np.zeros((len(flown), 17))
     steady[:, 0], steady[:, 1:5], steady[:, 5:9] = 1.0, flown.rotor_speed, flown.rotor_speed**2
-    found = whole.model.wrench(flown.air_velocity, flown.body_rate, steady)
-    wanted = flown.wrench + extended.effect_wrench(flown)
+    found = whole.wrench(flown.air_velocity, flown.body_rate, steady)
+    moved = actuated(flown, extended.chosen)
+    wanted = moved.wrench + sum(columns_of(*pair).direct @ each for *pair, each in _columns(extended, moved))
     wanted += columns_of(nuisance(), flown).direct @ coupling(numbers)
     wanted[:, 5] += 0.1 * flown.thrust
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
-    np.testing.assert_allclose(whole.model.body.inertia, extended.inertia(flown), rtol=1e-12)
+    np.testing.assert_allclose(whole.body.inertia, STATED + inertia_correction(numbers, QUAD), rtol=1e-12)
 
 
 def test_products_of_inertia_stand_in_the_inertia():
     products = fitted("products_of_inertia", 1e-4, 2e-4, 0)
-    whole = whole_vehicle(ExtendedModel(None, parameters(), (products,)), QUAD, STATED)
-    np.testing.assert_allclose(whole.model.body.inertia, STATED + symmetric([0, 0, 0, 1e-4, 2e-4, 0]), rtol=1e-12)
-    assert (whole.model.effects, whole.not_held) == ((), ())
+    whole = whole_vehicle(ExtendedModel(None, parameters(), (products,)), QUAD)
+    np.testing.assert_allclose(whole.body.inertia, STATED + symmetric([0, 0, 0, 1e-4, 2e-4, 0]), rtol=1e-12)
+    assert whole.effects == ()
 
 
 def test_lag_and_delay_are_those_of_the_rotors():
     effects = (fitted("motor_lag", time_constant_s=0.04), fitted("command_delay", delay_s=0.02))
-    whole = whole_vehicle(ExtendedModel(None, parameters(), effects), QUAD, STATED)
-    assert (whole.model.response.lag_s, whole.model.response.delay_s) == (0.04, 0.02)
-    assert (whole.model.effects, whole.not_held) == ((), ())
+    whole = whole_vehicle(ExtendedModel(None, parameters(), effects), QUAD)
+    assert (whole.response.lag_s, whole.response.delay_s) == (0.04, 0.02)
+    assert whole.effects == ()
 
 
 def test_what_is_no_polynomial_is_named():
     effects = (fitted("wind", 1.0, 0.0), fitted("torque_bias", 0.1, 0, 0), fitted("battery_sag", exponent=1.5))
-    whole = whole_vehicle(ExtendedModel(None, parameters(), effects), QUAD, STATED)
-    assert whole.not_held == ("wind", "battery_sag")
-    assert [one.name for one in whole.model.effects] == ["torque_bias"]
+    whole = whole_vehicle(ExtendedModel(None, parameters(), effects), QUAD)
+    assert whole.beside_table == ("battery_sag", "wind")
+    assert [*whole.part_weights()] == ["rotors", "torque_bias"]
 
 
-def test_playback_of_the_whole_vehicle_is_that_of_its_effects_height_of_the_mass_and_wind_included():
+def test_height_of_the_mass_and_wind_are_those_of_the_effects():
     wind, offset = effect("wind").exact, effect("com_offset").exact
     effects = (
         FittedEffect(Candidate(wind, {"W_x": 4.0, "W_y": -1.5}), np.array([3e-5])),
@@ -89,18 +96,24 @@ def test_playback_of_the_whole_vehicle_is_that_of_its_effects_height_of_the_mass
         fitted("parasitic_drag", 0.02, 0.03, 0.04, 0.0, 0.001, 0.0),
     )
     extended = ExtendedModel(None, parameters(thrust_scale=0.05), effects)
-    whole = whole_vehicle(extended, QUAD, STATED)
-    assert (whole.not_held, whole.model.wind) == ((), (4.0, -1.5, 0.0))
-    flight, player = extended_player(extended, "flight", [signals()], "linear")
+    whole = whole_vehicle(extended, QUAD)
+    assert (whole.beside_table, whole.wind) == ((), (4.0, -1.5, 0.0))
+    (offset,) = (each for each in whole.effects if each.is_lever)
+    flown = replace(whole.acting(signals()), rotor_speed=np.full((60, 4), 1000.0))
+    blown = [each for each in extended.effects if each.candidate.effect.name != "com_offset"]
+    total = flown.wrench + sum(columns_of(each.candidate, flown).direct @ each.linear for each in blown)
+    total[:, 5] += 0.05 * flown.thrust
+    total[:, :3] -= np.cross(offset.coefficients, total[:, 3:])
+    np.testing.assert_allclose(whole.wrench_along(flown), total, atol=1e-10)
+    flight, player = made_ready(whole, LoggedFlight.of("flight", signals()))
     starts = np.arange(0, 40, 8)
-    runs = [free_runs(each, flight, starts, 12).errors for each in (player, player_of(whole.model, flight))]
-    np.testing.assert_allclose(runs[1], runs[0], atol=1e-10)
-    lower = replace(whole.model, effects=tuple(e for e in whole.model.effects if not e.is_lever))
-    for changed in (lower, replace(whole.model, wind=(0.0, 0.0, 0.0))):
-        assert np.abs(free_runs(player_of(changed, flight), flight, starts, 12).errors - runs[0]).max() > 1e-3
+    runs = free_runs(player, flight, starts, 12).errors
+    lower = replace(whole, effects=tuple(e for e in whole.effects if not e.is_lever))
+    for changed in (lower, replace(whole, wind=(0.0, 0.0, 0.0))):
+        assert np.abs(free_runs(player_of(changed, flight), flight, starts, 12).errors - runs).max() > 1e-3
     # The height alone has a lever for the forces across the rotors, which the thrust is none of.
-    table, centre = whole.model.part_weights()["com_offset"], np.array([0.004, -0.003, 0.02])
-    forces = whole.model.weights[3:]
+    table, centre = whole.part_weights()["com_offset"], np.array([0.004, -0.003, 0.02])
+    forces = whole.weights[3:]
     np.testing.assert_allclose(table[:3], -np.cross(centre, forces, axisb=0, axisc=0), atol=1e-15)
 
 
@@ -109,39 +122,46 @@ def test_what_is_left_out_is_measured_along_flights():
     steady = np.full((60, 4), 1000.0)
     flown = replace(signals(), voltage=np.linspace(1.0, 0.8, 60), commanded=True, rotor_speed=steady)
     extended = replace(plain(None), effects=(fitted("torque_bias", 0.01, 0.0, 0.0), sag))
-    (left,) = left_out(extended, ["battery_sag"], [Recording("flight", flown)])
+    (left,) = left_out(whole_vehicle(extended, QUAD), ["battery_sag"], [Recording("flight", flown)])
     assert left.name == "battery_sag"
     lost = (1.0 - actuated(flown, extended.chosen).speed ** 2 / flown.speed**2) * flown.thrust[:, None]
     assert left.wrench[5] == pytest.approx(np.sqrt((lost[:, 0] ** 2).mean()), rel=0.02)
     assert left.ends[1] > 0.1
     still = replace(flown, velocity=None, acceleration=None, position=None)
-    (unseen,) = left_out(extended, ["battery_sag"], [Recording("flight", still)])
+    (unseen,) = left_out(whole_vehicle(extended, QUAD), ["battery_sag"], [Recording("flight", still)])
     np.testing.assert_array_equal(np.isfinite(unseen.ends), [False, False, True, True])
     assert Off.of(unseen.ends).sentence.endswith(" degrees")
 
 
 def test_a_plain_model_is_the_vehicle():
-    whole = whole_vehicle(plain(None), QUAD, STATED)
-    assert (whole.model.vehicle, whole.model.effects, whole.not_held) == (QUAD, (), ())
+    whole = whole_vehicle(plain(None), QUAD)
+    assert (whole.vehicle, whole.is_rigid_body) == (QUAD, True)
 
 
-def test_an_inertia_of_no_body_is_named():
+def test_an_inertia_of_no_body_is_not_taken():
     products = fitted("products_of_inertia", 0.1, 0.0, 0.0)
-    whole = whole_vehicle(ExtendedModel(None, parameters(), (products,)), QUAD, STATED)
-    assert whole.model.vehicle == QUAD
-    assert whole.not_held == ("inertia, which is not positive definite",)
+    whole = whole_vehicle(ExtendedModel(None, parameters(), (products,)), QUAD)
+    assert whole.vehicle == QUAD
 
 
 def test_a_whole_vehicle_as_a_model_with_one_effect_has_its_torque_force_and_inertia():
     model = vehicle_models.whole(effects=vehicle_models.whole().effects[:4])
-    recording = of_vehicle(Recording("flight", replace(signals(), vehicle=replace(QUAD, mass_kg=1.0))), model)
+    (recording,) = of_vehicle([Recording("flight", replace(signals(), vehicle=replace(QUAD, mass_kg=1.0)))], model)
     flown, extended = recording.signals, with_effects(model)
-    assert flown.vehicle == model.vehicle
+    assert (flown.vehicle, extended.base) == (model.vehicle, None)
     rotor = model.rotor_terms_at(flown.rotor_speed, flown.period, "linear")
     wanted = model.wrench(flown.air_velocity, flown.body_rate, rotor)
-    found = flown.wrench + extended.effect_wrench(flown)
+    (whole,) = extended.chosen
+    found = flown.wrench + columns_of(whole, flown).direct[:, :, 0]
     np.testing.assert_allclose(found, wanted, atol=1e-12 * np.abs(wanted).max())
-    np.testing.assert_array_equal(extended.inertia(flown), symmetric(model.vehicle.inertia_kg_m2))
+    assert not extended.parameters.any()
+
+
+def test_a_rigid_body_has_no_effect_and_the_place_of_a_sensor_stays_a_number():
+    assert with_effects(VehicleModel(vehicle=QUAD)).effects == ()
+    numbers = parameters(thrust_scale=0.1, reference_x=0.2)
+    again = with_effects(whole_vehicle(ExtendedModel(None, numbers, ()), QUAD))
+    np.testing.assert_array_equal(again.parameters, parameters(reference_x=0.2))
 
 
 @pytest.mark.parametrize(
@@ -155,7 +175,7 @@ def test_a_whole_vehicle_as_a_model_with_one_effect_has_its_torque_force_and_ine
 def test_a_flight_has_to_have_what_the_model_depends_on(model, lacking, needed):
     recording = Recording("flight", replace(signals(), **lacking))
     if needed is None:
-        assert of_vehicle(recording, model).signals.vehicle == model.vehicle
+        assert of_vehicle([recording], model)[0].signals.vehicle == model.vehicle
         return
     with pytest.raises(InputError, match=f"^flight: {needed} which the model of the whole vehicle needs$"):
-        of_vehicle(recording, model)
+        of_vehicle([recording], model)

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from cpfls_cli.dynamics.visited import outside_visited, visited_cells
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.excitation import rule_excitation
 from cpfls_cli.identification.samples import Ready, Samples
-from cpfls_cli.identification.visited import outside_visited, visited_cells
 from cpfls_cli.regressor import Motion, StructureSettings, data_ranges, model_structure, uniform_breakpoints
 
 DEGREE = np.pi / 180

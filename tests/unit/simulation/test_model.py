@@ -1,14 +1,18 @@
 """Values of effects: read by order or name, refused where they are impossible."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cpfls_cli import rotations
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError, SettingError
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulation.actuators import mixer
 from cpfls_cli.simulation.closed_loop import upright
-from cpfls_cli.simulation.model import SimulatedModel, simulated_effects, simulated_model
+from cpfls_cli.simulation.model import in_the_loop, simulated_effects, with_effects
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.vehicle import VehicleSettings, body_wrench
 
@@ -100,20 +104,30 @@ def test_upright_body_has_the_yaw_and_the_thrust_of_the_plan():
 
 def test_errors_of_the_numbers_add_up_and_other_effects_are_flown_once():
     vehicle = VehicleSettings()
-    model = simulated_model(None, {"parameter_error": {"inertia_x": 0.1}, "torque_bias": {"M_z": 0.1}}, vehicle)
-    more = model.with_effects(
-        simulated_effects({"parameter_error": {"inertia_x": 0.05, "thrust_scale": -0.1}}, vehicle)
-    )
-    values = more.effects.values("parameter_error")
-    assert values["inertia_x"] == pytest.approx(0.15)
-    assert values["thrust_scale"] == -0.1
-    with pytest.raises(SettingError, match=r"has it already: M_x = 0, M_y = 0, M_z = 0\.1"):
-        model.with_effects(simulated_effects({"torque_bias": {"M_z": 0.1}}, vehicle))
+    numbers = np.zeros(10)
+    numbers[6] = 0.1
+    effects = (ModelEffect("parameter_error", {}, numbers), ModelEffect("torque_bias", {}, np.array([0.0, 0.0, 0.1])))
+    model = VehicleModel(vehicle=vehicle, effects=effects)
+    held, more = with_effects(model, simulated_effects({"parameter_error": {"thrust_scale": -0.05}}, vehicle))
+    assert (held.effects, more.values("parameter_error")["thrust_scale"]) == (effects, -0.05)
+    with pytest.raises(SettingError, match="the model has it already"):
+        with_effects(model, simulated_effects({"torque_bias": {"M_z": 0.1}}, vehicle))
+
+
+def test_what_no_table_holds_is_simulated_by_itself_and_a_lag_behind_commands_stands_before_the_speeds():
+    vehicle = VehicleSettings()
+    sag, bias = ModelEffect("battery_sag", {"exponent": 1.5}, np.zeros(0)), ModelEffect("torque_bias", {}, np.ones(3))
+    model = VehicleModel(vehicle=vehicle, effects=(sag, bias), response=RotorResponse(lag_s=0.05), wind=(3.0, 0.0, 0.0))
+    held, own = in_the_loop(model)
+    assert ([one.name for one in held.effects], held.response.lag_s, held.wind) == (["torque_bias"], 0.05, (0, 0, 0))
+    assert [(one.effect.name, dict(one.values)) for one in own.listed] == [("battery_sag", {"exponent": 1.5})]
+    held, own = in_the_loop(replace(model, commanded=True))
+    assert (held.response.lag_s, own.values("motor_lag")) == (0.0, {"time_constant_s": 0.05})
 
 
 def test_effects_that_hide_the_speeds_are_refused_beside_a_shift_of_them():
     vehicle = VehicleSettings()
-    shifted = simulated_model(None, {"channel_delay": {CATALOGUE["channel_delay"].shapes[0].name: 0.01}}, vehicle)
+    name = CATALOGUE["channel_delay"].shapes[0].name
+    late = VehicleModel(vehicle=vehicle, response=RotorResponse(lag_s=0.05), commanded=True)
     with pytest.raises(SettingError, match="shifts measured rotor speeds"):
-        shifted.with_effects(simulated_effects({"motor_lag": [0.05]}, vehicle))
-    assert SimulatedModel().with_effects(shifted.effects) == shifted
+        with_effects(late, simulated_effects({"channel_delay": {name: 0.01}}, vehicle))

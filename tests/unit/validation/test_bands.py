@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.identification.model import Model
 from cpfls_cli.regressor import StructureSettings, model_structure, uniform_breakpoints
 from cpfls_cli.validation.bands import definite_share
 from cpfls_cli.validation.bootstrap import Draws
@@ -19,7 +19,7 @@ BODY = np.array([0.6, 0.8, 1.2, 0.05, 0.0, -0.03])
 def model(visited):
     structure = model_structure(StructureSettings())
     parts = uniform_breakpoints(structure)
-    return Model(structure, (RANGE, RANGE), parts, np.zeros(structure.parameters), BODY, visited)
+    return InertiaFunctions(structure, (RANGE, RANGE), parts, np.zeros(structure.parameters), BODY, visited)
 
 
 def random_draws(own, size, count=60, seed=91):

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy import linalg
 
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import rigid_columns
 from cpfls_cli.identification import data
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
-from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
 from cpfls_cli.regressor import Regressor
 from cpfls_cli.regressor.motion import RIGID
@@ -35,7 +35,7 @@ def fitted(training, learned, base):
     evaluator = model_evaluator(training, learned, IdentificationSettings(**STRUCTURE, base=base))
     structure, chromosome = evaluator.structure, uniform_chromosome(evaluator.structure)
     fit, partitions = evaluator.fit(chromosome), decode(structure, chromosome.astype(float))
-    model = Model(structure, evaluator.judge.ranges, partitions, fit.coefficients, fit.rigid_body, NOWHERE)
+    model = InertiaFunctions(structure, evaluator.judge.ranges, partitions, fit.coefficients, fit.rigid_body, NOWHERE)
     return evaluator, model, fit
 
 
@@ -128,7 +128,7 @@ def test_noise_free_data_and_short_flights_give_finite_draws(base, samples):
     chromosome = uniform_chromosome(evaluator.structure)
     fit, partitions = evaluator.fit(chromosome), decode(evaluator.structure, chromosome.astype(float))
     ranges = evaluator.judge.ranges
-    model = Model(evaluator.structure, ranges, partitions, fit.coefficients, fit.rigid_body, NOWHERE)
+    model = InertiaFunctions(evaluator.structure, ranges, partitions, fit.coefficients, fit.rigid_body, NOWHERE)
     draws = bootstrap(evaluator, training, model, fit, VALIDATION, np.random.default_rng(6))
     assert draws.blocks >= 2
     assert all(np.isfinite(getattr(draws, name)).all() for name in ("coefficients", "rigid_body", "best_rigid_body"))

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix
+from cpfls_cli.dynamics.visited import visited_cells
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.identification.visited import visited_cells
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.validation.bands import inertia_band
@@ -27,7 +27,9 @@ def drawn(roll, pitch):
     training = TorqueData(0.01 * np.arange(2001), Motion(attitude, still, still), still)
     ranges, parameters = data_ranges(STRUCTURE, attitude), STRUCTURE.parameters
     partitions = uniform_breakpoints(STRUCTURE)
-    model = Model(STRUCTURE, ranges, partitions, rng.standard_normal(parameters), BEST, visited_cells([attitude]))
+    model = InertiaFunctions(
+        STRUCTURE, ranges, partitions, rng.standard_normal(parameters), BEST, visited_cells([attitude])
+    )
     draws = Draws(
         model.coefficients + 0.1 * rng.standard_normal((30, parameters)),
         BEST + 0.01 * rng.standard_normal((30, 6)),

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.identification.model import Model
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import StructureSettings, model_structure, uniform_breakpoints
 from cpfls_cli.regressor.regressor import InertiaValues
@@ -24,7 +24,9 @@ def model(rigid_body=BODY, visited=None, d11=0.0):
     coefficients = np.zeros(structure.parameters)
     coefficients[0] = d11
     visited = np.ones((72, 72), dtype=bool) if visited is None else visited
-    return Model(structure, (RANGE, RANGE), uniform_breakpoints(structure), coefficients, rigid_body, visited)
+    return InertiaFunctions(
+        structure, (RANGE, RANGE), uniform_breakpoints(structure), coefficients, rigid_body, visited
+    )
 
 
 def examined(*args, **kwargs):
@@ -87,7 +89,9 @@ def random_model(**settings):
     structure = model_structure(StructureSettings(**settings))
     coefficients = np.random.default_rng(91).standard_normal(structure.parameters)
     visited = np.ones((72, 72), dtype=bool)
-    return Model(structure, (RANGE, RANGE), uniform_breakpoints(structure), coefficients, np.ones(6), visited)
+    return InertiaFunctions(
+        structure, (RANGE, RANGE), uniform_breakpoints(structure), coefficients, np.ones(6), visited
+    )
 
 
 def flight_of(torque_of, seed):

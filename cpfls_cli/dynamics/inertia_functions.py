@@ -1,17 +1,17 @@
-"""An identified model: torque, inertia matrix and Coriolis matrix for any motion."""
+"""Inertia functions over the attitude: torque, inertia matrix and Coriolis matrix for any motion."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient, rigid_columns
+from cpfls_cli.dynamics.visited import outside_visited
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.identification.visited import outside_visited
-from cpfls_cli.inertia import symmetric
+from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues, Regressor
 from cpfls_cli.regressor.structure import ModelStructure
@@ -20,7 +20,7 @@ _BATCH = 8192
 
 
 @dataclass(frozen=True)
-class Model:
+class InertiaFunctions:
     """A grey-box model of rotational dynamics.
 
     Attributes
@@ -67,6 +67,10 @@ class Model:
         return InertiaValues(
             fuzzy.value + inertia_matrix(attitude, tensor), fuzzy.gradient + inertia_matrix_gradient(attitude, tensor)
         )
+
+    def corrected(self, added: Array) -> InertiaFunctions:
+        """Add an inertia tensor, shape (3, 3), kg m^2, body frame."""
+        return replace(self, rigid_body=self.rigid_body + [added[entry] for entry in INERTIA_ENTRIES])
 
     def coriolis(self, attitude: Array, rate: Array) -> Array:
         """Evaluate C(q, qd) by Christoffel symbols, so that the torque is ``J qdd + C qd``.

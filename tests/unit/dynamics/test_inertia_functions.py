@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics.visited import visited_cells
 from cpfls_cli.identification.chromosome import decode
-from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.visited import visited_cells
 from cpfls_cli.regressor import Motion, StructureSettings, data_ranges, model_structure
 
 STRUCTURES = {
@@ -28,7 +28,7 @@ def case(request):
     rng = np.random.default_rng(19)
     structure = model_structure(StructureSettings(**STRUCTURES[request.param]))
     attitude = rng.uniform(-np.pi, np.pi, (50, 3))
-    model = Model(
+    model = InertiaFunctions(
         structure,
         data_ranges(structure, attitude),
         decode(structure, rng.uniform(1, 2, structure.genes)),
@@ -98,7 +98,7 @@ def test_one_rule_learned_all_round_the_circle_is_the_same_everywhere():
         structure = model_structure(StructureSettings(membership_functions=functions))
         partitions = decode(structure, np.ones(structure.genes))
         ranges, visited = data_ranges(structure, attitude), visited_cells([attitude])
-        return Model(structure, ranges, partitions, np.zeros(structure.parameters), np.ones(6), visited)
+        return InertiaFunctions(structure, ranges, partitions, np.zeros(structure.parameters), np.ones(6), visited)
 
     assert model(round_both, 1).same_everywhere
     assert model(round_both, 1).outside(np.array([[0.0, 2.0, 0.0]])).all()

@@ -1,0 +1,335 @@
+"""The artifact of an identified model."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.artifacts.checkpoint import HistoryGroup
+from cpfls_cli.artifacts.evidence import (
+    CurvesGroup,
+    PeriodGroup,
+    PhysicsGroup,
+    ResidualsGroup,
+    RoundTripGroup,
+    StepsGroup,
+    StructuresGroup,
+    UncertaintyGroup,
+    VerdictGroup,
+    evidence_groups,
+    group_of,
+)
+from cpfls_cli.artifacts.model import InertiaFunctionsGroup, ModelRecord, VehicleGroup
+from cpfls_cli.artifacts.scores import MODEL, TRAINING, JudgedGroup
+from cpfls_cli.artifacts.spec import BODY, EULER, Format, dataset, group, record
+from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
+
+if TYPE_CHECKING:
+    # What evaluates a model loads compiled kernels, which nobody waits for who only reads one.
+    from cpfls_cli.config.study import Study
+    from cpfls_cli.identification.identify import Identification
+    from cpfls_cli.validation.bootstrap import Draws
+    from cpfls_cli.validation.validate import Validation
+    from cpfls_cli.vehicle.settings import VehicleSettings
+
+WELL_CONDITIONED = 100.0
+"""Largest condition number of a model whose coefficients are all known."""
+
+
+@record
+class ChosenGroup:
+    """What was chosen for the inertia functions."""
+
+    weights: Array = dataset("weights", "partition weights a_i of the chosen chromosome", "gene")
+    base: str = dataset("base", "none or rigid-body")
+    ridge_weight: float = dataset("ridge_weight", "chosen; infinite means the fuzzy part is off", gaps=True)
+
+
+@record
+class SolveGroup:
+    """How well the training samples determine the coefficients."""
+
+    singular_values: Array = dataset(
+        "singular_values", "of the regressor of the parameters in use, without penalty", "value", units="SI"
+    )
+    rank: int = dataset("rank", "numerical rank")
+    condition_number: float = dataset("condition_number", "over the kept singular values", least=1.0)
+    parameters: int = dataset("parameters", "number of linear parameters in use")
+
+
+@record
+class RulesGroup:
+    """Excitation of each rule in training."""
+
+    name: tuple[str, ...] = dataset("name", "inertia function and rule", "rule")
+    firing: Array = dataset("firing", "largest firing strength in training", "rule")
+    determined: Array = dataset("determined", "share of the rule's coefficients that data determine", "rule")
+    excited: BoolArray = dataset("excited", "1 where the rule is excited, else 0", "rule")
+
+
+@record
+class FrontGroup:
+    """Pareto front of the search."""
+
+    chromosomes: IntArray = dataset("chromosomes", "Pareto front, 16-bit weights", "member", "gene")
+    objectives: Array = dataset(
+        "objectives",
+        "MSE (rigid-body base: cross-validated, scaled by axis), largest error, condition number",
+        "member",
+        "3",
+        units="SI",
+    )
+    chosen: int = dataset("chosen", "index of the chosen member", into="member")
+    held_out: Array | None = dataset(
+        "held_out",
+        "mean squared error on the flights kept for the choice; objective 1 of them",
+        "member",
+        units="SI",
+        gaps=True,
+        default=None,
+    )
+
+
+@record
+class SearchGroup:
+    """How the search ended."""
+
+    stop_reason: str | None = dataset("stop_reason", "generations, converged, time-limit or interrupted", default=None)
+    complete: bool | None = dataset(
+        "complete", "1 where the search came to its end, 0 where `--resume` goes on", default=None
+    )
+
+
+@record
+class BaselinesGroup:
+    """Inertia parameters of the baselines."""
+
+    rigid_body: Array = dataset(
+        "rigid_body", "six inertia parameters by least squares", "6", units="kg m^2", frame=BODY
+    )
+    constant_inertia: Array = dataset(
+        "constant_inertia", "J11 J22 J33 J12 J13 J23, constant", "6", units="kg m^2", frame=EULER
+    )
+
+
+@record
+class RidgeGroup:
+    """Cross-validation of the ridge weight."""
+
+    weight: Array = dataset("weight", "ridge weights tried", "tried", gaps=True)
+    error: Array = dataset("error", "cross-validated error", "tried")
+    standard_error: Array = dataset("standard_error", "its standard error", "tried")
+
+
+@record
+class IdentifiedRecord(ModelRecord):
+    """The artifact `cpfls/model` of an identified model: its inertia functions, with mass and rotors of the config."""
+
+    FORMAT: ClassVar = Format(
+        "cpfls/model",
+        "an identified model, how it was found and how it was judged",
+        "identify",
+        ("flight", "selection", "validate", "choose-on"),
+        kind="identified",
+    )
+
+    model: ChosenGroup = group("model")
+    solve: SolveGroup = group("solve")
+    rules: RulesGroup = group("rules")
+    front: FrontGroup = group("front")
+    history: HistoryGroup = group("history")
+    search: SearchGroup | None = group("search", default=None)
+    judged: JudgedGroup = group("judged")
+    baselines: BaselinesGroup = group("baselines")
+    ridge: RidgeGroup | None = group("ridge", default=None)
+    training_indices: IntArray = dataset("training/indices", "samples of the flight that trained", "sample")
+    findings: tuple[str, ...] = dataset("findings", "what failed or was not excited, in words", "finding")
+    structures: StructuresGroup | None = group("structures", default=None)
+    residuals: ResidualsGroup | None = group("residuals", default=None)
+    uncertainty: UncertaintyGroup | None = group("uncertainty", default=None)
+    curves: CurvesGroup | None = group("curves", default=None)
+    round_trip: RoundTripGroup | None = group("round_trip", default=None)
+    steps: StepsGroup | None = group("steps", default=None)
+    physics: PhysicsGroup | None = group("physics", default=None)
+    period: PeriodGroup | None = group("period", default=None)
+    verdict: VerdictGroup | None = group("verdict", default=None)
+
+    @classmethod
+    def of(
+        cls,
+        result: Identification,
+        base: str,
+        learned: IntArray,
+        evidence: Validation | None,
+        vehicle: VehicleSettings,
+    ) -> Self:
+        """Arrange an identification and the evidence on it.
+
+        Parameters
+        ----------
+        base : str
+            ``none`` or ``rigid-body``.
+        learned : array of int
+            Indices of the samples that trained.
+        evidence : Validation or None
+            None where it was not gathered.
+        vehicle : VehicleSettings
+            As stated: what was identified is its inertia.
+        """
+        from cpfls_cli.playback.model import VehicleModel
+
+        baselines = {baseline.name: baseline.parameters for baseline in result.baselines}
+        return cls(
+            vehicle=VehicleGroup.of(VehicleModel(vehicle=vehicle, fuzzy=result.model)),
+            model=ChosenGroup(
+                weights=result.front.chromosomes[result.front.chosen],
+                base=base,
+                ridge_weight=result.fit.ridge_weight,
+            ),
+            solve=SolveGroup(
+                singular_values=result.system.singular_values,
+                rank=result.system.rank,
+                condition_number=result.system.condition_number,
+                parameters=result.system.parameters,
+            ),
+            rules=group_of(RulesGroup, result.excitation),
+            front=group_of(FrontGroup, result.front),
+            history=group_of(HistoryGroup, result.history),
+            search=SearchGroup(stop_reason=result.stop_reason, complete=result.complete),
+            judged=JudgedGroup.of(result),
+            baselines=BaselinesGroup(
+                rigid_body=baselines["rigid-body"], constant_inertia=baselines["constant-inertia"]
+            ),
+            ridge=None if result.ridge is None else group_of(RidgeGroup, result.ridge),
+            training_indices=learned,
+            findings=tuple(result.findings),
+            **({} if evidence is None else evidence_groups(evidence)),
+        )
+
+    @cached_property
+    def study(self) -> Study:
+        """The study that it was identified with."""
+        return _study(self.origin.config, self.FORMAT.name)
+
+    @property
+    def functions(self) -> InertiaFunctionsGroup:
+        """Its inertia functions."""
+        assert self.vehicle.inertia_functions is not None, "what is identified"
+        return self.vehicle.inertia_functions
+
+    def draws(self) -> Draws | None:
+        """Give the bootstrap draws behind its bands; None for a model without."""
+        from cpfls_cli.validation.bootstrap import Draws
+
+        if self.uncertainty is None:
+            return None
+        drawn = self.uncertainty
+        return Draws(drawn.coefficients, drawn.rigid_body, drawn.best_rigid_body, drawn.blocks, drawn.block_duration)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the search came to its end; models of before searches could be stopped did."""
+        return self.search is None or self.search.complete is not False
+
+    @property
+    def stop_reason(self) -> str:
+        """Why the search ended; empty where that is not known."""
+        return (self.search and self.search.stop_reason) or ""
+
+    @property
+    def stopped(self) -> str:
+        """Why the search for it ended before its end; empty where it did not."""
+        return "" if self.complete else self.stop_reason or "unknown"
+
+    @property
+    def searched(self) -> bool:
+        """Whether it has partitions to search for; without, one chromosome was evaluated."""
+        return bool(np.size(self.model.weights))
+
+    @property
+    def on_rigid_body(self) -> bool:
+        """Whether a rigid body lies under the fuzzy part."""
+        return self.model.base == "rigid-body"
+
+    @property
+    def fuzzy_part_off(self) -> bool:
+        """Whether cross-validation switched the fuzzy part off."""
+        return bool(np.isinf(self.model.ridge_weight))
+
+    @property
+    def same_everywhere(self) -> bool:
+        """Whether one rule acts at all attitudes, and training went all the way round in roll and in pitch."""
+        functions = [name.split(" rule ")[0] for name in self.rules.name]
+        visited = np.asarray(self.functions.visited, dtype=bool)
+        return len(set(functions)) == len(functions) and all(bool(visited.any(axis=axis).all()) for axis in (0, 1))
+
+    @property
+    def known_everywhere(self) -> bool:
+        """Whether its one rule is known well enough to hold at attitudes that training did not visit."""
+        full = self.solve.rank == self.solve.parameters
+        return self.same_everywhere and full and self.solve.condition_number <= WELL_CONDITIONED
+
+    @property
+    def verdict_label(self) -> str | None:
+        """How far to trust it, as `Verdict` names it; None where that was not judged."""
+        return None if self.verdict is None else self.verdict.label
+
+    @property
+    def validated(self) -> bool:
+        """Whether any evidence was gathered for it."""
+        evidence = (self.structures, self.residuals, self.uncertainty, self.curves, self.round_trip, self.steps)
+        return any(part is not None for part in (*evidence, self.physics, self.period, self.verdict))
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The model for machines.
+
+        ``not_positive_definite`` is None: only the identification itself counts the training samples at which D(q) is
+        not positive definite.
+        """
+        judged, solve = self.judged, self.solve
+        stated = six_parameters(self.study.vehicle.inertia_kg_m2)
+        return {
+            **judged.summary_of(MODEL, TRAINING),
+            "condition_number": solve.condition_number,
+            "rank": solve.rank,
+            "parameters": solve.parameters,
+            "generations": len(self.history.evaluations) - 1,
+            "evaluations": int(self.history.evaluations[-1]),
+            "stop_reason": self.stop_reason,
+            "complete": self.complete,
+            "front": len(self.front.objectives),
+            "choice_error": None if self.front.held_out is None else float(np.min(self.front.held_out)),
+            "samples": judged.samples_of(TRAINING),
+            "learned": len(self.training_indices),
+            "ridge_weight": self.model.ridge_weight,
+            "fuzzy_part": "off" if self.fuzzy_part_off else "on",
+            "inertia_kg_m2": {
+                "found": dict(zip(INERTIA_PARAMETERS, self.baselines.rigid_body.tolist(), strict=True)),
+                "stated": dict(zip(INERTIA_PARAMETERS, stated.tolist(), strict=True)),
+            },
+            "not_positive_definite": None,
+            "baselines": {name: judged.summary_of(name, TRAINING) for name in judged.baselines},
+            "held_out": {part: self._held_out_summary(part) for part in judged.held_out},
+            "findings": list(self.findings),
+            "verdict": None if self.verdict is None or self.verdict.label is None else self.verdict.summary,
+        }
+
+    def _held_out_summary(self, part: str) -> dict[str, Any]:
+        judged = self.judged
+        return {
+            **judged.summary_of(MODEL, part),
+            "samples": judged.samples_of(part),
+            "outside": int(judged.outside[judged.parts.index(part)]),
+            "baselines": {name: judged.summary_of(name, part) for name in judged.baselines},
+        }
+
+
+def _study(config: str, path: object) -> Study:
+    from cpfls_cli.config.load import parse_config, validate
+
+    source = f"{path}: /config"
+    return validate(parse_config(config, source), source)
