@@ -16,7 +16,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help reproduce reproduce-full reproduce-larger quick hexarotor full-circle crazyflie gap-example replay-example test lint bench blind-study blind-quick fuzz clean FORCE
+.PHONY: help reproduce reproduce-full reproduce-larger quick hexarotor full-circle crazyflie gap-example replay-example test decides oldest lint bench blind-study blind-quick fuzz clean FORCE
 
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -3
@@ -28,6 +28,8 @@ help:
 	@echo "  make crazyflie LOGS=FOLDER   the real flight; FOLDER holds log119.csv and log149.csv"
 	@echo "  make gap-example [HIDDEN=NAME=VALUES]   a flight with a hidden effect, and what the gap workflow makes of it"
 	@echo "  make replay-example   a vehicle that is not what its config states: found in flights, and what it predicts then"
+	@echo "  make decides     tests of words, names and verdicts once more, as another processor computes"
+	@echo "  make oldest      the same with the oldest packages that are allowed"
 	@echo "  make lint        formatting, lint, types, import contracts"
 	@echo "  make bench       benchmarks, as Markdown tables; hours, and goes on where it was stopped"
 	@echo "  make blind-study [SEED=N DRAWS=N NONE=N SIZE=...]   flights with hidden effects, to data/blind/tables.md"
@@ -330,6 +332,19 @@ docs/notebook.ipynb: FORCE | $(INSTALLED_DEV)
 PYTEST := $(BIN)/python -m pytest
 test: $(INSTALLED_DEV)
 	$(PYTEST) -n 2 --dist worksteal --assert=plain || { $(PYTEST) --last-failed; exit 1; }
+
+# What decides (words, names, verdicts, choices), with the linear algebra of the plainest processor.
+DECIDES = $$(grep -rl --include='*.py' mark.decides tests) -m decides --assert=plain
+decides: $(INSTALLED_DEV)
+	OPENBLAS_CORETYPE=Prescott $(PYTEST) $(DECIDES)
+
+# The same with the oldest packages that pyproject.toml allows.
+OLDEST := .venv-oldest/bin/python
+oldest:
+	$(PYTHON) -m venv .venv-oldest
+	$(OLDEST) -m pip install --quiet --disable-pip-version-check pytest hypothesis $$($(PYTHON) -c "import tomllib; \
+		print(*(each.replace('>=', '==') for each in tomllib.load(open('pyproject.toml', 'rb'))['project']['dependencies']))")
+	PYTHONPATH=. $(OLDEST) -m pytest $(DECIDES)
 
 lint: $(INSTALLED_DEV)
 	$(BIN)/ruff check .

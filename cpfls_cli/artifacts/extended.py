@@ -46,6 +46,13 @@ class LeftOutGroup:
 
 
 @record
+class ExtendedVehicleGroup(VehicleGroup):
+    """A vehicle with what was found of the sensors, which a refit repairs first."""
+
+    repair: AuditGroup = group("repair")
+
+
+@record
 class ExtendedRecord(ModelRecord):
     """The artifact `cpfls/model` of a model with the effects that it missed in it."""
 
@@ -57,6 +64,7 @@ class ExtendedRecord(ModelRecord):
         kind="extended",
     )
 
+    vehicle: ExtendedVehicleGroup = group("vehicle")
     inertia: Array = dataset(
         "inertia", "Ixx Iyy Izz Ixy Ixz Iyz: of the rigid body, or what the model gets", "6", units="kg m^2", frame=BODY
     )
@@ -93,7 +101,7 @@ class ExtendedRecord(ModelRecord):
         correction = np.array([*fitted.parameters[:3] * np.array(moments[:3]), 0.0, 0.0, 0.0])
         numbers = {number.name: number for number in refit.estimates.parameters}
         return cls(
-            vehicle=VehicleGroup.of(model),
+            vehicle=ExtendedVehicleGroup.of(model),
             inertia=rigid_body + correction,
             thrust_scale=1.0 + numbers["thrust_scale"].value if "thrust_scale" in numbers else 1.0,
             effects=NamedEffectsGroup.of(refit.effects, True, numbers, fitted.parameters),
@@ -105,7 +113,6 @@ class ExtendedRecord(ModelRecord):
     @property
     def audit(self) -> AuditGroup:
         """Faults of the sensors that it repairs."""
-        assert self.vehicle.repair is not None, "a refit repairs what the audit found"
         return self.vehicle.repair
 
     @property

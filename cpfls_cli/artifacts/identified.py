@@ -125,6 +125,13 @@ class RidgeGroup:
 
 
 @record
+class IdentifiedVehicleGroup(VehicleGroup):
+    """A vehicle with inertia functions, which are what is identified."""
+
+    inertia_functions: InertiaFunctionsGroup = group("inertia_functions")
+
+
+@record
 class IdentifiedRecord(ModelRecord):
     """The artifact `cpfls/model` of an identified model: its inertia functions, with mass and rotors of the config."""
 
@@ -136,6 +143,7 @@ class IdentifiedRecord(ModelRecord):
         kind="identified",
     )
 
+    vehicle: IdentifiedVehicleGroup = group("vehicle")
     model: ChosenGroup = group("model")
     solve: SolveGroup = group("solve")
     rules: RulesGroup = group("rules")
@@ -183,7 +191,7 @@ class IdentifiedRecord(ModelRecord):
 
         baselines = {baseline.name: baseline.parameters for baseline in result.baselines}
         return cls(
-            vehicle=VehicleGroup.of(VehicleModel(vehicle=vehicle, fuzzy=result.model)),
+            vehicle=IdentifiedVehicleGroup.of(VehicleModel(vehicle=vehicle, fuzzy=result.model)),
             model=ChosenGroup(
                 weights=result.front.chromosomes[result.front.chosen],
                 base=base,
@@ -217,7 +225,6 @@ class IdentifiedRecord(ModelRecord):
     @property
     def functions(self) -> InertiaFunctionsGroup:
         """Its inertia functions."""
-        assert self.vehicle.inertia_functions is not None, "what is identified"
         return self.vehicle.inertia_functions
 
     def draws(self) -> Draws | None:

@@ -22,7 +22,6 @@ from cpfls_cli.regressor.structure import ModelStructure
 
 _OUTSIDE, _VERTICAL = 1, 4
 _FASTEST_PERIOD = 1e-3
-_SHORTEST_S = 1e-5
 
 
 @dataclass(frozen=True)
@@ -302,7 +301,7 @@ def _features_text(structure: ModelStructure) -> list[str]:
 def response_of(sheet: Sheet) -> dict[str, float]:
     """Give delay, lag and slow actuation of the rotors, s; 0 for what `cpfls_cli.playback.rotors` takes for none."""
     response = sheet.model.response
-    lag, slow = (time if time >= _SHORTEST_S else 0.0 for time in (response.lag_s, response.slow_s))
+    lag, slow = response.lag_s, response.slow_s
     return {"delay_s": response.delay_s, "lag_s": lag, "slow_s": slow}
 
 

@@ -19,6 +19,7 @@ from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
 from cpfls_cli.inertia import INERTIA_ENTRIES
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.simulation.model import late_effects
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
 
@@ -122,7 +123,9 @@ def _numbers(parameters: Array, vehicle: VehicleSettings, corrected: Array) -> t
 
 
 def with_effects(model: VehicleModel) -> ExtendedModel:
-    """Turn the model of a whole vehicle into one with a single effect: all that it has beyond its rigid body.
+    """Write a model as effects on its rigid body, for the balance of flights.
+
+    A model with more than effects of the catalogue has a single one: all that it has beyond its rigid body.
 
     Parameters
     ----------
@@ -130,9 +133,12 @@ def with_effects(model: VehicleModel) -> ExtendedModel:
         Signals have to be those of its vehicle, see `of_vehicle`.
     """
     base = replace(plain(model.fuzzy), audit=model.repairs)
-    if model.is_rigid_body:
-        return base
     numbers = next((one.coefficients for one in model.effects if one.name == VEHICLE_NUMBERS.name), base.parameters)
+    if model.of_catalogue:
+        listed = [(one.known, one.shape, one.coefficients) for one in model.effects if one.known.kind != "parameter"]
+        listed += [(known, {known.shapes[0].name: value}, np.zeros(0)) for known, value in late_effects(model.response)]
+        fitted = tuple(FittedEffect(Candidate(known, shape), linear) for known, shape, linear in listed)
+        return replace(base, parameters=numbers, effects=fitted)
     # Where a sensor sits moves nothing, and is no part of torque and force.
     of_log = np.array([coefficient.of_log for coefficient in VEHICLE_NUMBERS.coefficients])
     whole = FittedEffect(Candidate(_beyond_rigid_body(model), {}), np.zeros(0))
@@ -155,9 +161,10 @@ def _of_vehicle(recording: Recording, model: VehicleModel) -> Recording:
     if missing:
         lacking = " and ".join(name.replace("_", " ") for name in missing)
         raise InputError(f"{recording.name}: lacks {lacking}, which the model of the whole vehicle needs")
-    if recording.signals.vehicle == model.vehicle:
+    if recording.signals.vehicle == model.vehicle and not any(model.wind):
         return recording
-    return replace(recording, signals=replace(recording.signals, vehicle=model.vehicle))
+    wind = np.array(model.wind) if any(model.wind) else None
+    return replace(recording, signals=replace(recording.signals, vehicle=model.vehicle, wind=wind))
 
 
 def _beyond_rigid_body(model: VehicleModel) -> Effect:

@@ -236,4 +236,5 @@ def _wanted(sources: Sources) -> Iterator[_Lack]:
 
 
 def _word(wanted: type[Record]) -> str:
-    return wanted.FORMAT.name.removeprefix("cpfls/")
+    kind = wanted.FORMAT.kind
+    return wanted.FORMAT.name.removeprefix("cpfls/") if kind in ("", "identified") else kind

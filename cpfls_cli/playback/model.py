@@ -228,6 +228,14 @@ class VehicleModel:
         )
 
     @property
+    def of_catalogue(self) -> bool:
+        """Whether it is a rigid body or inertia functions with effects of the catalogue, lag and delay among them."""
+        response = self.response
+        slow = response.slow_roll_pitch or response.slow_yaw
+        late = (response.lag_s or response.delay_s) and not self.commanded
+        return not (self.thrust_linear or self.remainder or slow or late)
+
+    @property
     def beside_table(self) -> tuple[str, ...]:
         """Effects that no table of weights holds, by name."""
         return tuple(one.name for one in (*self.filters, *self.along))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -111,7 +111,7 @@ def in_the_loop(model: VehicleModel) -> tuple[VehicleModel, SimulatedEffects]:
     kept = tuple(one for one in model.effects if one.name not in model.beside_table)
     response = model.response
     if model.commanded:
-        late = ((effect, value) for effect, value in _late(response) if value > 0)
+        late = late_effects(response)
         apart += [SimulatedEffect(effect, {effect.shapes[0].name: value}) for effect, value in late]
         response = replace(response, delay_s=0.0, lag_s=0.0)
     # What repairs the log of its flights, and the wind in them, is no part of a vehicle.
@@ -157,13 +157,12 @@ def with_effects(model: VehicleModel | None, asked: SimulatedEffects) -> tuple[V
     return held, effects
 
 
-def _late(response: RotorResponse) -> Iterator[tuple[Effect, float]]:
-    """Find the effects of the catalogue that are a lag or a delay, with their only value."""
-    for effect in CATALOGUE.values():
-        if effect.actuation is not None and effect.actuation.lag is not None:
-            yield effect, response.lag_s
-        elif effect.actuation is not None and effect.actuation.delay is not None:
-            yield effect, response.delay_s
+def late_effects(response: RotorResponse) -> list[tuple[Effect, float]]:
+    """List the effects of the catalogue that are the lag and the delay of a response, with their only value."""
+    hooks = [(effect, effect.actuation) for effect in CATALOGUE.values() if effect.actuation is not None]
+    lags = [(effect, response.lag_s) for effect, actuation in hooks if actuation.lag is not None]
+    delays = [(effect, response.delay_s) for effect, actuation in hooks if actuation.delay is not None]
+    return [(effect, value) for effect, value in (*lags, *delays) if value > 0]
 
 
 def _refuse_conflict(chosen: SimulatedEffects) -> None:

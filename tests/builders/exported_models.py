@@ -7,8 +7,7 @@ import numpy as np
 import yaml
 
 from cpfls_cli.artifacts.evidence import VerdictGroup
-from cpfls_cli.artifacts.identified import ChosenGroup, IdentifiedRecord, SearchGroup
-from cpfls_cli.artifacts.model import VehicleGroup
+from cpfls_cli.artifacts.identified import ChosenGroup, IdentifiedRecord, IdentifiedVehicleGroup, SearchGroup
 from cpfls_cli.artifacts.scores import JudgedGroup
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.commands.vehicle_sheets import identified_sheet
@@ -121,7 +120,7 @@ def sheet_of(model: InertiaFunctions, **changes) -> Sheet:
     inputs = {"flight": InputFile(given["source"], "0" * 64, "cpfls/flight")}
     record = IdentifiedRecord(
         header=Header("0.1.0", 1, yaml.safe_dump(given["config"]), inputs),
-        vehicle=VehicleGroup.of(VehicleModel(vehicle=VEHICLE, fuzzy=model)),
+        vehicle=IdentifiedVehicleGroup.of(VehicleModel(vehicle=VEHICLE, fuzzy=model)),
         model=ChosenGroup(base="rigid-body" if model.rigid_body.any() else "none", weights=None, ridge_weight=None),
         judged=_judged(),
         search=SearchGroup(stop_reason=given["stop_reason"], complete=given["complete"]),

@@ -85,13 +85,18 @@ def test_missing_file_and_folder(refuse, study, tmp_path):
         ("simulate", ["flight"], "cpfls/trajectory (made by `cpfls trajectory`)"),
         ("reduce", ["trajectory"], "cpfls/flight (made by `cpfls simulate` or `cpfls import`)"),
         ("identify", ["model"], "cpfls/flight (made by `cpfls simulate` or `cpfls import`)"),
-        ("predict", ["flight", "flight"], "cpfls/model (made by `cpfls identify`)"),
+        (
+            "predict",
+            ["flight", "flight"],
+            "cpfls/model (made by `cpfls identify` or `cpfls extend` or `cpfls gap` or `cpfls vehicle`)",
+        ),
     ],
 )
 def test_artifact_of_another_stage(refuse, pipeline, study, tmp_path, command, given, needed):
     paths = [pipeline.paths[stage] for stage in given]
     (line,) = refuse(command, study, *paths, "-o", tmp_path / "out.h5")
-    assert line == f"{paths[0]}: is a cpfls/{given[0]}; this command needs a {needed}"
+    made = " made by `cpfls identify`" if given == ["model"] else ""
+    assert line == f"{paths[0]}: is a cpfls/{given[0]}{made}; this command needs a {needed}"
 
 
 def test_selection_given_as_flight_to_identify(refuse, pipeline, study, tmp_path):
@@ -103,7 +108,7 @@ def test_selection_given_as_flight_to_identify(refuse, pipeline, study, tmp_path
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("schema_version", 99, "schema_version = 99: written by a newer cpfls; this one reads up to 1"),
+        ("schema_version", 99, "schema_version = 99: written by a newer cpfls; this one reads up to 2"),
         ("schema_version", "x", "the root attribute 'schema_version' is missing or not a number"),
         ("format", "cpfls/other", "format = 'cpfls/other': this cpfls does not know it"),
         ("seed", "x", "damaged: invalid literal for int() with base 10: 'x'"),
@@ -184,19 +189,23 @@ def test_model_of_wrong_content(refuse, changed, pipeline, study, tmp_path, path
     assert all(line.startswith(f"{model}: ") for line in lines)
 
 
-def test_model_whose_numbers_do_not_fit_its_config(refuse, changed, pipeline, study, tmp_path):
+def test_model_whose_numbers_do_not_fit_its_structure(refuse, changed, pipeline, study, tmp_path):
     def shorten(file):
         for name in ("coefficients", "parameter"):
-            values = file[f"model/{name}"][:-1]
-            del file[f"model/{name}"]
-            file[f"model/{name}"] = values
+            path = f"vehicle/inertia_functions/{name}"
+            values = file[path][:-1]
+            del file[path]
+            file[path] = values
         draws = file["uncertainty/coefficients"][:, :-1]
         del file["uncertainty/coefficients"]
         file["uncertainty/coefficients"] = draws
 
     model = changed("model", shorten)
     (line,) = refuse("predict", study, model, pipeline.flight, "-o", tmp_path / "out.h5")
-    assert line == f"{model}: holds 24 weights and 112 coefficients; its config asks for 24 and 113"
+    assert line == (
+        f"{model}: vehicle/inertia_functions holds [5, 5, 5, 5, 5, 5] breakpoints and 112 coefficients; its structure "
+        "asks for [5, 5, 5, 5, 5, 5] and 113"
+    )
 
 
 def test_selection_from_another_flight(refuse, cpfls, pipeline, study, tmp_path):

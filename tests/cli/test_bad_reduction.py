@@ -27,6 +27,7 @@ def test_all_samples_can_be_asked_for(cpfls, pipeline, study, tmp_path):
     assert cpfls("reduce", study, pipeline.flight, *words).exit_code == 0
 
 
+@pytest.mark.decides
 @pytest.mark.parametrize(
     ("size", "target", "words"),
     [

@@ -152,28 +152,34 @@ def test_hostile_text_in_a_model_stays_text(cpfls, model, tmp_path, form):
 def test_not_a_good_model(refuse, pipeline, model, study, tmp_path):
     words = ("--format", "json", "-o", tmp_path / "m.json")
     (line,) = refuse("export", pipeline.flight, *words)
-    assert line == f"{pipeline.flight}: is a cpfls/flight; this command needs a cpfls/model (made by `cpfls identify`)"
+    assert line == (
+        f"{pipeline.flight}: is a cpfls/flight; this command needs a cpfls/model (made by `cpfls identify` or "
+        "`cpfls extend` or `cpfls gap` or `cpfls vehicle`)"
+    )
     (line,) = refuse("export", study, *words)
     assert line == f"{study}: is a config, and this takes what cpfls made; `cpfls config {study}` shows it"
     assert refuse("export", tmp_path / "none.h5", *words) == [f"{tmp_path / 'none.h5'}: no such file"]
     with edited(model) as file:
         file.attrs["schema_version"] = 99
     (line,) = refuse("export", model, *words, "--dry-run")
-    assert line == f"{model}: schema_version = 99: written by a newer cpfls; this one reads up to 1"
+    assert line == f"{model}: schema_version = 99: written by a newer cpfls; this one reads up to 2"
     with edited(model) as file:
         file.attrs["schema_version"] = 1
         file.attrs["format"] = "cpfls/extended"
-    lines = refuse("export", model, *words)
-    assert lines[0].startswith(f"{model}: the cpfls/extended lacks ")
+    (line,) = refuse("export", model, *words)
+    assert line.startswith(f"{model}: a model that an earlier cpfls wrote, before all models had one format; ")
 
 
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"model__weights": np.zeros(24)}, "model/weights: those of D13(pitch) make no partition; identify it again"),
         (
-            {"model__weights": -np.arange(24.0)},
-            "model/weights: those of D13(pitch) make no partition; identify it again",
+            {"vehicle__inertia_functions__breakpoints": np.full(30, 2.0)},
+            "vehicle/inertia_functions/breakpoints: those of D13(pitch) make no partition; identify it again",
+        ),
+        (
+            {"vehicle__inertia_functions__breakpoints": np.linspace(1.0, 0.0, 30)},
+            "vehicle/inertia_functions/breakpoints: those of D13(pitch) make no partition; identify it again",
         ),
         (
             {"vehicle__inertia_functions__visited": np.zeros((71, 71))},

@@ -13,10 +13,12 @@ from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.export.registry import TARGETS
+from cpfls_cli.playback.model import ModelEffect
 from tests.builders.artifacts import edited
 from tests.builders.playback_flights import truth
 from tests.builders.vehicle_models import HEXA, record_of, whole
 
+LOAD = ModelEffect("payload", {"length_m": 0.3, "damping_1_s": 0.6, "depth_m": 0.05}, np.array([0.03, 0.0, 0.0, 0.3]))
 HOSTILE = '--> </sdf> <x a="\'&]]>--\n"""\nraise SystemExit(7)\n\u202e -'
 
 
@@ -40,7 +42,7 @@ def read(form, output):
 def test_a_vehicle_is_exported_and_hostile_names_stay_text(cpfls, tmp_path, form):
     header = Header("0", 1, "seed: 1\n", {"flight": InputFile("flight.h5", "0" * 64, "cpfls/flight")})
     path = tmp_path / ("x--" + "' \"; raise SystemExit(8)\n#-->.h5")
-    write_record(path, record_of(truth(), ("payload",)).with_header(header))
+    write_record(path, record_of(replace(truth(), effects=(*truth().effects, LOAD))).with_header(header))
     with edited(path) as file:
         file["inputs/flight"].attrs["name"] = HOSTILE
     output = tmp_path / f"uav{TARGETS[form].ending}"
@@ -49,8 +51,10 @@ def test_a_vehicle_is_exported_and_hostile_names_stay_text(cpfls, tmp_path, form
     assert result.exit_code == 0, result.stderr
     summary = json.loads(result.stdout)
     assert (summary["format"], summary["rotors"], summary["bytes"]) == (form, 4, output.stat().st_size)
+    title = summary["missing"][-1]["title"]
+    assert title.startswith("load on a cable (")
     assert summary["missing"][-1] == {
-        "title": "load on a cable", "torque": None, "force": None, "floors": None, "off": None, "where": "about hover"
+        "title": title, "torque": None, "force": None, "floors": None, "off": None, "where": "about hover"
     }  # fmt: skip
     read(form, output)
     first = output.read_bytes()

@@ -14,6 +14,7 @@ from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.effects.polynomial import Probe, polynomial
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.motion import State, step
 from tests.builders.artifacts import edited
 from tests.builders.compiled_c import build, require_gcc
@@ -112,19 +113,22 @@ def test_hostile_text_stays_text(cpfls, tmp_path, form):
 @pytest.mark.parametrize("form", ENDINGS)
 def test_what_an_export_cannot_hold_is_named_on_the_screen_and_in_the_file(cpfls, tmp_path, form):
     path, output = tmp_path / "vehicle.h5", tmp_path / f"m.{ENDINGS[form]}"
-    model = replace(whole(effects=(), remainder=None), wind=(3.0, 0.5, 0.0))
-    write_record(path, record_of(model, ("ground_effect", "battery_sag")))
+    none = np.zeros(0)
+    beside = ModelEffect("ground_effect", {"G": 1.2}, none), ModelEffect("battery_sag", {"exponent": 1.5}, none)
+    model = replace(whole(effects=beside, remainder=None), wind=(3.0, 0.5, 0.0))
+    write_record(path, record_of(model))
     result = cpfls("export", path, "-o", output, "--json")
     assert result.exit_code == 0, result.stderr
     titles = [each["title"] for each in json.loads(result.stdout)["missing"]]
     # Nothing of this vehicle meets the air, so that the wind does nothing.
-    assert titles == ["ground effect", "battery sag"]
+    assert [title.partition(" (")[0] for title in titles] == ["battery sag", "ground effect"]
+    assert titles[0].endswith("; exponent = 1.5)")
     said = cpfls("export", path, "-o", output, "--force").stdout.splitlines()
     assert said[-2:] == [
         f"Not held: {title}; its size depends on the flight, and was not measured along one." for title in titles
     ]
     written = " ".join(output.read_text().replace("\n *", " ").replace("\n#", " ").split())
-    assert all(sentence in written for sentence in said[-2:])
+    assert all(" ".join(sentence.split()) in written for sentence in said[-2:])
     if form != "json":
         assert self_test(output).returncode == 0
 

@@ -65,6 +65,7 @@ def test_it_finds_what_was_put_in(found):
     assert found.told["mass_kg"] == 0.8
 
 
+@pytest.mark.decides
 def test_json_tells_verdict_structures_and_what_was_held_out(found):
     told = found.told
     assert told["verdict"] == "good-for-simulation"

@@ -149,7 +149,8 @@ def test_a_vehicle_found_from_commands_flies_from_commands(sums, fly, written):
     flown = fly("commanded-flight.h5", commanded)
     record = read_record(flown, FlightRecord)
     assert record.rotor_speed is None
-    assert record.effects.by_name == {"motor_lag.time_constant_s": 0.02, "command_delay.delay_s": 0.013}
+    late = {"motor_lag.time_constant_s": 0.02, "command_delay.delay_s": 0.013}
+    assert late.items() <= record.effects.by_name.items()
     errors = sums(commanded, flown, "--hold", "linear")
     assert (errors["model"] < 0.005 * np.minimum(errors["nothing-moves"], errors["rate-stays"])).all()
 

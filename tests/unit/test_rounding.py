@@ -7,6 +7,8 @@ from hypothesis import strategies as st
 
 from cpfls_cli.rounding import ROUNDING, ascending, at_most, largest, less, levelled, smallest, tied
 
+pytestmark = pytest.mark.decides
+
 LAST_BITS = 1e-12
 
 

@@ -279,8 +279,8 @@ def test_ranking_by_quantity_beside_a_classical_one():
 
 @pytest.mark.parametrize(("torque", "passes"), [(np.cos, True), (np.sin, True), (np.asarray, False)])
 def test_torque_goes_on_across_a_full_turn(torque, passes):
-    rebuilt = SimpleNamespace(torque=lambda motion: torque(motion.attitude))
-    record = SimpleNamespace(rebuilt=lambda _: rebuilt)
+    functions = SimpleNamespace(torque=lambda motion: torque(motion.attitude))
+    record = SimpleNamespace(functions=SimpleNamespace(inertia=lambda: functions))
     model = SimpleNamespace(record=record, label="m.h5", config={"identification": {"structure": "cpfls"}})
     measured = CONTINUITY_CLAIM.measure(SimpleNamespace(models=[model]))
     assert (measured.verdict == ClaimVerdict.PASS) == passes

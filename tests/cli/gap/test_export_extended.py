@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.extended import ExtendedRecord, LeftOutGroup
+from cpfls_cli.artifacts.extended import ExtendedRecord, ExtendedVehicleGroup, LeftOutGroup
 from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.model import VehicleGroup
 from cpfls_cli.artifacts.store import read_record, write_record
 from cpfls_cli.playback.model import ModelEffect
 from tests.builders.artifacts import edited
@@ -50,7 +49,7 @@ def test_what_a_table_does_not_hold_is_told_with_numbers_and_size(cpfls, extende
     size, ends = np.array([[0.0, 0.4, 0.0, 0.0, 0.0, 0.0]]), np.array([[0.1, 0.2, 0.3, 0.4]])
     model = record.vehicle.vehicle_model()
     sag = ModelEffect("battery_sag", {"exponent": 1.5}, np.zeros(0))
-    outside = VehicleGroup.of(replace(model, effects=(*model.effects, sag)))
+    outside = ExtendedVehicleGroup.of(replace(model, effects=(*model.effects, sag)))
     path, output = tmp_path / "outside.h5", tmp_path / "m.c"
     sizes = LeftOutGroup(name=("battery_sag",), wrench=size, ends=ends)
     write_record(path, replace(record, vehicle=outside, left_out=sizes))
@@ -73,7 +72,8 @@ def test_an_identified_inertia_under_effects(cpfls, extended, pipeline, tmp_path
     assert said.splitlines()[-1] == "CasADi holds all of it."
     assert cpfls("export", path, "-o", tmp_path / "over.json").exit_code == 0
     document = json.loads((tmp_path / "over.json").read_text())
-    assert any("Not held, or not whole: inertia that depends on the attitude" in each for each in document["worth"])
+    assert document["inertia_kg_m2"] is None
+    assert document["structure"] is not None
 
 
 @pytest.mark.parametrize(("name", "command"), [("extended", "extend"), ("vehicle", "vehicle"), ("model", "identify")])

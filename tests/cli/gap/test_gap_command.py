@@ -37,6 +37,7 @@ def none(cpfls, gap_config, exact, tmp_path_factory):
     return SimpleNamespace(folder=folder, summary=json.loads(result.stdout))
 
 
+@pytest.mark.decides
 def test_offset_is_named_with_its_size(found):
     assert found.summary["verdict"] == "NAMED"
     assert [effect["name"] for effect in found.summary["effects"]] == ["com_offset"]

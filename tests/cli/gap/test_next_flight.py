@@ -43,6 +43,7 @@ def diagnosed(cpfls, folder, name, *training):
     return run(cpfls, folder, "diagnose", compared, "--held-out", folder / "flight-2.h5", "-o", diagnosis)
 
 
+@pytest.mark.decides
 def test_the_next_flight_settles_what_the_first_left_open(cpfls, folder):
     planned = run(cpfls, folder, "trajectory", "--for", folder / "open.h5", *NEXT, "-o", folder / "next.h5")
     rows = [row for row in planned["questions"] if {row["true"], row["rival"]} == {"com_offset", "torque_bias"}]

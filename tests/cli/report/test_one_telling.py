@@ -67,7 +67,9 @@ def answered(told):
             source = source_of(vehicle_models.record_of(vehicle_models.whole()), f"{name}.h5")
             return source, tuple(vehicle_model.answer(source))
         made = getattr(gap_artifacts, name)()
-        source = source_of(record_of_format(made.spec.format).of_data(made.header, made.data), f"{name}.h5")
+        source = source_of(
+            record_of_format(made.spec.format, made.spec.kind).of_data(made.header, made.data), f"{name}.h5"
+        )
         return source, tuple(FROM_NUMBERS[name].answer(source))
 
     return of
@@ -104,5 +106,9 @@ def test_what_json_prints_is_the_summary_of_the_record(told, name):
 
 
 def test_every_format_with_a_page_is_here():
-    formats = {record.FORMAT.name.removeprefix("cpfls/") for record in RECORDS}
+    words = {"identified": "model"}
+    formats = {
+        words.get(record.FORMAT.kind, record.FORMAT.kind) or record.FORMAT.name.removeprefix("cpfls/")
+        for record in RECORDS
+    }
     assert formats - {"checkpoint", "vehicle-checkpoint"} == set(FORMATS)

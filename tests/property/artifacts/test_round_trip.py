@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.formats import RECORDS
-from cpfls_cli.artifacts.spec import Header, InputFile
+from cpfls_cli.artifacts.spec import SCHEMA_VERSION, Header, InputFile
 from cpfls_cli.artifacts.store import Artifact, file_sha256, read_artifact, write_artifact
 
 FIXED = {"axis": 3}
@@ -83,7 +83,8 @@ def test_round_trip(artifact):
 def _describes_itself(path, artifact):
     with h5py.File(path) as file:
         assert file.attrs["format"] == artifact.spec.format
-        assert file.attrs["schema_version"] == 1
+        assert file.attrs["schema_version"] == SCHEMA_VERSION
+        assert file.attrs.get("kind", "") == artifact.spec.kind
         assert file.attrs["cpfls_version"] == artifact.header.version
         assert file.attrs["seed"] == artifact.header.seed
         assert file.attrs["config_sha256"] == hashlib.sha256(bytes(file["config"][()])).hexdigest()

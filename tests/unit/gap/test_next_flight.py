@@ -90,6 +90,7 @@ def test_hovering_tells_nothing_of_the_two_whatever_the_yaw():
         assert told(question("com_offset", [LEVER, LEVER], "torque_bias"), path) < 1e-6
 
 
+@pytest.mark.decides
 def test_flights_are_taken_together():
     """Two hovers at different thrust would tell; two at the same do not: what is fitted is the same in both."""
     hover, climb = path_of(2, 0.0), path_of(2, 0.15)
@@ -229,6 +230,7 @@ def asked():
     return goal(questions, [], room(), LOGGING)
 
 
+@pytest.mark.decides
 def test_a_search_improves_on_random_paths_and_is_the_same_by_seed(asked):
     found, again = (next_flight(asked, np.random.default_rng(7)) for _ in range(2))
     assert found.path.sine.tobytes() == again.path.sine.tobytes()

@@ -151,8 +151,8 @@ def test_a_whole_vehicle_as_a_model_with_one_effect_has_its_torque_force_and_ine
     assert (flown.vehicle, extended.base) == (model.vehicle, None)
     rotor = model.rotor_terms_at(flown.rotor_speed, flown.period, "linear")
     wanted = model.wrench(flown.air_velocity, flown.body_rate, rotor)
-    (whole,) = extended.chosen
-    found = flown.wrench + columns_of(whole, flown).direct[:, :, 0]
+    (beyond,) = extended.chosen
+    found = flown.wrench + columns_of(beyond, flown).direct[:, :, 0]
     np.testing.assert_allclose(found, wanted, atol=1e-12 * np.abs(wanted).max())
     assert not extended.parameters.any()
 
@@ -161,7 +161,9 @@ def test_a_rigid_body_has_no_effect_and_the_place_of_a_sensor_stays_a_number():
     assert with_effects(VehicleModel(vehicle=QUAD)).effects == ()
     numbers = parameters(thrust_scale=0.1, reference_x=0.2)
     again = with_effects(whole_vehicle(ExtendedModel(None, numbers, ()), QUAD))
-    np.testing.assert_array_equal(again.parameters, parameters(reference_x=0.2))
+    np.testing.assert_array_equal(again.parameters, numbers)
+    late = with_effects(replace(whole_vehicle(ExtendedModel(None, numbers, ()), QUAD), thrust_linear=0.1))
+    np.testing.assert_array_equal(late.parameters, parameters(reference_x=0.2))
 
 
 @pytest.mark.parametrize(
