@@ -338,13 +338,13 @@ DECIDES = $$(grep -rl --include='*.py' mark.decides tests) -m decides --assert=p
 decides: $(INSTALLED_DEV)
 	OPENBLAS_CORETYPE=Prescott $(PYTEST) $(DECIDES)
 
-# The same with the oldest packages that pyproject.toml allows.
+# The same with the oldest packages that pyproject.toml allows; old ones call what the newest beside them call outdated.
 OLDEST := .venv-oldest/bin/python
 oldest:
 	$(PYTHON) -m venv .venv-oldest
 	$(OLDEST) -m pip install --quiet --disable-pip-version-check pytest hypothesis $$($(PYTHON) -c "import tomllib; \
 		print(*(each.replace('>=', '==') for each in tomllib.load(open('pyproject.toml', 'rb'))['project']['dependencies']))")
-	PYTHONPATH=. $(OLDEST) -m pytest $(DECIDES)
+	PYTHONPATH=. $(OLDEST) -m pytest -W ignore::DeprecationWarning $(DECIDES)
 
 lint: $(INSTALLED_DEV)
 	$(BIN)/ruff check .

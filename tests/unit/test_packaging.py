@@ -23,6 +23,7 @@ def test_the_citation_is_of_this_version():
 def test_the_workflow_runs_what_has_to_be_green():
     workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))
     assert {"run": ".ci/run"} in workflow["jobs"]["run"]["steps"]
+    assert {"run": "make oldest"} in workflow["jobs"]["oldest"]["steps"]
     assert os.access(ROOT / ".ci" / "run", os.X_OK)
 
 
