@@ -36,7 +36,7 @@ def body_lines(function):
 def test_functions_are_short():
     lengths = {f"{path}:{f.name}": body_lines(f) for path in MODULES for f in functions(path)}
     assert {name: length for name, length in lengths.items() if length > LONGEST} == {}
-    assert median(lengths.values()) <= 10
+    assert median(lengths.values()) <= 25
 
 
 def documented(path):
