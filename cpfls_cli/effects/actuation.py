@@ -67,7 +67,6 @@ def with_actuation(signals: Signals, change: Callable[[Array], Array]) -> Signal
 
     Parameters
     ----------
-    signals : Signals
     change : callable
         From a signal to the changed one, time first.
     """

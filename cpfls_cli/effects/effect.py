@@ -23,11 +23,8 @@ class Coefficient:
 
     Attributes
     ----------
-    name : str
-    unit : str
     low, high : float
         What is physically possible, not what is usual, in multiples of `scale`.
-    meaning : str
     scale : callable or None
         Natural size on a vehicle, in `unit`; None for 1.
     of_log : bool
@@ -60,11 +57,8 @@ class Shape:
 
     Attributes
     ----------
-    name : str
-    unit : str
     grid : tuple of float
         Ascending; values that a search starts from. The first and the last bound it.
-    meaning : str
     first : float or None
         Where a search stays until the effect is chosen; None: it tries the whole grid.
     valley : float or None
@@ -149,14 +143,12 @@ class Effect:
         What a pilot understands.
     coefficients : tuple of Coefficient
         Physical, as reported; those of `shapes` not among them.
-    shapes : tuple of Shape
     needs : frozenset of str
         Of `Signals.available`.
     excitation : str
         The flight that shows it.
     rivals : mapping of str to str
         Effects that look alike, each with the flight that tells them apart.
-    source : str
     columns : callable or None
         ``columns(signals, shape) -> Columns``, linear in the linear coefficients; None for what only the audit of the
         sensors can see.

@@ -114,8 +114,6 @@ def polynomial(known: Effect, probe: Probe, shape: Mapping[str, float]) -> Array
 
     Parameters
     ----------
-    known : Effect
-    probe : Probe
     shape : mapping of str to float
         Its nonlinear parameters.
 
@@ -145,7 +143,6 @@ def fitted_terms(columns: Array, probe: Probe) -> Array | None:
     Parameters
     ----------
     columns : array, shape (time, 6, coefficient)
-    probe : Probe
 
     Returns
     -------

@@ -35,7 +35,6 @@ class Signals:
     ----------
     time : array, shape (time,), s
     body_rate : array, shape (time, 3), rad/s, body frame
-    vehicle : VehicleSettings
     attitude : array, shape (time, 3), rad, or None
         Roll, pitch, yaw.
     velocity : array, shape (time, 3), m/s, world frame, or None
@@ -240,7 +239,6 @@ class Signals:
         ----------
         key : hashable
             Who makes it, and all that it depends on beside the flight.
-        make : callable
         """
         made = self.__dict__.setdefault("made", {})
         if key not in made:

@@ -31,7 +31,6 @@ class StretchCurves:
     ----------
     flight : int
         Number of the held-out flight.
-    channel : str
     time : array, shape (moment,), s
     measured : array, shape (moment,), N m or N
         What the measured motion takes.
@@ -55,14 +54,10 @@ class BeforeAfter:
     ----------
     centres : array, shape (window,), s
     flight_index : array of int, shape (window,)
-    played : list of PlayedPair
-    playback : Replay
     stretches : tuple of Stretch
         Of the model as given, largest gap first.
-    white_before, white_after : Whiteness
     lag_s : float
         Between windows without common samples.
-    picture : StretchCurves
     run : WorstStretch
         Free runs over the stretch in which the model as given was worst.
     """
@@ -90,8 +85,6 @@ def before_after(
         Held-out flights.
     unseen : HeldOut
         Their residuals.
-    model : ExtendedModel
-    settings : GapSettings
     """
     windows = common_windows(held, settings)
     centres = [windows.centres(recording.signals.time) for recording in held]

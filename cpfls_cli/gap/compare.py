@@ -31,8 +31,6 @@ class WorstChannel:
 
     Attributes
     ----------
-    channel : str
-    signals : tuple of str
     heat_map : HeatMap
         Of the gap in N m or N.
     """
@@ -48,7 +46,6 @@ class Disagreement:
 
     Attributes
     ----------
-    audit : Audit
     rms, floor, activity : array, shape (6,), N m and N
         Of the gap, of noise, and of what moves the vehicle; NaN where unknown.
     residual : array, shape (window, 6), N m and N
@@ -56,14 +53,10 @@ class Disagreement:
     centres : array, shape (window,), s
     flight_index : array of int, shape (window,)
     states : mapping of str to array, shape (window,)
-    stretches : tuple of Stretch
-    dependence : tuple of Dependence
     worst : WorstChannel or None
         None where no two signals tell anything.
-    not_excited : tuple of NotExcited
     played : list of PlayedPair
         The model alone.
-    playback : Replay
     """
 
     audit: Audit
@@ -100,10 +93,8 @@ def compare(
 
     Parameters
     ----------
-    recordings : sequence of Recording
     model : VehicleModel
         Its rigid body is what `recordings` state as their vehicle, see `of_vehicle`.
-    settings : GapSettings
     rng : numpy.random.Generator
         Of the shifts that say what chance explains.
     progress : callable

@@ -47,14 +47,10 @@ class DiagnosisRun:
 
     Attributes
     ----------
-    diagnosis : Diagnosis
-    audit : Audit
     hypothesis : System
         Of the training flights, with the chosen effects.
-    estimates : Estimates
     leftover : Leftover
         Of the training flights with the effects.
-    held_out : HeldOut
     """
 
     diagnosis: Diagnosis
@@ -91,8 +87,6 @@ def diagnose(
     ----------
     training, held : sequence of Recording
         At least one each.
-    settings : GapSettings
-    rng : numpy.random.Generator
     model : InertiaModel or None
         None for the rigid body of the vehicle.
     progress : callable

@@ -39,7 +39,6 @@ class FittedEffect(NamedTuple):
 
     Attributes
     ----------
-    candidate : Candidate
     linear : array, shape (coefficient,)
         Of its columns; empty where everything is in the shape.
     """
@@ -58,7 +57,6 @@ class ExtendedModel:
         None for the rigid body of the vehicle.
     parameters : array, shape (parameter,)
         Relative errors of the vehicle's own numbers, in the order of the catalogue.
-    effects : tuple of FittedEffect
     audit : Audit or None
         Faults of the sensors, which are taken out of signals first.
     """
@@ -165,11 +163,8 @@ class Refit:
 
     Attributes
     ----------
-    model : ExtendedModel
     effects : tuple of NamedEffect
         With refitted numbers.
-    estimates : Estimates
-    unseen : HeldOut
     """
 
     model: ExtendedModel
@@ -190,12 +185,10 @@ def extend(
 
     Parameters
     ----------
-    training, held : sequence of Recording
     effects : sequence of NamedEffect
         To become part of the model; shapes start from theirs.
     audit : Audit
         Faults of the sensors that are repaired.
-    settings : GapSettings
     base : InertiaModel or None
         None for the rigid body of the vehicle.
 

@@ -69,7 +69,6 @@ class LeftOut(NamedTuple):
 
     Attributes
     ----------
-    name : str
     wrench : array, shape (6,), N m and N
         Root mean square.
     ends : array, shape (4,)

@@ -19,10 +19,8 @@ class Preparation:
 
     Attributes
     ----------
-    windows : Windows
     model : InertiaModel or None
         None for the rigid body of the vehicle.
-    settings : GapSettings
     audit : Audit
         Faults that are repaired.
     """

@@ -36,7 +36,6 @@ def inertia_correction(values: Array, vehicle: VehicleSettings) -> Array:
     ----------
     values : array, shape (10,)
         The coefficients.
-    vehicle : VehicleSettings
 
     Returns
     -------
@@ -103,7 +102,6 @@ def physical(vehicle: VehicleSettings, shown: BoolArray, least: BoolArray) -> Ch
 
     Parameters
     ----------
-    vehicle : VehicleSettings
     shown : array of bool, shape (3,)
         Axes whose inertia the flights show.
     least : array of bool, shape (3,)

@@ -54,7 +54,6 @@ def gains(vehicle: VehicleSettings, differences: Array) -> Array:
 
     Parameters
     ----------
-    vehicle : VehicleSettings
     differences : array, shape (2,)
         The first two coefficients.
 

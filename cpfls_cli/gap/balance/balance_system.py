@@ -26,7 +26,6 @@ class System:
 
     Attributes
     ----------
-    flights : tuple of WeakFlight
     chosen : tuple of Candidate
         Effects of the hypothesis.
     signals : tuple of Signals
@@ -132,7 +131,6 @@ def floors(hypothesis: System, coefficients: Array) -> Array:
 
     Parameters
     ----------
-    hypothesis : System
     coefficients : array, shape (column,)
         Of `hypothesis.base`.
 
@@ -155,7 +153,6 @@ def left_over(hypothesis: System, number: int, coefficients: Array) -> Columns:
 
     Parameters
     ----------
-    hypothesis : System
     number : int
         Of the flight.
     coefficients : array, shape (column,)
@@ -222,7 +219,6 @@ def relative_scatter(hypothesis: System, linear: Array, floor: Array) -> float:
 
     Parameters
     ----------
-    hypothesis : System
     linear : array, shape (column,)
         Coefficients of its base.
     floor : array, shape (6,)
@@ -266,7 +262,6 @@ def window_noise(hypothesis: System, residual: Array, floor: Array) -> Array:
 
     Parameters
     ----------
-    hypothesis : System
     residual : array, shape (window, 6)
         Of a fit; the size of the random part is read from it.
     floor : array, shape (6,)

@@ -47,7 +47,6 @@ def noise_floor(residual: Columns, windows: Windows, cut_off: Array | None = Non
     ----------
     residual : Columns
         What the model leaves, shape (time, 6).
-    windows : Windows
     cut_off : array, shape (6,), Hz, or None
         Of the filter that each channel went through before it was logged, infinite for none.
 
@@ -68,7 +67,6 @@ def channel_cut_offs(signals: Signals, euler: bool) -> Array:
 
     Parameters
     ----------
-    signals : Signals
     euler : bool
         Whether the inertial torque takes the attitude.
 
@@ -177,7 +175,6 @@ def modulated(windows: Windows, frequency: float) -> Windows:
 
     Parameters
     ----------
-    windows : Windows
     frequency : float
         Hz.
 

@@ -45,8 +45,6 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
 
     Parameters
     ----------
-    flights : sequence of WeakFlight
-    chosen : sequence of Candidate
     floor : array, shape (6,)
     """
     best = list(_exact(system(flights, chosen), floor).chosen)
@@ -140,7 +138,6 @@ def equations(hypothesis: System, weight: Array) -> Equations:
 
     Parameters
     ----------
-    hypothesis : System
     weight : array, shape (6,) or (window, 6), N m and N
         Standard deviation of each channel.
     """
@@ -154,7 +151,6 @@ def fit(hypothesis: System, floor: Array) -> Array:
 
     Parameters
     ----------
-    hypothesis : System
     floor : array, shape (6,) or (window, 6)
 
     Returns
@@ -177,7 +173,6 @@ def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = F
 
     Parameters
     ----------
-    hypothesis : System
     weight : array, shape (6,) or (window, 6), N m and N
         Standard deviation of each channel.
     of_vehicle : bool
@@ -283,7 +278,6 @@ def weighted_residual(hypothesis: System, floor: Array, rotor_wrench: Array) -> 
 
     Parameters
     ----------
-    hypothesis : System
     floor : array, shape (6,)
     rotor_wrench : array, shape (window, 6), N m and N
         Wrench of the rotors without effects on the actuation.
@@ -304,7 +298,6 @@ def refitted(hypothesis: System, weight: Array) -> System:
 
     Parameters
     ----------
-    hypothesis : System
     weight : array, shape (6,) or (window, 6), N m and N
         Standard deviation of each channel.
     """
@@ -479,7 +472,6 @@ def shape_columns(hypothesis: System, linear: Array, rotor_wrench: Array | None 
 
     Parameters
     ----------
-    hypothesis : System
     linear : array, shape (column,)
         Coefficients of the base, held.
     rotor_wrench : array, shape (window, 6), N m and N, optional

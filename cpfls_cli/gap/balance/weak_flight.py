@@ -51,9 +51,6 @@ class WeakFlight:
 
     Attributes
     ----------
-    name : str
-    signals : Signals
-    windows : Windows
     inertial : Columns
         Momentum and direct terms of inertial torque and force of the model, shape (time, 6); 0 where unknown.
     known : array of bool, shape (6,)
@@ -169,10 +166,6 @@ def weak_flight(
 
     Parameters
     ----------
-    name : str
-    signals : Signals
-    windows : Windows
-    model : InertiaModel or None
     force : bool
         Whether to use the force balance where the flight allows it.
     axes : sequence of str
@@ -229,7 +222,6 @@ def columns_of(candidate: Candidate, signals: Signals) -> Columns:
     ----------
     candidate : Candidate
         Of an effect with columns.
-    signals : Signals
 
     Returns
     -------
@@ -250,7 +242,6 @@ def actuated(signals: Signals, chosen: Iterable[Candidate]) -> Signals:
 
     Parameters
     ----------
-    signals : Signals
     chosen : iterable of Candidate
         Those that need a signal which the flight lacks leave it as it is: measured speeds, say, do not lag.
     """
@@ -282,7 +273,6 @@ def rotation_balance(signals: Signals, model: InertiaModel | None = None) -> Bal
 
     Parameters
     ----------
-    signals : Signals
     model : InertiaModel or None
         None for the rigid body of the vehicle.
 

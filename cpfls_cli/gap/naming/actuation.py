@@ -71,7 +71,6 @@ def without_companion(refitted: System, step: SearchStep, settings: GapSettings)
         With what was added.
     step : SearchStep
         The look that added it.
-    settings : GapSettings
     """
     *before, newest = refitted.chosen
     for index, candidate in enumerate(before):
@@ -95,8 +94,6 @@ def settled(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], index: i
 
     Parameters
     ----------
-    flights : sequence of WeakFlight
-    chosen : sequence of Candidate
     index : int
         Of the effect among them.
     step : SearchStep
@@ -145,13 +142,10 @@ def chance_beside_its_like(
 
     Parameters
     ----------
-    flights : sequence of WeakFlight
-    chosen : sequence of Candidate
     index : int
         Of the effect among them.
     effects : sequence of Effect
         That the search tried.
-    settings : GapSettings
     """
     # Slow to load, and needed only here and where two effects explain almost the same.
     from scipy.stats import wilcoxon

@@ -60,16 +60,10 @@ def judge_effect(
 
     Parameters
     ----------
-    flights : sequence of WeakFlight
-    chosen : sequence of Candidate
     index : int
         Of the effect among them.
-    estimates : Estimates
     share : float
         Of what all effects explain.
-    effects : sequence of Effect
-    settings : GapSettings
-    rng : numpy.random.Generator
     """
     candidate = chosen[index]
     others = [other for other in chosen if other is not candidate]
@@ -110,8 +104,6 @@ def shares(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], estimates
 
     Parameters
     ----------
-    flights : sequence of WeakFlight
-    chosen : sequence of Candidate
     estimates : Estimates
         Of the hypothesis with all of them.
     floor : array, shape (6,)
@@ -147,7 +139,6 @@ def wrong_numbers(
 
     Parameters
     ----------
-    estimates : Estimates
     effects : sequence of NamedEffect
         Already named.
     removed : array, shape (6,)
@@ -207,7 +198,6 @@ def sensor_fault(
 
     Parameters
     ----------
-    finding : AuditFinding
     as_logged, as_repaired : sequence of WeakFlight
         The training flights without and with the repair.
     """

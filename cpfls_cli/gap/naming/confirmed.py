@@ -40,13 +40,10 @@ class Judge:
 
     Attributes
     ----------
-    training : sequence of WeakFlight
     logged, repaired : sequence of WeakFlight
         The held-out flights as logged, and after repair of the sensors.
     floor : array, shape (6,)
         Of the training flights.
-    settings : GapSettings
-    rng : numpy.random.Generator
     """
 
     training: Sequence[WeakFlight]
@@ -222,8 +219,6 @@ def differences(
         Of all that was found in training, and of what the held-out flights confirm.
     start : SearchStep
         Without effects.
-    judge : Judge
-    settings : GapSettings
 
     Returns
     -------

@@ -28,9 +28,7 @@ class Fitted(NamedTuple):
 
     Attributes
     ----------
-    hypothesis : System
     block : array of int, shape (window,)
-    estimates : Estimates
     """
 
     hypothesis: System
@@ -43,7 +41,6 @@ class Refusal(NamedTuple):
 
     Attributes
     ----------
-    name, reason : str
     in_the_way : bool
         Whether others are to be looked for without it: on a bound it may stand for what another one is.
     """
@@ -96,7 +93,6 @@ def on_bound(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | N
 
     Parameters
     ----------
-    found : Fitted
     floor : array, shape (6,)
     """
     chosen = found.hypothesis.chosen

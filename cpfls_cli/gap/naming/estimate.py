@@ -112,7 +112,6 @@ def weighted_estimates(hypothesis: System, floor: Array, block: IntArray) -> tup
 
     Parameters
     ----------
-    hypothesis : System
     floor : array, shape (6,)
     block : array of int, shape (window,)
 
@@ -134,7 +133,6 @@ def free_estimates(hypothesis: System, floor: Array, block: IntArray) -> Estimat
 
     Parameters
     ----------
-    hypothesis : System
     floor : array, shape (6,)
     block : array of int, shape (window,)
     """
@@ -166,7 +164,6 @@ def differs_from_zero(effect: Effect, numbers: Sequence[Estimate]) -> bool:
 
     Parameters
     ----------
-    effect : Effect
     numbers : sequence of Estimate
         Physical coefficients, then shapes.
     """
@@ -180,7 +177,6 @@ def sized(effect: Effect, numbers: Sequence[Estimate]) -> list[Estimate]:
 
     Parameters
     ----------
-    effect : Effect
     numbers : sequence of Estimate
         Physical coefficients, then shapes.
     """
@@ -240,10 +236,8 @@ def effect_sentence(effect: Effect, numbers: Sequence[Estimate], vehicle: Vehicl
 
     Parameters
     ----------
-    effect : Effect
     numbers : sequence of Estimate
         Coefficients, then shapes.
-    vehicle : VehicleSettings
 
     Returns
     -------

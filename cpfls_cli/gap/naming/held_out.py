@@ -112,8 +112,6 @@ def judged_unseen(
 
     Parameters
     ----------
-    held : sequence of Recording
-    prepared : Preparation
     fitted : System
         Of the training flights.
     linear : array, shape (column,)

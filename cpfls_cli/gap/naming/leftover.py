@@ -56,7 +56,6 @@ class Leftover:
     ----------
     floors : array, shape (6,)
         Root mean square of each channel, in floors; 0 where unknown.
-    dependence : tuple of Dependence
     unexplained : tuple of Unexplained
         Channels with a gap.
     """
@@ -78,13 +77,10 @@ def leftover(
 
     Parameters
     ----------
-    hypothesis : System
     linear : array, shape (column,)
         Coefficients of its base.
     floor : array, shape (6,)
     block : array of int, shape (window,)
-    settings : GapSettings
-    rng : numpy.random.Generator
     """
     residual = hypothesis.residual - hypothesis.base @ linear
     variance = scatter_variance(hypothesis)
@@ -177,7 +173,6 @@ class Beside(NamedTuple):
     ----------
     estimates : Estimates
         Intervals hold what the numbers are with the unnamed effects and without them.
-    unnamed : tuple of str
     """
 
     estimates: Estimates
@@ -200,8 +195,6 @@ def beside_the_unnamed(
         Of the search, with nothing to add.
     effects : sequence of Effect
         To be tried.
-    settings : GapSettings
-    rng : numpy.random.Generator
     """
     named = found.hypothesis.chosen
     if not named:
@@ -245,8 +238,6 @@ def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> 
 
     Parameters
     ----------
-    hypothesis : System
-    effects : sequence of Effect
     floor : array, shape (6,)
     """
     # The vehicle's own numbers are free in every fit, so beyond themselves they never show.
@@ -298,8 +289,6 @@ def usual_size(effect: Effect, vehicle: VehicleSettings, width: int) -> Array:
 
     Parameters
     ----------
-    effect : Effect
-    vehicle : VehicleSettings
     width : int
         Number of the coefficients.
 

@@ -45,7 +45,6 @@ class SearchStep:
 
     Attributes
     ----------
-    hypothesis : System
     floor : array, shape (6,)
     ranking : tuple of Scored
         Best first, each effect once, at its best shape.
@@ -91,11 +90,8 @@ def rank_effects(
 
     Parameters
     ----------
-    flights : sequence of WeakFlight
-    chosen : sequence of Candidate
     effects : sequence of Effect
         To be scored.
-    settings : GapSettings
     rng : numpy.random.Generator or None
         Of the shifts; None for none.
     also : sequence of Candidate
@@ -183,7 +179,6 @@ def least_gain(above_floor: float, windows: int) -> float:
     ----------
     above_floor : float
         The gap, in squared floors.
-    windows : int
     """
     return max(LEAST_SHARE * above_floor, VISIBLE**2 * windows)
 

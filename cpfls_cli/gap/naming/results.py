@@ -41,8 +41,6 @@ class Estimate:
 
     Attributes
     ----------
-    name, unit : str
-    value : float
     low, high : float
         95 % confidence interval.
     plausible : tuple of float
@@ -68,7 +66,6 @@ class NamedEffect:
 
     Attributes
     ----------
-    name : str
     candidate : Candidate or None
         With its shapes; None for faults of sensors.
     linear : array, shape (coefficient,)
@@ -81,7 +78,6 @@ class NamedEffect:
         Part of the gap above the floor that comes back without it.
     selection_frequency : float
         Share of the blocks without which it would still be the first choice.
-    sentence : str
     """
 
     name: str
@@ -100,8 +96,6 @@ class Alternative:
 
     Attributes
     ----------
-    name : str
-    instead_of : str
     relative_gain : float
         What it explains, as a share of what the named one explains; NaN where it could not be tried, because the
         flights lack a signal.
@@ -124,7 +118,6 @@ class Unexplained:
 
     Attributes
     ----------
-    axis : str
     floors : float
         Root mean square of what is left, in floors.
     signal : str or None
@@ -174,13 +167,8 @@ class Diagnosis:
 
     Attributes
     ----------
-    verdict : GapVerdict
-    effects : tuple of NamedEffect
     closest : tuple of NamedEffect
         What explained most where the verdict names nothing.
-    alternatives : tuple of Alternative
-    unexplained : tuple of Unexplained
-    not_excited : tuple of NotExcited
     parameters : mapping of str to Estimate
         Relative errors of the vehicle's own numbers, refitted with the effects.
     share : float
@@ -234,8 +222,6 @@ def verdict_of(
 
     Parameters
     ----------
-    effects : sequence of NamedEffect
-    alternatives : sequence of Alternative
     unexplained : sequence of Unexplained
         Where effects were found: of those, the ones that matter.
     shares : sequence of float
@@ -244,7 +230,6 @@ def verdict_of(
         Whether an axis keeps a clear gap.
     excited : bool
         Whether anything moved enough to show a gap.
-    settings : GapSettings
     """
     if not effects:
         if unexplained:
@@ -295,7 +280,6 @@ def matters(unexplained: Unexplained, before: Array, named_share: float) -> bool
 
     Parameters
     ----------
-    unexplained : Unexplained
     before : array, shape (6,), floors
         The gap of each channel without effects.
     named_share : float

@@ -27,7 +27,6 @@ class Scored:
 
     Attributes
     ----------
-    candidate : Candidate
     columns : array of int
         Of the layout; without those that a bound at 0 took out.
     gain : float
@@ -53,8 +52,6 @@ class PlacedCandidate(NamedTuple):
 
     Attributes
     ----------
-    candidate : Candidate
-    columns : array of int
     weight : array, shape (6,)
         On the residuals of the channels where the candidate acts on the actuation.
     """
@@ -72,8 +69,6 @@ class Layout:
     ----------
     matrix : array, shape (window, 6, column)
         Weighted.
-    base : array of int
-    candidates : tuple of PlacedCandidate
     prior : array, shape (column,)
         What bounds say of the coefficients before any data.
     """
@@ -101,8 +96,6 @@ def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) ->
 
     Parameters
     ----------
-    hypothesis : System
-    candidates : sequence of Candidate
     floor : array, shape (6,)
     """
     moving = shape_columns(hypothesis, fit(hypothesis, floor))
@@ -137,7 +130,6 @@ def score(arranged: Layout, beside: Beside, hypothesis: System) -> tuple[list[Sc
 
     Parameters
     ----------
-    arranged : Layout
     beside : Beside
         Of the residual, and of shifted residuals behind it.
 
@@ -162,7 +154,6 @@ def normal_equations(arranged: Layout, right: Array, floor: Array, block: IntArr
 
     Parameters
     ----------
-    arranged : Layout
     right : array, shape (window, 6) or (window, 6, draw), N m and N
     floor : array, shape (6,)
     block : array of int, shape (window,)
@@ -216,12 +207,10 @@ def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleS
 
     Parameters
     ----------
-    effect : Effect
     linear : array, shape (coefficient,)
         Linear coefficients of a fit.
     error : array, shape (coefficient,)
         Their standard errors.
-    vehicle : VehicleSettings
 
     Returns
     -------
@@ -255,10 +244,8 @@ def information(effect: Effect, columns: int, vehicle: VehicleSettings) -> Array
 
     Parameters
     ----------
-    effect : Effect
     columns : int
         Linear coefficients in use.
-    vehicle : VehicleSettings
 
     Returns
     -------

@@ -42,10 +42,6 @@ def forward_selection(
 
     Parameters
     ----------
-    flights : sequence of WeakFlight
-    effects : sequence of Effect
-    settings : GapSettings
-    rng : numpy.random.Generator
     progress : callable
         Takes the number of looks done.
 
@@ -182,7 +178,6 @@ def simplest(ranking: Sequence[Scored], above_floor: float) -> Scored:
     ----------
     ranking : sequence of Scored
         Best first.
-    above_floor : float
     """
     best = ranking[0]
     rivals = [other for other in unbeaten(best, ranking, above_floor) if other.gain > (1 - CLOSE) * best.gain]

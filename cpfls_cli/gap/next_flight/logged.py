@@ -61,7 +61,6 @@ class Logging:
         Whether commands are logged in place of rotor speeds.
     floor : array, shape (6,), N m and N
         What noise leaves of a window.
-    settings : GapSettings
     base : InertiaModel or None
         Of the model that misses something; None for the rigid body of the vehicle.
     """
@@ -118,14 +117,12 @@ def expected_floor(
 
     Parameters
     ----------
-    room : Room
     logging : Logging
         Its floor is not used.
     noise : SimulationSettings
         Noise of each signal.
     period : float
         Of the log, s.
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -151,11 +148,8 @@ def flown_signals(
 
     Parameters
     ----------
-    planned : Trajectory
     effects : sequence of SizedEffect
         That the flown vehicle has and the autopilot does not know.
-    vehicle : VehicleSettings
-    logging : Logging
     settings : ClosedLoopSettings
         Their effects are not flown.
 

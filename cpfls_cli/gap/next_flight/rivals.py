@@ -26,10 +26,8 @@ def require_tellable(effects: Sequence[Effect], source: str, vehicle: VehicleSet
 
     Parameters
     ----------
-    effects : sequence of Effect
     source : str
         File or key that named them, for the message.
-    vehicle : VehicleSettings
 
     Raises
     ------
@@ -90,8 +88,6 @@ def questions_left(
 
     Parameters
     ----------
-    named : sequence of NamedEffect
-    rivals : sequence of Alternative
     unseen : sequence of Effect
         To show at a usual size.
     flights : sequence of WeakFlight
@@ -144,7 +140,6 @@ def fitted_effects(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], f
 
     Parameters
     ----------
-    flights : sequence of WeakFlight
     chosen : sequence of Candidate
         Their shapes are kept.
     floor : array, shape (6,), N m and N
@@ -171,10 +166,8 @@ def fitted_rival(
 
     Parameters
     ----------
-    flights : sequence of WeakFlight
     besides : sequence of Candidate
         The other named effects.
-    rival : Effect
     floor : array, shape (6,), N m and N
     """
     if all(rival.missing(flight.signals) for flight in flights):

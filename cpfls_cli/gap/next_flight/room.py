@@ -44,7 +44,6 @@ class Room:
     middle : array, shape (3,), m, world frame
     settings : TrajectorySettings
         Limits, tilt and duration.
-    vehicle : VehicleSettings
     period : float
         Between the samples that are looked at, s.
     """
@@ -120,8 +119,6 @@ def room_of(settings: TrajectorySettings, vehicle: VehicleSettings, ground: floa
 
     Parameters
     ----------
-    settings : TrajectorySettings
-    vehicle : VehicleSettings
     ground : float
         Height of the ground, m.
     period : float

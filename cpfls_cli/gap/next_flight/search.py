@@ -38,11 +38,8 @@ class Goal:
 
     Attributes
     ----------
-    questions : tuple of Question
     known : tuple of Evidence
         What the flights already flown say on each question; no rows without such flights.
-    room : Room
-    logging : Logging
     noise : float
         See `shared_noise`.
     """
@@ -89,11 +86,8 @@ def goal(questions: Sequence[Question], flights: Sequence[WeakFlight], room: Roo
 
     Parameters
     ----------
-    questions : sequence of Question
     flights : sequence of WeakFlight
         That are there already.
-    room : Room
-    logging : Logging
     """
     shared = windows(room.period, logging.settings.window_s, logging.settings.overlap)
     blank = Goal(tuple(questions), (), room, logging, shared_noise(shared))
@@ -106,7 +100,6 @@ class NextFlight:
 
     Attributes
     ----------
-    path : HarmonicPath
     random : tuple of HarmonicPath
         Drawn at random within the same room, from the worst to the best; the best was improved.
     history : array, shape (iteration,)
@@ -130,8 +123,6 @@ def next_flight(
 
     Parameters
     ----------
-    asked : Goal
-    rng : numpy.random.Generator
     progress : callable
         Takes paths done, paths in all, and a note.
 

@@ -27,7 +27,6 @@ class SizedEffect:
 
     Attributes
     ----------
-    candidate : Candidate
     linear : array, shape (coefficient,)
         1 where everything is in the shape.
     """
@@ -42,7 +41,6 @@ class Question:
 
     Attributes
     ----------
-    true : SizedEffect
     rival : Effect or None
         None: whether the effect shows at all, beyond the vehicle's own numbers.
     besides : tuple of SizedEffect
@@ -62,7 +60,6 @@ class Evidence:
     ----------
     gram : array, shape (column, column)
         In squared floors: the true effect, then base columns, then the rival at each point of its grid.
-    windows : int
     rows : int
         Windows times known channels.
     """
@@ -85,7 +82,6 @@ class Columns:
 
     Attributes
     ----------
-    base : array of int
     rivals : tuple of array of int
         One for each point of the rival's grid; one empty array where there is no rival.
     unit : bool
@@ -102,7 +98,6 @@ def gathered(question: Question, flights: Sequence[WeakFlight], floor: Array) ->
 
     Parameters
     ----------
-    question : Question
     flights : sequence of WeakFlight
         Their residuals are not used.
     floor : array, shape (6,), N m and N

@@ -33,7 +33,6 @@ class Dependence(NamedTuple):
     ----------
     channel : str
         One of `CHANNELS`.
-    signal : str
     r2 : float
         Share of the variance about the mean of each flight that the curve explains on blocks its fit did not see;
         negative where the curve is worse than none.
@@ -74,7 +73,6 @@ def rank_dependence(
         Not a number where a flight lacks the signal; it is judged on the other flights.
     shifts : int
         Number of draws of chance.
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -145,7 +143,6 @@ def state_signals(flight: WeakFlight, signals: Signals) -> dict[str, Array]:
 
     Parameters
     ----------
-    flight : WeakFlight
     signals : Signals
         Of the flight, as measured or with actuator effects applied.
 

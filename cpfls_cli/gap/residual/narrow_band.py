@@ -41,7 +41,6 @@ class NarrowBand:
     ----------
     channel : str
         One of `CHANNELS`.
-    frequency_hz : float
     share : float
         Of the variance of the channel, above the background.
     p_value : float
@@ -88,7 +87,6 @@ def narrow_band(
         From one window to the next, s.
     draws : int
         Of noise, at most.
-    rng : numpy.random.Generator
     significance : float
         Largest p that anybody asks for: no noise is drawn once p has to be larger.
 
@@ -212,7 +210,6 @@ def grid(lengths: Sequence[int], period: float) -> Grid:
 
     Parameters
     ----------
-    lengths : sequence of int
     period : float
         From one row to the next, s.
     """
@@ -226,7 +223,6 @@ def pooled_power(series: Sequence[Array], on: Grid) -> Array:
     Parameters
     ----------
     series : sequence of array, shape (..., time)
-    on : Grid
 
     Returns
     -------
@@ -250,7 +246,6 @@ def background(power: Array, on: Grid) -> Array:
     Parameters
     ----------
     power : array, shape (..., frequency)
-    on : Grid
 
     Returns
     -------
@@ -296,8 +291,6 @@ def noise_like(smooth: Array, lengths: Sequence[int], present: BoolArray, on: Gr
     lengths : sequence of int
         Of the flights.
     present : array of bool, shape (flight, channel)
-    on : Grid
-    rng : numpy.random.Generator
 
     Returns
     -------
