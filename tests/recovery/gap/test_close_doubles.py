@@ -14,6 +14,7 @@ from cpfls_cli.gap.naming.actuation import chance_beside_its_like, parted, settl
 from cpfls_cli.gap.naming.ranking import rank_effects
 from cpfls_cli.gap.naming.search import alternatives, forward_selection
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.rotors import body_wrench, rotor_demand
 from tests.builders.gap_flights import INERTIA, PERIOD, VEHICLE, candidate, fly, weak
 
@@ -60,7 +61,7 @@ def turned(torque, share=0.0, natural=1.0, damping=0.0):
 
     def rate(state, driven):
         turning, angle, swing = state
-        stiff = (driven - np.cross(turning, turning @ INERTIA)) / moments
+        stiff = (driven - cross(turning, turning @ INERTIA)) / moments
         spring = natural**2 * angle + 2 * damping * natural * swing
         spun = (stiff + share * spring) / (1 - share)
         return np.array([spun, swing, -spun - spring])

@@ -74,7 +74,7 @@ def test_a_rigid_body_turns_as_an_independent_integration_says():
         x, y, z, w = state[:4]
         rate = state[4:]
         turning = 0.5 * np.array([[w, -z, y], [z, w, -x], [-y, x, w], [-x, -y, -z]]) @ rate
-        return np.concatenate([turning, np.linalg.solve(tensor, torque(t) - np.cross(rate, tensor @ rate))])
+        return np.concatenate([turning, np.linalg.solve(tensor, torque(t) - rotations.cross(rate, tensor @ rate))])
 
     measured = Rotation.from_euler("ZYX", data.motion.attitude[:, ::-1])
     rates = rotations.body_rate(data.motion.attitude, data.motion.rate)

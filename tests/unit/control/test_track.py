@@ -70,7 +70,7 @@ def command(state, plan, instant, gains, inertia):
     wanted = plan.acceleration[instant] + gains.frequency**2 * (plan.attitude[instant] - angles[0])
     wanted = wanted + 2 * gains.ratio * gains.frequency * (plan.rate[instant] - euler)
     turning = rotations.body_acceleration(angles, euler[None], wanted[None])[0]
-    return inertia @ turning + np.cross(rate, inertia @ rate)
+    return inertia @ turning + rotations.cross(rate, inertia @ rate)
 
 
 def by_rotation_matrix(state, body_torque, period, inertia):
@@ -78,7 +78,7 @@ def by_rotation_matrix(state, body_torque, period, inertia):
         turn, rate = y[:9].reshape(3, 3), y[9:]
         skew = np.array([[0, -rate[2], rate[1]], [rate[2], 0, -rate[0]], [-rate[1], rate[0], 0]])
         return np.concatenate(
-            [(turn @ skew).ravel(), np.linalg.solve(inertia, body_torque - np.cross(rate, inertia @ rate))]
+            [(turn @ skew).ravel(), np.linalg.solve(inertia, body_torque - rotations.cross(rate, inertia @ rate))]
         )
 
     return solve_ivp(change, (0, period), state, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]

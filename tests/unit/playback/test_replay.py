@@ -16,7 +16,7 @@ from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.player import free_runs, player_of, rotation_vectors
 from cpfls_cli.playback.replay import MODEL, NOTHING_MOVES, RATE_STAYS, SIGNALS, STATED, Played, replay, where_better
 from cpfls_cli.regressor.regressor import InertiaValues
-from cpfls_cli.rotations import euler_angles
+from cpfls_cli.rotations import cross, euler_angles
 from cpfls_cli.vehicle.rotors import body_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -55,7 +55,7 @@ def integrated(flight, start, horizon, acceleration):
         speed = np.array([np.interp(at, time, rotor) for rotor in flight.speed.T])
         rotation, velocity, rate = state[6:15].reshape(3, 3), state[3:6], state[15:]
         linear, angular = acceleration(rotation, rotation.T @ velocity, rate, speed)
-        return np.concatenate([velocity, linear, np.cross(rotation, rate[None]).ravel(), angular])
+        return np.concatenate([velocity, linear, cross(rotation, rate[None]).ravel(), angular])
 
     first = [motion.position[start], motion.velocity[start], motion.rotation[start].ravel(), motion.rate[start]]
     ends = time[start], time[start + horizon]
@@ -67,14 +67,14 @@ def integrated(flight, start, horizon, acceleration):
 def wrench_with_effects(air, rate, speed):
     """Rotors, damping, and drag of each rotor in its plane, written out."""
     rotors = body_wrench(VEHICLE, speed[None])
-    pushes = -DRAG * speed[:, None] * (air + np.cross(rate, HUBS)) * PLANE
-    torque = rotors.body_torque[0] - DAMPING * rate + np.cross(HUBS, pushes).sum(axis=0)
+    pushes = -DRAG * speed[:, None] * (air + cross(rate, HUBS)) * PLANE
+    torque = rotors.body_torque[0] - DAMPING * rate + cross(HUBS, pushes).sum(axis=0)
     return torque, np.array([0.0, 0.0, rotors.thrust[0]]) + pushes.sum(axis=0)
 
 
 def of_rigid_body(rotation, air, rate, speed):
     torque, force = wrench_with_effects(air, rate, speed)
-    angular = np.linalg.solve(INERTIA, torque - np.cross(rate, INERTIA @ rate))
+    angular = np.linalg.solve(INERTIA, torque - cross(rate, INERTIA @ rate))
     return rotation @ force / 6.0 - [0, 0, 9.81], angular
 
 
