@@ -85,11 +85,12 @@ def test_full_disk_leaves_the_old_output(refuse, study, tmp_path, monkeypatch):
 @pytest.mark.parametrize(("command", "limit"), [("trajectory", 100), ("trajectory", 60_000), ("predict", 60_000)])
 def test_output_larger_than_the_system_allows(pipeline, study, tmp_path, command, limit):
     """A real refusal by the system, in the first and in a later block; HDF5 must not crash when the program ends."""
+    # The limit is for all files: of a module compiled anew Python would keep what fits, and fail to load it ever after.
     limited = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0})); "
     code = limited.format(limit) + "from cpfls_cli.cli.main import run; sys.argv[0] = 'cpfls'; run()"
     inputs = (pipeline.model, pipeline.flight) if command == "predict" else ()
     words = [command, study, *inputs, "-o", tmp_path / "out.h5"]
-    result = subprocess.run([sys.executable, "-c", code, *map(str, words)], capture_output=True, text=True)
+    result = subprocess.run([sys.executable, "-B", "-c", code, *map(str, words)], capture_output=True, text=True)
     assert (result.returncode, result.stdout) == (1, "")
     assert result.stderr == f"cpfls: error: {tmp_path / 'out.h5'}: cannot be written: File too large\n"
     assert list(tmp_path.iterdir()) == []

@@ -155,7 +155,8 @@ def test_full_disk_leaves_the_checkpoint_before(program, whole, tmp_path, call, 
 
     def fill():
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-        # The limit is for all files; what is printed goes to files here.
+        # The limit is for all files: of a module compiled now Python would keep a part; what is printed goes to files.
+        sys.dont_write_bytecode = True
         sys.stdout, sys.stderr = (os.fdopen(os.dup(pipe), "w", buffering=1) for pipe in printed)
 
     reading, writing_end = os.pipe()
