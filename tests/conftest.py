@@ -14,13 +14,25 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # As the program itself does: a tenth of the time of the tests went into looking for garbage among what stays.
 gc.set_threshold(20_000, *gc.get_threshold()[1:])
 
+
+def pytest_collection_finish():
+    """Leave what is there for good, modules and thousands of tests, out of every later look for garbage."""
+    gc.collect()
+    gc.freeze()
+
+
 # How long an example takes is the machine's, and no test asks for it.
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
 
 
 @pytest.fixture
-def undrawn():
+def undrawn(request):
     """Leave the pictures of pages away."""
-    with command_line.undrawn():
+    with command_line.undrawn(told="data_of_figures" in request.fixturenames):
         yield
+
+
+@pytest.fixture
+def data_of_figures():
+    """Keep the tables of what figures show where their pictures are left away."""

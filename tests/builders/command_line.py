@@ -31,13 +31,17 @@ def run(*words):
 
 
 @contextmanager
-def undrawn():
+def undrawn(*, told=False):
     """Leave the pictures of pages away: most of their time, and nothing to a test of their words and numbers.
 
-    The figures are made, and their series told; only what they look like is not worked out.
+    No figure is made, and the tables of their data are empty; where those are `told`, figures are made, and only what
+    they look like is not worked out.
     """
     with pytest.MonkeyPatch.context() as monkeypatch:
         monkeypatch.setattr("cpfls_cli.report.canvas._inline_svg", lambda *_: "<svg></svg>")
+        if not told:
+            monkeypatch.setattr("cpfls_cli.report.canvas._Drawing.svg", "<svg></svg>")
+            monkeypatch.setattr("cpfls_cli.report.canvas._Drawing.panels", ())
         yield
 
 

@@ -8,6 +8,11 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+# Each process looks at its own stack a hundred times in a second otherwise, and at the machine.
+UNWATCHED = {
+    "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
+    "DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__INTERVAL": "10s",
+}
 
 
 @contextmanager
@@ -18,7 +23,7 @@ def running(folder, *words, announced=None):
     with subprocess.Popen(
         [sys.executable, "-m", *words, "--no-dashboard"],
         cwd=folder,
-        env=free | {"PYTHONPATH": str(ROOT)},
+        env=free | UNWATCHED | {"PYTHONPATH": str(ROOT)},
         stderr=subprocess.PIPE if announced else subprocess.DEVNULL,
         text=True,
     ) as process:

@@ -40,7 +40,7 @@ identification:
   population: 10
   generations: 1
   local_search: {enabled: false}
-  validation: {draws: 20, windows: 20, horizon_samples: 20}
+  validation: {draws: 20, windows: 20, horizon_samples: 6}
 """
 
 

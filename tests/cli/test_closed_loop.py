@@ -12,13 +12,14 @@ SHORT = """\
 seed: 5
 trajectory: {legs: 1, displacement_m: 1.0, period_s: 0.18, duration_s: 3.0, yaw_turn_rad: 0.3}
 simulation:
+  closed_loop: {integration_rate_hz: 200.0}
   noise: {body_rate: 0.002, rotor_speed: 0.5, rotor_command: 0.5}
 identification:
   base: rigid-body
   population: 10
   generations: 1
   local_search: {enabled: false}
-  validation: {draws: 20, windows: 20}
+  validation: {draws: 20, windows: 20, horizon_samples: 6}
 """
 
 
@@ -99,7 +100,7 @@ def test_mode_of_the_command_line_goes_before_that_of_the_config(fly, short, cpf
     with h5py.File(path) as file:
         assert "rotor_command" not in file
     plain = tmp_path / "plain.yaml"
-    plain.write_text("seed: 5\n" + VEHICLE)
+    plain.write_text("seed: 5\nsimulation: {closed_loop: {integration_rate_hz: 200.0}}\n" + VEHICLE)
     closed = cpfls("simulate", plain, short[1], "--mode", "closed-loop", "-o", tmp_path / "closed.h5")
     assert "off the path" in closed.stdout
 
@@ -132,7 +133,7 @@ def test_impossible_effects_are_refused(short, refuse, tmp_path, options, messag
 
 def test_effects_without_closed_loop_are_refused(short, refuse, tmp_path):
     plain = tmp_path / "plain.yaml"
-    plain.write_text("seed: 5\n" + VEHICLE)
+    plain.write_text("seed: 5\nsimulation: {closed_loop: {integration_rate_hz: 200.0}}\n" + VEHICLE)
     (line,) = refuse("simulate", plain, short[1], "--effect", "rotor_drag=0.001", "-o", tmp_path / "flight.h5")
     assert "effects are flown in closed loop only; add --mode closed-loop" in line
 

@@ -13,13 +13,13 @@ from tests.builders.studies import VEHICLE
 CONFIG = """\
 seed: 5
 trajectory: {legs: 1, displacement_m: 1.0, period_s: 0.18, duration_s: 3.0, sample_time_s: 0.02, yaw_turn_rad: 0.3}
-simulation: {computed_torque: {control_rate_hz: 50}}
+simulation: {closed_loop: {integration_rate_hz: 200}, computed_torque: {control_rate_hz: 50}}
 identification:
   base: rigid-body
   population: 10
   generations: 1
   local_search: {enabled: false}
-  validation: {draws: 20, windows: 20}
+  validation: {draws: 20, windows: 20, horizon_samples: 6}
 """
 CONTROLLERS = ["model", "rigid-body", "pd", "vehicle"]
 NAMED = ["identified model", "rigid body", "PD alone", "exact vehicle"]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 PATH = {"legs": 1, "displacement_m": 1.0, "period_s": 0.18, "duration_s": 3.0, "yaw_turn_rad": 0.3}
-CLOSED = ("--mode", "closed-loop")
+CLOSED = ("--mode", "closed-loop", "--set", "simulation.closed_loop.integration_rate_hz=200")
 
 
 @pytest.fixture(scope="module")

@@ -143,7 +143,7 @@ def test_a_simulated_flight_of_the_vehicle_itself_is_predicted(cpfls, replayed, 
     config, path, flight = tmp_path / "study.yaml", tmp_path / "path.h5", tmp_path / "flight.h5"
     config.write_text(
         "seed: 1\ntrajectory: {legs: 1, displacement_m: 2.0, period_s: 0.4, sample_time_s: 0.01, yaw_turn_rad: 3.0}\n"
-        + VEHICLE
+        "simulation: {closed_loop: {integration_rate_hz: 200.0}}\n" + VEHICLE
     )
     assert cpfls("trajectory", config, "-o", path).exit_code == 0
     result = cpfls("simulate", config, path, "--mode", "closed-loop", "-o", flight)

@@ -17,7 +17,7 @@ identification:
   generations: 6
   subpopulations: 2
   local_search: {enabled: false}
-  validation: {structures: false, draws: 20, windows: 20, horizon_samples: 20}
+  validation: {structures: false, draws: 20, windows: 20, horizon_samples: 4}
 """
 
 

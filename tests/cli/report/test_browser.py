@@ -15,29 +15,31 @@ from tests.builders.evidence_artifacts import with_evidence
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to show the page in")
-PHONE, HEIGHT = 360, 800
+PHONE, PAPER, HEIGHT = 360, 750, 800
 QUIET = (
     "headless", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run", "disable-background-networking",
     "disable-component-update", "disable-sync", "disable-default-apps", "hide-scrollbars", "enable-logging=stderr",
     "host-resolver-rules=MAP * ~NOTFOUND", "virtual-time-budget=4000",
 )  # fmt: skip
-# Told by the page inside a frame of the size of a phone: windows cannot be as narrow.
+# Told by the pages inside frames of the sizes of screens: windows cannot be as narrow as a phone.
 MEASURE = """
 <script>
 addEventListener("load", () => {
-  const page = document.querySelector("iframe").contentDocument;
   const box = (element) => element.getBoundingClientRect();
-  const told = {
-    width: page.documentElement.scrollWidth,
-    sections: [...page.querySelectorAll("main > section")].map((each) => [each.id, box(each).top, box(each).bottom]),
-    figures: [...page.querySelectorAll("figure")].map((each) => [each.id, box(each.querySelector("svg")).width,
-      box(each.querySelector("svg")).height, box(each).right]),
-    asked: performance.getEntriesByType("resource").concat(
-      page.defaultView.performance.getEntriesByType("resource")).map((each) => each.name),
-    links: [...page.querySelectorAll("nav a")].map((each) => page.querySelector(each.getAttribute("href")) !== null),
-    background: page.defaultView.getComputedStyle(page.body).backgroundColor,
-    figure: page.defaultView.getComputedStyle(page.querySelector("figure")).backgroundColor,
-  };
+  const told = [...document.querySelectorAll("iframe")].map((frame) => {
+    const page = frame.contentDocument;
+    return {
+      width: page.documentElement.scrollWidth,
+      sections: [...page.querySelectorAll("main > section")].map((each) => [each.id, box(each).top, box(each).bottom]),
+      figures: [...page.querySelectorAll("figure")].map((each) => [each.id, box(each.querySelector("svg")).width,
+        box(each.querySelector("svg")).height, box(each).right]),
+      asked: performance.getEntriesByType("resource").concat(
+        page.defaultView.performance.getEntriesByType("resource")).map((each) => each.name),
+      links: [...page.querySelectorAll("nav a")].map((each) => page.querySelector(each.getAttribute("href")) !== null),
+      background: page.defaultView.getComputedStyle(page.body).backgroundColor,
+      figure: page.defaultView.getComputedStyle(page.querySelector("figure")).backgroundColor,
+    };
+  });
   const result = document.createElement("pre");
   result.id = "told";
   result.textContent = JSON.stringify(told);
@@ -72,21 +74,36 @@ def browse(tmp_path_factory):
     return call
 
 
-def framed(page, width, height, script=MEASURE):
-    path = page.path.with_name(f"frame-{width}.html")
-    frame = f'<iframe style="width:{width}px;height:{height}px;border:0" srcdoc="{html.escape(page.text)}"></iframe>'
-    path.write_text(f'<!DOCTYPE html><meta charset="utf-8"><body style="margin:0">{frame}{script}', encoding="utf-8")
+def framed(folder, name, height, pages):
+    """Put pages into one file, each in a frame of some width."""
+    path = folder / f"{name}.html"
+    frames = "".join(
+        f'<iframe style="width:{width}px;height:{height}px;border:0" srcdoc="{html.escape(text)}"></iframe>'
+        for width, text in pages.items()
+    )
+    path.write_text(f'<!DOCTYPE html><meta charset="utf-8"><body style="margin:0">{frames}{MEASURE}', encoding="utf-8")
     return path
 
 
-def told(browse, page, width, *options):
-    shown = browse(framed(page, width, HEIGHT), "dump-dom", f"window-size={max(width, 500)},{HEIGHT}", *options)
+def told(browse, path, scheme):
+    shown = browse(path, "dump-dom", f"window-size=1400,{HEIGHT}", f"blink-settings=preferredColorScheme={scheme}")
     return json.loads(html.unescape(re.search(r'<pre id="told">(.*?)</pre>', shown, re.DOTALL)[1]))
 
 
+@pytest.fixture(scope="module")
+def light(browse, page):
+    """What is seen of the page where it is light, by the width of the screen, and of the printed one on paper."""
+    pages = {PHONE: page.text, 1400: page.text, 900: page.text, PAPER: printed(page.text)}
+    return dict(zip(pages, told(browse, framed(page.path.parent, "light", HEIGHT, pages), 1), strict=True))
+
+
+def printed(text):
+    return text.replace("@media print", "@media all")
+
+
 @pytest.mark.parametrize("width", [PHONE, 1400])
-def test_every_section_and_figure_is_there_and_the_page_is_no_wider_than_the_screen(browse, page, width):
-    seen = told(browse, page, width)
+def test_every_section_and_figure_is_there_and_the_page_is_no_wider_than_the_screen(light, page, width):
+    seen = light[width]
     assert seen["width"] <= width
     assert [name for name, _, _ in seen["sections"]] == page.sections
     assert all(bottom - top > 60 for _, top, bottom in seen["sections"])
@@ -100,22 +117,23 @@ def test_every_section_and_figure_is_there_and_the_page_is_no_wider_than_the_scr
     assert seen["asked"] == []
 
 
-def test_it_is_dark_where_the_reader_wants_it_dark(browse, page):
-    grounds = {}
-    for scheme, number in (("dark", 0), ("light", 1)):
-        seen = told(browse, page, 900, f"blink-settings=preferredColorScheme={number}")
-        grounds[scheme] = [sum(map(int, re.findall(r"\d+", seen[key])[:3])) for key in ("background", "figure")]
+def test_it_is_dark_where_the_reader_wants_it_dark(browse, page, light):
+    (dark,) = told(browse, framed(page.path.parent, "dark", HEIGHT, {900: page.text}), 0)
+    grounds = {
+        scheme: [sum(map(int, re.findall(r"\d+", seen[key])[:3])) for key in ("background", "figure")]
+        for scheme, seen in (("dark", dark), ("light", light[900]))
+    }
     assert max(grounds["dark"]) < 150 < 600 < min(grounds["light"])
 
 
-def test_a_picture_of_every_section_shows_something(browse, page, tmp_path):
+def test_a_picture_of_every_section_shows_something(browse, page, light, tmp_path):
     width, scale = 900, 0.5
-    seen = told(browse, page, width)
+    seen = light[width]
     height = int(max(bottom for _, _, bottom in seen["sections"])) + 100
     picture = tmp_path / "page.png"
     browse(
-        framed(page, width, height), f"screenshot={picture}", f"window-size={width},{height}",
-        f"force-device-scale-factor={scale}",
+        framed(tmp_path, "whole", height, {width: page.text}), f"screenshot={picture}",
+        f"window-size={width},{height}", f"force-device-scale-factor={scale}",
     )  # fmt: skip
     pixels = matplotlib.image.imread(picture)[:, :, :3]
     assert pixels.shape[0] >= scale * height - 2
@@ -126,11 +144,7 @@ def test_a_picture_of_every_section_shows_something(browse, page, tmp_path):
         assert drawn.mean() > 0.01, name
 
 
-def test_the_printed_page_is_black_on_white_and_folds_the_data_of_its_figures(browse, page):
-    printed = page.path.with_name("printed.html")
-    printed.write_text(page.text.replace("@media print", "@media all"), encoding="utf-8")
-    text = printed.read_text(encoding="utf-8")
-    paper = SimpleNamespace(text=text, path=printed, sections=page.sections, figures=page.figures)
-    seen = told(browse, paper, 750)
+def test_the_printed_page_is_black_on_white_and_folds_the_data_of_its_figures(light):
+    seen = light[PAPER]
     assert seen["background"] == "rgb(255, 255, 255)"
     assert seen["width"] <= 750

@@ -147,6 +147,7 @@ def test_what_only_rounding_tells_apart_is_marked_alike(compared, write):
     assert all("◂" in cell for row in named(blocks, "comparison-axes-1")["rows"] for cell in row[1:])
 
 
+@pytest.mark.usefixtures("data_of_figures")
 def test_an_error_of_rounding_is_drawn_at_zero_and_leaves_the_others_their_scale(compared, write, bare):
     mse = bare.array("judged/mse").copy()
     mse[bare.texts("judged/models").index("rigid-body")] = 1e-32
@@ -179,6 +180,7 @@ def test_equal_configs_are_called_equal(compared, write):
     assert any("Nothing: the same config" in block.get("text", "") for block in blocks)
 
 
+@pytest.mark.usefixtures("data_of_figures")
 def test_inertia_curves_and_verdicts_stand_side_by_side(compared, write):
     own = {path: values for path, values in curves().items() if path.startswith("curves/")}
     models = [write(name, **own, **verdict(label)) for name, label in (("one.h5", "do-not-use"), ("two.h5", "new"))]

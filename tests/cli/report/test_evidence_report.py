@@ -217,7 +217,7 @@ def test_each_part_of_the_evidence_stands_alone(report, bare, tmp_path, model):
         assert "holds its scores only" not in report(output).words
 
 
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("undrawn", "data_of_figures")
 def test_bands_of_a_prediction_are_drawn(report, pipeline, tmp_path):
     prediction, output = read_artifact(pipeline.prediction), tmp_path / "banded.h5"
     bands = {

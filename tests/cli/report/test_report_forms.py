@@ -20,7 +20,7 @@ def report(cpfls, pipeline, study, tmp_path_factory):
     def write(name, *options, little=False):
         output = tmp_path_factory.mktemp("report") / name
         given = [pipeline.selection] if little else pipeline.paths.values()
-        with undrawn():
+        with undrawn(told=True):
             result = cpfls("report", study, *given, "-o", output, "--json", *options)
         assert result.exit_code == 0, result.stderr
         return output.read_text(encoding="utf-8"), json.loads(result.stdout)

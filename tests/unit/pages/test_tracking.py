@@ -99,6 +99,7 @@ def test_clipping_extrapolation_and_impossible_inertia_are_told():
     ]
 
 
+@pytest.mark.usefixtures("data_of_figures")
 def test_the_figure_draws_each_controller_at_its_error():
     (figure,) = (block for block in sections([0.5, 1.0, 8.0, np.nan]).blocks if isinstance(block, Plot))
     curves = {
