@@ -30,7 +30,7 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.arrays import Array
 from cpfls_cli.playback.fit import Fitted, fit, uncertainty, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.groups import Group, JointLayout
+from cpfls_cli.playback.groups import Group
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import MASS
 from cpfls_cli.playback.settings import PlaybackSettings
@@ -98,12 +98,11 @@ def found(
 ) -> tuple[Fitted, list[FoundNumber], list]:
     """Fit blocks beside what is not known, as `cpfls vehicle` does when it has chosen them."""
     begun, _ = carrying_weight(vehicle, [flight for flight in flights if not flight.group])
-    layout = Structure(tuple(block for block in blocks if block not in begun.unknown)).layout(begun)
+    free = Structure(tuple(block for block in blocks if block not in begun.unknown)).free(begun, groups)
     windows = windows_of(flights, USUAL.horizon_s, USUAL.window_interval_s)
-    joint = JointLayout(layout, groups)
-    fitted = fit(joint if groups else layout, windows, {}, STEPS, TOLERANCE)
+    fitted = fit(free, windows, {}, STEPS, TOLERANCE)
     spread = uncertainty(fitted, windows)
-    between = list(differences(joint, fitted, spread)) if groups else []
+    between = list(differences(fitted, spread)) if groups else []
     return fitted, list(found_numbers(fitted, spread)), between
 
 
@@ -204,7 +203,7 @@ def commands() -> None:
         speeds = np.concatenate([flight.speed for flight in flights]) / NOMINAL_SPEED
         flew = np.linspace(speeds.min(), speeds.max(), 200)
         curve = thrust(curved(), LARGEST_SPEED * flew)
-        away = thrust(fitted.layout.model(fitted.values), NOMINAL_SPEED * flew) - curve
+        away = thrust(fitted.model, NOMINAL_SPEED * flew) - curve
         curves.append((flew[0], flew[-1], 100 * np.abs(away).max() / curve.max()))
     low, high, largest = np.array(curves).T
     row = (f"{low.mean():.2f} to {high.mean():.2f}", "2 %", f"{np.median(largest):.2f} %", f"{largest.max():.2f} %")
@@ -215,7 +214,7 @@ def commands() -> None:
 
 def thrust(model: VehicleModel, speed: Array) -> Array:
     """Compute the thrust of a rotor, N."""
-    upwards = model.part_weights()["rotors"][5, 0]
+    upwards = model.parts["rotors"][5, 0]
     return np.asarray(speed * upwards[1] + speed**2 * upwards[1 + model.rotors])
 
 

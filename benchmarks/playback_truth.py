@@ -78,15 +78,15 @@ def flights(seed: int, noise) -> tuple[list[PlaybackFlight], list[PlaybackFlight
 
 def recovered(training: Sequence[PlaybackFlight], judging: Sequence[PlaybackFlight]) -> Recovered:
     windows = [Windows.of(flight, HORIZON, EVERY) for flight in training]
-    layout = Structure(TRUE_BLOCKS).layout(STATED)
-    fitted = fit(layout, windows, {}, STEPS, TOLERANCE)
+    free = Structure(TRUE_BLOCKS).free(STATED)
+    fitted = fit(free, windows, {}, STEPS, TOLERANCE)
     spread = uncertainty(fitted, windows)
-    slopes = np.stack([numbers(fitted, step) - numbers(fitted, -step) for step in _STEP * np.diag(layout.scales)], 1)
-    slopes /= 2 * _STEP * layout.scales
+    slopes = np.stack([numbers(fitted, step) - numbers(fitted, -step) for step in _STEP * np.diag(free.scales)], 1)
+    slopes /= 2 * _STEP * free.scales
     half = student.ppf(0.975, spread.blocks - 1) * np.sqrt(np.diag(slopes @ spread.covariance @ slopes.T))
     true = TRUE[1]
     error = numbers(fitted) - true
-    return Recovered(error / true, np.abs(error) <= half, half / true, ratio(layout.model(fitted.values), judging))
+    return Recovered(error / true, np.abs(error) <= half, half / true, ratio(fitted.model, judging))
 
 
 def _with_ratios(known: dict[str, float]) -> tuple[list[str], Array]:
@@ -100,7 +100,7 @@ TRUE = _with_ratios(true_numbers())
 
 def numbers(fitted: Fitted, step: Array | float = 0.0) -> Array:
     """Give the numbers, and those of yaw over its inertia as well."""
-    physical = fitted.layout.physical(fitted.values + step)
+    physical = fitted.free.physical(fitted.values + step)
     return _with_ratios({name: each.value for name, each in physical.items()})[1]
 
 

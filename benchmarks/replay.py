@@ -24,12 +24,12 @@ pin_threads()
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.effects.polynomial import state_terms
 from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.kernels import Airflow
-from cpfls_cli.playback.model import VehicleModel, remainder_terms
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
-from cpfls_cli.playback.parameters import LEARNED, Layout, blocks_of
+from cpfls_cli.playback.parameters import LEARNED, FreeNumbers, blocks_of
 from cpfls_cli.playback.player import Player, free_runs, player_of, rotation_vectors
 from cpfls_cli.playback.replay import Played, replay
 from cpfls_cli.rotations import turns
@@ -65,16 +65,18 @@ def players(flights: Sequence[PlaybackFlight]) -> dict[str, Along]:
     }
     along = {name: [(player_of(model, flight), flight) for flight in flights] for name, model in models.items()}
     last, rng = list(along.values())[-1], np.random.default_rng(2)
-    noise = 1e-9 * abs(last[0][0].table).max() * rng.standard_normal(last[0][0].table.shape)
-    along["every term in every row"] = [(replace(player, table=player.table + noise), at) for player, at in last]
+    table = last[0][0].table
+    noise = 1e-9 * abs(table.weights).max() * rng.standard_normal(table.weights.shape)
+    full = replace(table, weights=table.weights + noise)
+    along["every term in every row"] = [(replace(player, table=full), at) for player, at in last]
     return along
 
 
 def drawn(blocks: tuple[str, ...]) -> VehicleModel:
     """Draw numbers near the stated ones, none of them 0."""
-    layout = Layout(STATED, blocks, RULES)
-    away = 0.05 * layout.scales * abs(np.random.default_rng(1).standard_normal(len(layout.numbers)))
-    return layout.model(np.clip(layout.starts + away, layout.lows, layout.highs))
+    free = JointNumbers(FreeNumbers(STATED, blocks, RULES))
+    away = 0.05 * free.scales * abs(np.random.default_rng(1).standard_normal(len(free.numbers)))
+    return free.at(np.clip(free.starts + away, free.lows, free.highs)).model
 
 
 def timed(along: Along) -> tuple:
@@ -139,7 +141,7 @@ class _NumpyRuns:
     def accelerations(self, at: State, weights: Array) -> tuple[Array, Array]:
         body = self.player.body
         air = (at.velocity[:, None] @ at.rotation)[:, 0]
-        terms = np.hstack([state_terms(air, at.rate), remainder_terms(self.player.remainder, air)])[:, self.used.active]
+        terms = self.player.table.terms(air, at.rate)[:, self.used.active]
         wrench = (weights @ terms[:, :, None])[:, :, 0]
         linear = (at.rotation @ wrench[:, 3:, None])[:, :, 0] / body.mass - [0.0, 0.0, body.gravity]
         return linear, (wrench[:, :3] - np.cross(at.rate, at.rate @ body.inertia)) @ body.inverse

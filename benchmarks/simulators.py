@@ -88,7 +88,7 @@ def steps() -> None:
     flight = flown(model, ("multisine",), hold="linear", duration_s=2.0, rate_hz=1000.0)[0]
     course = Course(flight, np.array([0]), 400)
     state = np.concatenate([part[0].ravel() for part in course.start])
-    rotor = model.rotor_terms(flight.speed, 0.001, "linear")[0]
+    rotor = model.response.terms_by_step(flight.speed, 0.001, "linear")[0]
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         call = in_c(model, Path(folder))

@@ -69,7 +69,7 @@ def learned(
         clock = perf_counter()
         fitted, _ = fitted_to_all(judged.structure, vehicle, training, used, judged.fits[0])
         print(f"  {name} fitted to all in {perf_counter() - clock:.1f} s")
-        models[f"{name}, {judged.numbers} numbers"] = fitted.layout.model(fitted.values)
+        models[f"{name}, {judged.numbers} numbers"] = fitted.model
     return models
 
 

@@ -67,8 +67,8 @@ def free_runs(model: VehicleModel, flight: PlaybackFlight, every: int = 1, horiz
     starts = flight.starts(horizon, every)
     rotor = np.zeros((len(flight), 1 + 4 * model.rotors))
     for part in flight.stretches:
-        rotor[part] = model.rotor_terms(flight.speed[part], flight.motion.period, flight.hold)
-    terms, weights = model.step_weights(rotor)
+        rotor[part] = model.response.terms_by_step(flight.speed[part], flight.motion.period, flight.hold)
+    terms, weights = model.table.by_step(rotor)
     errors = np.empty((len(starts), horizon, 4, 3))
     diverged = errors_of_runs(flight.motion, model.body, terms, weights, starts, flight.translates, errors)
     return Runs(errors, int(np.sum(diverged >= 0)))

@@ -16,8 +16,9 @@ from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 if TYPE_CHECKING:
     # Reading a record does not need the compiled loops that evaluate a model.
     from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-    from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
+    from cpfls_cli.playback.model import ModelEffect, VehicleModel
     from cpfls_cli.playback.rotors import RotorResponse
+    from cpfls_cli.playback.table import Remainder
     from cpfls_cli.regressor.structure import ModelStructure
     from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
@@ -192,7 +193,7 @@ class RemainderGroup:
 
     def remainder(self) -> Remainder:
         """Rebuild it."""
-        from cpfls_cli.playback.model import Remainder
+        from cpfls_cli.playback.table import Remainder
 
         return Remainder(
             breakpoints=self.breakpoints,

@@ -68,7 +68,7 @@ def _warnings(name: str, model: VehicleModel, pairs: Sequence[Played]) -> Iterat
     """Say what a model does to flights, and what it lacks in them."""
     for repair in repairs_of(model):
         yield f"{name} takes a fault of the sensors out of the flights first: {repair}"
-    still = [each.flight.name for each in pairs if each.model.feels_air and not each.flight.translates]
+    still = [each.flight.name for each in pairs if each.model.table.feels_air and not each.flight.translates]
     if still:
         yield f"{name} depends on the velocity through the air, which is taken as 0 in {joined(still)}"
 

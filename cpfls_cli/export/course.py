@@ -11,7 +11,7 @@ from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Motion
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.player import rotation_vectors
-from cpfls_cli.playback.rotors import RotorResponse, rotor_terms_at_samples
+from cpfls_cli.playback.rotors import RotorResponse
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Course:
         """Give the speeds, or their squares, at which rotors that lag turn at the starts, shape (run, rotor)."""
         flight = self.finer_flight
         parts = [
-            rotor_terms_at_samples(flight.speed[part] ** power, flight.motion.period, flight.hold, response)
+            response.terms_at_samples(flight.speed[part] ** power, flight.motion.period, flight.hold)
             for part in flight.stretches
         ]
         return np.concatenate(parts)[self.finer * self.starts, 1 : 1 + flight.speed.shape[1]]

@@ -19,9 +19,10 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.export.points import body_inertia
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Body, Motion
-from cpfls_cli.playback.model import Remainder, VehicleModel, body_of
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import Player, apart, free_runs, player_of, rotor_terms_along
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.playback.table import WrenchTable, body_of
 from cpfls_cli.rotations import rotation_matrix
 
 HORIZON_S = 0.5
@@ -113,31 +114,28 @@ class Held:
 
     Attributes
     ----------
-    weights : array, shape (6, terms, 1 + 4 rotors)
+    table : WrenchTable
     response : RotorResponse
     body : Body
     squares : bool
         Whether the lag acts on speeds and on squared speeds each, and not on the speeds alone.
-    remainder : Remainder or None
-        What is learned; its weights stand behind the others.
     fuzzy : InertiaModel or None
         In the place of the inertia of `body`.
     numbers : mapping of str to float
         Of a target that has numbers of its own.
     """
 
-    weights: Array
+    table: WrenchTable
     response: RotorResponse
     body: Body
     squares: bool = False
-    remainder: Remainder | None = None
     fuzzy: InertiaModel | None = None
     numbers: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def whole(cls, model: VehicleModel) -> Self:
         """Hold everything."""
-        return cls(model.weights, model.response, model.body, remainder=model.remainder, fuzzy=model.fuzzy)
+        return cls(model.table, model.response, model.body, fuzzy=model.fuzzy)
 
     def rotor(self, flight: PlaybackFlight) -> Array:
         """Evaluate the terms of the rotors over each step of a flight, shape (time, 1 + 4 rotors)."""
@@ -150,7 +148,7 @@ class Held:
 
     def player(self, flight: PlaybackFlight) -> Player:
         """Make it ready for a flight."""
-        return Player(self.weights, self.rotor(flight), self.body, None, self.remainder, self.fuzzy)
+        return Player(self.table, self.rotor(flight), self.body, fuzzy=self.fuzzy)
 
 
 def held_by(
@@ -167,8 +165,8 @@ def held_by(
     squares : bool
         See `Held`.
     """
-    known = slice(0, len(STATE_TERMS))
-    return Held(holds(model.weights)[:, known], response, body or model.body, squares)
+    table = WrenchTable(holds(model.table.weights)[:, : len(STATE_TERMS)])
+    return Held(table, response, body or model.body, squares)
 
 
 def constant_body(model: VehicleModel) -> Body:
@@ -247,7 +245,7 @@ def _left(model: VehicleModel, holds: Holds) -> Iterator[tuple[str, Array]]:
     rotors = model.rotors
     columns = {_ROTORS: slice(1 + rotors, 1 + 2 * rotors), _LINEAR: slice(1, 1 + rotors)}
     columns[_SLOW] = slice(1 + 3 * rotors, None)
-    for name, weights in model.part_weights().items():
+    for name, weights in model.parts.items():
         if name == "rotors":
             for title, own in columns.items():
                 part = np.zeros_like(weights)
@@ -274,8 +272,9 @@ def _others(model: VehicleModel, held: Held, whole: Player, flight: PlaybackFlig
 
 
 def _of_table(name: str, left: Array, whole: Player, flight: PlaybackFlight, floor: Array) -> Missing:
-    without = replace(whole, table=whole.table - left)
-    return _sized(name, replace(whole, table=left).wrench(flight), floor, _apart(whole, without, flight))
+    alone = replace(whole, table=replace(whole.table, weights=left))
+    without = replace(whole, table=replace(whole.table, weights=whole.table.weights - left))
+    return _sized(name, alone.wrench(flight), floor, _apart(whole, without, flight))
 
 
 def _of_player(name: str, other: Player, whole: Player, flight: PlaybackFlight, floor: Array) -> Missing:

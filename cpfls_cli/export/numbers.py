@@ -87,7 +87,7 @@ def numbers_of(model: VehicleModel, wrenches: Wrenches, *, alike: bool) -> Numbe
 
 def places(model: VehicleModel, *, alike: bool) -> Array:
     """Find where rotors have to stand so that their thrust gives the torque of the model, shape (rotor, 3), m."""
-    squares = model.weights[:, 0, 1 + model.rotors : 1 + 2 * model.rotors]
+    squares = model.table.weights[:, 0, 1 + model.rotors : 1 + 2 * model.rotors]
     thrust = np.full(model.rotors, squares[_UP].mean()) if alike else squares[_UP]
     hubs = np.array([rotor.position_m for rotor in model.vehicle.rotors], dtype=float)
     return np.column_stack([-squares[_PITCH] / thrust, squares[_ROLL] / thrust, hubs[:, 2]])

@@ -17,10 +17,11 @@ from cpfls_cli.dynamics.rigid_body import body_torque
 from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.playback.model import VehicleModel, wrench_of
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.player import one_step
 from cpfls_cli.playback.rotors import Hold
+from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues, Regressor
 
@@ -187,7 +188,7 @@ def reference_points(model: VehicleModel, rng: np.random.Generator, count: int =
     turning = rng.normal(0.0, speed.mean() / _SECOND, speed.shape)
     slow = _speeds(model, rng, count) ** 2 - speed**2
     rotor = np.hstack([np.ones((count, 1)), speed, speed**2, turning, slow])
-    return ReferencePoints(air, rate, rotor, model.wrench(air, rate, rotor), term_sizes(model, air, rate, rotor))
+    return ReferencePoints(air, rate, rotor, model.table.wrench(air, rate, rotor), term_sizes(model, air, rate, rotor))
 
 
 def term_sizes(model: VehicleModel, air: Array, rate: Array, rotor: Array) -> Array:
@@ -203,7 +204,7 @@ def term_sizes(model: VehicleModel, air: Array, rate: Array, rotor: Array) -> Ar
     array, shape (samples, 6)
         Above zero.
     """
-    sizes = wrench_of(np.abs(model.weights), np.abs(model.terms(air, rate)), np.abs(rotor))
+    sizes = wrench_of(np.abs(model.table.weights), np.abs(model.table.terms(air, rate)), np.abs(rotor))
     return np.where(sizes > 0.0, sizes, 1.0)
 
 
@@ -211,7 +212,7 @@ def reference_run(model: VehicleModel, rng: np.random.Generator, hold: Hold, ste
     """Fly along rotor speeds at random, beginning from some state, until long after the delay."""
     steps += ceil(model.response.delay_s / PERIOD)
     speed = _speeds(model, rng, steps + 1)
-    rotor = model.rotor_terms(speed, PERIOD, hold)[:-1]
+    rotor = model.response.terms_by_step(speed, PERIOD, hold)[:-1]
     place, velocity, rate, attitude = rng.uniform(-1.0, 1.0, (4, 1, 3))
     path = [State(place, velocity, rotations.rotation_matrix(attitude), rate)]
     for row in rotor:

@@ -18,7 +18,8 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.export.holding import Missing
 from cpfls_cli.export.points import Expected, ReferencePoints, ReferenceRun, attitude_points, reference_points, runs_of
 from cpfls_cli.inertia import six_parameters
-from cpfls_cli.playback.model import Remainder, VehicleModel
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.table import Remainder
 from cpfls_cli.regressor.structure import Block, ModelStructure
 from cpfls_cli.version import __version__
 
@@ -133,8 +134,8 @@ class Sheet:
     @cached_property
     def weights(self) -> Weights:
         """The weights that are not zero."""
-        row, term, rotor = (places.astype(np.int64) for places in np.nonzero(self.model.weights))
-        return Weights(row, term, rotor, self.model.weights[row, term, rotor])
+        row, term, rotor = (places.astype(np.int64) for places in np.nonzero(self.model.table.weights))
+        return Weights(row, term, rotor, self.model.table.weights[row, term, rotor])
 
     @property
     def remainder(self) -> Remainder | None:
@@ -144,7 +145,7 @@ class Sheet:
     @property
     def terms(self) -> list[str]:
         """Names of the terms of the motion."""
-        columns = range((self.model.term_count - len(STATE_TERMS)) // 2)
+        columns = range((self.model.table.weights.shape[1] - len(STATE_TERMS)) // 2)
         return [*STATE_TERMS, *(f"{name} c{column}" for column in columns for name in ("U", "U^2"))]
 
     @property

@@ -114,7 +114,7 @@ def _require(flight: PlaybackFlight, held: Held) -> None:
         raise InputError(
             f"{flight.name}: has no rotor speeds, by which an exported vehicle flies; verify along one that has"
         )
-    if not flight.translates and held.player(flight).feels_air:
+    if not flight.translates and held.table.feels_air:
         raise InputError(
             f"{flight.name}: lacks attitude or velocity, and the vehicle depends on its velocity through the air; "
             "verify along a flight that has both"

@@ -258,7 +258,7 @@ class Model:
         if len(state.rate) != 1:
             raise InputError(f"fly takes one vehicle, the state holds {len(state.rate)}; step takes many")
         path = [state]
-        for terms in self._whole.rotor_terms(speed, period, hold)[:-1]:
+        for terms in self._whole.response.terms_by_step(speed, period, hold)[:-1]:
             path.append(one_step(self._whole, path[-1], terms[None], period))
         return State(*(np.concatenate(parts) for parts in zip(*path, strict=True)))
 

@@ -446,7 +446,7 @@ def remainder_curves(record: VehicleRecord) -> tuple[Array, Array, Array]:
     learned, named : array, shape (73, 6), N m and N
     """
     from cpfls_cli.effects.scales import hover_speed
-    from cpfls_cli.playback.model import wrench_of
+    from cpfls_cli.playback.table import wrench_of
 
     model = record.vehicle.vehicle_model()
     direction = np.linspace(-180.0, 180.0, 73)
@@ -455,7 +455,7 @@ def remainder_curves(record: VehicleRecord) -> tuple[Array, Array, Array]:
     rotor = np.zeros((len(angle), 1 + 4 * model.rotors))
     rotor[:, 0] = 1.0
     rotor[:, 1 : 1 + model.rotors] = hover_speed(model.vehicle)
-    parts, terms = model.part_weights(), model.terms(velocity, np.zeros_like(velocity))
-    learned = parts.pop(_REMAINDER)
-    named = np.sum([weights for name, weights in parts.items() if name != _ROTORS], axis=0) + np.zeros_like(learned)
+    parts, terms = model.parts, model.table.terms(velocity, np.zeros_like(velocity))
+    learned, others = parts[_REMAINDER], (name for name in parts if name not in (_ROTORS, _REMAINDER))
+    named = np.sum([parts[name] for name in others], axis=0) + np.zeros_like(learned)
     return direction, wrench_of(learned, terms, rotor), wrench_of(named, terms, rotor)

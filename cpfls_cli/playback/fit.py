@@ -13,12 +13,11 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, jackknife_covariance
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gauss_newton import damped_step
+from cpfls_cli.playback.evaluation import Evaluated
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.groups import JointLayout
+from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.kernels import Loss, Motion, errors_of_runs, sensitivities
-from cpfls_cli.playback.parameters import Evaluated, Layout
-
-AnyLayout = Layout | JointLayout
+from cpfls_cli.playback.model import VehicleModel
 
 POSITION, VELOCITY, ATTITUDE, RATE = range(4)
 _SIGNAL_WEIGHTS = (0.0, 0.3, 0.5, 1.0)
@@ -153,11 +152,11 @@ def loss_of(flight: PlaybackFlight, scale: Array) -> Loss:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A layout fitted to windows.
+    """Numbers fitted to windows.
 
     Attributes
     ----------
-    layout : Layout or JointLayout
+    free : JointNumbers
     values : array, shape (number,)
     loss : float
         Mean over windows, without the prior; about 1.1 for rates that stay.
@@ -165,10 +164,15 @@ class Fitted:
         Gauss-Newton, of the mean loss with the prior, in scales of the numbers.
     """
 
-    layout: AnyLayout
+    free: JointNumbers
     values: Array
     loss: float
     hessian: Array
+
+    @property
+    def model(self) -> VehicleModel:
+        """Model of the vehicle of the config."""
+        return self.free.at(self.values).model
 
     @property
     def condition_number(self) -> float:
@@ -187,13 +191,13 @@ class _Point:
 
 
 def fit(
-    layout: AnyLayout, windows: Sequence[Windows], known: Mapping[str, float], steps: int, tolerance: float
+    free: JointNumbers, windows: Sequence[Windows], known: Mapping[str, float], steps: int, tolerance: float
 ) -> Fitted:
     """Minimise the robust prediction error over windows by a damped Gauss-Newton method within bounds.
 
     Parameters
     ----------
-    layout : Layout or JointLayout
+    free : JointNumbers
     windows : sequence of Windows
     known : mapping of str to float
         Values to start from, by name.
@@ -212,32 +216,32 @@ def fit(
     Ljung, System Identification, section 10.2; Jategaonkar, Flight Vehicle System Identification, chapter 4 (output
     error); Bock 1983 (multiple shooting: each window starts from what was measured).
     """
-    low, high = layout.lows, layout.highs
-    point = _evaluated(layout, windows, np.clip(layout.values(known), low, high))
+    low, high = free.lows, free.highs
+    point = _evaluated(free, windows, np.clip(free.values(known), low, high))
     if not np.isfinite(point.objective):
         raise ComputationError("the prediction error is not finite at the stated numbers; look at the units of the log")
     damping = _FIRST_DAMPING
     for _ in range(steps):
-        following, damping = _better(layout, windows, point, damping, (low, high))
+        following, damping = _better(free, windows, point, damping, (low, high))
         if following is None:
             break
         decrease, point = point.objective - following.objective, following
         if decrease < tolerance * point.objective:
             break
-    return Fitted(layout, point.values, point.loss, point.hessian)
+    return Fitted(free, point.values, point.loss, point.hessian)
 
 
 class _Evaluations:
-    """A layout at values, evaluated once for each vehicle that flew."""
+    """Numbers at values, evaluated once for each vehicle that flew."""
 
-    def __init__(self, layout: AnyLayout, values: Array) -> None:
-        self.layout, self.values = layout, values
+    def __init__(self, free: JointNumbers, values: Array) -> None:
+        self.free, self.values = free, values
         self._known: dict[str, tuple[Evaluated, IntArray]] = {}
 
     def of(self, flight: PlaybackFlight) -> tuple[Evaluated, IntArray]:
         """Give the evaluation for a flight, and where its numbers stand among all."""
         if flight.group not in self._known:
-            own, places = self.layout.of_flight(flight)
+            own, places = self.free.of_flight(flight)
             self._known[flight.group] = Evaluated.of(own, self.values[places]), places
         return self._known[flight.group]
 
@@ -252,15 +256,15 @@ class _Evaluations:
         return loss, gradient, hessian
 
 
-def _evaluated(layout: AnyLayout, windows: Sequence[Windows], values: Array) -> _Point:
-    evaluations = _Evaluations(layout, values)
+def _evaluated(free: JointNumbers, windows: Sequence[Windows], values: Array) -> _Point:
+    evaluations = _Evaluations(free, values)
     total, gradient, hessian = 0.0, np.zeros(len(values)), np.zeros((len(values), len(values)))
     for window in windows:
         loss, by_group, curvature = evaluations.sums(window, np.zeros(len(window.starts), dtype=np.int64))
         total, gradient, hessian = total + loss, gradient + by_group[0], hessian + curvature[0]
     count = sum(len(window.starts) for window in windows)
-    scale, spread = layout.scales, layout.spreads
-    away = (values - layout.starts) / scale
+    scale, spread = free.scales, free.spreads
+    away = (values - free.starts) / scale
     belief = _PRIOR / spread**2
     return _Point(
         values,
@@ -287,7 +291,7 @@ def window_sums(evaluated: Evaluated, window: Windows, group: IntArray) -> tuple
     gradient : array, shape (group, number)
     hessian : array, shape (group, number, number)
     """
-    flight, count, groups = window.flight, len(evaluated.values), int(group.max(initial=0)) + 1
+    flight, count, groups = window.flight, len(evaluated.at.values), int(group.max(initial=0)) + 1
     gradient, hessian = np.zeros((groups, count)), np.zeros((groups, count, count))
     terms = evaluated.rotor_terms(flight, window.samples)
     loss = sensitivities(
@@ -307,13 +311,13 @@ def window_sums(evaluated: Evaluated, window: Windows, group: IntArray) -> tuple
 
 
 def _better(
-    layout: AnyLayout, windows: Sequence[Windows], point: _Point, damping: float, bounds: tuple[Array, Array]
+    free: JointNumbers, windows: Sequence[Windows], point: _Point, damping: float, bounds: tuple[Array, Array]
 ) -> tuple[_Point | None, float]:
     """Find a point with a smaller objective, with more damping where a step fails; None where none is found."""
     for _ in range(_TRIES):
-        room = [(bound - point.values) / layout.scales for bound in bounds]
-        step = layout.scales * damped_step(point.hessian, point.gradient, damping, *room)
-        following = _evaluated(layout, windows, np.clip(point.values + step, *bounds))
+        room = [(bound - point.values) / free.scales for bound in bounds]
+        step = free.scales * damped_step(point.hessian, point.gradient, damping, *room)
+        following = _evaluated(free, windows, np.clip(point.values + step, *bounds))
         if following.objective < point.objective:
             return following, max(damping / _DAMPING_DOWN, _LEAST_DAMPING)
         damping *= _DAMPING_UP
@@ -361,8 +365,8 @@ def uncertainty(fitted: Fitted, windows: Sequence[Windows]) -> Uncertainty:
     ----------
     Bell and McCaffrey 2002; MacKinnon, Nielsen and Webb 2023 (jackknife by cluster); Ljung, section 9.4.
     """
-    layout = fitted.layout
-    evaluations, scale = _Evaluations(layout, fitted.values), layout.scales
+    free = fitted.free
+    evaluations, scale = _Evaluations(free, fitted.values), free.scales
     count = sum(len(window.starts) for window in windows)
     sums = []
     for window in windows:
@@ -373,7 +377,7 @@ def uncertainty(fitted: Fitted, windows: Sequence[Windows]) -> Uncertainty:
     without = fitted.hessian * count - hessian * scale[:, None] * scale
     moved = np.linalg.solve(without, (gradient * scale)[:, :, None])[:, :, 0]
     covariance = jackknife_covariance(moved * scale)
-    belief = _PRIOR / layout.spreads**2
+    belief = _PRIOR / free.spreads**2
     conditional = np.diag(fitted.hessian) - belief
     return Uncertainty(covariance, len(gradient), np.asarray(conditional > _INFORMED * belief))
 
@@ -381,7 +385,7 @@ def uncertainty(fitted: Fitted, windows: Sequence[Windows]) -> Uncertainty:
 def window_errors(fitted: Fitted, window: Windows) -> Array:
     """Weigh the errors of each window as the fit does, shape (window,): about 1.1 for rates that stay."""
     flight = window.flight
-    evaluated, _ = _Evaluations(fitted.layout, fitted.values).of(flight)
+    evaluated, _ = _Evaluations(fitted.free, fitted.values).of(flight)
     errors = np.empty((len(window.starts), window.horizon, 4, 3))
     errors_of_runs(
         window.motion,

@@ -12,9 +12,9 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.registry import CENTRE_OF_MASS
 from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.playback.evaluation import VehicleAt
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.parameters import AS_STATED, COUNTED, INERTIA, MASS, Layout, Number, Numbered, Physical
+from cpfls_cli.playback.parameters import AS_STATED, COUNTED, INERTIA, MASS, FreeNumbers, Number, Physical
 
 CENTRE = tuple(f"{CENTRE_OF_MASS.name}.{coefficient.name}" for coefficient in CENTRE_OF_MASS.coefficients)
 """Numbers of a fit that say where the centre of mass is, ahead and to the left."""
@@ -31,20 +31,21 @@ class Group(NamedTuple):
 
 
 @dataclass(frozen=True)
-class JointLayout(Numbered):
-    """The numbers of several configurations: those of the vehicle of the config, then what others have of their own.
+class JointNumbers:
+    """The free numbers of all configurations: those of the vehicle of the config, then what others have of their own.
 
     Attributes
     ----------
-    base : Layout
+    base : FreeNumbers
     groups : tuple of Group
+        Other configurations, if any.
     """
 
-    base: Layout
-    groups: tuple[Group, ...]
+    base: FreeNumbers
+    groups: tuple[Group, ...] = ()
 
     @cached_property
-    def _layouts(self) -> dict[str, Layout]:
+    def _by_group(self) -> dict[str, FreeNumbers]:
         found = {"": self.base}
         for group in self.groups:
             more = [block for block in group.differs if block not in self.base.blocks]
@@ -61,70 +62,108 @@ class JointLayout(Numbered):
             *(
                 replace(number, name=f"{group.name}: {number.name}")
                 for group in self.groups
-                for number in self._layouts[group.name].numbers
+                for number in self._by_group[group.name].numbers
                 if number.block in group.differs
             ),
         )
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Place of each number by name."""
+        return {number.name: place for place, number in enumerate(self.numbers)}
+
+    @cached_property
+    def starts(self) -> Array:
+        """Stated numbers, shape (number,)."""
+        return self._column("start")
+
+    @cached_property
+    def scales(self) -> Array:
+        """Natural sizes of changes, shape (number,)."""
+        return self._column("scale")
+
+    @cached_property
+    def lows(self) -> Array:
+        """Lower bounds, shape (number,)."""
+        return self._column("low")
+
+    @cached_property
+    def highs(self) -> Array:
+        """Upper bounds, shape (number,)."""
+        return self._column("high")
+
+    @cached_property
+    def spreads(self) -> Array:
+        """Standard deviations of what is believed before, in scales, shape (number,)."""
+        return self._column("spread")
+
+    def _column(self, name: str) -> Array:
+        return np.array([getattr(number, name) for number in self.numbers], dtype=float)
+
+    def named(self, values: Array) -> dict[str, float]:
+        """Name values."""
+        return dict(zip(self.index, values.tolist(), strict=True))
 
     def values(self, known: Mapping[str, float]) -> Array:
         """Start from known values; a number of a group from that of the base, or from the stated one."""
         found = [known.get(n.name, known.get(n.name.rpartition(": ")[2], n.start)) for n in self.numbers]
         return np.array(found, dtype=float)
 
-    def of_flight(self, flight: PlaybackFlight) -> tuple[Layout, IntArray]:
-        """Give the layout of the vehicle of a flight, and where its numbers stand among these."""
-        return self._layouts[flight.group], self._places(flight.group)
+    def of_flight(self, flight: PlaybackFlight) -> tuple[FreeNumbers, IntArray]:
+        """Give the numbers of the vehicle of a flight, and where they stand among these."""
+        return self._by_group[flight.group], self._places[flight.group]
 
-    def _places(self, group: str) -> IntArray:
-        numbers = self._layouts[group].numbers
-        return np.array([self._place(group, number.name) for number in numbers], dtype=np.int64)
+    @cached_property
+    def _places(self) -> dict[str, IntArray]:
+        return {
+            group: np.array([self._place(group, number.name) for number in free.numbers], dtype=np.int64)
+            for group, free in self._by_group.items()
+        }
 
     def _place(self, group: str, name: str) -> int:
         if name.startswith(COUNTED):
             return self.index[name.replace(COUNTED, INERTIA)]
         return self.index[own if (own := f"{group}: {name}") in self.index else name]
 
+    def at(self, values: Array, group: str = "") -> VehicleAt:
+        """Give the vehicle of a configuration at values of all numbers."""
+        return VehicleAt(self._by_group[group], values[self._places[group]])
+
     def physical(self, values: Array) -> dict[str, Physical]:
         """Give all numbers as people know them, in order."""
-        found = self.base.physical(values[: len(self.base.numbers)])
+        found = self.at(values).physical
         for group in self.groups:
-            layout = self._layouts[group.name]
-            own = layout.physical(values[self._places(group.name)])
-            pairs = zip(layout.numbers, own.items(), strict=True)
+            at = self.at(values, group.name)
+            pairs = zip(at.free.numbers, at.physical.items(), strict=True)
             found |= {
                 f"{group.name}: {name}": known for number, (name, known) in pairs if number.block in group.differs
             }
         return found
-
-    def model(self, values: Array, group: str = "") -> VehicleModel:
-        """Build the model of a configuration."""
-        return self._layouts[group].model(values[self._places(group)])
 
     def differences(self, values: Array) -> dict[str, Physical]:
         """Say what differs between each group and the vehicle of the config: an added mass, its place, and the rest.
 
         A mass at a place moves the centre of mass, ``m' c' = m c + (m' - m) p``.
         """
-        base, found = self.base.physical(values[: len(self.base.numbers)]), {}
-        mass = self.base.vehicle.mass_kg
+        stated, found = self.at(values), dict[str, Physical]()
+        base, mass = stated.physical, self.base.vehicle.mass_kg
         for group in self.groups:
-            own = self._layouts[group.name].physical(values[self._places(group.name)])
-            added = own[MASS].value - mass if MASS in own else 0.0
+            at = self.at(values, group.name)
+            own = at.physical
+            before = {name: base[name].value if name in base else 0.0 for name in own}
             if MASS in own:
+                added = own[MASS].value - mass
                 found[f"{group.name}: added mass"] = Physical(added, "kg")
-            if MASS in own and CENTRE_OF_MASS.name in group.differs:
-                for name, axis in zip(CENTRE, "xy", strict=True):
-                    before = base[name].value if name in base else 0.0
-                    place = (own[MASS].value * own[name].value - mass * before) / added if added else np.nan
+                for name, axis in zip(CENTRE, "xy", strict=True) if CENTRE_OF_MASS.name in group.differs else ():
+                    place = (own[MASS].value * own[name].value - mass * before[name]) / added if added else np.nan
                     found[f"{group.name}: place of the added mass, {axis}"] = Physical(place, "m")
-            inertia = self._layouts[group.name].inertia(values[self._places(group.name)])
             if INERTIA in group.differs:
-                difference = inertia - self.base.inertia(values[: len(self.base.numbers)])
-                for name, moment in zip(INERTIA_PARAMETERS, np.diag(difference).tolist(), strict=False):
+                difference = np.diag(at.inertia - stated.inertia).tolist()
+                for name, moment in zip(INERTIA_PARAMETERS, difference, strict=False):
                     found[f"{group.name}: added {name}"] = Physical(moment, "kg m^2")
             for name, known in own.items():
                 block = name.split(".")[0]
                 if block in group.differs and block not in OF_A_WEIGHT:
-                    before = base[name].value if name in base else 0.0
-                    found[f"{group.name}: {name} less that of the config"] = Physical(known.value - before, known.unit)
+                    away = Physical(known.value - before[name], known.unit)
+                    found[f"{group.name}: {name} less that of the config"] = away
         return found

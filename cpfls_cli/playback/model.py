@@ -4,25 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
-from cpfls_cli.effects.effect import Columns, Effect
+from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial, state_terms
-from cpfls_cli.effects.registry import CENTRE_OF_MASS, VEHICLE_NUMBERS, effect
+from cpfls_cli.effects.registry import CENTRE_OF_MASS, effect
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.fuzzy.basis import Consequents
-from cpfls_cli.fuzzy.periodic_system import PeriodicStructure
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.playback.kernels import MOST_COLUMNS, Airflow, Body, Terms, airflow_terms
-from cpfls_cli.playback.rotors import Hold, RotorResponse, rotor_terms_at_samples, rotor_terms_by_step
-from cpfls_cli.vehicle.rotors import allocation_matrix
+from cpfls_cli.playback.kernels import MOST_COLUMNS, Body, airflow_terms
+from cpfls_cli.playback.rotors import Hold, RotorResponse
+from cpfls_cli.playback.table import (
+    Remainder,
+    WrenchTable,
+    airflow_of,
+    body_of,
+    lever_weights,
+    remainder_weights,
+    rotor_weights,
+    with_slow,
+    wrench_of_numbers,
+)
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _AXES = 3
@@ -56,7 +64,7 @@ class ModelEffect(NamedTuple):
     @property
     def effect(self) -> Effect:
         """What it does: of the vehicle's own numbers what is no inertia, of others all."""
-        return _wrench_of_numbers() if self.known.kind == "parameter" else self.known
+        return wrench_of_numbers() if self.known.kind == "parameter" else self.known
 
     @property
     def values(self) -> dict[str, float]:
@@ -88,35 +96,11 @@ class ModelEffect(NamedTuple):
         known = self.effect
         # A body with a state of its own: the random motions of the probe, a second apart, may make it diverge.
         found = None if self.is_filter or known.carried is not None else polynomial(known, probe, self.shape)
-        return None if found is None else np.tensordot(self.linear, _with_slow(found, probe), axes=1)
+        return None if found is None else np.tensordot(self.linear, with_slow(found, probe), axes=1)
 
     def missing(self, signals: Signals) -> tuple[str, ...]:
         """Name the signals that it needs and a flight lacks; a filter may lack the command: it leaves speeds alone."""
         return tuple(each for each in self.effect.missing(signals) if not (self.is_filter and each == "command"))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Remainder:
-    """What has no name: torque and force over the direction of the airflow, by a periodic fuzzy system.
-
-    Each column of the system enters with the speed in the rotor plane times the mean rotor speed, and with its square.
-
-    Attributes
-    ----------
-    breakpoints : array, shape (rules + 1,)
-        Peaks of the membership functions, share of a turn.
-    harmonic_order : int
-        Of the consequents; 0 for the seesaw.
-    rows : array of int, shape (row,)
-        Which of torque (0 to 2) and force (3 to 5) it adds to.
-    coefficients : array, shape (row, columns, 2)
-        For speed times mean rotor speed, and for squared speed.
-    """
-
-    breakpoints: Array
-    harmonic_order: int
-    rows: IntArray
-    coefficients: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,30 +148,26 @@ class VehicleModel:
         return len(self.vehicle.rotors)
 
     @cached_property
-    def weights(self) -> Array:
-        """Torque (3) and force (3) by term of the motion and term of the rotors, shape (6, terms, 1 + 4 rotors)."""
-        return np.asarray(sum(self.part_weights().values()))
+    def table(self) -> WrenchTable:
+        """Torque and force of all parts that are sums of weights."""
+        return WrenchTable(np.asarray(sum(self.parts.values())), self.remainder)
 
-    def part_weights(self) -> dict[str, Array]:
-        """Give the weights of each part alone: rotors, effects by name, remainder; shapes as `weights`.
+    @cached_property
+    def parts(self) -> Mapping[str, Array]:
+        """Weights of each part alone: rotors, effects by name, remainder; shapes as those of the table.
 
         Raises
         ------
         ComputationError
             If the remainder has more columns than the compiled loops hold.
         """
-        return dict(self._parts)
-
-    @cached_property
-    def _parts(self) -> dict[str, Array]:
-        if airflow_terms(self.airflow) > 2 * MOST_COLUMNS:
-            columns = airflow_terms(self.airflow) // 2
-            raise ComputationError(f"a remainder of {columns} columns is too large; {MOST_COLUMNS} are possible")
-        parts = {"rotors": np.zeros((6, self.term_count, 1 + 4 * self.rotors))}
+        learned = airflow_terms(airflow_of(self.remainder))
+        if learned > 2 * MOST_COLUMNS:
+            raise ComputationError(f"a remainder of {learned // 2} columns is too large; {MOST_COLUMNS} are possible")
+        parts = {"rotors": np.zeros((6, len(STATE_TERMS) + learned, 1 + 4 * self.rotors))}
         parts["rotors"][:, 0] = rotor_weights(self.vehicle, self.thrust_linear, self.response)
         for name, weights in self._polynomials.items():
-            more = np.zeros((6, self.term_count - len(STATE_TERMS), weights.shape[2]))
-            parts[name] = np.concatenate([weights, more], axis=1)
+            parts[name] = np.concatenate([weights, np.zeros((6, learned, weights.shape[2]))], axis=1)
         if self.remainder is not None:
             parts["remainder"] = remainder_weights(self.remainder, self.rotors)
         levers = [known for known in self.effects if known.is_lever]
@@ -204,8 +184,8 @@ class VehicleModel:
     @property
     def along(self) -> tuple[ModelEffect, ...]:
         """Effects that are evaluated along a measured motion, being no polynomials."""
-        elsewhere = self._polynomials
-        return tuple(one for one in self.effects if not (one.is_lever or one.is_filter or one.name in elsewhere))
+        held = self._polynomials
+        return tuple(one for one in self.effects if not (one.is_lever or one.is_filter or one.name in held))
 
     @property
     def filters(self) -> tuple[ModelEffect, ...]:
@@ -304,15 +284,15 @@ class VehicleModel:
         """
         beside = self.wrench_beside(signals)
         if signals.rotor_speed is None:
-            rotor = np.zeros((len(signals), self.weights.shape[2]))
+            rotor = np.zeros((len(signals), self.table.weights.shape[2]))
             rotor[:, 0] = 1.0
             beside = beside + signals.wrench
         else:
             hold = self.hold_of(signals, "previous" if signals.commanded else "linear")
             response = self.response_to(signals)
-            rotor = rotor_terms_at_samples(signals.rotor_speed, signals.period, hold, response)
-        table = self.wrench(self._air(signals), signals.body_rate, rotor)
-        return np.asarray(table + beside + lever_weights(self.centre, beside.T).T)
+            rotor = response.terms_at_samples(signals.rotor_speed, signals.period, hold)
+        held = self.table.wrench(self._air(signals), signals.body_rate, rotor)
+        return np.asarray(held + beside + lever_weights(self.centre, beside.T).T)
 
     def wrench_beside(self, signals: Signals) -> Array:
         """Evaluate what the table of weights does not hold, at the samples of a flight.
@@ -340,232 +320,9 @@ class VehicleModel:
         return total
 
     def _air(self, signals: Signals) -> Array:
-        return signals.air_velocity if self.needs_velocity else np.zeros_like(signals.body_rate)
-
-    @property
-    def airflow(self) -> Airflow:
-        """Terms of the remainder."""
-        return airflow_of(self.remainder)
-
-    @property
-    def term_count(self) -> int:
-        """Number of terms of the motion."""
-        return len(STATE_TERMS) + airflow_terms(self.airflow)
+        return signals.air_velocity if self.table.feels_air else np.zeros_like(signals.body_rate)
 
     @cached_property
     def body(self) -> Body:
         """What is moved, where its inertia is constant."""
         return body_of(self.vehicle, symmetric(self.vehicle.inertia_kg_m2))
-
-    def rotor_terms(self, speed: Array, period: float, hold: Hold) -> Array:
-        """Evaluate the terms of the rotors over each step of a stretch.
-
-        Parameters
-        ----------
-        speed : array, shape (time, rotor), rad/s
-            Logged.
-        period : float, s
-        hold : {"linear", "previous"}
-            See `rotor_terms_by_step`.
-
-        Returns
-        -------
-        array, shape (time, 1 + 4 rotors)
-        """
-        response = self.response
-        terms = rotor_terms_by_step(speed, period, hold, response.delay_s, response.lag_s, response.slow_s)
-        return np.asarray(terms, dtype=float)
-
-    def rotor_terms_at(self, speed: Array, period: float, hold: Hold) -> Array:
-        """Evaluate the terms of the rotors at the samples of a stretch; parameters and shape as `rotor_terms`."""
-        return rotor_terms_at_samples(speed, period, hold, self.response)
-
-    @property
-    def needs_velocity(self) -> bool:
-        """Whether torque or force depend on the velocity through the air."""
-        of_velocity = np.array([any(axis in term for axis in "uvw") for term in STATE_TERMS])
-        learned = np.ones(self.term_count - len(STATE_TERMS), dtype=bool)
-        return bool(np.any(self.weights[:, np.concatenate([of_velocity, learned])]))
-
-    def step_weights(self, rotor: Array) -> tuple[Terms, Array]:
-        """Evaluate the weights of the terms of the motion over each step.
-
-        Parameters
-        ----------
-        rotor : array, shape (time, 1 + 4 rotors)
-            See `rotor_terms`.
-
-        Returns
-        -------
-        terms : Terms
-            Those in use.
-        weights : array, shape (time, 6, active)
-        """
-        used = used_terms(self.weights, self.airflow)
-        return used, weights_by_step(self.weights, used, rotor)
-
-    def wrench(self, velocity: Array, rate: Array, rotor: Array) -> Array:
-        """Compute torque and force on the body, without weight.
-
-        Parameters
-        ----------
-        velocity : array, shape (time, 3), m/s, body frame
-            Through the air.
-        rate : array, shape (time, 3), rad/s, body frame
-        rotor : array, shape (time, 1 + 4 rotors)
-            See `rotor_terms`.
-
-        Returns
-        -------
-        array, shape (time, 6), N m and N, body frame
-        """
-        return wrench_of(self.weights, self.terms(velocity, rate), rotor)
-
-    def terms(self, velocity: Array, rate: Array) -> Array:
-        """Evaluate the terms of the motion, shape (time, terms)."""
-        return np.hstack([state_terms(velocity, rate), remainder_terms(self.remainder, velocity)])
-
-    def weights_at(self, velocity: Array, rate: Array) -> Array:
-        """Compute what the terms of the rotors are multiplied with to give torque (3) and force (3).
-
-        Parameters
-        ----------
-        velocity : array, shape (time, 3), m/s, body frame
-            Through the air.
-        rate : array, shape (time, 3), rad/s, body frame
-
-        Returns
-        -------
-        array, shape (time, 6, 1 + 4 rotors)
-        """
-        return np.asarray(np.einsum("ta,kau->tku", self.terms(velocity, rate), self.weights, optimize=True))
-
-
-def wrench_of(weights: Array, terms: Array, rotor: Array) -> Array:
-    """Multiply weights with the terms of the motion and of the rotors, shape (time, 6)."""
-    return np.asarray(np.einsum("ta,kau,tu->tk", terms, weights, rotor, optimize=True))
-
-
-def body_of(vehicle: VehicleSettings, inertia: Array) -> Body:
-    """Arrange mass and inertia for the compiled loops."""
-    return Body(vehicle.mass_kg, vehicle.gravity_m_s2, inertia, np.asarray(np.linalg.inv(inertia), dtype=float))
-
-
-def used_terms(table: Array, airflow: Airflow) -> Terms:
-    """List the terms of the motion that have weights."""
-    active = np.flatnonzero(np.any(table, axis=(0, 2))).astype(np.int64)
-    return Terms(airflow, active, table.shape[1])
-
-
-def weights_by_step(table: Array, used: Terms, rotor: Array) -> Array:
-    """Multiply a table with the terms of the rotors, shape (time, 6, active)."""
-    flat = table[:, used.active].reshape(-1, table.shape[2])
-    return np.ascontiguousarray((rotor @ flat.T).reshape(len(rotor), 6, -1))
-
-
-def airflow_of(remainder: Remainder | None) -> Airflow:
-    """Describe the terms of a remainder to the compiled loops."""
-    if remainder is None:
-        return Airflow(np.zeros(0), 0)
-    return Airflow(remainder.breakpoints, remainder.harmonic_order)
-
-
-def rotor_weights(vehicle: VehicleSettings, thrust_linear: float, response: RotorResponse) -> Array:
-    """Weigh the terms of the rotors alone, shape (6, 1 + 4 rotors)."""
-    rotors = len(vehicle.rotors)
-    thrust, *torque = allocation_matrix(vehicle)
-    wrench = np.vstack([torque, np.zeros((2, rotors)), thrust])
-    hover = np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / thrust.sum())
-    table = np.zeros((6, 1 + 4 * rotors))
-    table[:, 1 : 1 + rotors] = thrust_linear * hover * wrench
-    table[:, 1 + rotors : 1 + 2 * rotors] = wrench
-    slow = response.slow_roll_pitch, response.slow_roll_pitch, response.slow_yaw
-    table[:3, 1 + 3 * rotors :] = np.array(slow)[:, None] * wrench[:3]
-    return table
-
-
-def lever_weights(centre: Array, forces: Array) -> Array:
-    """Weigh the torque ``-c x F`` of forces about a centre of mass.
-
-    Parameters
-    ----------
-    centre : array, shape (3,), m
-        Where it is, from where the forces have their levers from.
-    forces : array, shape (6, ...)
-        Weights of torque and force.
-
-    Returns
-    -------
-    array, shape (6, ...)
-    """
-    table = np.zeros_like(forces)
-    table[:3] = -np.cross(centre, forces[3:], axisb=0, axisc=0)
-    return table
-
-
-def effect_weights(name: str, shape: Mapping[str, float], probe: Probe) -> Array:
-    """Weigh the terms for a unit of each coefficient of an effect.
-
-    Returns
-    -------
-    array, shape (coefficient, 6, 34, 1 + 4 rotors)
-
-    Raises
-    ------
-    ComputationError
-        If the effect is no polynomial of motion and rotor speeds.
-    """
-    known = effect(name)
-    found = polynomial(_wrench_of_numbers() if known.kind == "parameter" else known, probe, shape)
-    if found is None:
-        raise ComputationError(f"the effect {name} is no polynomial of motion and rotor speeds")
-    return _with_slow(found, probe)
-
-
-def _with_slow(weights: Array, probe: Probe) -> Array:
-    """Add the columns of slow actuation, in which no effect of the catalogue has weights."""
-    slow = np.zeros((*weights.shape[:3], len(probe.signals.vehicle.rotors)))
-    return np.concatenate([weights, slow], axis=3)
-
-
-@cache
-def _wrench_of_numbers() -> Effect:
-    """Make an effect of the numbers of the vehicle that are no inertia: scale of the thrust, coupling of the rates."""
-
-    def columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-        assert VEHICLE_NUMBERS.columns is not None
-        given = VEHICLE_NUMBERS.columns(signals, shape)
-        assert given.momentum is not None
-        # What has momentum is inertia, which stands in the vehicle, or the place of a sensor, which moves nothing.
-        return Columns(given.direct * ~np.any(given.momentum, axis=(0, 1)))
-
-    return replace(VEHICLE_NUMBERS, kind="wrench", columns=columns)
-
-
-def remainder_weights(remainder: Remainder, rotors: int) -> Array:
-    """Weigh the terms of a remainder, shape (6, terms, 1 + 4 rotors)."""
-    terms = airflow_terms(airflow_of(remainder))
-    table = np.zeros((6, len(STATE_TERMS) + terms, 1 + 4 * rotors))
-    at = len(STATE_TERMS) + np.arange(0, terms, 2)
-    for row, by_column in zip(remainder.rows, remainder.coefficients, strict=True):
-        table[row, at, 1 : 1 + rotors] = by_column[:, :1] / rotors
-        table[row, at + 1, 0] = by_column[:, 1]
-    return table
-
-
-def remainder_terms(remainder: Remainder | None, velocity: Array) -> Array:
-    """Evaluate the terms of a remainder, shape (time, terms).
-
-    Parameters
-    ----------
-    remainder : Remainder or None
-    velocity : array, shape (time, 3), m/s, body frame
-    """
-    if remainder is None:
-        return np.zeros((len(velocity), 0))
-    order = remainder.harmonic_order
-    consequents: Consequents = "harmonic" if order else "seesaw"
-    structure = PeriodicStructure((remainder.breakpoints,), consequents, order, "additive")
-    columns = structure.columns(np.arctan2(velocity[:, 1], velocity[:, 0])[:, None])
-    speed = np.hypot(velocity[:, 0], velocity[:, 1])[:, None]
-    return np.stack([columns * speed, columns * speed**2], axis=2).reshape(len(velocity), -1)

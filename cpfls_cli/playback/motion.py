@@ -50,7 +50,7 @@ def accelerations(model: VehicleModel, state: State, rotor: Array) -> tuple[Arra
         Of constant inertia.
     state : State
     rotor : array, shape (samples, 1 + 4 rotors)
-        See `VehicleModel.rotor_terms`.
+        See `RotorResponse.terms_by_step`.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def accelerations(model: VehicleModel, state: State, rotor: Array) -> tuple[Arra
     """
     body = model.body
     air = np.einsum("nji,nj->ni", state.rotation, state.velocity - model.wind)
-    wrench = model.wrench(air, state.rate, rotor)
+    wrench = model.table.wrench(air, state.rate, rotor)
     linear = np.einsum("nij,nj->ni", state.rotation, wrench[:, 3:]) / body.mass
     linear[:, 2] -= body.gravity
     angular = (wrench[:, :3] - np.cross(state.rate, state.rate @ body.inertia)) @ body.inverse
@@ -75,7 +75,7 @@ def step(model: VehicleModel, state: State, rotor: Array, period: float) -> Stat
         Of constant inertia.
     state : State
     rotor : array, shape (samples, 1 + 4 rotors)
-        See `VehicleModel.rotor_terms`.
+        See `RotorResponse.terms_by_step`.
     period : float, s
     """
     half = 0.5 * period
@@ -153,7 +153,7 @@ class _Balance(NamedTuple):
         cls, model: VehicleModel, velocity: Array, rate: Array, wanted: Array, slow: Array, settled: bool
     ) -> _Balance:
         rotors = model.rotors
-        by_rotor = model.weights_at(velocity, rate)[:, [5, 0, 1, 2]]
+        by_rotor = model.table.by_rotor_term(velocity, rate)[:, [5, 0, 1, 2]]
         linear, square, _, late = (by_rotor[:, :, 1 + k * rotors : 1 + (k + 1) * rotors] for k in range(4))
         constant = by_rotor[:, :, 0] - wanted + np.einsum("nkr,nr->nk", late, slow)
         square = square if settled else square - late

@@ -11,23 +11,14 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, momentum_form
-from cpfls_cli.effects.polynomial import STATE_TERMS, state_terms
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_flight
 from cpfls_cli.playback.kernels import Body, Motion, Terms, errors_of_runs
-from cpfls_cli.playback.model import (
-    Remainder,
-    VehicleModel,
-    airflow_of,
-    lever_weights,
-    remainder_terms,
-    used_terms,
-    weights_by_step,
-    wrench_of,
-)
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.motion import step as step_of_rigid_body
-from cpfls_cli.playback.rotors import RotorResponse, rotor_terms_by_step
+from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.playback.table import WrenchTable, lever_weights, used_terms, weights_by_step
 from cpfls_cli.regressor.regressor import InertiaValues
 
 _FASTEST = 300.0
@@ -40,32 +31,23 @@ class Player:
 
     Attributes
     ----------
-    table : array, shape (6, terms, 1 + 4 rotors)
-        Torque and force by term of the motion and term of the rotors.
+    table : WrenchTable
     rotor : array, shape (time, 1 + 4 rotors)
         Terms of the rotors over each step.
     body : Body
     along : array, shape (time, 6), N m and N, or None
         What acts over each step beside: stated, or evaluated along the measured motion.
-    remainder : Remainder or None
     fuzzy : InertiaModel or None
         Stands in the place of the inertia of `body`.
     wind : tuple of float, m/s, world frame
     """
 
-    table: Array
+    table: WrenchTable
     rotor: Array
     body: Body
     along: Array | None = None
-    remainder: Remainder | None = None
     fuzzy: InertiaModel | None = None
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    @property
-    def feels_air(self) -> bool:
-        """Whether torque or force depend on the velocity through the air."""
-        airs = [index for index, term in enumerate(STATE_TERMS) if set("uvw") & set(term)]
-        return self.remainder is not None or bool(np.any(self.table[:, airs]))
 
     def step_weights(self, part: slice) -> tuple[Terms, Array]:
         """Evaluate the weights of the terms of the motion over each step of a part of the flight.
@@ -76,9 +58,9 @@ class Player:
             Those in use, the constant always.
         weights : array, shape (time, 6, active)
         """
-        found = used_terms(self.table, airflow_of(self.remainder))
+        found = used_terms(self.table.weights, self.table.airflow)
         used = found._replace(active=np.union1d([0], found.active).astype(np.int64))
-        weights = weights_by_step(self.table, used, self.rotor[part])
+        weights = weights_by_step(self.table.weights, used, self.rotor[part])
         if self.along is not None:
             weights[:, :, 0] += self.along[part]
         return used, weights
@@ -87,8 +69,7 @@ class Player:
         """Evaluate torque and force along the measured motion, shape (time, 6), N m and N, body frame."""
         motion = flight.motion
         air = np.einsum("tji,tj->ti", motion.rotation, motion.velocity - self.wind)
-        terms = np.hstack([state_terms(air, motion.rate), remainder_terms(self.remainder, air)])
-        wrench = wrench_of(self.table, terms, self.rotor)
+        wrench = self.table.wrench(air, motion.rate, self.rotor)
         return wrench if self.along is None else wrench + self.along
 
 
@@ -105,11 +86,10 @@ def player_of(model: VehicleModel, flight: PlaybackFlight, parts: Sequence[Signa
     """
     response = model.response_to(parts[0]) if parts else model.response
     return Player(
-        table=model.weights,
+        table=model.table,
         rotor=rotor_terms_along(flight, response),
         body=model.body,
         along=_along(model, stated_along(flight, response), parts),
-        remainder=model.remainder,
         fuzzy=model.fuzzy,
         wind=model.wind,
     )
@@ -153,7 +133,8 @@ def made_ready(model: VehicleModel, flight: LoggedFlight) -> tuple[PlaybackFligh
 
 def rotor_terms_along(flight: PlaybackFlight, response: RotorResponse) -> Array:
     """Evaluate the terms of the rotors over each step, stretch by stretch, shape (time, 1 + 4 rotors)."""
-    return np.concatenate([_late(flight.speed[part], flight, response) for part in flight.stretches])
+    parts = (flight.speed[part] for part in flight.stretches)
+    return np.concatenate([response.terms_by_step(part, flight.motion.period, flight.hold) for part in parts])
 
 
 def stated_along(flight: PlaybackFlight, response: RotorResponse) -> Array | None:
@@ -161,14 +142,8 @@ def stated_along(flight: PlaybackFlight, response: RotorResponse) -> Array | Non
     wrench = flight.wrench
     if wrench is None:
         return None
-    return np.concatenate([_late(wrench[part], flight, response)[:, 1:7] for part in flight.stretches])
-
-
-def _late(values: Array, flight: PlaybackFlight, response: RotorResponse) -> Array:
-    terms = rotor_terms_by_step(
-        values, flight.motion.period, flight.hold, response.delay_s, response.lag_s, response.slow_s
-    )
-    return np.asarray(terms, dtype=float)
+    parts = (wrench[part] for part in flight.stretches)
+    return np.concatenate([response.terms_by_step(part, flight.motion.period, flight.hold)[:, 1:7] for part in parts])
 
 
 def one_step(model: VehicleModel, state: State, rotor: Array, period: float) -> State:
@@ -177,7 +152,7 @@ def one_step(model: VehicleModel, state: State, rotor: Array, period: float) -> 
     Parameters
     ----------
     rotor : array, shape (samples, 1 + 4 rotors)
-        See `VehicleModel.rotor_terms`.
+        See `RotorResponse.terms_by_step`.
     period : float, s
 
     Returns
@@ -193,7 +168,7 @@ def one_step(model: VehicleModel, state: State, rotor: Array, period: float) -> 
         still = replace(model, wind=(0.0, 0.0, 0.0))
         after = one_step(still, state._replace(velocity=state.velocity - wind), rotor, period)
         return after._replace(position=after.position + period * wind, velocity=after.velocity + wind)
-    player = Player(table=model.weights, rotor=rotor, body=model.body, remainder=model.remainder, fuzzy=model.fuzzy)
+    player = Player(table=model.table, rotor=rotor, body=model.body, fuzzy=model.fuzzy)
     used, weights = player.step_weights(slice(None))
     return _FuzzyRuns(player, model.fuzzy, Motion(*state, period), used, weights, translates=True).one_step()
 
@@ -399,7 +374,7 @@ class _FuzzyRuns:
     def _moved(self, start: _State, at: _State, rate: Array, direct: Array, weights: Array, interval: float) -> _State:
         """Move a state for an interval with the derivatives at another one."""
         air = np.einsum("nji,nj->ni", at.rotation, at.velocity)
-        terms = np.hstack([state_terms(air, rate), remainder_terms(self.player.remainder, air)])[:, self.used.active]
+        terms = self.player.table.terms(air, rate)[:, self.used.active]
         wrench = np.einsum("nka,na->nk", weights, terms)
         momentum = start.momentum + interval * (wrench[:, :3] - direct)
         rotation = start.rotation @ rotations.turns(interval * rate)

@@ -38,6 +38,26 @@ class RotorResponse:
     slow_yaw: float = 0.0
     slow_s: float = 0.5
 
+    def terms_by_step(self, speed: Array, period: float, hold: Hold) -> Array:
+        """Evaluate the terms of the rotors over each step; parameters and shape as `rotor_terms_by_step`."""
+        terms = rotor_terms_by_step(speed, period, hold, self.delay_s, self.lag_s, self.slow_s)
+        return np.asarray(terms, dtype=float)
+
+    def terms_at_samples(self, speed: Array, period: float, hold: Hold) -> Array:
+        """Evaluate the terms of the rotors at the samples themselves, where torque and force are asked for.
+
+        A speed that stays until the next sample jumps there: taken is the middle of the jump. Parameters and shape as
+        `rotor_terms_by_step`.
+        """
+        mean, end, start = lagged(delayed(speed, self.delay_s / period, hold), self.lag_s / period, hold)
+        jumps = hold == "previous" and self.lag_s < _SHORTEST_S
+        acting = 0.5 * (start + mean) if jumps else start
+        slow = lagged(mean**2, self.slow_s / period, "previous").start
+        change = (end - start) / period
+        acceleration = 0.5 * (change + np.concatenate([change[:1], change[:-1]]))
+        one = np.ones((len(speed), 1))
+        return np.asarray(np.hstack([one, acting, acting**2, acceleration, slow - acting**2]), dtype=float)
+
 
 def rotor_terms_by_step(speed: Array, period: float, hold: Hold, delay_s: Any, lag_s: Any, slow_s: Any) -> Numbers:
     """Evaluate the terms of the rotors over each step: means of acting speeds, their squares, accelerations, slowness.
@@ -73,30 +93,3 @@ def steady_terms(speed: Array) -> Array:
     """
     still = np.zeros_like(speed)
     return np.hstack([np.ones((len(speed), 1)), speed, speed**2, still, still])
-
-
-def rotor_terms_at_samples(speed: Array, period: float, hold: Hold, response: RotorResponse) -> Array:
-    """Evaluate the terms of the rotors at the samples themselves, where torque and force are asked for.
-
-    A speed that stays until the next sample jumps there: taken is the middle of the jump.
-
-    Parameters
-    ----------
-    speed : array, shape (time, rotor), rad/s
-        Of one stretch without pauses.
-    period : float, s
-    hold : {"linear", "previous"}
-        As in `rotor_terms_by_step`.
-
-    Returns
-    -------
-    array, shape (time, 1 + 4 rotors)
-    """
-    mean, end, start = lagged(delayed(speed, response.delay_s / period, hold), response.lag_s / period, hold)
-    jumps = hold == "previous" and response.lag_s < _SHORTEST_S
-    acting = 0.5 * (start + mean) if jumps else start
-    slow = lagged(mean**2, response.slow_s / period, "previous").start
-    change = (end - start) / period
-    acceleration = 0.5 * (change + np.concatenate([change[:1], change[:-1]]))
-    one = np.ones((len(speed), 1))
-    return np.asarray(np.hstack([one, acting, acting**2, acceleration, slow - acting**2]), dtype=float)

@@ -18,9 +18,9 @@ from cpfls_cli.evolution import Evaluation, EvolutionSettings, evolve
 from cpfls_cli.evolution.ranking import comparable
 from cpfls_cli.playback.fit import Fitted, Windows, fit, stays_error, window_errors, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.groups import Group, JointLayout
+from cpfls_cli.playback.groups import Group, JointNumbers
 from cpfls_cli.playback.kernels import Airflow
-from cpfls_cli.playback.parameters import INERTIA, LEARNED, Layout, blocks_of, needs_velocity
+from cpfls_cli.playback.parameters import INERTIA, LEARNED, FreeNumbers, blocks_of, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.rounding import ascending, at_most, less, smallest
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -73,9 +73,9 @@ class Structure(NamedTuple):
         """Whether it has a remainder."""
         return not LEARNED.keys().isdisjoint(self.blocks)
 
-    def layout(self, vehicle: VehicleSettings) -> Layout:
-        """Lay out its numbers."""
-        return Layout(vehicle, self.blocks, self.rules.airflow)
+    def free(self, vehicle: VehicleSettings, groups: tuple[Group, ...] = ()) -> JointNumbers:
+        """List its numbers, and what other configurations have of their own."""
+        return JointNumbers(FreeNumbers(vehicle, self.blocks, self.rules.airflow), groups)
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ class SearchStoppedError(Exception):
 
 
 class Solution(NamedTuple):
-    """What a fit came to: `Fitted` without the layout, which follows from structure and vehicle."""
+    """What a fit came to: `Fitted` without the numbers, which follows from structure and vehicle."""
 
     values: Array
     loss: float
@@ -195,9 +195,9 @@ class _Bench:
         def fitted(part: int) -> Solution:
             known = self._known(structure, part, near)
             if first is not None:
-                layout = structure.layout(first)
-                known |= layout.named(self._fit(layout, part, known).values)
-            found = self._fit(structure.layout(self.vehicle), part, known)
+                free = structure.free(first)
+                known |= free.named(self._fit(free, part, known).values)
+            found = self._fit(structure.free(self.vehicle), part, known)
             return Solution(found.values, found.loss, found.hessian)
 
         with ThreadPoolExecutor(2) as threads:
@@ -219,18 +219,18 @@ class _Bench:
         """Give the values that a fit starts from."""
         if near is None:
             return {}
-        known = near.fits[part].layout.named(near.fits[part].values)
+        known = near.fits[part].free.named(near.fits[part].values)
         if near.structure.rules != structure.rules:
             known = {name: value for name, value in known.items() if name.split(".")[0] not in LEARNED}
         return known
 
-    def _fit(self, layout: Layout, part: int, known: Mapping[str, float]) -> Fitted:
+    def _fit(self, free: JointNumbers, part: int, known: Mapping[str, float]) -> Fitted:
         training = [windows for other, kept in enumerate(self.parts) if other != part for windows in kept]
-        return fit(layout, training, known, _SEARCH_STEPS, _SEARCH_TOLERANCE)
+        return fit(free, training, known, _SEARCH_STEPS, _SEARCH_TOLERANCE)
 
     def _judged(self, structure: Structure, solutions: Sequence[Solution]) -> Judged:
-        layout = structure.layout(self.vehicle)
-        fits = tuple(Fitted(layout, *solution) for solution in solutions)
+        free = structure.free(self.vehicle)
+        fits = tuple(Fitted(free, *solution) for solution in solutions)
         errors = [
             window_errors(fitted, windows) for fitted, kept in zip(fits, self.parts, strict=True) for windows in kept
         ]
@@ -376,11 +376,11 @@ def _shrinking(everything: Judged) -> Iterator[Structure]:
     of all parts.
     """
     structure, fits = everything.structure, everything.fits
-    layout, hessian = fits[0].layout, np.mean([fitted.hessian for fitted in fits], axis=0)
-    scale, absent = layout.scales, np.array([number.absent for number in layout.numbers])
+    free, hessian = fits[0].free, np.mean([fitted.hessian for fitted in fits], axis=0)
+    scale, absent = free.scales, np.array([number.absent for number in free.numbers])
     away = np.mean([(fitted.values - absent) / scale for fitted in fits], axis=0)
     inverse = np.linalg.inv(hessian)
-    place = {block: [i for i, n in enumerate(layout.numbers) if n.block == block] for block in structure.blocks}
+    place = {block: [i for i, n in enumerate(free.numbers) if n.block == block] for block in structure.blocks}
 
     def missed(blocks: Sequence[str]) -> float:
         at = [index for block in blocks for index in place[block]]
@@ -527,7 +527,6 @@ def fitted_to_all(
     groups : tuple of Group
         Other configurations.
     """
-    layout = structure.layout(vehicle)
     windows = windows_of(flights, settings.horizon_s, settings.window_interval_s)
-    known = start.layout.named(start.values)
-    return fit(JointLayout(layout, groups) if groups else layout, windows, known, _STEPS, _TOLERANCE), windows
+    known = start.free.named(start.values)
+    return fit(structure.free(vehicle, groups), windows, known, _STEPS, _TOLERANCE), windows

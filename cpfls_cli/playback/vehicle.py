@@ -12,13 +12,14 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.inertia import beyond_any_body
-from cpfls_cli.playback.fit import BLOCKS, AnyLayout, Fitted, Uncertainty, uncertainty
+from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.groups import OF_A_WEIGHT, Group, JointLayout
-from cpfls_cli.playback.model import VehicleModel, wrench_of
+from cpfls_cli.playback.groups import OF_A_WEIGHT, Group, JointNumbers
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import Physical, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Choice, Kept, Progress, choose, fitted_to_all
+from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _TRADED = 0.95
@@ -166,9 +167,7 @@ def find_vehicle(
     flown = {flight.group for flight in flights}
     groups = tuple(Group(group.name, group.differs or OF_A_WEIGHT) for group in settings.groups if group.name in flown)
     fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fits[0], groups)
-    spread, layout = uncertainty(fitted, windows), fitted.layout
-    model = layout.model(fitted.values)
-    joint = layout if isinstance(layout, JointLayout) else None
+    spread, model = uncertainty(fitted, windows), fitted.model
     return FoundVehicle(
         model,
         (*sensed, *bodily(begun, tuple(found_numbers(fitted, spread)))),
@@ -178,8 +177,8 @@ def find_vehicle(
         fitted.condition_number,
         spread.blocks,
         tuple(sorted(set(vehicle.unknown) - set(begun.unknown) - {number.name for number in sensed})),
-        {group.name: joint.model(fitted.values, group.name) for group in groups} if joint else {},
-        tuple(differences(joint, fitted, spread)) if joint else (),
+        {group.name: fitted.free.at(fitted.values, group.name).model for group in groups},
+        tuple(differences(fitted, spread)) if groups else (),
     )
 
 
@@ -247,14 +246,14 @@ def _sensed_thrust_factor(vehicle: VehicleSettings, flights: Sequence[PlaybackFl
 
 def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tuple[Share, ...], float]:
     """Evaluate the parts of a model along the measured motion, and the speed in the rotor plane."""
-    parts = model.part_weights()
+    parts = model.parts
     squares, speeds, samples = {name: np.zeros(6) for name in parts}, [], 0
     for flight in flights:
         velocity = np.einsum("tji,tj->ti", flight.motion.rotation, flight.motion.velocity)
-        terms = model.terms(velocity, flight.motion.rate)
+        terms = model.table.terms(velocity, flight.motion.rate)
         speeds.append(np.hypot(velocity[:, 0], velocity[:, 1]))
         for stretch in flight.stretches:
-            rotor = model.rotor_terms(flight.speed[stretch], flight.motion.period, flight.hold)
+            rotor = model.response.terms_by_step(flight.speed[stretch], flight.motion.period, flight.hold)
             samples += len(rotor)
             for name, weights in parts.items():
                 squares[name] += (wrench_of(weights, terms[stretch], rotor) ** 2).sum(axis=0)
@@ -271,16 +270,16 @@ def found_numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
     spread : Uncertainty
         Of this fit.
     """
-    layout, values = fitted.layout, fitted.values
-    physical = layout.physical(values)
-    stated = layout.physical(layout.starts)
-    half = _half_intervals(layout.physical, fitted, spread)
+    free, values = fitted.free, fitted.values
+    physical = free.physical(values)
+    stated = free.physical(free.starts)
+    half = _half_intervals(free.physical, fitted, spread)
     own = half_width(np.sqrt(np.diag(spread.covariance)), spread.blocks)
-    for place, (number, (name, found)) in enumerate(zip(layout.numbers, physical.items(), strict=True)):
+    for place, (number, (name, found)) in enumerate(zip(free.numbers, physical.items(), strict=True)):
         span = _AT_BOUND * number.scale
         bound = min(values[place] - number.low, number.high - values[place]) <= span
         ends = _interval(found.value, float(half[place]), positive=found.positive)
-        low, high = np.clip(ends, *_bounds(layout, values, place)).tolist()
+        low, high = np.clip(ends, *_bounds(free, values, place)).tolist()
         known = stated[name].value if found.stated else np.nan
         wide = high > _KNOWN * low if found.positive else own[place] > number.scale
         determined = spread.determined[place] and not wide
@@ -315,7 +314,7 @@ def _covariance(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fit
     """Turn the covariance of a fit into that of what follows from its numbers."""
     values = fitted.values
     slopes = []
-    for place, step in enumerate(_STEP * fitted.layout.scales * np.eye(len(values))):
+    for place, step in enumerate(_STEP * fitted.free.scales * np.eye(len(values))):
         ahead, behind = physical(values + step), physical(values - step)
         slopes.append([(ahead[name].value - behind[name].value) / (2 * step[place]) for name in ahead])
     # The shape is that of no numbers too, where the vehicle as stated is the best.
@@ -323,28 +322,20 @@ def _covariance(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fit
     return np.asarray(by_number.T @ spread.covariance @ by_number)
 
 
-def differences(joint: JointLayout, fitted: Fitted, spread: Uncertainty) -> Iterator[Difference]:
-    """Say what differs between configurations, with 95 % intervals.
-
-    Parameters
-    ----------
-    joint : JointLayout
-    fitted : Fitted
-        Of this layout.
-    spread : Uncertainty
-    """
-    half = _half_intervals(joint.differences, fitted, spread)
-    for (name, found), width in zip(joint.differences(fitted.values).items(), half.tolist(), strict=True):
+def differences(fitted: Fitted, spread: Uncertainty) -> Iterator[Difference]:
+    """Say what differs between configurations, with 95 % intervals."""
+    half = _half_intervals(fitted.free.differences, fitted, spread)
+    for (name, found), width in zip(fitted.free.differences(fitted.values).items(), half.tolist(), strict=True):
         yield Difference(name, found.unit, found.value, found.value - width, found.value + width)
 
 
-def _bounds(layout: AnyLayout, values: Array, place: int) -> tuple[float, float]:
+def _bounds(free: JointNumbers, values: Array, place: int) -> tuple[float, float]:
     """Give the bounds of a number as people know it, the others being what they are."""
-    number, ends = layout.numbers[place], []
+    number, ends = free.numbers[place], []
     for bound in (number.low, number.high):
         at = values.copy()
         at[place] = bound
-        ends.append(list(layout.physical(at).values())[place].value if np.isfinite(bound) else bound)
+        ends.append(list(free.physical(at).values())[place].value if np.isfinite(bound) else bound)
     return min(ends), max(ends)
 
 
@@ -358,7 +349,7 @@ def _interval(value: float, half: float, *, positive: bool) -> tuple[float, floa
 
 def _trades(fitted: Fitted, spread: Uncertainty) -> Iterator[Trade]:
     """Name pairs of numbers, as people know them, whose estimates go together."""
-    names, covariance = list(fitted.layout.physical(fitted.values)), _covariance(fitted.layout.physical, fitted, spread)
+    names, covariance = list(fitted.free.physical(fitted.values)), _covariance(fitted.free.physical, fitted, spread)
     deviation = np.sqrt(np.diag(covariance))
     correlation = covariance / np.maximum(np.outer(deviation, deviation), np.finfo(float).tiny)
     for first, second in np.argwhere(np.triu(np.abs(correlation) > _TRADED, 1)).tolist():

@@ -173,7 +173,7 @@ class Plant:
             return np.asarray(signals.wrench[0])
         squared = rotors.speed**2
         terms = np.concatenate([[1.0], rotors.speed, squared, rotors.acceleration, rotors.slow - squared])
-        return np.asarray(self.whole.wrench(signals.air_velocity, signals.body_rate, terms[None])[0])
+        return np.asarray(self.whole.table.wrench(signals.air_velocity, signals.body_rate, terms[None])[0])
 
 
 def instant(vehicle: VehicleSettings, state: Array, rotor_speed: Array) -> Signals:

@@ -15,8 +15,9 @@ from cpfls_cli.effects.polynomial import FACTORS, state_terms
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Motion
-from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel, remainder_terms
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.playback.table import Remainder, remainder_terms
 from cpfls_cli.rotations import rotation_matrix
 from cpfls_cli.vehicle import RotorSettings, VehicleSettings
 from cpfls_cli.vehicle.rotors import allocation_matrix
@@ -229,8 +230,8 @@ class _Fleet:
         self.marks = np.unique(np.append(even, np.round(model.response.delay_s / period % 1.0, 9)))
         self.ends = np.cumsum([3, 3, 4, 3, self.rotors])
         self.weight = np.array([0.0, 0.0, model.vehicle.gravity_m_s2])
-        self.used = np.flatnonzero(np.any(model.weights, axis=(0, 2)))
-        self.weights = model.weights[:, self.used].reshape(-1, model.weights.shape[2]).T
+        self.used = np.flatnonzero(np.any(model.table.weights, axis=(0, 2)))
+        self.weights = model.table.weights[:, self.used].reshape(-1, model.table.weights.shape[2]).T
         self.ones = np.ones((self.flights, 1))
         # Among 1, air velocity and rate; what is no product of two of them is left to the package.
         pairs = np.vstack([[(0, 0)], [(axis, 0) for axis in range(1, 7)], FACTORS + 1])

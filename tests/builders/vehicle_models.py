@@ -17,8 +17,9 @@ from cpfls_cli.artifacts.vehicle_model import (
 )
 from cpfls_cli.effects.polynomial import Probe, polynomial
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.playback.table import Remainder
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 QUAD = VehicleSettings(

@@ -185,7 +185,7 @@ def test_the_page_predicts_what_the_library_does(cpfls, tmp_path, monkeypatch):
     said = [float(word) for word in subprocess.run([program], capture_output=True, check=True).stdout.split()]
     speed = (1000.0 + 7 * (np.arange(80) % 13)).reshape(20, 4)
     state = State(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0]]), np.eye(3)[None], np.zeros((1, 3)))
-    for row in model.rotor_terms(speed, 0.01, "previous"):
+    for row in model.response.terms_by_step(speed, 0.01, "previous"):
         state = step(model, state, row[None], 0.01)
     wanted = [0, state.position[0, 0], state.velocity[0, 2], state.rate[0, 1]]
     np.testing.assert_allclose(said, wanted, rtol=1e-9)

@@ -73,10 +73,10 @@ def mjcf_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) -> str:
     """
     root = ElementTree.Element("mujoco", model=sheet.name)
     root.append(ElementTree.Comment(xml_text([*sheet.facts, "", *told, "", *_USE])))
-    drag = -float(held.weights[3, _DRAG[0], 0])
+    drag = -float(held.table.weights[3, _DRAG[0], 0])
     option = {"timestep": number(STEP_S), "integrator": "RK4", "gravity": f"0 0 {number(-held.body.gravity)}"}
     ElementTree.SubElement(root, "option", option | ({"density": number(_DENSITY)} if drag else {}))
-    actuators = list(_actuators(sheet.model, held.weights))
+    actuators = list(_actuators(sheet.model, held.table.weights))
     custom = ElementTree.SubElement(root, "custom")
     for name, values in (("rotor", [a.rotor for a in actuators]), ("power", [a.power for a in actuators])):
         ElementTree.SubElement(custom, "numeric", name=f"ctrl_{name}", data=" ".join(map(str, values)))

@@ -45,7 +45,7 @@ def rotorpy_held(model: VehicleModel) -> tuple[Held, Holds]:
     numbers = numbers_of(model, _wrenches, alike=True)
     body = constant_body(model)._replace(gravity=_GRAVITY)
     held = held_by(model, numbers.holds, RotorResponse(lag_s=model.response.lag_s), body)
-    return replace(held, numbers=numbers.of(model.weights)), numbers.holds
+    return replace(held, numbers=numbers.of(model.table.weights)), numbers.holds
 
 
 def _wrenches(signals: Signals) -> Mapping[str, Array]:

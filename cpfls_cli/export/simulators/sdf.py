@@ -48,7 +48,7 @@ def sdf_held(model: VehicleModel) -> tuple[Held, Holds]:
     margin = 2.0 * _MARGIN * _ROTOR_SHARE * model.body.mass * float((heights**2).sum())
     body = of_a_body(constant_body(model), margin)
     held = held_by(model, numbers.holds, RotorResponse(lag_s=model.response.lag_s), body)
-    return replace(held, numbers=numbers.of(model.weights)), numbers.holds
+    return replace(held, numbers=numbers.of(model.table.weights)), numbers.holds
 
 
 def _wrenches(signals: Signals) -> Mapping[str, Array]:

@@ -6,10 +6,10 @@ import pytest
 from benchmarks.shared.playback_scores import free_runs, score
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.fit import Windows, fit
-from cpfls_cli.playback.model import wrench_of
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Structure, choose, fitted_to_all
+from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.playback.vehicle import find_vehicle
 from tests.builders.playback_flights import (
     KINDS,
@@ -32,11 +32,11 @@ RATE = 3
 
 def fitted(vehicle, blocks, flights):
     windows = [Windows.of(flight, 50, 60) for flight in flights]
-    return fit(Structure(blocks).layout(vehicle), windows, {}, 60, 3e-5)
+    return fit(Structure(blocks).free(vehicle), windows, {}, 60, 3e-5)
 
 
 def numbers(found):
-    return {name: number.value for name, number in found.layout.physical(found.values).items()}
+    return {name: number.value for name, number in found.free.physical(found.values).items()}
 
 
 def chosen(vehicle, flights, candidates, **asked):
@@ -60,10 +60,7 @@ def test_with_noise_they_come_back_and_predict_another_flight(noisy):
     found = fitted(STATED, TRUE_BLOCKS, noisy)
     assert judged(numbers(found)) == pytest.approx(judged(true_numbers()), rel=0.05)
     other = flown(truth(), duration_s=10.0, seed=2, noise=MIDDLING)
-    by_found, by_truth = (
-        score([free_runs(model, flight, 5) for flight in other])
-        for model in (found.layout.model(found.values), truth())
-    )
+    by_found, by_truth = (score([free_runs(model, flight, 5) for flight in other]) for model in (found.model, truth()))
     assert (by_found.sums < 1.1 * by_truth.sums).all()
 
 
@@ -100,7 +97,7 @@ def test_a_force_without_a_name_is_learned_and_what_has_a_name_is_not():
     found, settings = chosen(STATED, flights, (*true, "remainder"), search_windows=60, folds=2, horizon_s=0.3)
     assert set(found.structure.blocks) == true
     final, _ = fitted_to_all(found.structure, STATED, flights, settings, found.fits[0])
-    learned, flew = (pushes(model) for model in (final.layout.model(final.values), pushed()))
+    learned, flew = (pushes(model) for model in (final.model, pushed()))
     assert np.abs(learned - flew).max() < 0.1 * np.abs(flew).max()
 
 
@@ -108,8 +105,8 @@ def pushes(model, speed=2.0):
     """The learned force over the direction of flight, near hover."""
     angle = np.linspace(0, 2 * np.pi, 36)
     velocity = speed * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
-    rotor = model.rotor_terms(np.full((len(angle), model.rotors), hover_speed(STATED)), 0.01, "previous")
-    return wrench_of(model.part_weights()["remainder"], model.terms(velocity, 0 * velocity), rotor)[:, 3:]
+    rotor = model.response.terms_by_step(np.full((len(angle), model.rotors), hover_speed(STATED)), 0.01, "previous")
+    return wrench_of(model.parts["remainder"], model.table.terms(velocity, 0 * velocity), rotor)[:, 3:]
 
 
 def test_the_drag_of_another_simulator_is_found():
@@ -117,11 +114,11 @@ def test_the_drag_of_another_simulator_is_found():
     candidates = (*(effect.name for effect in hidden), "com_offset")
     found, settings = chosen(ROTORPY, flights, candidates, search_windows=20, folds=2)
     final, _ = fitted_to_all(found.structure, ROTORPY, flights, settings, found.fits[0])
-    layout = final.layout
-    assert {effect.name for effect in hidden} <= set(layout.blocks)
+    free = final.free
+    assert {effect.name for effect in hidden} <= set(free.base.blocks)
     known = {effect.name: effect.coefficients for effect in hidden}
-    for effect in layout.model(final.values).effects:
-        scale = layout.scales[[number.block == effect.name for number in layout.numbers]]
+    for effect in final.model.effects:
+        scale = free.scales[[number.block == effect.name for number in free.numbers]]
         # Without noise, another block may be left to make up for the step of 10 ms: it is next to nothing.
         true = known.get(effect.name, np.zeros(len(scale)))
         assert effect.coefficients == pytest.approx(true, rel=0.02, abs=1e-4 * scale.max())

@@ -36,8 +36,8 @@ def test_the_round_trip_is_exact(model, tmp_path):
     assert again.vehicle == model.vehicle
     assert (again.response, again.thrust_linear) == (model.response, model.thrust_linear)
     assert [(one.name, one.shape) for one in again.effects] == [(one.name, one.shape) for one in model.effects]
-    assert np.array_equal(again.weights, model.weights)
-    assert all(np.array_equal(new, old) for new, old in zip(again.airflow, model.airflow, strict=True))
+    assert np.array_equal(again.table.weights, model.table.weights)
+    assert all(np.array_equal(new, old) for new, old in zip(again.table.airflow, model.table.airflow, strict=True))
 
 
 def test_an_effect_that_nobody_knows_is_refused():

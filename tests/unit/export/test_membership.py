@@ -18,7 +18,8 @@ from cpfls_cli.export import c_source, python_source
 from cpfls_cli.export.json_form import HOW_TO_EVALUATE, HOW_TO_EVALUATE_INERTIA
 from cpfls_cli.fuzzy.membership import Z_FUNCTION, memberships, z_function
 from cpfls_cli.playback import kernels as playback
-from cpfls_cli.playback.model import Remainder, VehicleModel
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.table import Remainder
 from cpfls_cli.regressor import Motion, Regressor, kernels
 from cpfls_cli.regressor.table import mapped_inputs, padded_breakpoints, structure_table
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -140,7 +141,7 @@ def test_the_compiled_loops_of_playback(airflow):
     """One step from rest changes the rate by the torque at its middle, where the airflow is that of the start."""
     model, samples = airflow.model, len(airflow.air)
     rotor = np.eye(1, 1 + 4 * model.rotors).repeat(samples, axis=0)
-    used, weights = model.step_weights(rotor)
+    used, weights = model.table.by_step(rotor)
     still, level = np.zeros((samples + 1, 3)), np.eye(3)[None].repeat(samples + 1, axis=0)
     velocity = np.vstack([airflow.air, airflow.air[:1]])
     errors, period = np.zeros((samples, 1, 4, 3)), 1e-7

@@ -117,7 +117,7 @@ def test_a_step_under_an_inertia_over_attitude_is_that_of_the_library(name, form
     assert np.max(np.abs(moved - wanted)) < ALLOWED * np.abs(wanted).max()
     assert np.max(np.abs(constant - wanted)) > 1e-5
     air = np.einsum("nji,nj->ni", state.rotation, velocity)
-    torque, turning = model.wrench(air, rate, rotor)[:, :3], identified_turning(model.fuzzy)
+    torque, turning = model.table.wrench(air, rate, rotor)[:, :3], identified_turning(model.fuzzy)
     for row, own in enumerate(found[:, 3:]):
         law = turning(attitude[row], rate[row])
         left = law.inertia @ own + law.direct - torque[row]
@@ -165,7 +165,7 @@ def test_acting_rotors_are_those_of_the_library(response, tmp_path):
             for period in (0.01, 0.0025, 0.0371):
                 # What comes after the last sample nobody knows, and no step of a flight begins there.
                 found = exported.rotor_terms(speed, period, hold)[:-1]
-                wanted = model.rotor_terms(speed, period, hold)[:-1]
+                wanted = model.response.terms_by_step(speed, period, hold)[:-1]
                 assert np.max(np.abs(found - wanted) / size) < ALLOWED * max(1.0, PERIOD / period), (form, hold, period)
 
 
@@ -178,7 +178,7 @@ def test_steps_along_a_flight_are_those_of_the_compiled_loops(exports, name, for
     exported, rotor = exports(name, form), exports(name, form).rotor_terms(run.speed, PERIOD, "linear")
     path = run.states
     _, moved = exported.motion(State(*(part[:-1] for part in path)), rotor[:-1], PERIOD)
-    used, weights = model.step_weights(model.rotor_terms(run.speed, PERIOD, "linear"))
+    used, weights = model.table.by_step(model.response.terms_by_step(run.speed, PERIOD, "linear"))
     size = max(np.abs(part).max() for part in path)
     for sample in range(len(moved)):
         position, velocity, rotation, rate = np.split(moved[sample], [3, 6, 15])

@@ -85,7 +85,7 @@ def test_what_is_no_polynomial_is_named():
     effects = (fitted("wind", 1.0, 0.0), fitted("torque_bias", 0.1, 0, 0), fitted("battery_sag", exponent=1.5))
     whole = whole_vehicle(ExtendedModel(None, parameters(), effects), QUAD)
     assert whole.beside_table == ("battery_sag", "wind")
-    assert [*whole.part_weights()] == ["rotors", "torque_bias"]
+    assert [*whole.parts] == ["rotors", "torque_bias"]
 
 
 def test_height_of_the_mass_and_wind_are_those_of_the_effects():
@@ -112,8 +112,8 @@ def test_height_of_the_mass_and_wind_are_those_of_the_effects():
     for changed in (lower, replace(whole, wind=(0.0, 0.0, 0.0))):
         assert np.abs(free_runs(player_of(changed, flight), flight, starts, 12).errors - runs).max() > 1e-3
     # The height alone has a lever for the forces across the rotors, which the thrust is none of.
-    table, centre = whole.part_weights()["com_offset"], np.array([0.004, -0.003, 0.02])
-    forces = whole.weights[3:]
+    table, centre = whole.parts["com_offset"], np.array([0.004, -0.003, 0.02])
+    forces = whole.table.weights[3:]
     np.testing.assert_allclose(table[:3], -np.cross(centre, forces, axisb=0, axisc=0), atol=1e-15)
 
 
@@ -149,8 +149,8 @@ def test_a_whole_vehicle_as_a_model_with_one_effect_has_its_torque_force_and_ine
     (recording,) = of_vehicle([Recording("flight", replace(signals(), vehicle=replace(QUAD, mass_kg=1.0)))], model)
     flown, extended = recording.signals, with_effects(model)
     assert (flown.vehicle, extended.base) == (model.vehicle, None)
-    rotor = model.rotor_terms_at(flown.rotor_speed, flown.period, "linear")
-    wanted = model.wrench(flown.air_velocity, flown.body_rate, rotor)
+    rotor = model.response.terms_at_samples(flown.rotor_speed, flown.period, "linear")
+    wanted = model.table.wrench(flown.air_velocity, flown.body_rate, rotor)
     (beyond,) = extended.chosen
     found = flown.wrench + columns_of(beyond, flown).direct[:, :, 0]
     np.testing.assert_allclose(found, wanted, atol=1e-12 * np.abs(wanted).max())

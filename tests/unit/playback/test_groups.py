@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli.playback.fit import fit, uncertainty, windows_of
-from cpfls_cli.playback.groups import Group, JointLayout
+from cpfls_cli.playback.groups import Group, JointNumbers
 from cpfls_cli.playback.kernels import Airflow
-from cpfls_cli.playback.parameters import Layout
+from cpfls_cli.playback.parameters import FreeNumbers
 from cpfls_cli.playback.vehicle import Difference, differences
 from tests.builders.playback_flights import (
     ADDED_AT,
@@ -23,7 +23,9 @@ from tests.builders.playback_flights import (
 )
 
 NO_REMAINDER = Airflow(np.zeros(0), 0)
-JOINT = JointLayout(Layout(STATED, TRUE_BLOCKS, NO_REMAINDER), (Group("payload", ("mass", "com_offset", "inertia")),))
+JOINT = JointNumbers(
+    FreeNumbers(STATED, TRUE_BLOCKS, NO_REMAINDER), (Group("payload", ("mass", "com_offset", "inertia")),)
+)
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +53,7 @@ def test_shared_numbers_stand_once_and_own_ones_beside_them():
 
 
 def test_added_mass_and_its_place_are_found(found):
-    by_name: dict[str, Difference] = {each.name: each for each in differences(JOINT, *found)}
+    by_name: dict[str, Difference] = {each.name: each for each in differences(*found)}
     mass = by_name["payload: added mass"]
     assert mass.low < ADDED_KG < mass.high
     assert mass.value == pytest.approx(ADDED_KG, rel=0.06)
@@ -63,8 +65,8 @@ def test_added_mass_and_its_place_are_found(found):
 
 def test_model_of_each_configuration_has_its_mass(found):
     fitted, _ = found
-    assert JOINT.model(fitted.values).vehicle.mass_kg == STATED.mass_kg
-    loaded = JOINT.model(fitted.values, "payload")
+    assert fitted.model.vehicle.mass_kg == STATED.mass_kg
+    loaded = JOINT.at(fitted.values, "payload").model
     assert loaded.vehicle.mass_kg == pytest.approx(STATED.mass_kg + ADDED_KG, rel=0.003)
     offset = next(each for each in loaded.effects if each.name == "com_offset")
     assert offset.coefficients == pytest.approx(ADDED_KG * ADDED_AT / (STATED.mass_kg + ADDED_KG), rel=0.03)
@@ -76,7 +78,7 @@ def test_effects_stay_what_they_are_where_the_inertia_differs():
     windows = windows_of([*flown(truth(), KINDS, seed=1), *others], 0.5, 0.6)
     found = fit(JOINT, windows, {}, 60, 3e-5)
     for group, flew in (("", truth()), ("payload", loaded())):
-        model = JOINT.model(found.values, group)
+        model = JOINT.at(found.values, group).model
         assert model.vehicle.inertia_kg_m2[:3] == pytest.approx(flew.vehicle.inertia_kg_m2, rel=0.001)
         known = {effect.name: effect.coefficients for effect in flew.effects}
         for effect in model.effects:
@@ -89,11 +91,11 @@ def test_gradient_by_a_number_of_a_group_is_that_of_its_flights(flights, blocks)
     from cpfls_cli.playback.fit import _evaluated
 
     windows = windows_of([flights[0], flights[-1]], 0.2, 2.0)
-    layout = replace(JOINT, base=Layout(STATED, blocks, NO_REMAINDER))
-    values = layout.starts + 0.1 * layout.scales
-    gradient = _evaluated(layout, windows, values).gradient
-    for place, scale in enumerate(layout.scales):
+    free = replace(JOINT, base=FreeNumbers(STATED, blocks, NO_REMAINDER))
+    values = free.starts + 0.1 * free.scales
+    gradient = _evaluated(free, windows, values).gradient
+    for place, scale in enumerate(free.scales):
         step = np.zeros(len(values))
         step[place] = 1e-6 * scale
-        ahead, behind = (_evaluated(layout, windows, values + sign * step).objective for sign in (1, -1))
+        ahead, behind = (_evaluated(free, windows, values + sign * step).objective for sign in (1, -1))
         assert gradient[place] == pytest.approx((ahead - behind) / 2e-6, rel=2e-4, abs=2e-7)

@@ -33,12 +33,12 @@ def states(count, seed=1):
 
 def test_a_step_is_that_of_the_compiled_loops(model):
     """A run over a flight is held against the steps themselves: what is left is rounding."""
-    rotor = model.rotor_terms(speeds(model, 12), PERIOD, "linear")
+    rotor = model.response.terms_by_step(speeds(model, 12), PERIOD, "linear")
     path = [State(*(part[:1] for part in states(1)))]
     for row in rotor[:-1]:
         path.append(step(model, path[-1], row[None], PERIOD))
     motion = Motion(*(np.concatenate(parts) for parts in zip(*path, strict=True)), PERIOD)
-    used, weights = model.step_weights(rotor)
+    used, weights = model.table.by_step(rotor)
     errors = np.zeros((1, len(path) - 1, 4, 3))
     starts = np.zeros(1, dtype=np.int64)
     assert errors_of_runs(motion, model.body, used, weights, starts, True, errors).tolist() == [-1]
@@ -46,7 +46,7 @@ def test_a_step_is_that_of_the_compiled_loops(model):
 
 
 def test_a_short_step_is_the_acceleration(model):
-    state, rotor = states(5), model.rotor_terms(speeds(model, 5), PERIOD, "previous")
+    state, rotor = states(5), model.response.terms_by_step(speeds(model, 5), PERIOD, "previous")
     linear, angular = accelerations(model, state, rotor)
     moved = step(model, state, rotor, 1e-6)
     np.testing.assert_allclose((moved.velocity - state.velocity) / 1e-6, linear, rtol=0, atol=1e-4 * abs(linear).max())
@@ -57,7 +57,7 @@ def test_a_vehicle_at_hover_stays(model):
     plain = VehicleModel(vehicle=model.vehicle)
     speed = rotor_demand(model.vehicle, np.array([model.vehicle.mass_kg * 9.81]), np.zeros((1, 3))).speed
     still = State(np.zeros((1, 3)), np.zeros((1, 3)), np.eye(3)[None], np.zeros((1, 3)))
-    moved = step(plain, still, plain.rotor_terms(speed, PERIOD, "previous"), PERIOD)
+    moved = step(plain, still, plain.response.terms_by_step(speed, PERIOD, "previous"), PERIOD)
     for now, before in zip(moved, still, strict=True):
         np.testing.assert_allclose(now, before, rtol=0, atol=1e-12)
 
@@ -73,10 +73,10 @@ def test_rotor_speeds_of_a_wrench_give_that_wrench(model, behind):
     count = 400
     speed, state = speeds(model, count), states(count)
     slow = speeds(model, count, 5) ** 2 if behind else None
-    wanted = model.wrench(state.velocity, state.rate, steady(speed, slow))
+    wanted = model.table.wrench(state.velocity, state.rate, steady(speed, slow))
     found = rotor_speeds(model, state.velocity, state.rate, wanted[:, 5], wanted[:, :3], slow)
     assert np.isfinite(found).all()
-    given = model.wrench(state.velocity, state.rate, steady(found, slow))[:, [0, 1, 2, 5]]
+    given = model.table.wrench(state.velocity, state.rate, steady(found, slow))[:, [0, 1, 2, 5]]
     size = np.abs(wanted[:, [0, 1, 2, 5]]).max(axis=0)
     assert np.max(np.abs(given - wanted[:, [0, 1, 2, 5]]) / size) < 1e-8
     if model.rotors == 4:

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from cpfls_cli.playback import vehicle
+from cpfls_cli.playback.evaluation import Evaluated
 from cpfls_cli.playback.fit import Windows, fit, loss_of, rate_stays, uncertainty, window_errors, window_sums
+from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.kernels import Airflow, errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.parameters import Evaluated, Layout, blocks_of
+from cpfls_cli.playback.parameters import FreeNumbers, blocks_of
 from tests.builders.playback_flights import MIDDLING, STATED, flown, truth
 
 RULES = {"one rule": Airflow(np.array([0.0, 1.0]), 2), "seesaw": Airflow(np.array([0.0, 0.3, 0.6, 1.0]), 0)}
@@ -18,46 +20,51 @@ def flight():
     return flown(truth(), ("multisine",), duration_s=3.0, seed=5)[0]
 
 
-def somewhere(layout, seed=0):
+def numbers(*given):
+    """The free numbers of one configuration."""
+    return JointNumbers(FreeNumbers(*given))
+
+
+def somewhere(free, seed=0):
     """Numbers near the stated ones, none of them where its derivative could vanish."""
-    away = 0.05 * layout.scales * np.random.default_rng(seed).standard_normal(len(layout.numbers))
-    return np.clip(layout.starts + away, layout.lows, layout.highs)
+    away = 0.05 * free.scales * np.random.default_rng(seed).standard_normal(len(free.numbers))
+    return np.clip(free.starts + away, free.lows, free.highs)
 
 
 @pytest.mark.parametrize("rules", RULES.values(), ids=RULES)
 def test_the_gradient_is_the_difference_quotient_for_every_number(flight, rules):
-    layout = Layout(STATED, blocks_of(STATED), rules)
-    values, scale = somewhere(layout), layout.scales
+    free = numbers(STATED, blocks_of(STATED), rules)
+    values, scale = somewhere(free), free.scales
     starts = flight.starts(20, 40)
     windows = Windows(flight, starts, loss_of(flight, rate_stays(flight, starts, 20)))
     group = np.zeros(len(starts), dtype=np.int64)
-    gradient = window_sums(Evaluated.of(layout, values), windows, group)[1][0] * scale
+    gradient = window_sums(Evaluated.of(free.base, values), windows, group)[1][0] * scale
     step = 1e-5
-    for place, number in enumerate(layout.numbers):
+    for place, number in enumerate(free.numbers):
         moved = step * scale[place] * np.eye(len(values))[place]
         ahead, behind = (
-            window_sums(Evaluated.of(layout, v), windows, group)[0] for v in (values + moved, values - moved)
+            window_sums(Evaluated.of(free.base, v), windows, group)[0] for v in (values + moved, values - moved)
         )
         assert gradient[place] == pytest.approx((ahead - behind) / (2 * step), rel=1e-4, abs=1e-6), number.name
 
 
 def test_the_sum_of_the_loss_is_that_of_the_windows(flight):
-    layout = Layout(STATED, ("inertia", "linear_damping"), RULES["one rule"])
+    free = numbers(STATED, ("inertia", "linear_damping"), RULES["one rule"])
     windows = Windows.of(flight, 20, 30)
-    evaluated = Evaluated.of(layout, layout.starts)
+    evaluated = Evaluated.of(free.base, free.starts)
     total, by_group, _ = window_sums(evaluated, windows, np.arange(len(windows.starts), dtype=np.int64))
-    fitted = fit(layout, [windows], {}, 0, 1e-3)
+    fitted = fit(free, [windows], {}, 0, 1e-3)
     assert window_errors(fitted, windows).sum() == pytest.approx(total, rel=1e-12)
     assert len(by_group) == len(windows.starts)
 
 
 @pytest.mark.parametrize("rules", RULES.values(), ids=RULES)
 def test_the_model_of_the_numbers_runs_as_they_do(flight, rules):
-    layout = Layout(STATED, blocks_of(STATED), rules)
-    values = somewhere(layout, seed=1)
-    model, evaluated, starts = layout.model(values), Evaluated.of(layout, values), flight.starts(30, 50)
-    rotor = model.rotor_terms(flight.speed, flight.motion.period, flight.hold)
-    used, weights = model.step_weights(rotor)
+    free = numbers(STATED, blocks_of(STATED), rules)
+    values = somewhere(free, seed=1)
+    model, evaluated, starts = free.at(values).model, Evaluated.of(free.base, values), flight.starts(30, 50)
+    rotor = model.response.terms_by_step(flight.speed, flight.motion.period, flight.hold)
+    used, weights = model.table.by_step(rotor)
     runs, expected = (np.empty((len(starts), 30, 4, 3)) for _ in range(2))
     errors_of_runs(flight.motion, model.body, used, weights, starts, True, runs)
     terms = evaluated.rotor_terms(flight, np.arange(len(flight)))
@@ -66,30 +73,28 @@ def test_the_model_of_the_numbers_runs_as_they_do(flight, rules):
 
 
 def test_the_stated_numbers_make_the_stated_vehicle():
-    layout = Layout(STATED, ("inertia", "thrust_factor", "drag_factor", "products"), RULES["one rule"])
-    model = layout.model(layout.starts)
+    free = numbers(STATED, ("inertia", "thrust_factor", "drag_factor", "products"), RULES["one rule"])
+    model = free.at(free.starts).model
     assert model.vehicle.inertia_kg_m2[:3] == pytest.approx(STATED.inertia_kg_m2)
     assert model.vehicle.rotors == STATED.rotors
     assert model.effects == ()
 
 
 def test_numbers_are_read_in_si():
-    layout = Layout(STATED, ("inertia", "thrust_factor", "slow_actuation"), RULES["one rule"])
-    values = layout.values(
-        {"inertia.log_Iyy": np.log(2.0), "thrust_factor.scale": 0.9, "slow_actuation.log_slow_s": 0.0}
-    )
-    found = layout.physical(values)
+    free = numbers(STATED, ("inertia", "thrust_factor", "slow_actuation"), RULES["one rule"])
+    values = free.values({"inertia.log_Iyy": np.log(2.0), "thrust_factor.scale": 0.9, "slow_actuation.log_slow_s": 0.0})
+    found = free.physical(values)
     assert found["inertia.Iyy"].value == pytest.approx(2 * STATED.inertia_kg_m2[1])
     assert found["thrust_factor"].value == pytest.approx(0.9 * STATED.rotors[0].thrust_factor_n_s2)
     assert found["slow_actuation.slow_s"].value == pytest.approx(1.0)
 
 
 def test_a_number_that_the_flight_does_not_show_is_not_determined(flight):
-    layout = Layout(STATED, ("rotor_gyroscopic", "linear_damping"), RULES["one rule"])
+    free = numbers(STATED, ("rotor_gyroscopic", "linear_damping"), RULES["one rule"])
     # Without any yaw effort the rotors' spins cancel, and nothing gyroscopic is left.
     still = flight.speed.mean(axis=1, keepdims=True) * np.ones(4)
     quiet = [Windows.of(type(flight)(**{**vars(flight), "speed": still}), 20, 20)]
-    spread = uncertainty(fit(layout, quiet, {}, 20, 1e-4), quiet)
+    spread = uncertainty(fit(free, quiet, {}, 20, 1e-4), quiet)
     assert spread.determined.tolist() == [False, True, True, True]
 
 
@@ -97,7 +102,7 @@ def test_an_interval_ends_at_the_bound_on_which_its_number_sits():
     """Rotors that follow at once are asked for their lag, of which at least 1 ms is believed."""
     flights = flown(VehicleModel(vehicle=STATED), ("multisine", "steps"), duration_s=4.0, noise=MIDDLING, seed=1)
     windows = [Windows.of(each, 20, 20) for each in flights]
-    fitted = fit(Layout(STATED, ("lag", "inertia"), RULES["one rule"]), windows, {}, 30, 1e-5)
+    fitted = fit(numbers(STATED, ("lag", "inertia"), RULES["one rule"]), windows, {}, 30, 1e-5)
     lag, *inertia = vehicle.found_numbers(fitted, uncertainty(fitted, windows))
     assert (lag.value, lag.low, lag.at_bound) == (0.001, 0.001, True)
     assert 0.001 < lag.high < 0.003
@@ -108,5 +113,5 @@ def test_an_interval_ends_at_the_bound_on_which_its_number_sits():
 
 def test_a_vehicle_as_it_is_stated_has_no_numbers(flight):
     windows = [Windows.of(flight, 20, 20)]
-    fitted = fit(Layout(STATED, (), Airflow(np.zeros(0), 0)), windows, {}, 20, 1e-4)
+    fitted = fit(numbers(STATED, (), Airflow(np.zeros(0), 0)), windows, {}, 20, 1e-4)
     assert list(vehicle.found_numbers(fitted, uncertainty(fitted, windows))) == []

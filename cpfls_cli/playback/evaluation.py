@@ -1,0 +1,330 @@
+"""A vehicle at values of its free numbers: its model, what people read of it, and its derivatives by the numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects.polynomial import Probe
+from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, symmetric
+from cpfls_cli.lag import Numbers
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.kernels import Body, Parameters, Terms
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.playback.parameters import (
+    DELAY,
+    DRAG,
+    LAG,
+    LAW,
+    LEARNED,
+    LOG_COUNTED,
+    LOG_INERTIA,
+    LOG_MASS,
+    PRODUCT_NAMES,
+    SLOW,
+    SLOW_SHARES,
+    THRUST,
+    FreeNumbers,
+    Physical,
+)
+from cpfls_cli.playback.rotors import RotorResponse, rotor_terms_by_step
+from cpfls_cli.playback.table import body_of, effect_weights, rotor_weights, used_terms, weights_by_step
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+_STEP = 1e-30
+"""Imaginary step of a derivative: so small that no digit is lost."""
+
+
+@dataclass(frozen=True)
+class VehicleAt:
+    """The vehicle that values of its free numbers make.
+
+    Attributes
+    ----------
+    free : FreeNumbers
+    values : array, shape (number,)
+    """
+
+    free: FreeNumbers
+    values: Array
+
+    def get(self, name: str, otherwise: float) -> float:
+        """Give the value of a number, or another one where it is not free."""
+        return float(self.values[self.free.index[name]]) if name in self.free.index else otherwise
+
+    @cached_property
+    def root_inertia(self) -> Array:
+        """Roots of the ratios of the moments of inertia to the stated ones, shape (3,)."""
+        return np.exp(0.5 * np.array([self.get(name, 0.0) for name in LOG_INERTIA]))
+
+    @cached_property
+    def inertia(self) -> Array:
+        """Inertia tensor, shape (3, 3), kg m^2."""
+        tensor = symmetric(self.free.vehicle.inertia_kg_m2) + symmetric(
+            [0.0, 0.0, 0.0, *(self.get(name, 0.0) for name in PRODUCT_NAMES)]
+        )
+        return np.asarray(self.root_inertia[:, None] * tensor * self.root_inertia)
+
+    @property
+    def response(self) -> RotorResponse:
+        """Response of the rotors."""
+        return RotorResponse(
+            delay_s=self.get(DELAY, 0.0),
+            lag_s=self.get(LAG, 0.0),
+            slow_roll_pitch=self.get(SLOW_SHARES[0], 0.0),
+            slow_yaw=self.get(SLOW_SHARES[1], 0.0),
+            slow_s=float(np.exp(self.get(SLOW, float(np.log(RotorResponse().slow_s))))),
+        )
+
+    @cached_property
+    def rotor_table(self) -> Array:
+        """Weights of the rotors alone, shape (6, 1 + 4 rotors)."""
+        weights = rotor_weights(self.free.vehicle, self.get(LAW, 0.0), self.response)
+        thrust, drag = self.get(THRUST, 1.0), self.get(DRAG, 1.0)
+        return np.array([thrust, thrust, drag, thrust, thrust, thrust])[:, None] * weights
+
+    @cached_property
+    def log_counted(self) -> Array:
+        """Inertia, as logarithms of ratios, in units of which coefficients of torque are counted, shape (3,)."""
+        return np.array([self.get(name, 0.0) for name in self.free.counting])
+
+    @cached_property
+    def coefficients(self) -> Mapping[str, float]:
+        """Coefficients of effects and remainder in SI, by name."""
+        return {
+            name: float(self.values[self.free.index[name]] * np.exp(column.share @ self.log_counted))
+            for name, column in self.free.columns.items()
+        }
+
+    @cached_property
+    def table(self) -> Array:
+        """Weights of torque and force, shape (6, terms, 1 + 4 rotors)."""
+        table = np.zeros(self.free.table_shape)
+        table[:, 0] += self.rotor_table
+        for name, coefficient in self.coefficients.items():
+            if coefficient:
+                table += coefficient * self.free.columns[name].scaled(self.drag_over_thrust)
+        return table * self.forces_by_mass
+
+    @property
+    def mass(self) -> float:
+        """Mass, kg."""
+        return self.free.vehicle.mass_kg * float(np.exp(self.get(LOG_MASS, 0.0)))
+
+    @property
+    def drag_over_thrust(self) -> float:
+        """By how much more the drag factor differs from the stated one than the thrust factor does."""
+        return self.get(DRAG, 1.0) / self.get(THRUST, 1.0)
+
+    @property
+    def forces_by_mass(self) -> Array:
+        """What rows of the weights are multiplied with: runs divide forces by the stated mass; shape (6, 1, 1)."""
+        share = self.free.vehicle.mass_kg / self.mass
+        return np.array([1.0, 1.0, 1.0, share, share, share])[:, None, None]
+
+    @cached_property
+    def vehicle(self) -> VehicleSettings:
+        """The vehicle with what was found as its own numbers."""
+        thrust, drag, stated = self.get(THRUST, 1.0), self.get(DRAG, 1.0), self.free.vehicle
+        rotors = tuple(
+            replace(
+                rotor,
+                thrust_factor_n_s2=rotor.thrust_factor_n_s2 * thrust,
+                drag_factor_n_m_s2=rotor.drag_factor_n_m_s2 * drag,
+            )
+            for rotor in stated.rotors
+        )
+        xx, yy, zz, xy, xz, yz = (float(self.inertia[entry]) for entry in INERTIA_ENTRIES)
+        inertia = (xx, yy, zz, xy, xz, yz)
+        return replace(stated, mass_kg=self.mass, rotors=rotors, inertia_kg_m2=inertia, unknown=())
+
+    @cached_property
+    def effects(self) -> tuple[ModelEffect, ...]:
+        """Effects, their coefficients counted on this vehicle and not on the stated one: some share its thrust."""
+        probe, effects = Probe.of(self.vehicle), []
+        for name in self.free.effects:
+            numbers = zip(self.free.of_block(name), effect_weights(name, {}, probe), strict=True)
+            counted = [
+                self.coefficients[number.name] * self.free.columns[number.name].counted(weights)
+                for number, weights in numbers
+            ]
+            effects.append(ModelEffect(name, {}, np.array(counted)))
+        return tuple(effects)
+
+    @property
+    def model(self) -> VehicleModel:
+        """The model, with what was found as numbers of the vehicle."""
+        lighter = self.get(THRUST, 1.0) * self.free.vehicle.mass_kg / self.vehicle.mass_kg
+        learned = [block for block in self.free.blocks if block in LEARNED]
+        names = (number.name for block in learned for number in self.free.of_block(block))
+        unnamed = np.array([self.coefficients[name] for name in names])
+        return VehicleModel(
+            vehicle=self.vehicle,
+            response=self.response,
+            # The speed that hovers goes with the root of the mass over the thrust factor.
+            thrust_linear=self.get(LAW, 0.0) * float(np.sqrt(lighter)),
+            effects=self.effects,
+            remainder=self.free.remainder(learned, unnamed) if learned else None,
+        )
+
+    @property
+    def physical(self) -> dict[str, Physical]:
+        """All numbers as people know them, in order: moments of inertia, factors of the first rotor, SI."""
+        free, inertia, rotor = self.free, self.inertia, self.free.vehicle.rotors[0]
+        coefficients = dict(self.coefficients)
+        for effect in self.effects:
+            names = (number.name for number in free.of_block(effect.name))
+            coefficients |= dict(zip(names, effect.coefficients.tolist(), strict=True))
+        found: dict[str, Physical] = {}
+        for number, value in zip(free.numbers, self.values.tolist(), strict=True):
+            name, stated = number.name, number.block not in free.vehicle.unknown
+            if name in LOG_INERTIA:
+                axis = LOG_INERTIA.index(name)
+                known = Physical(float(inertia[axis, axis]), "kg m^2", positive=True, stated=stated)
+                found[f"inertia.{INERTIA_PARAMETERS[axis]}"] = known
+            elif name in PRODUCT_NAMES:
+                row, column = INERTIA_ENTRIES[3 + PRODUCT_NAMES.index(name)]
+                found[name] = Physical(float(inertia[row, column]), "kg m^2", stated=True)
+            elif name == THRUST:
+                factor = value * rotor.thrust_factor_n_s2
+                found["thrust_factor"] = Physical(factor, "N s^2", positive=True, stated=stated)
+            elif name == DRAG:
+                factor = value * rotor.drag_factor_n_m_s2
+                found["drag_factor"] = Physical(factor, "N m s^2", positive=True, stated=stated)
+            elif name in LOG_COUNTED:
+                found[name] = Physical(value, "")
+            elif name == LOG_MASS:
+                found["mass"] = Physical(self.mass, "kg", positive=True, stated=True)
+            elif name == SLOW:
+                found["slow_actuation.slow_s"] = Physical(float(np.exp(value)), "s", positive=True)
+            else:
+                found[name] = Physical(coefficients.get(name, value), number.unit)
+        return found
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """A vehicle at values with its derivatives by them, as the compiled loops take it.
+
+    Attributes
+    ----------
+    at : VehicleAt
+    derivatives : list of array, shape (6, terms, 1 + 4 rotors), or None
+        Of the weights by each number; None by those of the rotors' response in time.
+    used : Terms
+        Terms of the motion that have weights, or derivatives.
+    """
+
+    at: VehicleAt
+    derivatives: list[Array | None]
+    used: Terms
+
+    @classmethod
+    def of(cls, free: FreeNumbers, values: Array) -> Evaluated:
+        """Evaluate numbers at values, shape (number,)."""
+        at = VehicleAt(free, values)
+        derivatives = [_weight_derivative(at, number.name) for number in free.numbers]
+        touched = np.abs(at.table) + sum(np.abs(each) for each in derivatives if each is not None)
+        return cls(at, derivatives, used_terms(touched, free.used_airflow))
+
+    @cached_property
+    def body(self) -> Body:
+        """What is moved."""
+        return body_of(self.at.free.vehicle, self.at.inertia)
+
+    @cached_property
+    def inertia_derivatives(self) -> Array:
+        """Derivatives of the inertia tensor by each number, shape (number, 3, 3)."""
+        inertia, root, index = self.at.inertia, self.at.root_inertia, self.at.free.index
+        derivatives = np.zeros((len(index), 3, 3))
+        for axis, name in enumerate(LOG_INERTIA):
+            if name in index:
+                derivatives[index[name], axis] += 0.5 * inertia[axis]
+                derivatives[index[name], :, axis] += 0.5 * inertia[:, axis]
+        for name, (row, column) in zip(PRODUCT_NAMES, INERTIA_ENTRIES[3:], strict=True):
+            if name in index:
+                derivatives[index[name], row, column] = derivatives[index[name], column, row] = root[row] * root[column]
+        return derivatives
+
+    def rotor_terms(self, flight: PlaybackFlight, samples: IntArray, by: str = "") -> Array:
+        """Evaluate the terms of the rotors over the steps that begin at samples of a flight.
+
+        Parameters
+        ----------
+        by : str
+            Number of the response that they are differentiated by; empty for the terms themselves.
+
+        Returns
+        -------
+        array, shape (samples, 1 + 4 rotors)
+        """
+        response = self.at.response
+        delay: complex = response.delay_s + (1j * _STEP if by == DELAY else 0.0)
+        lag: complex = response.lag_s + (1j * _STEP if by == LAG else 0.0)
+        slow: complex = response.slow_s * (1 + 1j * _STEP if by == SLOW else 1.0)
+        given = (delay, lag, slow) if by else (response.delay_s, response.lag_s, response.slow_s)
+        parts: list[Numbers] = [
+            rotor_terms_by_step(flight.speed[part], flight.motion.period, flight.hold, *given)
+            for part in flight.stretches
+        ]
+        terms = np.zeros((len(flight), parts[0].shape[1]))
+        for part, found in zip(flight.stretches, parts, strict=True):
+            terms[part] = found.imag / _STEP if by else found.real
+        return terms[samples]
+
+    def weights(self, terms: Array) -> Array:
+        """Evaluate the weights over steps of given terms of the rotors, shape (samples, 6, active)."""
+        return weights_by_step(self.at.table, self.used, terms)
+
+    def parameters(self, flight: PlaybackFlight, samples: IntArray, terms: Array) -> Parameters:
+        """Differentiate the weights over these steps, and the inertia, by each number."""
+        entries, values, first = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((len(samples), 0))], [0]
+        for number, derivative in zip(self.at.free.numbers, self.derivatives, strict=True):
+            of_response = derivative is None
+            source = self.rotor_terms(flight, samples, number.name) if of_response else terms
+            weights = (self.at.table if derivative is None else derivative)[:, self.used.active]
+            # The first term of the rotors is constant, so the response in time leaves it.
+            places = np.argwhere(np.any(weights[:, :, 1 if of_response else 0 :], axis=2))
+            entries.append(places)
+            values.append(source @ weights[places[:, 0], places[:, 1]].T)
+            first.append(first[-1] + len(places))
+        joined = np.concatenate(entries)
+        return Parameters(
+            np.ascontiguousarray(joined[:, 0]),
+            np.ascontiguousarray(joined[:, 1]),
+            np.array(first, dtype=np.int64),
+            np.ascontiguousarray(np.hstack(values)),
+            self.inertia_derivatives,
+            np.asarray(np.any(self.inertia_derivatives, axis=(1, 2))),
+        )
+
+
+def _weight_derivative(at: VehicleAt, name: str) -> Array | None:
+    """Differentiate the weights of a vehicle by a number; None by one of the rotors' response in time."""
+    if name in (DELAY, LAG, SLOW):
+        return None
+    columns, coefficients = at.free.columns, at.coefficients
+    derivative = np.zeros(at.free.table_shape)
+    if name in columns:
+        derivative = np.asarray(
+            np.exp(columns[name].share @ at.log_counted) * columns[name].scaled(at.drag_over_thrust)
+        )
+    elif name in at.free.counting:
+        axis = at.free.counting.index(name)
+        for each, column in columns.items():
+            derivative += coefficients[each] * column.share[axis] * column.weights
+    elif name == LOG_MASS:
+        derivative[3:] = -(at.table / at.forces_by_mass)[3:]
+    elif name not in PRODUCT_NAMES:
+        # The weights of the rotors are linear in each of their numbers.
+        moved = at.values.copy()
+        moved[at.free.index[name]] += 1.0
+        derivative[:, 0] = VehicleAt(at.free, moved).rotor_table - at.rotor_table
+        step = {DRAG: 1.0, THRUST: -at.drag_over_thrust}.get(name, 0.0) / at.get(THRUST, 1.0)
+        for each, column in columns.items():
+            derivative[column.drags] += step * coefficients[each] * column.weights[column.drags]
+    return derivative * at.forces_by_mass

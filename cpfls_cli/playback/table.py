@@ -1,0 +1,245 @@
+"""Torque and force as a table: weights of terms of the motion times terms of the rotors, and what they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects.effect import Columns, Effect
+from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial, state_terms
+from cpfls_cli.effects.registry import VEHICLE_NUMBERS, effect
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.fuzzy.basis import Consequents
+from cpfls_cli.fuzzy.periodic_system import PeriodicStructure
+from cpfls_cli.playback.kernels import Airflow, Body, Terms, airflow_terms
+from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.vehicle.rotors import allocation_matrix
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+
+@dataclass(frozen=True, kw_only=True)
+class Remainder:
+    """What has no name: torque and force over the direction of the airflow, by a periodic fuzzy system.
+
+    Each column of the system enters with the speed in the rotor plane times the mean rotor speed, and with its square.
+
+    Attributes
+    ----------
+    breakpoints : array, shape (rules + 1,)
+        Peaks of the membership functions, share of a turn.
+    harmonic_order : int
+        Of the consequents; 0 for the seesaw.
+    rows : array of int, shape (row,)
+        Which of torque (0 to 2) and force (3 to 5) it adds to.
+    coefficients : array, shape (row, columns, 2)
+        For speed times mean rotor speed, and for squared speed.
+    """
+
+    breakpoints: Array
+    harmonic_order: int
+    rows: IntArray
+    coefficients: Array
+
+
+@dataclass(frozen=True)
+class WrenchTable:
+    """Torque and force on a body, without weight, as a sum of weights of terms.
+
+    Attributes
+    ----------
+    weights : array, shape (6, terms, 1 + 4 rotors)
+        Torque (3) and force (3) by term of the motion and term of the rotors.
+    remainder : Remainder or None
+        Whose terms of the motion stand behind the others.
+    """
+
+    weights: Array
+    remainder: Remainder | None = None
+
+    @property
+    def airflow(self) -> Airflow:
+        """Terms of the remainder, for the compiled loops."""
+        return airflow_of(self.remainder)
+
+    @property
+    def feels_air(self) -> bool:
+        """Whether torque or force depend on the velocity through the air."""
+        of_velocity = [index for index, term in enumerate(STATE_TERMS) if set("uvw") & set(term)]
+        return bool(np.any(self.weights[:, of_velocity]) or np.any(self.weights[:, len(STATE_TERMS) :]))
+
+    def terms(self, velocity: Array, rate: Array) -> Array:
+        """Evaluate the terms of the motion, shape (time, terms), of velocity through the air and rate, body frame."""
+        return np.hstack([state_terms(velocity, rate), remainder_terms(self.remainder, velocity)])
+
+    def wrench(self, velocity: Array, rate: Array, rotor: Array) -> Array:
+        """Compute torque and force.
+
+        Parameters
+        ----------
+        velocity : array, shape (time, 3), m/s, body frame
+            Through the air.
+        rate : array, shape (time, 3), rad/s, body frame
+        rotor : array, shape (time, 1 + 4 rotors)
+            See `RotorResponse.terms_by_step`.
+
+        Returns
+        -------
+        array, shape (time, 6), N m and N, body frame
+        """
+        return wrench_of(self.weights, self.terms(velocity, rate), rotor)
+
+    def by_rotor_term(self, velocity: Array, rate: Array) -> Array:
+        """Compute what the terms of the rotors are multiplied with, shape (time, 6, 1 + 4 rotors); see `wrench`."""
+        return np.asarray(np.einsum("ta,kau->tku", self.terms(velocity, rate), self.weights, optimize=True))
+
+    def by_step(self, rotor: Array) -> tuple[Terms, Array]:
+        """Evaluate the weights of the terms of the motion over each step.
+
+        Parameters
+        ----------
+        rotor : array, shape (time, 1 + 4 rotors)
+            See `RotorResponse.terms_by_step`.
+
+        Returns
+        -------
+        terms : Terms
+            Those in use.
+        weights : array, shape (time, 6, active)
+        """
+        used = used_terms(self.weights, self.airflow)
+        return used, weights_by_step(self.weights, used, rotor)
+
+
+def wrench_of(weights: Array, terms: Array, rotor: Array) -> Array:
+    """Multiply weights with the terms of the motion and of the rotors, shape (time, 6)."""
+    return np.asarray(np.einsum("ta,kau,tu->tk", terms, weights, rotor, optimize=True))
+
+
+def body_of(vehicle: VehicleSettings, inertia: Array) -> Body:
+    """Arrange mass and inertia for the compiled loops."""
+    return Body(vehicle.mass_kg, vehicle.gravity_m_s2, inertia, np.asarray(np.linalg.inv(inertia), dtype=float))
+
+
+def used_terms(table: Array, airflow: Airflow) -> Terms:
+    """List the terms of the motion that have weights."""
+    active = np.flatnonzero(np.any(table, axis=(0, 2))).astype(np.int64)
+    return Terms(airflow, active, table.shape[1])
+
+
+def weights_by_step(table: Array, used: Terms, rotor: Array) -> Array:
+    """Multiply a table with the terms of the rotors, shape (time, 6, active)."""
+    flat = table[:, used.active].reshape(-1, table.shape[2])
+    return np.ascontiguousarray((rotor @ flat.T).reshape(len(rotor), 6, -1))
+
+
+def airflow_of(remainder: Remainder | None) -> Airflow:
+    """Describe the terms of a remainder to the compiled loops."""
+    if remainder is None:
+        return Airflow(np.zeros(0), 0)
+    return Airflow(remainder.breakpoints, remainder.harmonic_order)
+
+
+def rotor_weights(vehicle: VehicleSettings, thrust_linear: float, response: RotorResponse) -> Array:
+    """Weigh the terms of the rotors alone, shape (6, 1 + 4 rotors)."""
+    rotors = len(vehicle.rotors)
+    thrust, *torque = allocation_matrix(vehicle)
+    wrench = np.vstack([torque, np.zeros((2, rotors)), thrust])
+    hover = np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / thrust.sum())
+    table = np.zeros((6, 1 + 4 * rotors))
+    table[:, 1 : 1 + rotors] = thrust_linear * hover * wrench
+    table[:, 1 + rotors : 1 + 2 * rotors] = wrench
+    slow = response.slow_roll_pitch, response.slow_roll_pitch, response.slow_yaw
+    table[:3, 1 + 3 * rotors :] = np.array(slow)[:, None] * wrench[:3]
+    return table
+
+
+def lever_weights(centre: Array, forces: Array) -> Array:
+    """Weigh the torque ``-c x F`` of forces about a centre of mass.
+
+    Parameters
+    ----------
+    centre : array, shape (3,), m
+        Where it is, from where the forces have their levers from.
+    forces : array, shape (6, ...)
+        Weights of torque and force.
+
+    Returns
+    -------
+    array, shape (6, ...)
+    """
+    table = np.zeros_like(forces)
+    table[:3] = -np.cross(centre, forces[3:], axisb=0, axisc=0)
+    return table
+
+
+def effect_weights(name: str, shape: Mapping[str, float], probe: Probe) -> Array:
+    """Weigh the terms for a unit of each coefficient of an effect.
+
+    Returns
+    -------
+    array, shape (coefficient, 6, 34, 1 + 4 rotors)
+
+    Raises
+    ------
+    ComputationError
+        If the effect is no polynomial of motion and rotor speeds.
+    """
+    known = effect(name)
+    found = polynomial(wrench_of_numbers() if known.kind == "parameter" else known, probe, shape)
+    if found is None:
+        raise ComputationError(f"the effect {name} is no polynomial of motion and rotor speeds")
+    return with_slow(found, probe)
+
+
+def with_slow(weights: Array, probe: Probe) -> Array:
+    """Add the columns of slow actuation, in which no effect of the catalogue has weights."""
+    slow = np.zeros((*weights.shape[:3], len(probe.signals.vehicle.rotors)))
+    return np.concatenate([weights, slow], axis=3)
+
+
+@cache
+def wrench_of_numbers() -> Effect:
+    """Make an effect of the numbers of the vehicle that are no inertia: scale of the thrust, coupling of the rates."""
+
+    def columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+        assert VEHICLE_NUMBERS.columns is not None
+        given = VEHICLE_NUMBERS.columns(signals, shape)
+        assert given.momentum is not None
+        # What has momentum is inertia, which stands in the vehicle, or the place of a sensor, which moves nothing.
+        return Columns(given.direct * ~np.any(given.momentum, axis=(0, 1)))
+
+    return replace(VEHICLE_NUMBERS, kind="wrench", columns=columns)
+
+
+def remainder_weights(remainder: Remainder, rotors: int) -> Array:
+    """Weigh the terms of a remainder, shape (6, terms, 1 + 4 rotors)."""
+    terms = airflow_terms(airflow_of(remainder))
+    table = np.zeros((6, len(STATE_TERMS) + terms, 1 + 4 * rotors))
+    at = len(STATE_TERMS) + np.arange(0, terms, 2)
+    for row, by_column in zip(remainder.rows, remainder.coefficients, strict=True):
+        table[row, at, 1 : 1 + rotors] = by_column[:, :1] / rotors
+        table[row, at + 1, 0] = by_column[:, 1]
+    return table
+
+
+def remainder_terms(remainder: Remainder | None, velocity: Array) -> Array:
+    """Evaluate the terms of a remainder, shape (time, terms).
+
+    Parameters
+    ----------
+    remainder : Remainder or None
+    velocity : array, shape (time, 3), m/s, body frame
+    """
+    if remainder is None:
+        return np.zeros((len(velocity), 0))
+    order = remainder.harmonic_order
+    consequents: Consequents = "harmonic" if order else "seesaw"
+    structure = PeriodicStructure((remainder.breakpoints,), consequents, order, "additive")
+    columns = structure.columns(np.arctan2(velocity[:, 1], velocity[:, 0])[:, None])
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])[:, None]
+    return np.stack([columns * speed, columns * speed**2], axis=2).reshape(len(velocity), -1)
