@@ -20,7 +20,6 @@ class Course:
 
     Attributes
     ----------
-    flight : PlaybackFlight
     starts : array of int, shape (run,)
         Ascending samples of the flight.
     horizon : int

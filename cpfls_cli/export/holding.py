@@ -76,7 +76,6 @@ class Missing:
 
     Attributes
     ----------
-    title : str
     torque, force : float, N m and N
         Root mean square of the largest axis; NaN where nobody measured it.
     floors : float
@@ -114,9 +113,6 @@ class Held:
 
     Attributes
     ----------
-    table : WrenchTable
-    response : RotorResponse
-    body : Body
     squares : bool
         Whether the lag acts on speeds and on squared speeds each, and not on the speeds alone.
     fuzzy : InertiaModel or None
@@ -215,8 +211,6 @@ def missing(
 
     Parameters
     ----------
-    model : VehicleModel
-    held : Held
     holds : callable
         That `held` was made with.
     floor : array, shape (6,), N m and N

@@ -25,7 +25,6 @@ class Numbers:
 
     Attributes
     ----------
-    names : tuple of str
     tables : array, shape (number, 6, terms, 1 + 4 rotors)
     size : array, shape (6, terms, 1 + 4 rotors)
         Natural size of what one weight does.

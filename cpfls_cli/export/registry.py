@@ -32,12 +32,10 @@ class Form:
 
     Attributes
     ----------
-    title : str
     ending : str
         Of its file.
     held : callable
         From a vehicle to what the form holds of it, and to how it takes weights.
-    write : callable
     also : str
         Ending of a file that the other one needs; empty for none.
     """
@@ -62,7 +60,6 @@ class Target(Form):
     levels : int
         Flights, each with half the step of the one before, that a step of no length follows from; 0 for a target that
         takes the very steps of a playback.
-    fly : callable
     """
 
     fly: Callable[[str, Course], State]
@@ -108,8 +105,6 @@ class Exported:
     ----------
     texts : dict of str to str
         Of each file by its name, the one that needs the others last.
-    held : Held
-    missing : tuple of Missing
     told : tuple of str
         What the form does not hold, in words.
     """

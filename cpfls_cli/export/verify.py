@@ -35,8 +35,6 @@ class Verification:
     step, equations, missing : array, shape (4,)
         Largest norm over all windows and horizons of what the target's step leaves; of what is left between the target
         and what was exported where steps have no length; and of what the target does not hold.
-    windows : int
-    horizon_s : float
     """
 
     errors: Array

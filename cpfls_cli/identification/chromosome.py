@@ -16,7 +16,6 @@ def decode(structure: ModelStructure, weights: Array) -> tuple[Array, ...]:
 
     Parameters
     ----------
-    structure : ModelStructure
     weights : array, shape (genes,), >= 0
         Genes, or weights on any scale: only their ratios within a partition count.
 
@@ -56,7 +55,6 @@ def weight_jacobian(structure: ModelStructure, weights: Array) -> Array:
 
     Parameters
     ----------
-    structure : ModelStructure
     weights : array, shape (genes,)
         No partition all zero.
 

@@ -67,7 +67,6 @@ def contiguous_blocks(judged: Array, learned: Array, folds: int, embargo: float)
         Times of the samples that judge, ascending.
     learned : array, shape (learned samples,), s
         Times of the samples that train: the same, or a selection of them.
-    folds : int
     embargo : float
         Seconds before and after a block that do not train with it held out.
 
@@ -173,7 +172,6 @@ def with_folds(learned: Samples, judged: Samples, settings: RidgeSettings) -> tu
     ----------
     learned, judged : Samples
         The samples that parameters are learned from, and the whole training part.
-    settings : RidgeSettings
 
     Returns
     -------

@@ -38,7 +38,6 @@ class TorqueData:
     Attributes
     ----------
     time : array, shape (samples,), s
-    motion : Motion
     torque : array, shape (samples, 3), N m
         Generalised torque on the Euler angles.
     """
@@ -107,7 +106,6 @@ def gathered(source: TorqueSource, samples: IntArray) -> TorqueData:
 
     Parameters
     ----------
-    source : TorqueSource
     samples : array of int
         Indices, ascending.
     """

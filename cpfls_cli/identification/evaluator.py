@@ -39,7 +39,6 @@ class Point:
     genes : array of int, shape (genes,)
     products : Products
         Of the columns, by label.
-    equations : NormalEquations
     solution : array, shape (columns,)
     factor : tuple
         Cholesky factor of the matrix whose rows and columns are multiplied by `scale`.
@@ -66,7 +65,6 @@ class Problem:
 
     Attributes
     ----------
-    solver : Solver
     start : Fit
         The fit at the start; its ridge weight is finite.
     """
@@ -113,7 +111,6 @@ def refine(problem: Problem, genes: IntArray, products: Products, evaluations: i
 
     Parameters
     ----------
-    problem : Problem
     genes : array of int, shape (genes,)
         No partition all zero.
     products : Products
@@ -171,11 +168,9 @@ class Evaluator:
 
     Attributes
     ----------
-    solver : Solver
     judge : Samples
         The whole training part where `judged_on` does not say otherwise: a membership function that falls between two
         samples learned from costs nothing there and everything beside them.
-    local_search : LocalSearchSettings
     cross_validated : bool
         Take the solver's cross-validated error for the first objective, not the training part's.
     """
@@ -226,7 +221,6 @@ class Evaluator:
         Parameters
         ----------
         chromosome : array of int, shape (genes,)
-        fit : Fit
 
         Returns
         -------

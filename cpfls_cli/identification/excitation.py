@@ -57,13 +57,10 @@ def rule_excitation(
 
     Parameters
     ----------
-    learned : Samples
-    partitions : sequence of array
     noise : float, N m
         Root mean square of what no model explains.
     inertia : float, kg m^2
         Typical moment of inertia.
-    rank_tolerance : float
     """
     blocks, singular_values, Vt = learned.structure.blocks, *_decomposed(learned, partitions)
     floor = max(rank_tolerance * singular_values[0], noise / inertia if inertia > 0 else 0.0)

@@ -34,10 +34,8 @@ class FitDiagnostics:
 
     Attributes
     ----------
-    fit : Fit
     system : LeastSquares
         The regressor of the model's parameters, without penalty.
-    excitation : RuleExcitation
     axes : AxisEvidence
         Of the training part.
     rigid_body : array, shape (6,), kg m^2

@@ -39,9 +39,6 @@ class Identification(FitDiagnostics):
 
     Attributes
     ----------
-    model : InertiaFunctions
-    front : Front
-    history : History
     stop_reason : str
         Why the search ended: generations, converged, time-limit or interrupted.
     ridge : RidgeCurve or None
@@ -86,8 +83,6 @@ def identify(
         The samples of it that parameters are learned from: all, or a selection, in the order of time.
     held_out : mapping of str to TorqueSource
         Data that nothing is learned from, by name (not ``training``); judged once, at the end.
-    settings : IdentificationSettings
-    rng : numpy.random.Generator
     run : SearchRun, optional
         How the search is run; by default from the start to its end, without being watched.
     stated_inertia : array, shape (6,), kg m^2, optional
@@ -153,7 +148,6 @@ def model_evaluator(training: TorqueSource, learned: TorqueSource, settings: Ide
         Gives the input ranges, and judges where the settings do not say otherwise.
     learned : TorqueSource
         Solves.
-    settings : IdentificationSettings
 
     Raises
     ------

@@ -58,7 +58,6 @@ def score(data: TorqueData, predicted: Array) -> Score:
 
     Parameters
     ----------
-    data : TorqueData
     predicted : array, shape (samples, 3), N m
         Generalised torque.
     """
@@ -72,7 +71,6 @@ def score_of(source: TorqueSource, torque: Callable[[Motion], Array]) -> Score:
 
     Parameters
     ----------
-    source : TorqueSource
     torque : callable
         Predicts the generalised torque of a motion.
     """
@@ -172,7 +170,6 @@ class Baseline:
 
     Attributes
     ----------
-    name : str
     columns : callable
         Motion to columns, shape (samples, 3, parameters).
     parameters : array, shape (parameters,)
@@ -212,10 +209,8 @@ def fit_baselines(source: TorqueSource, row_scale: Array, rank_tolerance: float)
 
     Parameters
     ----------
-    source : TorqueSource
     row_scale : array, shape (3,)
         Weight of each axis, the model's own.
-    rank_tolerance : float
 
     Returns
     -------

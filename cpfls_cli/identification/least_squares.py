@@ -183,7 +183,6 @@ def solve_normal(equations: NormalEquations, rank_tolerance: float, project: Pro
 
     Parameters
     ----------
-    equations : NormalEquations
     rank_tolerance : float
         Singular values below this share of the largest count as zero; not smaller than `SMALLEST_SINGULAR_SHARE`.
     project : callable

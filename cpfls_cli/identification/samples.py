@@ -80,7 +80,6 @@ class Ready:
 
     Attributes
     ----------
-    source : TorqueSource
     rigid : bool
         Whether a rigid body stands beside the fuzzy columns.
     """
@@ -111,14 +110,11 @@ class Samples:
 
     Attributes
     ----------
-    ready : Ready
-    structure : ModelStructure
     ranges : tuple of InputRange
         Of roll and pitch over the training data.
     scale : array, shape (3,)
     label : array of int, shape (samples,)
         From 0.
-    labels : int
     """
 
     ready: Ready

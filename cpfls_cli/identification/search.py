@@ -62,7 +62,6 @@ class Unfinished:
     ----------
     submitted : array of int, shape (evaluations, genes)
         Chromosomes as they were before the evaluation.
-    evaluation : Evaluation
     """
 
     submitted: IntArray
@@ -139,7 +138,6 @@ class SearchResult:
 
     Attributes
     ----------
-    front : Front
     history : History
         Where the search stopped within a generation, the last row is of what was evaluated of it.
     stop_reason : str
@@ -184,11 +182,8 @@ def search(
 
     Parameters
     ----------
-    evaluator : Evaluator
-    settings : IdentificationSettings
     rng : numpy.random.Generator
         Not used by a search that goes on, which has its own.
-    run : SearchRun
     kept : TorqueSource, optional
         Flights to choose on, for the choice `held-out`.
 
@@ -335,7 +330,6 @@ def require_flights(rule: Choice, *, given: bool) -> None:
 
     Parameters
     ----------
-    rule : Choice
     given : bool
         Whether there are such flights.
 
@@ -356,7 +350,6 @@ def held_out_errors(evaluator: Evaluator, kept: TorqueSource, chromosomes: IntAr
     ----------
     evaluator : Evaluator
         Solves each chromosome on the samples that it learns from.
-    kept : TorqueSource
     chromosomes : array of int, shape (members, genes)
 
     Returns

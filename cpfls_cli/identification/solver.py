@@ -59,11 +59,9 @@ def decomposed(learned: Samples, partitions: Breakpoints, fit: Fit, rank_toleran
 
     Parameters
     ----------
-    learned : Samples
     partitions : sequence of array, shape (functions,)
     fit : Fit
         Gives ridge weight and column sizes.
-    rank_tolerance : float
 
     Returns
     -------
@@ -114,7 +112,6 @@ class Solver:
         The samples that parameters are learned from.
     ridge : RidgeChoice or None
         With a rigid body underneath: how the ridge on the coefficients is chosen. Without: no ridge.
-    rank_tolerance : float
     """
 
     learned: Samples

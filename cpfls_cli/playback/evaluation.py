@@ -45,7 +45,6 @@ class VehicleAt:
 
     Attributes
     ----------
-    free : FreeNumbers
     values : array, shape (number,)
     """
 
@@ -212,7 +211,6 @@ class Evaluated:
 
     Attributes
     ----------
-    at : VehicleAt
     derivatives : list of array, shape (6, terms, 1 + 4 rotors), or None
         Of the weights by each number; None by those of the rotors' response in time.
     used : Terms

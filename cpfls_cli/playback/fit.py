@@ -43,7 +43,6 @@ class Windows:
 
     Attributes
     ----------
-    flight : PlaybackFlight
     starts : array of int, shape (window,)
     loss : Loss
         In errors of "rate stays" on windows of the flight, or more for a quiet one (`windows_of`).
@@ -81,7 +80,6 @@ class Windows:
 
         Parameters
         ----------
-        flight : PlaybackFlight
         horizon, every : int
             Samples.
         """
@@ -97,7 +95,6 @@ def windows_of(flights: Sequence[PlaybackFlight], horizon_s: float, interval_s: 
 
     Parameters
     ----------
-    flights : sequence of PlaybackFlight
     horizon_s, interval_s : float, s
     """
     periods = [flight.motion.period for flight in flights]
@@ -142,7 +139,6 @@ def loss_of(flight: PlaybackFlight, scale: Array) -> Loss:
 
     Parameters
     ----------
-    flight : PlaybackFlight
     scale : array, shape (horizon, 4), m, m/s, rad, rad/s
     """
     total = np.where(flight.shown & (scale.sum(axis=0) > 0), scale.sum(axis=0), np.inf)
@@ -156,7 +152,6 @@ class Fitted:
 
     Attributes
     ----------
-    free : JointNumbers
     values : array, shape (number,)
     loss : float
         Mean over windows, without the prior; about 1.1 for rates that stay.
@@ -197,8 +192,6 @@ def fit(
 
     Parameters
     ----------
-    free : JointNumbers
-    windows : sequence of Windows
     known : mapping of str to float
         Values to start from, by name.
     steps : int
@@ -280,8 +273,6 @@ def window_sums(evaluated: Evaluated, window: Windows, group: IntArray) -> tuple
 
     Parameters
     ----------
-    evaluated : Evaluated
-    window : Windows
     group : array of int, shape (window,)
         Which sum each window is added to.
 
@@ -331,7 +322,6 @@ class Uncertainty:
     Attributes
     ----------
     covariance : array, shape (number, number)
-    blocks : int
     determined : array of bool, shape (number,)
         Whether the flights say more of a number than what was believed before.
     """
@@ -357,7 +347,6 @@ def uncertainty(fitted: Fitted, windows: Sequence[Windows]) -> Uncertainty:
 
     Parameters
     ----------
-    fitted : Fitted
     windows : sequence of Windows
         Of the flights that it was fitted to.
 

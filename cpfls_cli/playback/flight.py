@@ -21,14 +21,12 @@ class PlaybackFlight:
 
     Attributes
     ----------
-    name : str
     motion : Motion
         Zero, and no rotation, where the flight does not know it.
     speed : array, shape (time, rotor), rad/s
         Measured, or commanded.
     hold : {"linear", "previous"}
         What a speed is between samples.
-    stretches : tuple of slice
     has_attitude, has_velocity, has_position : bool
         Whether they were measured. Without attitude or velocity rotation alone is played back.
     wrench : array, shape (time, 6), N m and N, body frame, or None
@@ -101,7 +99,6 @@ class LoggedFlight:
         What a speed is between samples.
     actuation : str
         What drives the playback, in words.
-    warnings : tuple of str
     contradictions : tuple of str
         What of it no verdict can stand beside.
     group : str

@@ -36,7 +36,6 @@ class JointNumbers:
 
     Attributes
     ----------
-    base : FreeNumbers
     groups : tuple of Group
         Other configurations, if any.
     """

@@ -62,7 +62,6 @@ class Body(NamedTuple):
 
     Attributes
     ----------
-    mass, gravity : float
     inertia, inverse : array, shape (3, 3)
     """
 
@@ -158,7 +157,6 @@ def _write_terms(motion: Array, airflow: Airflow, feature: Array, value: Array, 
     ----------
     motion : array, shape (6,)
         Air velocity and rate, body frame.
-    airflow : Airflow
     feature : array, shape (2, MOST_COLUMNS)
         Work space.
     value : array, shape (terms,)
@@ -291,7 +289,6 @@ class Terms(NamedTuple):
 
     Attributes
     ----------
-    airflow : Airflow
     active : array of int, shape (active,)
         Indices of the terms that have weights.
     total : int
@@ -452,9 +449,6 @@ def errors_of_runs(
 
     Parameters
     ----------
-    motion : Motion
-    body : Body
-    used : Terms
     weights : array, shape (time, 6, active)
         Torque (3) and force (3) by term, for the step that begins at each sample.
     starts : array of int, shape (run,)
@@ -737,8 +731,6 @@ def sensitivities(
     ----------
     motion, body, used, weights, starts, translates
         See `errors_of_runs`.
-    parameters : Parameters
-    loss : Loss
     group : array of int, shape (run,)
         Which sum a run is added to.
     gradient : array, shape (group, parameter)

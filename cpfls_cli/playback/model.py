@@ -41,8 +41,6 @@ class ModelEffect(NamedTuple):
 
     Attributes
     ----------
-    name : str
-    shape : mapping of str to float
     coefficients : array, shape (coefficient,)
         Linear ones, SI. An offset of the centre of mass with three has a lever for all forces, with two for the thrust.
     """
@@ -111,14 +109,12 @@ class VehicleModel:
     ----------
     vehicle : VehicleSettings
         Mass, inertia and rotors of the model, which need not be those of a config.
-    response : RotorResponse
     thrust_linear : float
         Law of the rotors: thrust and drag follow ``w^2 + thrust_linear w_h w``, with the speed w_h that hovers under
         the square alone.
     effects : tuple of ModelEffect
         Polynomials of motion and rotor speeds stand in `weights`; others are evaluated along a measured motion
         (`along`), or act on what drives the rotors (`filters`).
-    remainder : Remainder or None
     fuzzy : InertiaModel or None
         Inertia that depends on the attitude; it then stands in the place of the vehicle's.
     wind : tuple of float, m/s, world frame

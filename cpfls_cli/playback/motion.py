@@ -48,7 +48,6 @@ def accelerations(model: VehicleModel, state: State, rotor: Array) -> tuple[Arra
     ----------
     model : VehicleModel
         Of constant inertia.
-    state : State
     rotor : array, shape (samples, 1 + 4 rotors)
         See `RotorResponse.terms_by_step`.
 
@@ -73,7 +72,6 @@ def step(model: VehicleModel, state: State, rotor: Array, period: float) -> Stat
     ----------
     model : VehicleModel
         Of constant inertia.
-    state : State
     rotor : array, shape (samples, 1 + 4 rotors)
         See `RotorResponse.terms_by_step`.
     period : float, s
@@ -105,7 +103,6 @@ def rotor_speeds(
 
     Parameters
     ----------
-    model : VehicleModel
     velocity : array, shape (time, 3), m/s, body frame
         Through the air.
     rate : array, shape (time, 3), rad/s, body frame

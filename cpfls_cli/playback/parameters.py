@@ -94,8 +94,6 @@ class Physical(NamedTuple):
 
     Attributes
     ----------
-    value : float
-    unit : str
     positive : bool
         Whether it cannot be below 0.
     stated : bool

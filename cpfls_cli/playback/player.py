@@ -31,10 +31,8 @@ class Player:
 
     Attributes
     ----------
-    table : WrenchTable
     rotor : array, shape (time, 1 + 4 rotors)
         Terms of the rotors over each step.
-    body : Body
     along : array, shape (time, 6), N m and N, or None
         What acts over each step beside: stated, or evaluated along the measured motion.
     fuzzy : InertiaModel or None

@@ -44,13 +44,7 @@ class ReplayOptions:
 
 @dataclass(frozen=True)
 class Played:
-    """A flight and what is played back along it.
-
-    Attributes
-    ----------
-    flight : PlaybackFlight
-    model, stated : Player
-    """
+    """A flight and what is played back along it."""
 
     flight: PlaybackFlight
     model: Player
@@ -170,7 +164,6 @@ class Replay:
     ----------
     errors : mapping of str to SignalErrors or None
         By signal; None where no flight knows it.
-    windows : Windows
     """
 
     errors: Mapping[str, SignalErrors | None]

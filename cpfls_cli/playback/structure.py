@@ -84,12 +84,10 @@ class Judged:
 
     Attributes
     ----------
-    structure : Structure
     error : float
         Mean over windows of all parts; see `window_errors`.
     by_block : array, shape (block,)
         The same by flight, or by pieces of few flights; equal for all structures.
-    numbers : int
     condition_number : float
         The largest of its fits.
     fits : tuple of Fitted
@@ -117,7 +115,6 @@ class Choice:
     ----------
     chosen : Judged
         The one with the fewest numbers within one standard error of the best.
-    best : Judged
     greedy, everything, nothing : Judged
         Baselines: blocks added one by one, all blocks, and the stated vehicle.
     front : tuple of Judged
@@ -267,9 +264,6 @@ def choose(
         As stated.
     flights : sequence of PlaybackFlight
         Training flights alone.
-    settings : PlaybackSettings
-    rng : numpy.random.Generator
-    progress : callable
     kept : mapping of Structure to sequence of Solution
         Of the same search, stopped before; it goes on to the same end.
 
@@ -517,11 +511,8 @@ def fitted_to_all(
 
     Parameters
     ----------
-    structure : Structure
     vehicle : VehicleSettings
         As stated.
-    flights : sequence of PlaybackFlight
-    settings : PlaybackSettings
     start : Fitted
         The same structure on some of them.
     groups : tuple of Group

@@ -232,7 +232,6 @@ def remainder_terms(remainder: Remainder | None, velocity: Array) -> Array:
 
     Parameters
     ----------
-    remainder : Remainder or None
     velocity : array, shape (time, 3), m/s, body frame
     """
     if remainder is None:

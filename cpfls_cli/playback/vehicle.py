@@ -45,7 +45,6 @@ class FoundNumber(NamedTuple):
     ----------
     name : str
         Block and number.
-    unit : str
     value, low, high : float
         With a 95 % interval.
     stated : float
@@ -106,14 +105,10 @@ class FoundVehicle:
 
     Attributes
     ----------
-    model : VehicleModel
-    numbers : tuple of FoundNumber
     shares : tuple of Share
         Of rotors, named effects and learned remainder.
     airspeed : float, m/s
         In the rotor plane; 95 % of the samples are slower.
-    trades : tuple of Trade
-    choice : Choice
     condition_number : float
         Of the last fit.
     blocks : int
@@ -153,10 +148,6 @@ def find_vehicle(
     ----------
     vehicle : VehicleSettings
         As stated.
-    flights : sequence of PlaybackFlight
-    settings : PlaybackSettings
-    rng : numpy.random.Generator
-    progress : callable
     kept : mapping of Structure to sequence of Solution
         Of the same search, stopped before.
     """
@@ -266,7 +257,6 @@ def found_numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
 
     Parameters
     ----------
-    fitted : Fitted
     spread : Uncertainty
         Of this fit.
     """
@@ -296,7 +286,6 @@ def bodily(vehicle: VehicleSettings, numbers: Sequence[FoundNumber]) -> Iterator
     ----------
     vehicle : VehicleSettings
         Whose mass and rotors say what can be.
-    numbers : sequence of FoundNumber
     """
     hubs = np.array([rotor.position_m for rotor in vehicle.rotors])
     heavy = beyond_any_body(vehicle.mass_kg, hubs, {number.name: number.value for number in numbers})

@@ -59,7 +59,6 @@ class SmallestSingularValue:
 
         Parameters
         ----------
-        factor : TriangularFactor
         available : array of bool, shape (samples,)
 
         References
@@ -220,7 +219,6 @@ class PrintedRule:
 
         Parameters
         ----------
-        factor : TriangularFactor
         available : array of bool, shape (samples,)
 
         References
@@ -295,7 +293,6 @@ def make_criterion(space: RowSpace, name: CriterionName) -> Criterion:
 
     Parameters
     ----------
-    space : RowSpace
     name : {"sigma_min", "A", "D", "even", "paper-literal"}
         For `even` the rule is never asked: the start is the whole choice.
     """

@@ -127,7 +127,6 @@ def exchange_samples(
 
     Parameters
     ----------
-    space : RowSpace
     start : array of int
         Samples of full rank.
     size : int

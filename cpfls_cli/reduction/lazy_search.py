@@ -44,7 +44,6 @@ def eigenvalues_below(eigenvalues: Array, projections: Array, shift: float) -> I
     eigenvalues : array, shape (columns,)
     projections : array, shape (samples, 3, columns)
         Z_i: rows of each sample in the eigenvectors' basis.
-    shift : float
 
     Returns
     -------

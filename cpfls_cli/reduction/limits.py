@@ -41,8 +41,6 @@ def starting_samples(space: RowSpace, criterion: CriterionName, limit: int) -> I
 
     Parameters
     ----------
-    space : RowSpace
-    criterion : str
     limit : int
         Most samples that may be chosen.
 
@@ -66,8 +64,6 @@ def stop_reason(run: Run, settings: ReductionSettings, limit: int) -> StopReason
 
     Parameters
     ----------
-    run : Run
-    settings : ReductionSettings
     limit : int
         Most samples that may be chosen.
     """

@@ -87,8 +87,6 @@ class Run:
 
     Parameters
     ----------
-    space : RowSpace
-    criterion : Criterion
     start : array of int
         Samples to choose before the criterion is asked.
     """

@@ -220,7 +220,6 @@ def space_of(surveyed: Survey, rows: Array) -> RowSpace:
 
     Parameters
     ----------
-    surveyed : Survey
     rows : array, shape (samples, 3, rank)
         Some or all of its samples, projected.
     """

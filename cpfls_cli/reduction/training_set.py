@@ -37,7 +37,6 @@ def reduce(Q: Array, settings: ReductionSettings, progress: Progress | None = No
     ----------
     Q : array, shape (samples, 3, parameters)
         Regressor, three rows per sample.
-    settings : ReductionSettings
     progress : callable, optional
         Called with the samples chosen and the most there can be.
 
@@ -61,7 +60,6 @@ def check_reducible(Q: Array, settings: ReductionSettings) -> None:
     Parameters
     ----------
     Q : array, shape (samples, 3, parameters)
-    settings : ReductionSettings
 
     Raises
     ------
@@ -144,7 +142,6 @@ def draw_pool(surveyed: Survey, size: int, rng: np.random.Generator) -> Pool:
 
     Parameters
     ----------
-    surveyed : Survey
     size : int
         Samples to hold at most.
     rng : numpy.random.Generator
@@ -215,7 +212,6 @@ def reduce_streamed(
     ----------
     surveyed : Survey
         Made with the settings' rank tolerance.
-    settings : ReductionSettings
     rng : numpy.random.Generator
         Not used where all samples fit in the pool.
     progress : callable, optional
@@ -267,7 +263,6 @@ def pool_of(surveyed: Survey, wanted: IntArray) -> Pool:
 
     Parameters
     ----------
-    surveyed : Survey
     wanted : array of int, shape (samples,)
         Ascending.
     """
@@ -291,7 +286,6 @@ def random_selections(
         Samples to choose.
     count : int
         Subsets to choose, independently of each other.
-    rng : numpy.random.Generator
     rank_tolerance : float
         Singular values below this fraction of the largest count as zero.
 
@@ -309,12 +303,10 @@ def random_streamed(surveyed: Survey, size: int, count: int, rng: np.random.Gene
 
     Parameters
     ----------
-    surveyed : Survey
     size : int
         Samples to choose.
     count : int
         Subsets to choose, independently of each other.
-    rng : numpy.random.Generator
 
     Raises
     ------

@@ -48,7 +48,6 @@ class Table(NamedTuple):
         Columns that are not zero at a sample.
     parameters, breakpoints : int
         Columns and inner breakpoints in all.
-    circular, data_range, harmonic, tensor : bool
     single : int
         Features of one angle beside the constant: 1, or twice the harmonic order.
     ranges : array, shape (2, 2)
@@ -636,9 +635,7 @@ def add_gram(
 
     Parameters
     ----------
-    table : Table
     breakpoints : array, shape (partitions, most functions)
-    chunk : Chunk
     scale : array, shape (3,)
         Factor of the rows about each axis.
     label : array of int, shape (samples,)

@@ -58,7 +58,6 @@ def data_ranges(structure: ModelStructure, attitude: Array) -> tuple[InputRange,
 
     Parameters
     ----------
-    structure : ModelStructure
     attitude : array, shape (samples, 3), rad
 
     Returns
@@ -92,8 +91,6 @@ class Regressor:
 
     Parameters
     ----------
-    structure : ModelStructure
-    motion : Motion
     ranges : tuple of InputRange
         Of roll and pitch over the training data.
     """
@@ -136,7 +133,6 @@ class Regressor:
 
         Parameters
         ----------
-        partitions : sequence of array
         coefficients : array, shape (parameters,)
 
         Returns
@@ -162,7 +158,6 @@ class Regressor:
         ----------
         index : int
             Index of the block.
-        partitions : sequence of array
         """
         consequent = self.features[index]
         if consequent is None:
@@ -176,7 +171,6 @@ class Regressor:
         ----------
         index : int
             Index of the block.
-        partitions : sequence of array
         """
         block = self.structure.blocks[index]
         return [
@@ -191,7 +185,6 @@ class Regressor:
         ----------
         index : int
             Index of the block.
-        partitions : sequence of array
 
         Returns
         -------
@@ -206,7 +199,6 @@ class Regressor:
 
         Parameters
         ----------
-        partitions : sequence of array
         coefficients : array, shape (parameters,)
         """
         J = np.zeros((len(self.motion), 3, 3))
@@ -243,7 +235,6 @@ def torque_sensitivity(regressor: Regressor, partitions: Breakpoints, coefficien
 
     Parameters
     ----------
-    regressor : Regressor
     partitions : sequence of array, shape (functions,)
     coefficients : array, shape (parameters,)
 

@@ -114,10 +114,8 @@ class Block:
 
     Attributes
     ----------
-    function : InertiaFunction
     partitions : tuple of int
         Indices of its partitions, in the order of its inputs.
-    rules : int
     features : int
         Coefficients per rule.
     columns : slice
@@ -137,7 +135,6 @@ class ModelStructure:
 
     Attributes
     ----------
-    settings : StructureSettings
     partitions : tuple of Partition
         In the order of the genes: D13(pitch), D22(roll), D23(roll), D23(pitch), D33(roll), D33(pitch).
     blocks : tuple of Block

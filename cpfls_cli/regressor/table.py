@@ -16,7 +16,6 @@ def structure_table(structure: ModelStructure, ranges: tuple[InputRange, InputRa
 
     Parameters
     ----------
-    structure : ModelStructure
     ranges : tuple of InputRange
         Of roll and pitch over the training data.
     """
@@ -51,7 +50,6 @@ def mapped_inputs(table: Table, attitude: Array) -> Array:
 
     Parameters
     ----------
-    table : Table
     attitude : array, shape (samples, 3), rad
 
     Returns

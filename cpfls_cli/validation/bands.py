@@ -37,7 +37,6 @@ def band(estimate: Array, drawn: Array, blocks: int) -> tuple[Array, Array]:
     ----------
     estimate : array, shape (...)
     drawn : array, shape (draws, ...)
-    blocks : int
 
     Returns
     -------
@@ -57,8 +56,6 @@ def inertia_band(
 
     Parameters
     ----------
-    model : InertiaFunctions
-    draws : Draws
     attitude : array, shape (samples, 3), rad
     value : array, shape (samples, 3, 3), or None
         The model's inertia matrix there, where it is at hand.

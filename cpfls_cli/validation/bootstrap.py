@@ -81,7 +81,6 @@ class BlockScores:
         Parameters
         ----------
         penalty : array, shape (parameters,)
-        rank_tolerance : float
         """
         half = replace(self, penalty=penalty)._half_inverse(rank_tolerance)
         # The scores add up to P x: taken from there, parameters without a penalty do not move by rounding.
@@ -95,7 +94,6 @@ class BlockScores:
         ----------
         values : array, shape (draws, parameters)
             z.
-        rank_tolerance : float
 
         Returns
         -------
@@ -202,11 +200,8 @@ def bootstrap(
         Of the data that the model was identified from.
     training : TorqueSource
         The whole training part, which the blocks divide.
-    model : InertiaFunctions
     fit : Fit
         Gives the ridge.
-    settings : ValidationSettings
-    rng : numpy.random.Generator
 
     References
     ----------

@@ -80,10 +80,7 @@ def curves(model: InertiaFunctions, draws: Draws, best_rigid_body: Array, traini
 
     Parameters
     ----------
-    model : InertiaFunctions
-    draws : Draws
     best_rigid_body : array, shape (6,), kg m^2
-    training : TorqueSource
     """
     visited = _visited_angles(training)
     attitude = np.stack([_along(visited, angle) for angle in (ROLL, PITCH)])
@@ -128,9 +125,6 @@ class SimulatedTorque:
 
     Attributes
     ----------
-    source : TorqueSource
-    model : InertiaFunctions
-    blocks : TimeBlocks
     factor : array, shape (blocks,)
         What the errors of each block are multiplied with.
     """
@@ -193,10 +187,6 @@ def round_trip(
     ----------
     training, learned : TorqueSource
         What the model was identified from.
-    settings : IdentificationSettings
-    model : InertiaFunctions
-    curves : Curves
-    rng : numpy.random.Generator
 
     Raises
     ------

@@ -37,8 +37,6 @@ class Grounds:
         Of predictors `MODEL`, `RIGID_BODY` and `NOTHING_MOVES` as they are, to be shown.
     replayed : mapping of str to StepErrors
         The same of each judged part, without the constant torque that each predictor misses in training.
-    residuals : ResidualAnalysis
-    physics : Physics
     r2_min : float
         R2 of body torque that is good enough for control.
     band : array, shape (3,), or None

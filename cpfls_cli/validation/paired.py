@@ -43,7 +43,6 @@ class Comparison:
     lower, higher : bool
         Whether ours are lower, or higher, by more than chance: so is the mean over all blocks, and the mean logarithm
         of the ratio by block is outside its 95 % interval about 0.
-    blocks : int
     """
 
     ours: float
@@ -143,7 +142,6 @@ def mean_missing_torque(source: TorqueSource, torque: Callable[[Motion], Array])
 
     Parameters
     ----------
-    source : TorqueSource
     torque : callable
         Predicts the generalised torque of a motion.
 

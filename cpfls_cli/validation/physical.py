@@ -58,7 +58,6 @@ def physical_sense(model: InertiaFunctions, rng: np.random.Generator) -> Physics
 
     Parameters
     ----------
-    model : InertiaFunctions
     rng : numpy.random.Generator
         Draws an attitude rate for every cell.
 
@@ -89,7 +88,6 @@ def energy_share(values: InertiaValues, coriolis: Array, rate: Array) -> float:
 
     Parameters
     ----------
-    values : InertiaValues
     coriolis : array, shape (samples, 3, 3), kg m^2/s
         C.
     rate : array, shape (samples, 3), rad/s
@@ -132,7 +130,6 @@ class PeriodErrors:
 
     Attributes
     ----------
-    parts : tuple of str
     mse : array, shape (part, 3), (N m)^2
         Mean squared error; the worse of one turn in roll and one turn back in pitch.
     max_error : array, shape (part, 3), N m
@@ -149,7 +146,6 @@ def one_period_away(model: InertiaFunctions, parts: Mapping[str, TorqueSource]) 
 
     Parameters
     ----------
-    model : InertiaFunctions
     parts : mapping of str to TorqueSource
         By name.
 

@@ -234,7 +234,6 @@ class ModelInputs:
 
     Attributes
     ----------
-    name : tuple of str
     value : array, shape (samples, input)
     varies : array of bool, shape (input,)
         False for constants, that nothing can be correlated with.
@@ -252,7 +251,6 @@ def model_inputs(data: TorqueData, predicted: Array) -> ModelInputs:
 
     Parameters
     ----------
-    data : TorqueData
     predicted : array, shape (samples, 3), N m
         Torque of the model.
 
@@ -283,7 +281,6 @@ def cross_correlation(errors: Array, inputs: ModelInputs, number: IntArray, with
     Parameters
     ----------
     errors : array, shape (samples, 3)
-    inputs : ModelInputs
     number : array of int, shape (samples,)
         As from `sample_numbers`.
     without : array of bool, shape (3,)

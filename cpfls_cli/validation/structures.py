@@ -135,8 +135,6 @@ class StructureFolds:
         Their structures are replaced by those that are asked for.
     choice : RidgeChoice
         Blocks, and ridge weights to try.
-    base : Base
-    rank_tolerance : float
     """
 
     learned: Samples
@@ -276,7 +274,6 @@ def compare_structures(
         Judges; of more than `validation.samples` samples, as many in contiguous pieces.
     learned : TorqueSource
         The samples of it that parameters are learned from.
-    settings : IdentificationSettings
 
     Returns
     -------

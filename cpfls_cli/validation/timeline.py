@@ -144,7 +144,6 @@ def time_blocks(training: TorqueSource, block_duration: float | None, most: int 
 
     Parameters
     ----------
-    training : TorqueSource
     block_duration : float or None, s
         None: a fortieth of the training part. There are 2 to 200 blocks; above two, each has 20 samples at least, so a
         short flight has fewer blocks than asked for, and a long one longer blocks.

@@ -45,10 +45,8 @@ class Validation:
         What is identified from a simulation of the model.
     steps : StepErrors
         Measured torques replayed, on the same part as the residuals, by the predictors as they are.
-    physics : Physics
     period : PeriodErrors or None
         None where inputs do not go all the way round.
-    verdict : Verdict
     """
 
     structures: StructureComparison | None
@@ -83,9 +81,6 @@ def validate(
         learned from.
     held_out : mapping of str to TorqueSource
         Data that nothing was learned from, by name.
-    settings : IdentificationSettings
-    result : Identification
-    rng : numpy.random.Generator
     tell : callable, optional
         Called with the name of each step.
     """

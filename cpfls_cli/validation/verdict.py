@@ -88,7 +88,6 @@ def good_axes(grounds: Grounds, predictor: str) -> BoolArray:
 
     Parameters
     ----------
-    grounds : Grounds
     predictor : str
         `MODEL` or `RIGID_BODY`.
 
@@ -105,7 +104,6 @@ def confirmed_axes(grounds: Grounds, predictor: str) -> BoolArray:
 
     Parameters
     ----------
-    grounds : Grounds
     predictor : str
         `MODEL` or `RIGID_BODY`.
 
