@@ -26,7 +26,7 @@ from scipy.stats import t as student
 
 from benchmarks.shared.playback_scores import SYMBOLS, free_runs, score
 from cpfls_cli.arrays import Array
-from cpfls_cli.playback.fit import Fitted, Windows, fit, uncertainty
+from cpfls_cli.playback.fit import Fitted, FitWindows, fit, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.settings import PlaybackSettings
@@ -77,7 +77,7 @@ def flights(seed: int, noise) -> tuple[list[PlaybackFlight], list[PlaybackFlight
 
 
 def recovered(training: Sequence[PlaybackFlight], judging: Sequence[PlaybackFlight]) -> Recovered:
-    windows = [Windows.of(flight, HORIZON, EVERY) for flight in training]
+    windows = [FitWindows.of(flight, HORIZON, EVERY) for flight in training]
     free = Structure(TRUE_BLOCKS).free(STATED)
     fitted = fit(free, windows, {}, STEPS, TOLERANCE)
     spread = uncertainty(fitted, windows)

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.kernels import Motion
+from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 TRAINING = (
@@ -168,7 +168,7 @@ def _flight(
     name: str, position: Array, velocity: Array, rate: Array, quaternion: Array, speed: Array
 ) -> PlaybackFlight:
     rotation = Rotation.from_quat(quaternion).as_matrix()
-    motion = Motion(position, velocity, rotation, rate, PERIOD)
+    motion = MeasuredMotion(position, velocity, rotation, rate, PERIOD)
     # Up to a step the benchmark gives a model the rotor speeds of the sample before it.
     return PlaybackFlight(name=name, motion=motion, speed=speed, hold="previous", stretches=(slice(0, len(speed)),))
 

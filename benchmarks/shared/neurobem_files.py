@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.kernels import Motion
+from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 PERIOD, STEP = 0.0025, 4
@@ -96,7 +96,7 @@ def segment(path: Path, name: str) -> Segment:
         raise InputError(f"{path}: expected a sample every {PERIOD} s")
     table = table[::STEP]
     attitude, rate = Rotation.from_quat(table[:, _QUATERNION]), np.ascontiguousarray(table[:, _RATE])
-    motion = Motion(
+    motion = MeasuredMotion(
         np.ascontiguousarray(table[:, _POSITION]),
         np.ascontiguousarray(attitude.apply(table[:, _VELOCITY])),
         attitude.as_matrix(),

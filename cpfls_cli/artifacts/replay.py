@@ -12,7 +12,7 @@ from cpfls_cli.artifacts.spec import BODY, WORLD, Format, Record, dataset, group
 
 if TYPE_CHECKING:
     from cpfls_cli.playback.flight import LoggedFlight
-    from cpfls_cli.playback.replay import Played, Replay, ReplayOptions, SignalErrors, Windows
+    from cpfls_cli.playback.replay import Played, Replay, ReplayOptions, ReplayWindows, SignalErrors
 
 WORST = 5
 """Windows that are listed."""
@@ -257,7 +257,7 @@ class PlayedFlightsGroup:
     rotation_alone: BoolArray = dataset("rotation_alone", "1 where velocity was not played back", "flight")
 
     @classmethod
-    def of(cls, flights: Sequence[LoggedFlight], played: Sequence[Played], windows: Windows) -> Self:
+    def of(cls, flights: Sequence[LoggedFlight], played: Sequence[Played], windows: ReplayWindows) -> Self:
         """Arrange flights."""
         return cls(
             name=tuple(flight.name for flight in flights),
@@ -286,7 +286,7 @@ class WindowGroup:
     )
 
     @classmethod
-    def of(cls, windows: Windows, times: Sequence[Array], period: float) -> Self:
+    def of(cls, windows: ReplayWindows, times: Sequence[Array], period: float) -> Self:
         """Arrange windows.
 
         Parameters
@@ -319,7 +319,7 @@ class WorstGroup:
     model: Array = dataset("model", "body rate of the model", "worst", "sample", "axis", units="rad/s", frame=BODY)
 
     @classmethod
-    def of(cls, windows: Windows, played: Sequence[Played], horizon: int) -> Self:
+    def of(cls, windows: ReplayWindows, played: Sequence[Played], horizon: int) -> Self:
         """Draw the worst windows.
 
         Parameters
@@ -353,7 +353,7 @@ class DrawnGroup:
     )
 
     @classmethod
-    def of(cls, windows: Windows, played: Sequence[Played], horizon: int) -> Self:
+    def of(cls, windows: ReplayWindows, played: Sequence[Played], horizon: int) -> Self:
         """Draw a stretch of which half are better and half are worse.
 
         Parameters

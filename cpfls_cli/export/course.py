@@ -8,9 +8,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.kernels import Motion
+from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.playback.motion import State
-from cpfls_cli.playback.player import rotation_vectors
+from cpfls_cli.playback.player import less_measured
 from cpfls_cli.playback.rotors import RotorResponse
 
 
@@ -70,7 +70,7 @@ class Course:
         """The flight at the steps of a simulator; between samples its motion is that of the sample before."""
         motion, finer = self.flight.motion, self.finer
         position, velocity, rotation, rate = (np.repeat(part, finer, axis=0) for part in motion[:4])
-        own = Motion(position, velocity, rotation, rate, self.period)
+        own = MeasuredMotion(position, velocity, rotation, rate, self.period)
         stretches = tuple(slice(finer * part.start, finer * part.stop) for part in self.flight.stretches)
         return replace(self.flight, motion=own, speed=_finer_speed(self.flight, finer), stretches=stretches)
 
@@ -86,13 +86,7 @@ class Course:
         -------
         array, shape (run, horizon, 4, 3)
         """
-        motion, at = self.flight.motion, self.starts[:, None] + 1 + np.arange(self.horizon)
-        off = np.empty((len(self.starts), self.horizon, 4, 3))
-        off[:, :, 0] = states.position - motion.position[at]
-        off[:, :, 1] = states.velocity - motion.velocity[at]
-        off[:, :, 2] = rotation_vectors(motion.rotation[at], states.rotation)
-        off[:, :, 3] = states.rate - motion.rate[at]
-        return off
+        return less_measured(states, self.flight.motion, self.starts[:, None] + 1 + np.arange(self.horizon))
 
 
 def _finer_speed(flight: PlaybackFlight, finer: int) -> Array:

@@ -18,7 +18,7 @@ from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.points import body_inertia
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.kernels import Body, Motion
+from cpfls_cli.playback.kernels import Body, MeasuredMotion
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import Player, apart, free_runs, player_of, rotor_terms_along
 from cpfls_cli.playback.rotors import RotorResponse
@@ -312,7 +312,7 @@ def probe_flight(model: VehicleModel) -> PlaybackFlight:
     velocity = rng.normal(0.0, _VELOCITY, (_RUNS, 3))
     rate = rng.normal(0.0, _RATE, (_RUNS, 3))
     rotation = rotation_matrix(rng.normal(0.0, [_TILT, _TILT, 1.0], (_RUNS, 3)))
-    motion = Motion(
+    motion = MeasuredMotion(
         np.zeros((_RUNS * samples, 3)),
         np.repeat(velocity, samples, axis=0),
         np.repeat(rotation, samples, axis=0),

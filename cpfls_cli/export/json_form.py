@@ -13,7 +13,7 @@ from cpfls_cli.dynamics.rigid_body import VERTICAL
 from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.effects.polynomial import FACTORS
 from cpfls_cli.export.points import PERIOD
-from cpfls_cli.export.sheet import EXPORTER, Sheet, base_of, rule_labels, rules_along
+from cpfls_cli.export.sheet import EXPORTER, Sheet, base_of, rule_labels
 from cpfls_cli.export.source import (
     airflow_order,
     airflow_peaks,
@@ -24,7 +24,6 @@ from cpfls_cli.export.source import (
     visited_rows,
 )
 from cpfls_cli.export.text import strict_json
-from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.fuzzy.membership import Z_FUNCTION
 from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric
 from cpfls_cli.regressor.structure import Block
@@ -170,15 +169,14 @@ def _structure(model: InertiaFunctions) -> dict[str, Any]:
 
 def _fuzzy(model: InertiaFunctions) -> dict[str, Any]:
     return {
-        "inputs": {name: _range(r) for name, r in zip(_ANGLES, model.ranges, strict=True)},
+        "inputs": {
+            name: {"minimum": data.minimum, "maximum": data.maximum, "width": data.width}
+            for name, data in zip(_ANGLES, model.ranges, strict=True)
+        },
         "breakpoints": {p.name: b for p, b in zip(model.structure.partitions, model.partitions, strict=True)},
         "unit": "kg m^2",
         "functions": {block.function.name: _function(model, block) for block in model.structure.blocks},
     }
-
-
-def _range(data: InputRange) -> dict[str, float]:
-    return {"minimum": data.minimum, "maximum": data.maximum, "width": data.width}
 
 
 def _function(model: InertiaFunctions, block: Block) -> dict[str, Any]:
@@ -189,7 +187,7 @@ def _function(model: InertiaFunctions, block: Block) -> dict[str, Any]:
         "row": function.row,
         "column": function.column,
         "inputs": [_ANGLES[angle] for angle in function.inputs],
-        "rules_per_input": [rules_along(structure, partition) for partition in block.partitions],
+        "rules_per_input": [structure.partitions[i].rules(circular=structure.circular) for i in block.partitions],
         "rules": [{"rule": label, "coefficients": own} for label, own in zip(labels, coefficients, strict=True)],
     }
 

@@ -73,7 +73,8 @@ def expected(model: InertiaFunctions, motion: Motion) -> Expected:
         The torque of the rigid body is computed about the body axes, where it is finite at every attitude.
     """
     q, qd, qdd = motion.attitude, motion.rate, motion.acceleration
-    inertia, fuzzy = model.inertia(q), _fuzzy_torque(model, motion)
+    inertia = model.inertia(q)
+    fuzzy = Regressor(model.structure, motion, model.ranges).torque(model.partitions, model.coefficients)
     rigid = body_torque(q, qd, qdd, symmetric(model.rigid_body))
     return Expected(
         motion,
@@ -84,10 +85,6 @@ def expected(model: InertiaFunctions, motion: Motion) -> Expected:
         ~model.outside(q),
         _scale(inertia, motion, bool(fuzzy.any())),
     )
-
-
-def _fuzzy_torque(model: InertiaFunctions, motion: Motion) -> Array:
-    return Regressor(model.structure, motion, model.ranges).torque(model.partitions, model.coefficients)
 
 
 def _scale(inertia: InertiaValues, motion: Motion, fuzzy: bool) -> Array:

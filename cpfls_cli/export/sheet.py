@@ -231,19 +231,7 @@ def base_of(model: InertiaFunctions) -> str:
 def rule_labels(block: Block, structure: ModelStructure) -> list[str]:
     """Name the rules of an inertia function by their places along its inputs."""
     names = [("roll", "pitch")[angle] for angle in block.function.inputs]
-    last = rules_along(structure, block.partitions[-1])
+    last = structure.partitions[block.partitions[-1]].rules(circular=structure.circular)
     if len(names) == 1:
         return [f"{names[0]} {rule}" for rule in range(block.rules)]
     return [f"{names[0]} {rule // last}, {names[1]} {rule % last}" for rule in range(block.rules)]
-
-
-def rules_along(structure: ModelStructure, partition: int) -> int:
-    """Count the rules along one input.
-
-    Parameters
-    ----------
-    partition : int
-        Index.
-    """
-    functions = structure.partitions[partition].functions
-    return max(functions - 1, 1) if structure.circular else functions

@@ -15,7 +15,7 @@ from cpfls_cli.dynamics.rigid_body import VERTICAL, vertical
 from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.effects.polynomial import FACTORS
 from cpfls_cli.export.points import PERIOD, Expected, ReferencePoints, ReferenceRun
-from cpfls_cli.export.sheet import Sheet, rule_labels, rules_along
+from cpfls_cli.export.sheet import Sheet, rule_labels
 from cpfls_cli.export.text import c_row, c_rows, comment_lines, comment_text, filled, literal_text, number, python_rows
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.structure import ModelStructure
@@ -44,6 +44,7 @@ def c_source(sheet: Sheet, stem: str, told: Sequence[str] = ()) -> CSource:
     """
     points, runs, attitudes = sheet.references
     peaks = airflow_peaks(sheet)
+    rows = zip(*(column.tolist() for column in sheet.weights), strict=True)
     words = {
         **_common_words(sheet, told),
         "source": comment_text(f"{stem}.c"),
@@ -52,7 +53,7 @@ def c_source(sheet: Sheet, stem: str, told: Sequence[str] = ()) -> CSource:
         "history": int(sheet.model.response.delay_s / _FASTEST_PERIOD * (1 + 1e-9)) + 2,
         "rigid_rows": [c_row(row) for row in symmetric(sheet.rigid_body)],
         "factor_rows": filled(", ".join(f"{{{first}, {second}}}" for first, second in FACTORS.tolist()), 4),
-        "weights": [f"{{{row}, {term}, {rotor}, R({number(weight)})}}," for row, term, rotor, weight in _rows(sheet)],
+        "weights": [f"{{{row}, {term}, {rotor}, R({number(weight)})}}," for row, term, rotor, weight in rows],
         "peaks": len(peaks),
         "rules_of_airflow": max(len(peaks) - 1, 1),
         "features": 1 + (2 * airflow_order(sheet) or 1),
@@ -275,7 +276,7 @@ def _structure_words(model: InertiaFunctions) -> dict[str, Any]:
         "features_2": features[2],
         "features_text": _features_text(structure),
         "pitch_rules": {
-            block.function.name: rules_along(structure, block.partitions[-1])
+            block.function.name: structure.partitions[block.partitions[-1]].rules(circular=structure.circular)
             for block in structure.blocks
             if len(block.partitions) > 1
         },
@@ -351,7 +352,3 @@ def run_of(run: ReferenceRun) -> dict[str, Any]:
         "start": start,
         "end": end,
     }
-
-
-def _rows(sheet: Sheet) -> zip[tuple[int, int, int, float]]:
-    return zip(*(column.tolist() for column in sheet.weights), strict=True)

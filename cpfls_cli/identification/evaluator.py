@@ -239,7 +239,8 @@ class Evaluator:
         if products is None or fit is None:
             return chromosome, NOT_DEFINED
         objectives = self.objectives(chromosome, fit)
-        if self._refines(fit):
+        movable = any(partition.functions > 2 for partition in self.structure.partitions)
+        if self.local_search.enabled and movable and not np.isinf(fit.ridge_weight):
             refined = refine(Problem(self.solver, fit), chromosome, products, self.local_search.evaluations)
             better = self._fit(refined.genes, refined.products) if refined.products is not products else None
             after = NOT_DEFINED if better is None else self.objectives(refined.genes, better)
@@ -247,10 +248,6 @@ class Evaluator:
             if always or after[0] < objectives[0]:
                 return refined.genes, after
         return chromosome, objectives
-
-    def _refines(self, fit: Fit) -> bool:
-        movable = any(partition.functions > 2 for partition in self.structure.partitions)
-        return self.local_search.enabled and movable and not np.isinf(fit.ridge_weight)
 
     def _fit(self, chromosome: IntArray, products: Products | None) -> Fit | None:
         fit = None if products is None else self.solver.fit(self._decode(chromosome), products)

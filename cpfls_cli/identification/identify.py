@@ -25,7 +25,6 @@ from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.search import UNWATCHED, Front, SearchRun, StopReason, is_end, search
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.identification.solver import Fit, Solver
-from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import data_ranges, joined_ranges
 from cpfls_cli.regressor.structure import model_structure
 
@@ -114,7 +113,9 @@ def identify(
     if uniform is not None and model.structure.genes > 0:
         predictors[UNIFORM] = uniform[0].torque
     parts = {TRAINING: training, **held_out}
-    scores = {part: _scores(predictors, data) for part, data in parts.items()}
+    scores = {
+        part: {name: score_of(data, torque) for name, torque in predictors.items()} for part, data in parts.items()
+    }
     diagnostics = FitDiagnostics(
         fit=fit,
         system=system,
@@ -183,10 +184,6 @@ def _solve(
         learned.structure, learned.ranges, partitions, exact.coefficients, exact.rigid_body, visited
     )
     return model, exact, system
-
-
-def _scores(predictors: Mapping[str, Callable[[Motion], Array]], data: TorqueSource) -> dict[str, Score]:
-    return {name: score_of(data, torque) for name, torque in predictors.items()}
 
 
 def _count(source: TorqueSource, flag: Callable[[Array], BoolArray]) -> int:

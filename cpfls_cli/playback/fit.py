@@ -16,7 +16,7 @@ from cpfls_cli.gauss_newton import damped_step
 from cpfls_cli.playback.evaluation import Evaluated
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers
-from cpfls_cli.playback.kernels import Loss, Motion, errors_of_runs, sensitivities
+from cpfls_cli.playback.kernels import Loss, MeasuredMotion, errors_of_runs, sensitivities
 from cpfls_cli.playback.model import VehicleModel
 
 POSITION, VELOCITY, ATTITUDE, RATE = range(4)
@@ -38,7 +38,7 @@ _TRIES = 8
 
 
 @dataclass(frozen=True)
-class Windows:
+class FitWindows:
     """Windows of a flight that runs are compared in.
 
     Attributes
@@ -63,11 +63,11 @@ class Windows:
         return np.asarray((self.starts[:, None] + np.arange(self.horizon + 1)).ravel())
 
     @cached_property
-    def motion(self) -> Motion:
+    def motion(self) -> MeasuredMotion:
         """Motion at these samples."""
         whole = self.flight.motion
         position, velocity, rotation, rate = (np.ascontiguousarray(each[self.samples]) for each in whole[:4])
-        return Motion(position, velocity, rotation, rate, whole.period)
+        return MeasuredMotion(position, velocity, rotation, rate, whole.period)
 
     @cached_property
     def places(self) -> IntArray:
@@ -75,7 +75,7 @@ class Windows:
         return np.arange(len(self.starts), dtype=np.int64) * (self.horizon + 1)
 
     @classmethod
-    def of(cls, flight: PlaybackFlight, horizon: int, every: int) -> Windows:
+    def of(cls, flight: PlaybackFlight, horizon: int, every: int) -> FitWindows:
         """Take every n-th window of a flight.
 
         Parameters
@@ -87,7 +87,7 @@ class Windows:
         return cls(flight, starts, loss_of(flight, rate_stays(flight, starts, horizon)))
 
 
-def windows_of(flights: Sequence[PlaybackFlight], horizon_s: float, interval_s: float) -> list[Windows]:
+def windows_of(flights: Sequence[PlaybackFlight], horizon_s: float, interval_s: float) -> list[FitWindows]:
     """Take windows of flights, errors weighed so that a lively flight counts more, by the square root.
 
     A model misses more of a lively flight, but not in proportion: the noise of rotor speeds is there in hover as well.
@@ -107,7 +107,7 @@ def windows_of(flights: Sequence[PlaybackFlight], horizon_s: float, interval_s: 
     lively = np.array([scale.mean(axis=0) for scale in scales])
     weight = np.sqrt(lively.max(axis=0) / np.where(lively > 0, lively, np.inf))
     return [
-        Windows(flight, start, loss_of(flight, scale * np.where(own > 0, own, 1.0)))
+        FitWindows(flight, start, loss_of(flight, scale * np.where(own > 0, own, 1.0)))
         for flight, start, scale, own in zip(flights, starts, scales, weight, strict=True)
     ]
 
@@ -186,7 +186,7 @@ class _Point:
 
 
 def fit(
-    free: JointNumbers, windows: Sequence[Windows], known: Mapping[str, float], steps: int, tolerance: float
+    free: JointNumbers, windows: Sequence[FitWindows], known: Mapping[str, float], steps: int, tolerance: float
 ) -> Fitted:
     """Minimise the robust prediction error over windows by a damped Gauss-Newton method within bounds.
 
@@ -238,7 +238,7 @@ class _Evaluations:
             self._known[flight.group] = Evaluated.of(own, self.values[places]), places
         return self._known[flight.group]
 
-    def sums(self, window: Windows, group: IntArray) -> tuple[float, Array, Array]:
+    def sums(self, window: FitWindows, group: IntArray) -> tuple[float, Array, Array]:
         """Sum loss, gradient and Hessian over windows of a flight; see `window_sums`."""
         evaluated, places = self.of(window.flight)
         loss, own_gradient, own_hessian = window_sums(evaluated, window, group)
@@ -249,7 +249,7 @@ class _Evaluations:
         return loss, gradient, hessian
 
 
-def _evaluated(free: JointNumbers, windows: Sequence[Windows], values: Array) -> _Point:
+def _evaluated(free: JointNumbers, windows: Sequence[FitWindows], values: Array) -> _Point:
     evaluations = _Evaluations(free, values)
     total, gradient, hessian = 0.0, np.zeros(len(values)), np.zeros((len(values), len(values)))
     for window in windows:
@@ -268,7 +268,7 @@ def _evaluated(free: JointNumbers, windows: Sequence[Windows], values: Array) ->
     )
 
 
-def window_sums(evaluated: Evaluated, window: Windows, group: IntArray) -> tuple[float, Array, Array]:
+def window_sums(evaluated: Evaluated, window: FitWindows, group: IntArray) -> tuple[float, Array, Array]:
     """Sum loss, gradient and Hessian over the windows of a flight.
 
     Parameters
@@ -302,7 +302,7 @@ def window_sums(evaluated: Evaluated, window: Windows, group: IntArray) -> tuple
 
 
 def _better(
-    free: JointNumbers, windows: Sequence[Windows], point: _Point, damping: float, bounds: tuple[Array, Array]
+    free: JointNumbers, windows: Sequence[FitWindows], point: _Point, damping: float, bounds: tuple[Array, Array]
 ) -> tuple[_Point | None, float]:
     """Find a point with a smaller objective, with more damping where a step fails; None where none is found."""
     for _ in range(_TRIES):
@@ -338,7 +338,7 @@ _INFORMED = 10.0
 """Curvature by the flights over that by the prior from which on a number counts as determined."""
 
 
-def uncertainty(fitted: Fitted, windows: Sequence[Windows]) -> Uncertainty:
+def uncertainty(fitted: Fitted, windows: Sequence[FitWindows]) -> Uncertainty:
     """Estimate how far the numbers scatter, from blocks of neighbouring windows.
 
     Without a block b, windows within which are alike, the fit moves by ``(H - H_b)^-1 g_b``; the covariance is
@@ -347,7 +347,7 @@ def uncertainty(fitted: Fitted, windows: Sequence[Windows]) -> Uncertainty:
 
     Parameters
     ----------
-    windows : sequence of Windows
+    windows : sequence of FitWindows
         Of the flights that it was fitted to.
 
     References
@@ -371,7 +371,7 @@ def uncertainty(fitted: Fitted, windows: Sequence[Windows]) -> Uncertainty:
     return Uncertainty(covariance, len(gradient), np.asarray(conditional > _INFORMED * belief))
 
 
-def window_errors(fitted: Fitted, window: Windows) -> Array:
+def window_errors(fitted: Fitted, window: FitWindows) -> Array:
     """Weigh the errors of each window as the fit does, shape (window,): about 1.1 for rates that stay."""
     flight = window.flight
     evaluated, _ = _Evaluations(fitted.free, fitted.values).of(flight)
@@ -390,7 +390,7 @@ def window_errors(fitted: Fitted, window: Windows) -> Array:
     return np.asarray((weight * delta**2 * (root - 1.0)).sum(axis=(1, 2)))
 
 
-def stays_error(window: Windows) -> float:
+def stays_error(window: FitWindows) -> float:
     """Weigh the mean errors of "rate stays" on windows of a flight as the fit does."""
     weight, delta = window.loss.weight, window.loss.delta
     size = rate_stays(window.flight, window.starts, window.horizon)

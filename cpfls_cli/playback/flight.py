@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.playback.kernels import Motion
+from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.playback.rotors import Hold
 
 
@@ -21,7 +21,7 @@ class PlaybackFlight:
 
     Attributes
     ----------
-    motion : Motion
+    motion : MeasuredMotion
         Zero, and no rotation, where the flight does not know it.
     speed : array, shape (time, rotor), rad/s
         Measured, or commanded.
@@ -38,7 +38,7 @@ class PlaybackFlight:
     """
 
     name: str
-    motion: Motion
+    motion: MeasuredMotion
     speed: Array
     hold: Hold
     stretches: tuple[slice, ...]
@@ -141,10 +141,10 @@ def playback_flight(name: str, parts: Sequence[Signals], hold: Hold) -> Playback
     """
     first = parts[0]
     thrust_known = first.rotor_speed is not None or first.stated_thrust is not None
-    motion = Motion(
+    motion = MeasuredMotion(
         _joined([_or_zero(part.position, part) for part in parts]),
         _joined([_or_zero(part.velocity, part) for part in parts]),
-        _joined([_level(part) if part.attitude is None else part.rotation for part in parts]),
+        _joined([np.tile(np.eye(3), (len(part), 1, 1)) if part.attitude is None else part.rotation for part in parts]),
         _joined([part.body_rate for part in parts]),
         # Clocks are rounded; what rounding leaves of a step would show in every horizon.
         round(float(first.time[-1] - first.time[0]) / (len(first) - 1), 12),
@@ -154,7 +154,7 @@ def playback_flight(name: str, parts: Sequence[Signals], hold: Hold) -> Playback
     return PlaybackFlight(
         name=name,
         motion=motion,
-        speed=_joined([_rotor_speed(part) for part in parts]),
+        speed=_joined([_or_zero(part.rotor_speed, part, len(part.vehicle.rotors)) for part in parts]),
         hold=hold,
         stretches=tuple(slice(*pair) for pair in pairwise(ends)),
         has_attitude=first.attitude is not None,
@@ -169,13 +169,5 @@ def _joined(parts: Sequence[Array]) -> Array:
     return np.ascontiguousarray(np.concatenate(parts), dtype=float)
 
 
-def _or_zero(values: Array | None, part: Signals) -> Array:
-    return np.zeros((len(part), 3)) if values is None else values
-
-
-def _level(part: Signals) -> Array:
-    return np.tile(np.eye(3), (len(part), 1, 1))
-
-
-def _rotor_speed(part: Signals) -> Array:
-    return np.zeros((len(part), len(part.vehicle.rotors))) if part.rotor_speed is None else part.rotor_speed
+def _or_zero(values: Array | None, part: Signals, columns: int = 3) -> Array:
+    return np.zeros((len(part), columns)) if values is None else values

@@ -12,20 +12,13 @@ follows its file.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.compiling import compiled
+from cpfls_cli.compiling import Function, compiled
 from cpfls_cli.effects.polynomial import STATE_TERMS
-
-Function = TypeVar("Function", bound=Callable[..., Any])
-
-
-def _compiled(function: Function) -> Function:
-    return compiled(function)
 
 
 def _inlined(function: Function) -> Function:
@@ -38,7 +31,7 @@ def _inlined_sum(function: Function) -> Function:
     return compiled(function, fastmath={"reassoc", "contract"}, forceinline=True)
 
 
-class Motion(NamedTuple):
+class MeasuredMotion(NamedTuple):
     """Measured motion, where runs start and what they are held against.
 
     Attributes
@@ -87,10 +80,12 @@ class Airflow(NamedTuple):
 
 
 _POWERS = 2
+"""Terms of a column of the remainder: by the speed, and by its square."""
+
 _POLYNOMIAL = len(STATE_TERMS)
 
 
-@_compiled
+@compiled
 def airflow_terms(airflow: Airflow) -> int:
     """Count the terms of a remainder: each column of the system times the speed, and times its square."""
     if len(airflow.breakpoints) == 0:
@@ -280,7 +275,7 @@ def _slopes(body: Body, weights: Array, value: Array, rotation: Array, rate: Arr
     out[6], out[7], out[8] = f0, f1, f2
 
 
-_FASTEST = 300.0
+FASTEST = 300.0
 """Body rate in rad/s, and speed in m/s, at which a run is called diverged and stands still."""
 
 
@@ -325,12 +320,12 @@ class _Space(NamedTuple):
     moved: Array
 
 
-@_compiled
+@compiled
 def _new_state() -> _State:
     return _State(np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros(3))
 
 
-@_compiled
+@compiled
 def _new_space(used: Terms, slopes: bool) -> _Space:
     return _Space(
         np.zeros(6),
@@ -348,7 +343,7 @@ def _new_space(used: Terms, slopes: bool) -> _Space:
 
 
 @_inlined
-def _start(motion: Motion, sample: int, state: _State) -> None:
+def _start(motion: MeasuredMotion, sample: int, state: _State) -> None:
     for i in range(3):
         state.position[i] = motion.position[sample, i]
         state.velocity[i] = motion.velocity[sample, i]
@@ -403,11 +398,11 @@ def _to_end(state: _State, middle: _State, h: float, translates: bool, at: _Spac
 @_inlined
 def _lost(state: _State) -> bool:
     """Tell whether a state is beyond what any vehicle flies, or not a number."""
-    fastest = 0.0
     for i in range(3):
         for value in (state.rate[i], state.velocity[i]):
-            fastest = max(fastest, abs(value)) if value == value else np.inf
-    return not fastest < _FASTEST
+            if not abs(value) < FASTEST:
+                return True
+    return False
 
 
 @_inlined
@@ -433,7 +428,7 @@ def rotation_error(measured: Array, predicted: Array, out: Array) -> None:
 
 
 @_inlined
-def _write_errors(motion: Motion, sample: int, state: _State, out: Array) -> None:
+def _write_errors(motion: MeasuredMotion, sample: int, state: _State, out: Array) -> None:
     for i in range(3):
         out[0, i] = state.position[i] - motion.position[sample, i]
         out[1, i] = state.velocity[i] - motion.velocity[sample, i]
@@ -441,9 +436,9 @@ def _write_errors(motion: Motion, sample: int, state: _State, out: Array) -> Non
     rotation_error(motion.rotation[sample], state.rotation, out[2])
 
 
-@_compiled
+@compiled
 def errors_of_runs(
-    motion: Motion, body: Body, used: Terms, weights: Array, starts: IntArray, translates: bool, out: Array
+    motion: MeasuredMotion, body: Body, used: Terms, weights: Array, starts: IntArray, translates: bool, out: Array
 ) -> IntArray:
     """Simulate free runs and write their errors.
 
@@ -540,7 +535,7 @@ class _Tangent(NamedTuple):
     rate: Array
 
 
-@_compiled
+@compiled
 def _new_tangent(count: int) -> _Tangent:
     return _Tangent(np.zeros((3, count)), np.zeros((3, count)), np.zeros((3, count)), np.zeros((3, count)))
 
@@ -590,7 +585,7 @@ class _Columns(NamedTuple):
     by_motion: Array
 
 
-@_compiled
+@compiled
 def _new_columns(count: int) -> _Columns:
     return _Columns(
         np.zeros((6, count)), np.zeros((6, count)), np.zeros((3, count)), np.zeros((3, count)), np.zeros((6, 6))
@@ -708,9 +703,9 @@ def _add(error: Array, rows: Array, weight: float, delta: float, gradient: Array
     return float(weight * delta * delta * (root - 1.0))
 
 
-@_compiled
+@compiled
 def sensitivities(
-    motion: Motion,
+    motion: MeasuredMotion,
     body: Body,
     used: Terms,
     weights: Array,
@@ -761,7 +756,7 @@ def sensitivities(
             _tangent_to_end(tangent, half, change, h, translates, at)
             if _lost(state):
                 # A run that leaves every flight behind: as bad as the largest error, and of no direction.
-                total += np.sum(loss.weight[step:] * loss.delta[step:]) * _FASTEST
+                total += np.sum(loss.weight[step:] * loss.delta[step:]) * FASTEST
                 break
             _write_errors(motion, sample + 1, state, error)
             for signal in range(4):

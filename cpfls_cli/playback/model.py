@@ -33,8 +33,6 @@ from cpfls_cli.playback.table import (
 )
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_AXES = 3
-
 
 class ModelEffect(NamedTuple):
     """An effect of the catalogue in a model.
@@ -52,7 +50,7 @@ class ModelEffect(NamedTuple):
     @property
     def is_lever(self) -> bool:
         """Whether it has a lever for the forces of all other parts."""
-        return self.name == CENTRE_OF_MASS.name and len(self.coefficients) == _AXES
+        return self.name == CENTRE_OF_MASS.name and len(self.coefficients) == 3
 
     @property
     def known(self) -> Effect:
@@ -219,7 +217,7 @@ class VehicleModel:
     @property
     def centre(self) -> Array:
         """Centre of mass, from where all forces have their levers from, shape (3,), m."""
-        return next((one.coefficients for one in self.effects if one.is_lever), np.zeros(_AXES))
+        return next((one.coefficients for one in self.effects if one.is_lever), np.zeros(3))
 
     def require(self, signals: Signals, name: str) -> None:
         """Refuse a flight that lacks what an effect beside the table needs.

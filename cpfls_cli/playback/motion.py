@@ -16,12 +16,19 @@ from cpfls_cli.rotations import turns
 from cpfls_cli.vehicle.rotors import rotor_demand
 
 _STEPS = 40
+"""Of Newton's method at most: few are needed but where steps are cut short (`_SLOWEST`)."""
+
 _SLOWEST = 0.2
 """Share of a speed that one step of Newton's method leaves of it at least, so that it stays above zero."""
 
 _MET = 1e-10
+"""Share of the sizes of its terms up to which what is left of a balance is rounding."""
+
 _ROUNDING = 1e-12
+"""Share by which a speed at its limit may lie above it."""
+
 _SMALL = 1e-4
+"""Least share of the largest squared speed that a rotor starts from."""
 
 
 class State(NamedTuple):

@@ -13,16 +13,16 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, momentum_form
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_flight
-from cpfls_cli.playback.kernels import Body, Motion, Terms, errors_of_runs
+from cpfls_cli.playback.kernels import FASTEST, Body, MeasuredMotion, Terms, errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.motion import step as step_of_rigid_body
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.playback.table import WrenchTable, lever_weights, used_terms, weights_by_step
+from cpfls_cli.playback.table import WrenchTable, lever_weights
 from cpfls_cli.regressor.regressor import InertiaValues
 
-_FASTEST = 300.0
 _TINY = 1e-12
+"""Sine of an angle, in rad, that is rounding: the axis does not show."""
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,7 @@ class Player:
             Those in use, the constant always.
         weights : array, shape (time, 6, active)
         """
-        found = used_terms(self.table.weights, self.table.airflow)
-        used = found._replace(active=np.union1d([0], found.active).astype(np.int64))
-        weights = weights_by_step(self.table.weights, used, self.rotor[part])
+        used, weights = self.table.by_step(self.rotor[part])
         if self.along is not None:
             weights[:, :, 0] += self.along[part]
         return used, weights
@@ -168,7 +166,7 @@ def one_step(model: VehicleModel, state: State, rotor: Array, period: float) -> 
         return after._replace(position=after.position + period * wind, velocity=after.velocity + wind)
     player = Player(table=model.table, rotor=rotor, body=model.body, fuzzy=model.fuzzy)
     used, weights = player.step_weights(slice(None))
-    return _FuzzyRuns(player, model.fuzzy, Motion(*state, period), used, weights, translates=True).one_step()
+    return _FuzzyRuns(player, model.fuzzy, MeasuredMotion(*state, period), used, weights, translates=True).one_step()
 
 
 class Runs(NamedTuple):
@@ -202,7 +200,9 @@ def free_runs(player: Player, flight: PlaybackFlight, starts: IntArray, horizon:
         Samples.
     """
     first, part = int(starts[0]), slice(int(starts[0]), int(starts[-1]) + horizon + 1)
-    motion = _part(in_the_air(flight, player.wind).motion, part)
+    whole = in_the_air(flight, player.wind).motion
+    position, velocity, rotation, rate = (values[part] for values in whole[:4])
+    motion = MeasuredMotion(position, velocity, rotation, rate, whole.period)
     used, weights = player.step_weights(part)
     errors = np.empty((len(starts), horizon, 4, 3))
     if player.fuzzy is None:
@@ -239,18 +239,17 @@ def still_runs(flight: PlaybackFlight, starts: IntArray, horizon: int, *, rate_s
     turn = rotations.turns(moves * motion.period * rate)
     errors = np.empty((len(starts), horizon, 4, 3))
     for step in range(horizon):
-        at = starts + step + 1
         held = held @ turn if rate_stays else held
-        gone = moves * (step + 1) * motion.period * velocity
-        errors[:, step, 0] = motion.position[starts] + gone - motion.position[at]
-        errors[:, step, 1] = velocity - motion.velocity[at]
-        errors[:, step, 2] = rotation_vectors(motion.rotation[at], held)
-        errors[:, step, 3] = rate - motion.rate[at]
+        position = motion.position[starts] + moves * (step + 1) * motion.period * velocity
+        errors[:, step] = less_measured(State(position, velocity, held, rate), motion, starts + step + 1)
     return Runs(errors, np.full(len(starts), -1))
 
 
-def _part(motion: Motion, part: slice) -> Motion:
-    return Motion(motion.position[part], motion.velocity[part], motion.rotation[part], motion.rate[part], motion.period)
+def less_measured(state: State, motion: MeasuredMotion, at: IntArray) -> Array:
+    """Compare states with what was measured at samples, shape (..., 4, 3): in the order and sense of `Runs.errors`."""
+    turned = rotation_vectors(motion.rotation[at], state.rotation)
+    position, velocity = state.position - motion.position[at], state.velocity - motion.velocity[at]
+    return np.stack([position, velocity, turned, state.rate - motion.rate[at]], axis=-2)
 
 
 def rotation_vectors(measured: Array, predicted: Array) -> Array:
@@ -321,7 +320,7 @@ class _FuzzyRuns:
 
     player: Player
     fuzzy: InertiaModel
-    motion: Motion
+    motion: MeasuredMotion
     used: Terms
     weights: Array
     translates: bool
@@ -334,16 +333,13 @@ class _FuzzyRuns:
             with np.errstate(all="ignore"):
                 moved, after = self._step(state, rate, now, self.weights[starts + step])
             fastest = np.maximum(np.abs(after.rate).max(axis=1), np.abs(moved.velocity).max(axis=1))
-            good = (diverged < 0) & after.exists & (fastest < _FASTEST)
+            good = (diverged < 0) & after.exists & (fastest < FASTEST)
             # A run that no body flies stands still from there on, as that of a rigid body does.
             diverged[(diverged < 0) & ~good] = step
             state = _State(*(_kept(good, new, old) for new, old in zip(moved, state, strict=True)))
             rate, now = _kept(good, after.rate, rate), after
-            at = starts + step + 1
-            errors[:, step, 0] = state.position - motion.position[at]
-            errors[:, step, 1] = state.velocity - motion.velocity[at]
-            errors[:, step, 2] = rotation_vectors(motion.rotation[at], state.rotation)
-            errors[:, step, 3] = rate - motion.rate[at]
+            reached = State(state.position, state.velocity, state.rotation, rate)
+            errors[:, step] = less_measured(reached, motion, starts + step + 1)
         return diverged
 
     def one_step(self) -> State:

@@ -95,7 +95,7 @@ class SignalErrors:
 
 
 @dataclass(frozen=True)
-class Windows:
+class ReplayWindows:
     """Where runs started, and how far off they were.
 
     Attributes
@@ -167,10 +167,11 @@ class Replay:
     """
 
     errors: Mapping[str, SignalErrors | None]
-    windows: Windows
+    windows: ReplayWindows
 
 
 _OUTER = 0.05
+"""Share of the windows at each end that a region leaves out: one stray sample is no region."""
 
 
 @dataclass(frozen=True)
@@ -191,7 +192,7 @@ class Region:
     rate: Array
 
 
-def where_better(flights: Sequence[Played], windows: Windows) -> Region | None:
+def where_better(flights: Sequence[Played], windows: ReplayWindows) -> Region | None:
     """Find the speeds and rates at which a model is better; None where it is nowhere."""
     model, *rivals = windows.size[:3]
     better = model < np.min(rivals, axis=0)
@@ -266,20 +267,18 @@ def replay(
     starts = [played.flight.starts(horizon, every) for played in flights]
     sums, parts, done, total = _Sums(horizon), [], 0, sum(map(len, starts))
     for index, played in enumerate(flights):
-        for batch in _batches(starts[index], max(1, _BATCH // horizon)):
+        size = max(1, _BATCH // horizon)
+        for first in range(0, len(starts[index]), size):
+            batch = starts[index][first : first + size]
             parts.append(_added(sums, played, batch, index))
             done += len(batch)
             progress(done / total)
     joined = [np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)]
-    return Replay(sums.errors(), Windows(*joined))
-
-
-def _batches(starts: IntArray, size: int) -> Iterator[IntArray]:
-    return (starts[first : first + size] for first in range(0, len(starts), size))
+    return Replay(sums.errors(), ReplayWindows(*joined))
 
 
 def _added(sums: _Sums, played: Played, starts: IntArray, flight: int) -> tuple[IntArray, IntArray, Array, IntArray]:
-    """Add a batch to the sums; give the columns of `Windows`."""
+    """Add a batch to the sums; give the columns of `ReplayWindows`."""
     size = np.empty((len(PREDICTIONS), len(starts)))
     diverged = np.empty(size.shape, dtype=np.int64)
     knows = played.knows

@@ -16,7 +16,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.evolution import Evaluation, EvolutionSettings, evolve
 from cpfls_cli.evolution.ranking import comparable
-from cpfls_cli.playback.fit import Fitted, Windows, fit, stays_error, window_errors, windows_of
+from cpfls_cli.playback.fit import Fitted, FitWindows, fit, stays_error, window_errors, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import Group, JointNumbers
 from cpfls_cli.playback.kernels import Airflow
@@ -164,7 +164,7 @@ class _Bench:
     """
 
     vehicle: VehicleSettings
-    parts: Sequence[Sequence[Windows]]
+    parts: Sequence[Sequence[FitWindows]]
     progress: Progress
     expected: int
     kept: Kept
@@ -296,7 +296,7 @@ def choose(
     return Choice(chosen, best, path[-1], everything, nothing, _front(judged), len(judged), complete)
 
 
-def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> list[list[Windows]]:
+def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> list[list[FitWindows]]:
     """Split flights into parts that are kept aside in turn: neighbours in their order, or pieces of each.
 
     Neighbours are kept aside together because flights of one kind usually stand side by side: what a model has to
@@ -315,15 +315,15 @@ def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> l
     return [part for pieces in zip(*cut, strict=True) if (part := [piece for piece in pieces if len(piece.starts)])]
 
 
-def _pieces(windows: Windows, count: int) -> list[Windows]:
+def _pieces(windows: FitWindows, count: int) -> list[FitWindows]:
     """Cut the windows of a flight; those that reach into the next piece are left out, so that none shares a sample."""
     pieces = np.array_split(windows.starts, count)
     ends = [*(piece[0] if len(piece) else np.inf for piece in pieces[1:]), np.inf]
     kept = [piece[piece + windows.horizon < end] for piece, end in zip(pieces, ends, strict=True)]
-    return [Windows(windows.flight, piece, windows.loss) for piece in kept]
+    return [FitWindows(windows.flight, piece, windows.loss) for piece in kept]
 
 
-def _lacks_an_axis(parts: Sequence[Sequence[Windows]]) -> bool:
+def _lacks_an_axis(parts: Sequence[Sequence[FitWindows]]) -> bool:
     """Tell whether a part turns about an axis about which hardly anything turns in the others."""
     squares = np.array([sum((each.motion.rate**2).sum(axis=0) for each in part) for part in parts])
     samples = np.array([sum(len(each.motion.rate) for each in part) for part in parts])[:, None]
@@ -506,7 +506,7 @@ def fitted_to_all(
     settings: PlaybackSettings,
     start: Fitted,
     groups: tuple[Group, ...] = (),
-) -> tuple[Fitted, list[Windows]]:
+) -> tuple[Fitted, list[FitWindows]]:
     """Fit a structure to all training flights, those of other configurations as well, with windows close together.
 
     Parameters

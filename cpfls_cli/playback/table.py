@@ -98,7 +98,7 @@ class WrenchTable:
         return np.asarray(np.einsum("ta,kau->tku", self.terms(velocity, rate), self.weights, optimize=True))
 
     def by_step(self, rotor: Array) -> tuple[Terms, Array]:
-        """Evaluate the weights of the terms of the motion over each step.
+        """Evaluate the weights of the terms of the motion over each step, the constant among them always.
 
         Parameters
         ----------
@@ -111,7 +111,8 @@ class WrenchTable:
             Those in use.
         weights : array, shape (time, 6, active)
         """
-        used = used_terms(self.weights, self.airflow)
+        found = used_terms(self.weights, self.airflow)
+        used = found._replace(active=np.union1d([0], found.active).astype(np.int64))
         return used, weights_by_step(self.weights, used, rotor)
 
 

@@ -142,15 +142,7 @@ def find_vehicle(
     progress: Progress,
     kept: Kept = MappingProxyType({}),
 ) -> FoundVehicle:
-    """Find structure and numbers of a vehicle in training flights.
-
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-        As stated.
-    kept : mapping of Structure to sequence of Solution
-        Of the same search, stopped before.
-    """
+    """Find structure and numbers of a vehicle in training flights, those of other configurations too; see `choose`."""
     own = [flight for flight in flights if not flight.group]
     begun, sensed = carrying_weight(vehicle, own)
     choice = choose(begun, own, settings, rng, progress, kept)

@@ -87,7 +87,8 @@ def lazy_best(
         Counts of vectors for the sharper bounds.
     """
     highest = float(bounds.max())
-    scouts = _highest(bounds)
+    count = min(_SCOUTS, int(np.count_nonzero(np.isfinite(bounds))))
+    scouts = np.argpartition(-bounds, count - 1)[:count]
     _, level = _raise_level(exceeds, project(rows[scouts], vectors), (floor, highest), _SCOUT_TOLERANCE)
     candidates = np.flatnonzero(bounds >= level)
     # At the floor itself nothing can be discarded, and it is an eigenvalue, where counting has no accuracy.
@@ -96,11 +97,6 @@ def lazy_best(
         candidates = candidates[reached] if reached.any() else candidates
     best, _ = _raise_level(exceeds, project(rows[candidates], vectors), (level, highest), 0.0)
     return int(candidates[best].min())
-
-
-def _highest(bounds: Array) -> IntArray:
-    count = min(_SCOUTS, int(np.count_nonzero(np.isfinite(bounds))))
-    return np.argpartition(-bounds, count - 1)[:count]
 
 
 def _raise_level(

@@ -54,21 +54,6 @@ def reduce(Q: Array, settings: ReductionSettings, progress: Progress | None = No
     return choose(row_space(Q, settings.rank_tolerance), settings, progress)
 
 
-def check_reducible(Q: Array, settings: ReductionSettings) -> None:
-    """Refuse what `reduce` would refuse, without the work of choosing.
-
-    Parameters
-    ----------
-    Q : array, shape (samples, 3, parameters)
-
-    Raises
-    ------
-    ComputationError, SettingError
-        See `reduce`.
-    """
-    check_space(row_space(Q, settings.rank_tolerance), settings)
-
-
 def choose(space: RowSpace, settings: ReductionSettings, progress: Progress | None = None) -> Selection:
     """Choose samples of a row space as `reduce` does.
 

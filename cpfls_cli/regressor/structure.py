@@ -102,6 +102,10 @@ class Partition:
         """Name such as ``D23(pitch)``."""
         return f"{self.function}({('roll', 'pitch')[self.input]})"
 
+    def rules(self, *, circular: bool) -> int:
+        """Count the rules along its input: on a circle the first and the last function are one."""
+        return max(self.functions - 1, 1) if circular else self.functions
+
     @property
     def weights(self) -> int:
         """Number of weights, that is genes, that encode it."""
@@ -203,21 +207,14 @@ def model_structure(settings: StructureSettings) -> ModelStructure:
 
 def _blocks(settings: StructureSettings, partitions: tuple[Partition, ...]) -> Iterator[Block]:
     start = 0
+    circular = settings.structure == "cpfls"
     for function in INERTIA_FUNCTIONS:
         of_function = tuple(i for i, partition in enumerate(partitions) if partition.function == function.name)
         rules = 1
         for i in of_function:
-            rules *= _rules(partitions[i].functions, settings.structure == "cpfls")
-        features = _features(len(of_function), settings)
+            rules *= partitions[i].rules(circular=circular)
+        features = 1
+        if of_function:
+            features = feature_count(len(of_function), settings.consequents, settings.harmonic_order, settings.products)
         yield Block(function, of_function, rules, features, slice(start, start + rules * features))
         start += rules * features
-
-
-def _rules(functions: int, circular: bool) -> int:
-    return max(functions - 1, 1) if circular else functions
-
-
-def _features(inputs: int, settings: StructureSettings) -> int:
-    if inputs == 0:
-        return 1
-    return feature_count(inputs, settings.consequents, settings.harmonic_order, settings.products)

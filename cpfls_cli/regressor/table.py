@@ -21,12 +21,13 @@ def structure_table(structure: ModelStructure, ranges: tuple[InputRange, InputRa
     """
     settings = structure.settings
     harmonic = settings.consequents == "harmonic"
-    active = sum(_active(structure, block) for block in structure.blocks)
+    firing = [_firing(structure, partition) for partition in structure.partitions]
+    active = sum(block.features * int(np.prod([firing[i] for i in block.partitions])) for block in structure.blocks)
     inner = [max(partition.functions - 2, 0) for partition in structure.partitions]
     first = np.cumsum([0, *inner[:-1]])
     partitions = [
-        (partition.input, partition.functions, _firing(structure, partition), int(start))
-        for partition, start in zip(structure.partitions, first, strict=True)
+        (partition.input, partition.functions, together, int(start))
+        for partition, together, start in zip(structure.partitions, firing, first, strict=True)
     ]
     # One that stands for no partition.
     partitions.append((ROLL, 1, 1, 0))
@@ -103,15 +104,10 @@ def _firing(structure: ModelStructure, partition: Partition) -> int:
     return 1 if partition.functions == 1 or (structure.circular and partition.functions == 2) else 2
 
 
-def _active(structure: ModelStructure, block: Block) -> int:
-    return block.features * int(np.prod([_firing(structure, structure.partitions[i]) for i in block.partitions]))
-
-
 def _block(structure: ModelStructure, block: Block) -> tuple[int, ...]:
     none, inputs = len(structure.partitions), block.function.inputs
     roll, pitch = (block.partitions[inputs.index(angle)] if angle in inputs else none for angle in (ROLL, PITCH))
-    functions = structure.partitions[pitch].functions if pitch < none else 1
-    rules = max(functions - 1, 1) if structure.circular else functions
+    rules = structure.partitions[pitch].rules(circular=structure.circular) if pitch < none else 1
     kind = len(inputs) if len(inputs) != 1 else inputs[0]
     entry = block.function.row, block.function.column, roll, pitch, kind
     return (*entry, block.features, block.columns.start, rules)

@@ -221,7 +221,8 @@ def bootstrap(
     hidden = _BIAS_DEVIATION * rng.standard_normal((settings.draws, 1))
     scores, parameters = _model_scores(products, model, fit, over_rigid_body=learned.ready.rigid)
     held = scores.penalty > 0
-    weakest = scores.with_penalty(np.where(held, _mean_square(products), 0.0), tolerance)
+    mean_square = float(np.sum(products.square) / np.sum(products.rows))
+    weakest = scores.with_penalty(np.where(held, mean_square, 0.0), tolerance)
     prior = np.zeros((settings.draws, len(held)))
     prior[:, held] = rng.standard_normal((settings.draws, np.count_nonzero(held)))
     deviations = np.zeros((settings.draws, columns))
@@ -261,11 +262,6 @@ def _rigid_scores(products: Products, model: InertiaFunctions, rank_tolerance: f
     free = BlockScores(gram, torque, np.zeros(RIGID), np.zeros(RIGID))
     best = free.solution(rank_tolerance)
     return replace(free, score=torque - gram @ best, parameters=best), best
-
-
-def _mean_square(products: Products) -> float:
-    """Mean squared torque of a row."""
-    return float(np.sum(products.square) / np.sum(products.rows))
 
 
 def _divide(fit: Fit) -> Array:

@@ -82,7 +82,8 @@ def curves(model: InertiaFunctions, draws: Draws, best_rigid_body: Array, traini
     ----------
     best_rigid_body : array, shape (6,), kg m^2
     """
-    visited = _visited_angles(training)
+    every = len(training) // _LOOKED_AT + 1
+    visited = wrap(np.concatenate([data.motion.attitude[::every, :2] for data in training.chunks()]))
     attitude = np.stack([_along(visited, angle) for angle in (ROLL, PITCH)])
     flat, shape = attitude.reshape(-1, 3), (*attitude.shape[:2], 3, 3)
     low, high = inertia_band(model, draws, flat)
@@ -95,12 +96,6 @@ def curves(model: InertiaFunctions, draws: Draws, best_rigid_body: Array, traini
         rigid_body=inertia_matrix(flat, symmetric(best_rigid_body)).reshape(shape),
         outside=model.outside(flat).reshape(attitude.shape[:2]),
     )
-
-
-def _visited_angles(training: TorqueSource) -> Array:
-    """Roll and pitch at samples spread over the flight, shape (samples, 2)."""
-    every = len(training) // _LOOKED_AT + 1
-    return wrap(np.concatenate([data.motion.attitude[::every, :2] for data in training.chunks()]))
 
 
 def _along(visited: Array, angle: int) -> Array:

@@ -79,16 +79,11 @@ def compare_errors(ours: Array, theirs: Array, size: float) -> Comparison:
         return Comparison(mean, rival, 1.0, False, False, len(ours))
     least = max(rounding, np.finfo(float).tiny)
     logarithm = np.log(np.maximum(ours, least) / np.maximum(theirs, least))
-    typical, chance = float(np.mean(logarithm)), _chance(logarithm)
+    enough = len(ours) >= _FEWEST_BLOCKS
+    typical = float(np.mean(logarithm))
+    chance = float(half_width(mean_error(logarithm), len(ours))) if enough else float("inf")
     ratio = mean / rival if rival > rounding else float("inf")
     return Comparison(mean, rival, ratio, apart < 0 and typical < -chance, apart > 0 and typical > chance, len(ours))
-
-
-def _chance(values: Array) -> float:
-    """Half the width of the 95 % interval of a mean; infinite for too few."""
-    if len(values) < _FEWEST_BLOCKS:
-        return float("inf")
-    return float(half_width(mean_error(values), len(values)))
 
 
 def _block_means(errors: Array, block: IntArray) -> Array:

@@ -156,13 +156,13 @@ def one_period_away(model: InertiaFunctions, parts: Mapping[str, TorqueSource]) 
     """
     if model.structure.settings.input_map != "full-circle":
         return None
-    scores = [[score_of(data, _moved(model, shift)) for shift in _AWAY] for data in parts.values()]
+
+    def away(shift: Array) -> Callable[[Motion], Array]:
+        return lambda motion: model.torque(replace(motion, attitude=motion.attitude + shift))
+
+    scores = [[score_of(data, away(shift)) for shift in _AWAY] for data in parts.values()]
     return PeriodErrors(
         parts=tuple(parts),
         mse=np.max([[score.mse for score in both] for both in scores], axis=1),
         max_error=np.max([[score.max_error for score in both] for both in scores], axis=1),
     )
-
-
-def _moved(model: InertiaFunctions, shift: Array) -> Callable[[Motion], Array]:
-    return lambda motion: model.torque(replace(motion, attitude=motion.attitude + shift))

@@ -269,7 +269,9 @@ def model_inputs(data: TorqueData, predicted: Array) -> ModelInputs:
     return ModelInputs(
         name=tuple(kind.format(axis) for kind, values in kinds.items() for axis in axes[: values.shape[1]]),
         value=np.concatenate(list(kinds.values()), axis=1),
-        varies=np.concatenate([_varies(values) for values in kinds.values()]),
+        varies=np.concatenate(
+            [np.std(values, axis=0) > _CONSTANT * np.max(np.abs(values), initial=0.0) for values in kinds.values()]
+        ),
     )
 
 
@@ -303,7 +305,3 @@ def cross_correlation(errors: Array, inputs: ModelInputs, number: IntArray, with
     size = np.sqrt(np.outer(np.sum(u**2, axis=0), np.sum(e**2, axis=0)))
     known = np.outer(inputs.varies, ~without) & (size > 0)
     return np.moveaxis(np.where(known, products / np.where(known, size, 1.0), np.nan), 0, 1)
-
-
-def _varies(values: Array) -> BoolArray:
-    return np.asarray(np.std(values, axis=0) > _CONSTANT * np.max(np.abs(values), initial=0.0))

@@ -172,7 +172,9 @@ class StructureFolds:
 
     def structure(self, settings: StructureSettings) -> FoldResult | None:
         """Cross-validate a structure; None where the samples cannot tell its parameters, or it is not finite."""
-        if model_structure(settings).parameters > min(_MOST_PARAMETERS, self._fewest_rows()):
+        samples = np.bincount(self.learned.label, minlength=self.learned.labels)
+        fewest_rows = 3 * int(np.min(~self.choice.left_out @ samples))
+        if model_structure(settings).parameters > min(_MOST_PARAMETERS, fewest_rows):
             return None
         products = self._products(settings)
         if products is None:
@@ -204,10 +206,6 @@ class StructureFolds:
         ]
         spread = mean_error(np.array(errors))
         return FoldResult(float(np.average(errors, weights=judged.rows)), float(spread), weight)
-
-    def _fewest_rows(self) -> int:
-        samples = np.bincount(self.learned.label, minlength=self.learned.labels)
-        return 3 * int(np.min(~self.choice.left_out @ samples))
 
 
 def _pieces(source: TorqueSource, most: int) -> TorqueData:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import Predictor
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.identify import TRAINING, Identification, model_evaluator
@@ -16,7 +15,7 @@ from cpfls_cli.validation.bands import definite_share
 from cpfls_cli.validation.bootstrap import Draws, bootstrap
 from cpfls_cli.validation.curves import Curves, RoundTrip, curves, round_trip
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
-from cpfls_cli.validation.paired import Comparison, compare_torque, mean_missing_torque, with_constant
+from cpfls_cli.validation.paired import compare_torque, mean_missing_torque, with_constant
 from cpfls_cli.validation.physical import PeriodErrors, Physics, one_period_away, physical_sense
 from cpfls_cli.validation.replay import StepErrors, replay_steps
 from cpfls_cli.validation.residuals import ResidualAnalysis, examine_residuals
@@ -100,10 +99,12 @@ def validate(
     residuals = examine_residuals(part, source, model.torque, asked.lags)
     physics = physical_sense(model, examining)
     period = one_period_away(model, {TRAINING: training, **held_out})
-    missing = _missing(training, result)
+    torques = {MODEL: model.torque, RIGID_BODY: result.baselines[0].torque}
+    missing = {name: mean_missing_torque(training, torque) for name, torque in torques.items()}
+    ours, theirs = (with_constant(torques[name], missing[name]) for name in (MODEL, RIGID_BODY))
     grounds = Grounds(
         identification=result,
-        torque=_torque_compared(held_out, result, missing),
+        torque={name: compare_torque(judged, ours, theirs) for name, judged in held_out.items()},
         steps=steps,
         replayed={
             name: replay_steps(name, judged, predictors, asked.horizon_samples, asked.windows, missing)
@@ -116,17 +117,3 @@ def validate(
         definite=definite_share(model, draws),
     )
     return Validation(structures, residuals, draws, drawn, again, steps, physics, period, verdict(grounds))
-
-
-def _missing(training: TorqueSource, result: Identification) -> dict[str, Array]:
-    """Average what model and rigid body miss of the body torque in training."""
-    torques = {MODEL: result.model.torque, RIGID_BODY: result.baselines[0].torque}
-    return {name: mean_missing_torque(training, torque) for name, torque in torques.items()}
-
-
-def _torque_compared(
-    held_out: Mapping[str, TorqueSource], result: Identification, missing: Mapping[str, Array]
-) -> dict[str, Comparison]:
-    ours = with_constant(result.model.torque, missing[MODEL])
-    theirs = with_constant(result.baselines[0].torque, missing[RIGID_BODY])
-    return {part: compare_torque(source, ours, theirs) for part, source in held_out.items()}

@@ -65,7 +65,9 @@ def verdict(grounds: Grounds) -> Verdict:
     """
     label, decisive = _decided(grounds)
     listed = (decisive, *reasons(grounds))
-    return Verdict(label, _region(grounds, label), tuple(r.text for r in listed), tuple(r.speaks for r in listed))
+    everywhere = label == "good-for-control"
+    region = "every roll and pitch" if everywhere else region_in_words(grounds.identification.model.visited)
+    return Verdict(label, region, tuple(r.text for r in listed), tuple(r.speaks for r in listed))
 
 
 def contradicted(found: Verdict, contradictions: Sequence[str]) -> Verdict:
@@ -84,33 +86,13 @@ def contradicted(found: Verdict, contradictions: Sequence[str]) -> Verdict:
 
 
 def good_axes(grounds: Grounds, predictor: str) -> BoolArray:
-    """Flag the body axes about which a predictor is good enough for control, by rule 3 of `verdict`.
-
-    Parameters
-    ----------
-    predictor : str
-        `MODEL` or `RIGID_BODY`.
-
-    Returns
-    -------
-    array of bool, shape (3,)
-    """
+    """Flag the body axes about which a predictor is good enough for control, by rule 3 of `verdict`; shape (3,)."""
     unexcited = grounds.hardly_excited | np.isnan(grounds.r2(predictor))
     return confirmed_axes(grounds, predictor) | (unexcited & grounds.beats_nothing_moves(predictor))
 
 
 def confirmed_axes(grounds: Grounds, predictor: str) -> BoolArray:
-    """Flag the body axes about which the held-out R2 of torque is at least `r2_min`, and playback does not deny it.
-
-    Parameters
-    ----------
-    predictor : str
-        `MODEL` or `RIGID_BODY`.
-
-    Returns
-    -------
-    array of bool, shape (3,)
-    """
+    """Flag the body axes, shape (3,), whose held-out R2 of torque is at least `r2_min` and not denied by playback."""
     return np.asarray((grounds.r2(predictor) >= grounds.r2_min) & grounds.predicts(predictor))
 
 
@@ -205,11 +187,6 @@ def _no_body(grounds: Grounds) -> str:
     if grounds.held_out and np.all(confirmed_axes(grounds, RIGID_BODY)) and why_unphysical(result.rigid_body) is None:
         text += f"; the rigid body is good for control (R2 of body torque {numbers(grounds.r2(RIGID_BODY))})"
     return text
-
-
-def _region(grounds: Grounds, label: Label) -> str:
-    visited = region_in_words(grounds.identification.model.visited)
-    return "every roll and pitch" if label == "good-for-control" else visited
 
 
 def region_in_words(visited: BoolArray) -> str:

@@ -18,7 +18,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.logs.formats import log_contents
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.kernels import Motion
+from cpfls_cli.playback.kernels import MeasuredMotion
 
 PERIOD, SAMPLES, LEAD_IN, SPIKE = 0.01, 900, 120, 400
 ERPM_OF_RAD_S = 6 * 60 / (2 * np.pi)
@@ -107,7 +107,7 @@ def flight_of(position, rate):
     """A flight that never turns its body, whatever its rate says."""
     samples = len(position)
     flat, still = np.tile(np.eye(3), (samples, 1, 1)), np.zeros((samples, 3))
-    motion = Motion(position, still, flat, rate, PERIOD)
+    motion = MeasuredMotion(position, still, flat, rate, PERIOD)
     return PlaybackFlight(
         name="made up", motion=motion, speed=np.ones((samples, 4)), hold="previous", stretches=(slice(0, samples),)
     )

@@ -14,7 +14,7 @@ from cpfls_cli.config.unknown import with_guesses
 from cpfls_cli.effects.polynomial import FACTORS, state_terms
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.kernels import Motion
+from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.table import Remainder, remainder_terms
@@ -412,7 +412,7 @@ def logged(name, states, speed, period, hold, noise, rng):
         return np.ascontiguousarray(values + noise.drawn(size, values, period, rng))
 
     turn = Rotation.from_quat(states[:, 6:10]) * Rotation.from_rotvec(noisy(np.zeros((len(states), 3)), noise.attitude))
-    motion = Motion(
+    motion = MeasuredMotion(
         noisy(states[:, :3], noise.position),
         noisy(states[:, 3:6], noise.velocity),
         turn.as_matrix(),
@@ -458,7 +458,7 @@ def rotorpy_flight(name):
     def columns(*names):
         return np.ascontiguousarray(np.stack([log[column] for column in names], axis=1))
 
-    motion = Motion(
+    motion = MeasuredMotion(
         columns("x", "y", "z"),
         columns("vx", "vy", "vz"),
         rotation_matrix(columns("phi", "theta", "psi")),

@@ -15,7 +15,7 @@ from cpfls_cli.artifacts.formats import RECORDS
 PACKAGE = Path(cpfls_cli.__file__).parent
 TESTS = Path(__file__).parents[1]
 MODULES = sorted(PACKAGE.rglob("*.py"))
-LONGEST = 60
+LONGEST, LONGEST_CLASS = 60, 250
 
 
 @cache
@@ -37,6 +37,13 @@ def test_functions_are_short():
     lengths = {f"{path}:{f.name}": body_lines(f) for path in MODULES for f in functions(path)}
     assert {name: length for name, length in lengths.items() if length > LONGEST} == {}
     assert median(lengths.values()) <= 25
+
+
+def test_classes_are_of_one_thought():
+    """With their docstrings, which grow with the attributes: a class that is longer does several things."""
+    classes = [(path, node) for path in MODULES for node in ast.walk(syntax(path)) if isinstance(node, ast.ClassDef)]
+    lengths = {f"{path}:{node.name}": node.end_lineno - node.lineno + 1 for path, node in classes}
+    assert {name: length for name, length in lengths.items() if length > LONGEST_CLASS} == {}
 
 
 def documented(path):

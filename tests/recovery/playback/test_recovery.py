@@ -5,7 +5,7 @@ import pytest
 
 from benchmarks.shared.playback_scores import free_runs, score
 from cpfls_cli.effects.scales import hover_speed
-from cpfls_cli.playback.fit import Windows, fit
+from cpfls_cli.playback.fit import FitWindows, fit
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Structure, choose, fitted_to_all
@@ -31,7 +31,7 @@ RATE = 3
 
 
 def fitted(vehicle, blocks, flights):
-    windows = [Windows.of(flight, 50, 60) for flight in flights]
+    windows = [FitWindows.of(flight, 50, 60) for flight in flights]
     return fit(Structure(blocks).free(vehicle), windows, {}, 60, 3e-5)
 
 

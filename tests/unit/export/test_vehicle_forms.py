@@ -11,7 +11,7 @@ import pytest
 from cpfls_cli.dynamics.equations_of_motion import identified_turning
 from cpfls_cli.export import c_source, json_text, python_source
 from cpfls_cli.export.points import reference_points, reference_run, term_sizes
-from cpfls_cli.playback.kernels import Motion, errors_of_runs
+from cpfls_cli.playback.kernels import MeasuredMotion, errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State, accelerations, step
 from cpfls_cli.playback.player import one_step
@@ -186,7 +186,7 @@ def test_steps_along_a_flight_are_those_of_the_compiled_loops(exports, name, for
         pair = [np.stack([part[sample], own]) for part, own in zip(path, after, strict=True)]
         errors = np.zeros((1, 1, 4, 3))
         one = np.ascontiguousarray(weights[sample : sample + 1])
-        errors_of_runs(Motion(*pair, PERIOD), model.body, used, one, np.zeros(1, np.int64), True, errors)
+        errors_of_runs(MeasuredMotion(*pair, PERIOD), model.body, used, one, np.zeros(1, np.int64), True, errors)
         assert np.abs(errors).max() < ALLOWED * size
 
 

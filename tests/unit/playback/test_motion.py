@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects import scales
-from cpfls_cli.playback.kernels import Motion, errors_of_runs
+from cpfls_cli.playback.kernels import MeasuredMotion, errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State, accelerations, rotor_speeds, step
 from cpfls_cli.rotations import rotation_matrix
@@ -37,7 +37,7 @@ def test_a_step_is_that_of_the_compiled_loops(model):
     path = [State(*(part[:1] for part in states(1)))]
     for row in rotor[:-1]:
         path.append(step(model, path[-1], row[None], PERIOD))
-    motion = Motion(*(np.concatenate(parts) for parts in zip(*path, strict=True)), PERIOD)
+    motion = MeasuredMotion(*(np.concatenate(parts) for parts in zip(*path, strict=True)), PERIOD)
     used, weights = model.table.by_step(rotor)
     errors = np.zeros((1, len(path) - 1, 4, 3))
     starts = np.zeros(1, dtype=np.int64)

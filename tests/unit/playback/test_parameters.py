@@ -5,7 +5,7 @@ import pytest
 
 from cpfls_cli.playback import vehicle
 from cpfls_cli.playback.evaluation import Evaluated
-from cpfls_cli.playback.fit import Windows, fit, loss_of, rate_stays, uncertainty, window_errors, window_sums
+from cpfls_cli.playback.fit import FitWindows, fit, loss_of, rate_stays, uncertainty, window_errors, window_sums
 from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.kernels import Airflow, errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
@@ -36,7 +36,7 @@ def test_the_gradient_is_the_difference_quotient_for_every_number(flight, rules)
     free = numbers(STATED, blocks_of(STATED), rules)
     values, scale = somewhere(free), free.scales
     starts = flight.starts(20, 40)
-    windows = Windows(flight, starts, loss_of(flight, rate_stays(flight, starts, 20)))
+    windows = FitWindows(flight, starts, loss_of(flight, rate_stays(flight, starts, 20)))
     group = np.zeros(len(starts), dtype=np.int64)
     gradient = window_sums(Evaluated.of(free.base, values), windows, group)[1][0] * scale
     step = 1e-5
@@ -50,7 +50,7 @@ def test_the_gradient_is_the_difference_quotient_for_every_number(flight, rules)
 
 def test_the_sum_of_the_loss_is_that_of_the_windows(flight):
     free = numbers(STATED, ("inertia", "linear_damping"), RULES["one rule"])
-    windows = Windows.of(flight, 20, 30)
+    windows = FitWindows.of(flight, 20, 30)
     evaluated = Evaluated.of(free.base, free.starts)
     total, by_group, _ = window_sums(evaluated, windows, np.arange(len(windows.starts), dtype=np.int64))
     fitted = fit(free, [windows], {}, 0, 1e-3)
@@ -93,7 +93,7 @@ def test_a_number_that_the_flight_does_not_show_is_not_determined(flight):
     free = numbers(STATED, ("rotor_gyroscopic", "linear_damping"), RULES["one rule"])
     # Without any yaw effort the rotors' spins cancel, and nothing gyroscopic is left.
     still = flight.speed.mean(axis=1, keepdims=True) * np.ones(4)
-    quiet = [Windows.of(type(flight)(**{**vars(flight), "speed": still}), 20, 20)]
+    quiet = [FitWindows.of(type(flight)(**{**vars(flight), "speed": still}), 20, 20)]
     spread = uncertainty(fit(free, quiet, {}, 20, 1e-4), quiet)
     assert spread.determined.tolist() == [False, True, True, True]
 
@@ -101,7 +101,7 @@ def test_a_number_that_the_flight_does_not_show_is_not_determined(flight):
 def test_an_interval_ends_at_the_bound_on_which_its_number_sits():
     """Rotors that follow at once are asked for their lag, of which at least 1 ms is believed."""
     flights = flown(VehicleModel(vehicle=STATED), ("multisine", "steps"), duration_s=4.0, noise=MIDDLING, seed=1)
-    windows = [Windows.of(each, 20, 20) for each in flights]
+    windows = [FitWindows.of(each, 20, 20) for each in flights]
     fitted = fit(numbers(STATED, ("lag", "inertia"), RULES["one rule"]), windows, {}, 30, 1e-5)
     lag, *inertia = vehicle.found_numbers(fitted, uncertainty(fitted, windows))
     assert (lag.value, lag.low, lag.at_bound) == (0.001, 0.001, True)
@@ -112,6 +112,6 @@ def test_an_interval_ends_at_the_bound_on_which_its_number_sits():
 
 
 def test_a_vehicle_as_it_is_stated_has_no_numbers(flight):
-    windows = [Windows.of(flight, 20, 20)]
+    windows = [FitWindows.of(flight, 20, 20)]
     fitted = fit(numbers(STATED, (), Airflow(np.zeros(0), 0)), windows, {}, 20, 1e-4)
     assert list(vehicle.found_numbers(fitted, uncertainty(fitted, windows))) == []

@@ -11,7 +11,7 @@ from cpfls_cli.dynamics.equations_of_motion import identified_turning
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.kernels import Motion
+from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.player import free_runs, player_of, rotation_vectors
 from cpfls_cli.playback.replay import MODEL, NOTHING_MOVES, RATE_STAYS, SIGNALS, STATED, Played, replay, where_better
@@ -33,7 +33,7 @@ def flight_of(samples=80, period=0.01, seed=0, **changes):
     rng = np.random.default_rng(seed)
     time = period * np.arange(samples)
     turns = 0.4 * np.sin(np.outer(time, rng.uniform(1, 3, 3)) + rng.uniform(0, 6, 3))
-    motion = Motion(
+    motion = MeasuredMotion(
         position=rng.uniform(-1, 1, 3) + np.outer(time, rng.uniform(-1, 1, 3)),
         velocity=np.cos(np.outer(time, rng.uniform(1, 3, 3)) + rng.uniform(0, 6, 3)),
         rotation=Rotation.from_euler("ZYX", turns).as_matrix(),
@@ -101,7 +101,7 @@ def finer(flight, factor):
     fine = period * np.arange((len(flight) - 1) * factor + 1)
     speed = np.column_stack([np.interp(fine, time, rotor) for rotor in flight.speed.T])
     index = np.minimum(np.arange(len(fine)) // factor, len(flight) - 1)
-    motion = Motion(*(values[index] for values in flight.motion[:4]), period)
+    motion = MeasuredMotion(*(values[index] for values in flight.motion[:4]), period)
     return replace(flight, motion=motion, speed=speed, stretches=(slice(0, len(fine)),))
 
 

@@ -5,9 +5,14 @@ import pytest
 
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.reduction.settings import ReductionSettings
-from cpfls_cli.reduction.training_set import check_reducible, random_selections, reduce
+from cpfls_cli.reduction.survey import row_space
+from cpfls_cli.reduction.training_set import check_space, random_selections, reduce
 
 REGRESSOR = np.random.default_rng(0).standard_normal((20, 3, 10))
+
+
+def check_reducible(Q, settings):
+    check_space(row_space(Q, settings.rank_tolerance), settings)
 
 
 def test_something_must_stop_the_reduction():
