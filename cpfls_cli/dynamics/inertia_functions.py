@@ -45,12 +45,7 @@ class InertiaFunctions:
     visited: BoolArray
 
     def torque(self, motion: Motion) -> Array:
-        """Predict the generalised torque, ``J qdd + C qd``.
-
-        Returns
-        -------
-        array, shape (samples, 3), N m
-        """
+        """Predict the generalised torque, ``J qdd + C qd``, shape (samples, 3), N m."""
         starts = range(0, len(motion), _BATCH)
         return np.concatenate([self._torque(motion[slice(start, start + _BATCH)]) for start in starts])
 

@@ -18,12 +18,7 @@ _ROUNDING, _VERTICAL_ROUNDING = 1e-9, 0.01
 
 
 def inertia_tensor(vehicle: VehicleSettings) -> Array:
-    """Build the inertia tensor of a vehicle.
-
-    Returns
-    -------
-    array, shape (3, 3), kg m^2, body frame
-    """
+    """Build the inertia tensor of a vehicle, shape (3, 3), kg m^2, body frame."""
     return symmetric(vehicle.inertia_kg_m2)
 
 

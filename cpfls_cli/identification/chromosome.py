@@ -69,10 +69,5 @@ def weight_jacobian(structure: ModelStructure, weights: Array) -> Array:
 
 
 def uniform_chromosome(structure: ModelStructure) -> IntArray:
-    """Encode the equidistant partitions.
-
-    Returns
-    -------
-    array of int, shape (genes,)
-    """
+    """Encode the equidistant partitions, shape (genes,)."""
     return np.full(structure.genes, LARGEST_GENE // 2, dtype=np.int64)

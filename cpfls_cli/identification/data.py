@@ -123,12 +123,7 @@ def gathered(source: TorqueSource, samples: IntArray) -> TorqueData:
 
 
 def sample_times(source: TorqueSource) -> Array:
-    """Gather the times of all samples.
-
-    Returns
-    -------
-    array, shape (samples,), s
-    """
+    """Gather the times of all samples, shape (samples,), s."""
     return np.concatenate([data.time for data in source.chunks()])
 
 

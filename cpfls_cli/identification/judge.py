@@ -185,22 +185,12 @@ class Baseline:
 
 
 def constant_inertia_columns(motion: Motion) -> Array:
-    """Build the columns of a constant symmetric J in ``J qdd``: J11, J22, J33, J12, J13, J23.
-
-    Returns
-    -------
-    array, shape (samples, 3, 6)
-    """
+    """Build the columns of a constant symmetric J in ``J qdd``: J11, J22, J33, J12, J13, J23; shape (samples, 3, 6)."""
     return symmetric_columns(motion.acceleration)
 
 
 def no_torque_columns(motion: Motion) -> Array:
-    """Build the columns of the prediction that no torque acts: none.
-
-    Returns
-    -------
-    array, shape (samples, 3, 0)
-    """
+    """Build the columns of the prediction that no torque acts: none; shape (samples, 3, 0)."""
     return np.zeros((len(motion), 3, 0))
 
 

@@ -99,13 +99,7 @@ class Triangle:
         return float(np.sum((self.matrix[:, -1] - self.matrix[:, :-1] @ parameters) ** 2))
 
     def solve(self, rank_tolerance: float) -> LeastSquares:
-        """Solve for the parameters of smallest norm.
-
-        Parameters
-        ----------
-        rank_tolerance : float
-            Singular values below this share of the largest count as zero.
-        """
+        """Solve for the parameters of smallest norm."""
         return solve(self.matrix[:, :-1], self.matrix[:, -1], rank_tolerance)
 
 
@@ -116,8 +110,6 @@ def solve(matrix: Array, right_side: Array, rank_tolerance: float) -> LeastSquar
     ----------
     matrix : array, shape (rows, parameters)
     right_side : array, shape (rows,)
-    rank_tolerance : float
-        Singular values below this share of the largest count as zero.
 
     References
     ----------

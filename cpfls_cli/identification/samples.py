@@ -139,12 +139,7 @@ class Samples:
         return structure_table(self.structure, self.ranges)
 
     def products(self, partitions: Breakpoints) -> Products:
-        """Add up the products of all columns with each other and with the torque.
-
-        Parameters
-        ----------
-        partitions : sequence of array, shape (functions,)
-        """
+        """Add up the products of all columns with each other and with the torque."""
         P, dense = self.table.parameters, self._dense_products
         gram, moment = np.zeros((self.labels, P, P)), np.zeros((self.labels, P, dense.shape[1]))
         breakpoints = padded_breakpoints(partitions)
@@ -162,7 +157,6 @@ class Samples:
 
         Parameters
         ----------
-        partitions : sequence of array, shape (functions,)
         coefficients : array, shape (parameters,)
         rigid_body : array, shape (6,)
             Not used without a rigid body.
@@ -185,7 +179,6 @@ class Samples:
 
         Parameters
         ----------
-        partitions : sequence of array, shape (functions,)
         parameters : array, shape (columns,)
         directions : array, shape (columns, n)
 
@@ -214,7 +207,6 @@ class Samples:
 
         Parameters
         ----------
-        partitions : sequence of array, shape (functions,)
         coefficients : array, shape (parameters,)
         rigid_body : array, shape (6,)
             Not used without a rigid body.

@@ -59,7 +59,6 @@ def decomposed(learned: Samples, partitions: Breakpoints, fit: Fit, rank_toleran
 
     Parameters
     ----------
-    partitions : sequence of array, shape (functions,)
     fit : Fit
         Gives ridge weight and column sizes.
 
@@ -133,7 +132,6 @@ class Solver:
 
         Parameters
         ----------
-        partitions : sequence of array, shape (functions,)
         products : Products, optional
             Of these partitions, where they are known already.
 
@@ -154,10 +152,6 @@ class Solver:
 
     def curve(self, partitions: Breakpoints) -> RidgeCurve | None:
         """Cross-validate the ridge weight.
-
-        Parameters
-        ----------
-        partitions : sequence of array, shape (functions,)
 
         Returns
         -------
@@ -195,7 +189,6 @@ class Solver:
 
         Parameters
         ----------
-        partitions : sequence of array, shape (functions,)
         fit : Fit
             Gives the ridge.
 

@@ -110,12 +110,7 @@ def rank_growing_start(space: RowSpace) -> IntArray:
 
 
 def every_nth(samples: int, size: int) -> IntArray:
-    """Choose samples as evenly as whole numbers allow, the first one among them.
-
-    Returns
-    -------
-    array of int, shape (size,)
-    """
+    """Choose samples as evenly as whole numbers allow, the first one among them; shape (size,)."""
     return np.asarray(np.arange(size, dtype=np.int64) * samples // size)
 
 

@@ -79,8 +79,6 @@ def survey(chunks: Chunks, rank_tolerance: float) -> Survey:
     chunks : callable
         Starts a pass over the regressor: an iterable of arrays of shape (samples, 3, parameters), not empty.
         Every pass must yield the same samples in the same order; how they are cut into chunks does not matter.
-    rank_tolerance : float
-        Singular values below this fraction of the largest count as zero.
 
     Raises
     ------
@@ -203,8 +201,6 @@ def row_space(Q: Array, rank_tolerance: float) -> RowSpace:
     Parameters
     ----------
     Q : array, shape (samples, 3, parameters)
-    rank_tolerance : float
-        Singular values below this fraction of the largest count as zero.
 
     Raises
     ------

@@ -271,8 +271,6 @@ def random_selections(
         Samples to choose.
     count : int
         Subsets to choose, independently of each other.
-    rank_tolerance : float
-        Singular values below this fraction of the largest count as zero.
 
     Raises
     ------

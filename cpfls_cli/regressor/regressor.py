@@ -25,6 +25,7 @@ from cpfls_cli.regressor.motion import Carrier, Motion, carrier
 from cpfls_cli.regressor.structure import PITCH, ROLL, Block, ModelStructure
 
 Breakpoints = Sequence[Array]
+"""Of all partitions, in the order of `ModelStructure.partitions`, each of shape (functions,)."""
 
 
 @dataclass(frozen=True)
@@ -235,7 +236,6 @@ def torque_sensitivity(regressor: Regressor, partitions: Breakpoints, coefficien
 
     Parameters
     ----------
-    partitions : sequence of array, shape (functions,)
     coefficients : array, shape (parameters,)
 
     Returns

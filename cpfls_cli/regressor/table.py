@@ -84,10 +84,6 @@ def mapped_inputs(table: Table, attitude: Array) -> Array:
 def padded_breakpoints(partitions: Breakpoints) -> Array:
     """Stack the breakpoints of all partitions.
 
-    Parameters
-    ----------
-    partitions : sequence of array, shape (functions,)
-
     Returns
     -------
     array, shape (partitions, most functions)

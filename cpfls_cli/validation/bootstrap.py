@@ -61,8 +61,6 @@ class BlockScores:
         Parameters
         ----------
         weights : array, shape (draws, blocks)
-        rank_tolerance : float
-            Singular values below this share of the largest count as zero.
 
         Returns
         -------
