@@ -11,6 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics.rigid_body import vertical
 from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.effects.polynomial import STATE_TERMS
 from cpfls_cli.effects.registry import CATALOGUE
@@ -28,11 +29,14 @@ from cpfls_cli.rotations import rotation_matrix
 HORIZON_S = 0.5
 """How far ahead the size of what is missing is told."""
 
-_RUNS, _PERIOD = 24, 0.01
-_FREQUENCIES = (0.7, 2.0, 5.0)
+# The flight about hover: runs with steps of 10 ms, speeds with waves of 5 % below and above what motors follow, and
+# velocities in m/s, rates in rad/s and tilts in rad of a vehicle that is flown gently.
+_RUNS, _PERIOD, _FREQUENCIES = 24, 0.01, (0.7, 2.0, 5.0)
 _SPEED_SPREAD, _VELOCITY, _RATE, _TILT = 0.05, 1.5, 1.0, 0.25
+
 _NOTHING, _ROUNDING = 1e-9, 1e-12
-_STEEP = 0.1
+"""Distance in SI that half a second without a part may end off, and torque or force: below both are rounding."""
+
 _LAG, _DELAY, _SLOW = "lag of the rotors", "delay of the rotors", "slow actuation"
 _LINEAR = "part of the thrust that is linear in the speed"
 _ROTORS = "what differs between rotors, and their places"
@@ -179,7 +183,7 @@ def constant_body(model: VehicleModel) -> Body:
     cell = 2 * np.pi / CELLS
     roll, pitch = ((np.argwhere(model.fuzzy.visited) + 0.5) * cell - np.pi).T
     attitude = np.column_stack([roll, pitch, np.zeros_like(roll)])
-    tensors = body_inertia(model.fuzzy, attitude[np.abs(np.cos(attitude[:, 1])) > _STEEP])
+    tensors = body_inertia(model.fuzzy, attitude[~vertical(attitude)])
     mean = tensors.mean(axis=0) if len(tensors) else np.zeros((3, 3))
     if not np.linalg.eigvalsh(mean).min() > 0:
         raise InputError("its inertia, averaged where training went, is that of no body; identify it again")

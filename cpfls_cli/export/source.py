@@ -21,7 +21,10 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.structure import ModelStructure
 
 _OUTSIDE, _VERTICAL = 1, 4
+"""Flags of the header of C."""
+
 _FASTEST_PERIOD = 1e-3
+"""Shortest step in s that the history of speeds in C is long enough for by default."""
 
 
 @dataclass(frozen=True)

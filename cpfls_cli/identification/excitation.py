@@ -18,8 +18,9 @@ from cpfls_cli.regressor.motion import RIGID
 from cpfls_cli.regressor.regressor import Breakpoints
 from cpfls_cli.rotations import body_acceleration, body_torque, euler_rate_matrix
 
-SILENT_FIRING = 1e-3
-DETERMINED_SHARE = 0.5
+# A rule that never fires by more adds nothing to a torque; half of its directions known are a surface, if a rough one.
+_SILENT_FIRING, _DETERMINED_SHARE = 1e-3, 0.5
+# Standard deviations beyond which a rate is clearly on one side of its mean, so that noise does not count.
 _CLEARLY = 0.5
 
 
@@ -44,7 +45,7 @@ class RuleExcitation:
     @property
     def excited(self) -> BoolArray:
         """Whether a rule fires at all and data determine at least half of its coefficients."""
-        return np.asarray((self.firing > SILENT_FIRING) & (self.determined >= DETERMINED_SHARE))
+        return np.asarray((self.firing > _SILENT_FIRING) & (self.determined >= _DETERMINED_SHARE))
 
 
 def rule_excitation(

@@ -16,11 +16,21 @@ from cpfls_cli.identification.solver import Fit
 from cpfls_cli.rounding import less
 
 AXES = ("roll", "pitch", "yaw")
-BADLY_EXPLAINED_R2 = 0.5
+_BADLY_EXPLAINED_R2 = 0.5
+"""Below it most of a torque is something else."""
+
 HARDLY_EXCITED_SHARE = 1 / 3
-LARGE_CONSTANT_SHARE = 0.25
-LARGEST_SCALE = 3.0
-NAMED = 8
+"""Of the acceleration of the liveliest axis: below it, torque about an axis is mostly what is not inertial."""
+
+_LARGE_CONSTANT_SHARE = 0.25
+"""Of the torque about an axis, from which on a constant one is worth a warning."""
+
+_LARGEST_SCALE = 3.0
+"""Ratio of inertia found and stated beyond any mistake in weighing: wrong units come in larger ones."""
+
+_NAMED = 8
+"""Rules at most in one sentence."""
+
 RIVALS = {
     "rigid-body": "the rigid body with six inertia parameters",
     "constant-inertia": "a constant inertia matrix",
@@ -87,7 +97,7 @@ def _physics(diagnostics: FitDiagnostics) -> Iterator[str]:
     if diagnostics.indefinite:
         training = next(iter(diagnostics.samples.values()))
         share = f"{diagnostics.indefinite} of {training} training samples"
-        if why is None and np.all(diagnostics.training_scores["rigid-body"].r2_body > BADLY_EXPLAINED_R2):
+        if why is None and np.all(diagnostics.training_scores["rigid-body"].r2_body > _BADLY_EXPLAINED_R2):
             remedy = "a rigid body explains this flight, so it is the structure or its excitation that fails"
         yield f"D(q) is not positive definite at {share}: not a model of a body, do not use it; {remedy}"
 
@@ -96,9 +106,9 @@ def _scale(diagnostics: FitDiagnostics) -> Iterator[str]:
     if diagnostics.stated is None:
         return
     # An axis that the flight does not explain says nothing about scales.
-    explained = diagnostics.axes.r2 > BADLY_EXPLAINED_R2
+    explained = diagnostics.axes.r2 > _BADLY_EXPLAINED_R2
     ratio = (diagnostics.rigid_body[:3] / diagnostics.stated[:3])[explained]
-    if np.any(ratio > LARGEST_SCALE) or np.any(ratio < 1 / LARGEST_SCALE):
+    if np.any(ratio > _LARGEST_SCALE) or np.any(ratio < 1 / _LARGEST_SCALE):
         ratios = " ".join(f"{value:.3g}" for value in ratio)
         axes = ", ".join(np.array(AXES)[explained])
         yield (
@@ -112,13 +122,13 @@ def _axes(diagnostics: FitDiagnostics) -> Iterator[str]:
     alone = diagnostics.training_scores["rigid-body"].r2_body
     seen = diagnostics.axes
     for axis, name in enumerate(AXES):
-        large = abs(seen.constant[axis]) > LARGE_CONSTANT_SHARE * seen.torque[axis]
+        large = abs(seen.constant[axis]) > _LARGE_CONSTANT_SHARE * seen.torque[axis]
         if large and 1 - seen.r2[axis] < 0.75 * (1 - alone[axis]):
             yield (
                 f"{name}: a constant torque of {seen.constant[axis]:.3g} N m acts that no motion explains (centre of "
                 "mass, trim or sensor bias); the model has no term for it"
             )
-        if not seen.r2[axis] > BADLY_EXPLAINED_R2:
+        if not seen.r2[axis] > _BADLY_EXPLAINED_R2:
             moves = seen.acceleration[axis] > HARDLY_EXCITED_SHARE * np.max(seen.acceleration)
             reason = ": something other than inertia acts, or columns are wrong" if moves else " is hardly excited"
             yield (
@@ -137,8 +147,8 @@ def _silent_rules(diagnostics: FitDiagnostics) -> Iterator[str]:
     rules = diagnostics.excitation
     silent = [name for name, excited in zip(rules.name, rules.excited, strict=True) if not excited]
     if silent:
-        rest = f" and {len(silent) - NAMED} more" if len(silent) > NAMED else ""
-        named = ", ".join(silent[:NAMED])
+        rest = f" and {len(silent) - _NAMED} more" if len(silent) > _NAMED else ""
+        named = ", ".join(silent[:_NAMED])
         yield f"{len(silent)} of {len(rules.name)} rules not excited beyond the noise: {named}{rest}"
 
 
@@ -174,7 +184,7 @@ def _badly_explained(diagnostics: FitDiagnostics) -> Iterator[str]:
         bad = [
             name
             for name, ours, before in zip(AXES, r2, learned, strict=True)
-            if not ours > BADLY_EXPLAINED_R2 and before > BADLY_EXPLAINED_R2
+            if not ours > _BADLY_EXPLAINED_R2 and before > _BADLY_EXPLAINED_R2
         ]
         if bad:
             yield f"{part}: the model explains less than half of the torque about {', '.join(bad)}"

@@ -20,6 +20,7 @@ from cpfls_cli.regressor.regressor import Breakpoints, Regressor
 _BLOCK = 4096
 NO_RIGID_BODY = np.zeros(RIGID)
 LARGEST_SQUARE = 1e200
+"""Of a column, beyond which products of products overflow."""
 
 
 @dataclass(frozen=True)

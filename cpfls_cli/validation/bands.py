@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from cpfls_cli.validation.bootstrap import Draws
 
 COVERAGE = 0.95
+# Attitudes at a time, which bounds the memory.
 _BATCH = 1024
 
 # Cells times draws at a time: 50 MB for the six entries.

@@ -22,6 +22,7 @@ from cpfls_cli.validation.bootstrap import Draws
 from cpfls_cli.validation.timeline import TimeBlocks, time_blocks
 
 POINTS = 181
+"""Every two degrees of a whole turn."""
 
 # A flight that stays within this range would be a speck on the whole turn.
 _SMALL_RANGE = np.deg2rad(60.0)

@@ -15,6 +15,7 @@ from cpfls_cli.dynamics.rigid_body import vertical
 from cpfls_cli.identification.data import TorqueData, TorqueSource
 from cpfls_cli.regressor.motion import Motion
 
+# Fewer blocks can prove nothing: Student's t of three is 4.3.
 _FEWEST_BLOCKS = 4
 # What two solutions of the same equations may differ by, and rounding as a share of what is predicted, squared.
 _SAME, _ROUNDING = 1e-6, 1e-18

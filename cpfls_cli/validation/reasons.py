@@ -21,6 +21,7 @@ _SMALLEST_P = 1e-16
 DEFINITE_SHARE = 0.975
 """Share of the bootstrap draws that are to be positive definite wherever training was."""
 
+# A constant torque is told from a quarter of the noise on, that errors are judged beside, if it is a hundredth of all.
 _LARGE_BESIDE_NOISE, _SMALL = 0.25, 0.01
 
 

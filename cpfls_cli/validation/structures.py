@@ -22,6 +22,7 @@ from cpfls_cli.regressor.motion import RIGID
 from cpfls_cli.regressor.regressor import data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
+# Choices on both sides of those that are usual: the paper's five functions, the second order by default.
 _FUNCTIONS = (1, 3, 5, 7)
 _SEESAW_FUNCTIONS = 5
 _INPUT_MAPS: tuple[InputMap, ...] = ("full-circle", "data-range")

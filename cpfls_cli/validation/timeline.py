@@ -14,9 +14,8 @@ from cpfls_cli.identification.data import TorqueData, TorqueSource, gathered, sa
 # what is usual there.
 _STEPS_AROUND = 25
 
-_DEFAULT_BLOCKS = 40
-_MOST_BLOCKS = 200
-_FEWEST_BLOCKS = 2
+# By default enough that Student's t is that of a normal distribution; more than 200 take time and tell no more.
+_DEFAULT_BLOCKS, _MOST_BLOCKS, _FEWEST_BLOCKS = 40, 200, 2
 
 # Shorter blocks are no longer independent of their neighbours where noise is coloured.
 _FEWEST_SAMPLES = 20

@@ -26,10 +26,12 @@ from cpfls_cli.playback.rotors import RotorResponse
 STEP_S = 0.001
 """Step of the file; verification takes a whole number of steps of at most this."""
 
+# A sphere in a fluid so thin that nothing but its own drag, which is counted up by as much, feels it.
 _SPHERE_M, _DENSITY = 0.05, 1e-9
 _DRAG = tuple(STATE_TERMS.index(f"|u| {axis}") for axis in "uvw")
 _LINEAR = slice(1, 7)
 _FORCE_FIRST = [3, 4, 5, 0, 1, 2]
+# Share of the largest eigenvalue up to which another one is rounding.
 _ROUNDING = 1e-13
 
 

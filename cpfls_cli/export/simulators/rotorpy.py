@@ -21,11 +21,12 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
 
-_ROTORS = 4
-_GRAVITY = 9.81
+# What RotorPy's `Multirotor` allocates to, and has in its code.
+_ROTORS, _GRAVITY = 4, 9.81
 _FASTEST_S = 1e-3
 """RotorPy divides by the time constant of its motors."""
 
+# So exact that what its step leaves is below what it is compared by.
 _INTEGRATOR = {"method": "DOP853", "rtol": 1e-9, "atol": 1e-9}
 
 

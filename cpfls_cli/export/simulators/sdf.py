@@ -35,8 +35,14 @@ _ROTOR_SHARE = 1e-3
 """Share of the mass in the link of each rotor, which Gazebo needs; it is taken from the body."""
 
 _SLOWER, _MARGIN = 10.0, 1.5
+"""Rotors are drawn turning slower by the first; the second is the margin for what their links take from the inertia."""
+
 _RADIUS_M = 0.05
+"""Of a rotor that nobody knows the size of; it is drawn alone."""
+
 _SHORTEST_S = 1e-6
+"""Lag of rotors that have none: the plugin divides by it."""
+
 _ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
