@@ -45,7 +45,7 @@ from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.regressor import Motion
 from cpfls_cli.validation.bands import band, inertia_band
-from cpfls_cli.validation.bootstrap import POWER, BlockScores, MissedTorque, bootstrap
+from cpfls_cli.validation.bootstrap import POWER, BlockScores, bootstrap, missed_torque
 from cpfls_cli.validation.timeline import time_blocks
 
 NOISE, TIME_CONSTANT, ATTITUDES = 0.05, 5.0, 100
@@ -226,7 +226,7 @@ def block_scores(evaluator, training: TorqueData, model: InertiaFunctions) -> Bl
     """Sum by block, without a ridge and without a rigid body."""
     learned = evaluator.solver.learned
     label = time_blocks(training, None).labels(learned.ready.source)
-    ready = Ready(MissedTorque(learned.ready.source, model), rigid=False)
+    ready = Ready(missed_torque(learned.ready.source, model), rigid=False)
     products = replace(learned, ready=ready, label=label, labels=int(label[-1]) + 1).products(model.partitions)
     return BlockScores(products.gram, products.moment, np.zeros(len(model.coefficients)), model.coefficients)
 

@@ -17,11 +17,10 @@ from cpfls_cli.effects.polynomial import STATE_TERMS
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.points import body_inertia
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Body, MeasuredMotion
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.player import Player, apart, free_runs, player_of, rotor_terms_along
+from cpfls_cli.playback.player import Player, apart, body_inertia, free_runs, player_of, rotor_terms_along
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.table import WrenchTable, body_of
 from cpfls_cli.rotations import rotation_matrix
@@ -183,7 +182,7 @@ def constant_body(model: VehicleModel) -> Body:
     cell = 2 * np.pi / CELLS
     roll, pitch = ((np.argwhere(model.fuzzy.visited) + 0.5) * cell - np.pi).T
     attitude = np.column_stack([roll, pitch, np.zeros_like(roll)])
-    tensors = body_inertia(model.fuzzy, attitude[~vertical(attitude)])
+    _, tensors = body_inertia(model.fuzzy, attitude[~vertical(attitude)])
     mean = tensors.mean(axis=0) if len(tensors) else np.zeros((3, 3))
     if not np.linalg.eigvalsh(mean).min() > 0:
         raise InputError("its inertia, averaged where training went, is that of no body; identify it again")

@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel, coriolis_matrix
+from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import body_torque
 from cpfls_cli.dynamics.visited import CELLS
@@ -19,7 +19,7 @@ from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
-from cpfls_cli.playback.player import one_step
+from cpfls_cli.playback.player import body_inertia, one_step
 from cpfls_cli.playback.rotors import Hold
 from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.regressor.motion import Motion
@@ -120,13 +120,6 @@ def _cells(allowed: BoolArray, rng: np.random.Generator) -> Iterator[tuple[int, 
         yield int(places[index, 0]), int(places[index, 1])
 
 
-def body_inertia(model: InertiaModel, attitude: Array) -> Array:
-    """Evaluate an inertia over attitude about the body axes, shape (samples, 3, 3), kg m^2."""
-    axes = [rotations.attitude_rate(attitude, np.broadcast_to(axis, attitude.shape)) for axis in np.eye(3)]
-    inverse = np.stack(axes, axis=2)
-    return np.asarray(inverse.swapaxes(1, 2) @ model.inertia(attitude).value @ inverse)
-
-
 class ReferencePoints(NamedTuple):
     """States, what the model gives there, and the sizes of the terms that it is a sum of.
 
@@ -216,7 +209,7 @@ def reference_run(model: VehicleModel, rng: np.random.Generator, hold: Hold, ste
     states = State(*(np.concatenate(parts) for parts in zip(*path, strict=True)))
     if model.fuzzy is None or not np.isfinite(states.rate).all():
         return ReferenceRun(hold, speed, rotor, states)
-    tensors = body_inertia(model.fuzzy, rotations.euler_angles(states.rotation))
+    _, tensors = body_inertia(model.fuzzy, rotations.euler_angles(states.rotation))
     return ReferenceRun(hold, speed, rotor, states, float(np.linalg.cond(tensors).max()))
 
 

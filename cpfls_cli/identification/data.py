@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -88,6 +88,29 @@ class Flights:
             for data in flight.chunks():
                 yield replace(data, time=data.time + offset)
                 end = float(data.time[-1]) + offset + _PAUSE
+
+
+@dataclass(frozen=True)
+class OtherTorque:
+    """The motion of a source with another torque.
+
+    Attributes
+    ----------
+    torque : callable
+        From samples to their torque, shape (samples, 3), N m.
+    """
+
+    source: TorqueSource
+    torque: Callable[[TorqueData], Array]
+
+    def __len__(self) -> int:
+        """Count the samples."""
+        return len(self.source)
+
+    def chunks(self) -> Iterator[TorqueData]:
+        """Yield the samples, chunk by chunk."""
+        for data in self.source.chunks():
+            yield replace(data, torque=self.torque(data))
 
 
 def joined(flights: Sequence[TorqueSource]) -> TorqueSource:

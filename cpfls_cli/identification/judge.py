@@ -53,19 +53,6 @@ class Score:
         return float(np.max(self.relative_error[np.isfinite(self.relative_error)], initial=0.0))
 
 
-def score(data: TorqueData, predicted: Array) -> Score:
-    """Compare a prediction with the torque of a flight.
-
-    Parameters
-    ----------
-    predicted : array, shape (samples, 3), N m
-        Generalised torque.
-    """
-    sums = ScoreSums()
-    sums.add(data, predicted)
-    return sums.score()
-
-
 def score_of(source: TorqueSource, torque: Callable[[Motion], Array]) -> Score:
     """Compare the predictions of a model with the torque of flights, chunk by chunk.
 

@@ -297,14 +297,6 @@ class _Fuzzy(NamedTuple):
     exists: BoolArray
 
 
-class _BodyInertia(NamedTuple):
-    """Inertia at the attitudes of the runs, and the matrices from rate to momentum, ``W^-T J W^-1``."""
-
-    attitude: Array
-    values: InertiaValues
-    matrices: Array
-
-
 class _State(NamedTuple):
     """Free runs in momentum form: no inertia that depends on the attitude has to be differentiated in time."""
 
@@ -353,7 +345,8 @@ class _FuzzyRuns:
     def _begun(self, starts: IntArray) -> tuple[_State, Array, _Fuzzy]:
         motion = self.motion
         rate, rotation = motion.rate[starts], motion.rotation[starts]
-        momentum = rotations.multiply(np.nan_to_num(self._body_inertia(rotation).matrices), rate)
+        _, matrices = body_inertia(self.fuzzy, _finite_attitude(rotation))
+        momentum = rotations.multiply(np.nan_to_num(matrices), rate)
         state = _State(motion.position[starts], motion.velocity[starts], rotation, momentum)
         return state, rate, self._fuzzy(state.rotation, state.momentum)
 
@@ -380,19 +373,25 @@ class _FuzzyRuns:
         return _State(position, start.velocity + interval * acceleration, rotation, momentum)
 
     def _fuzzy(self, rotation: Array, momentum: Array) -> _Fuzzy:
-        inertia = self._body_inertia(rotation)
-        exists = _positive_definite(inertia.matrices)
-        safe = np.where(exists[:, None, None], inertia.matrices, np.eye(3))
+        attitude = _finite_attitude(rotation)
+        values, matrices = body_inertia(self.fuzzy, attitude)
+        exists = _positive_definite(matrices)
+        safe = np.where(exists[:, None, None], matrices, np.eye(3))
         rate: Array = np.asarray(np.linalg.solve(safe, momentum[..., None])[..., 0], dtype=float)
-        _, direct = momentum_form(inertia.attitude, rate, inertia.values)
+        _, direct = momentum_form(attitude, rate, values)
         return _Fuzzy(rate, direct, exists)
 
-    def _body_inertia(self, rotation: Array) -> _BodyInertia:
-        attitude = rotations.euler_angles(np.nan_to_num(rotation))
-        values = self.fuzzy.inertia(attitude)
-        axes = [rotations.attitude_rate(attitude, np.broadcast_to(axis, attitude.shape)) for axis in np.eye(3)]
-        inverse = np.stack(axes, axis=2)
-        return _BodyInertia(attitude, values, inverse.swapaxes(1, 2) @ values.value @ inverse)
+
+def body_inertia(model: InertiaModel, attitude: Array) -> tuple[InertiaValues, Array]:
+    """Evaluate an inertia on Euler angles, and about the body axes, ``W^-T J W^-1``, shape (samples, 3, 3), kg m^2."""
+    values = model.inertia(attitude)
+    axes = [rotations.attitude_rate(attitude, np.broadcast_to(axis, attitude.shape)) for axis in np.eye(3)]
+    inverse = np.stack(axes, axis=2)
+    return values, np.asarray(inverse.swapaxes(1, 2) @ values.value @ inverse)
+
+
+def _finite_attitude(rotation: Array) -> Array:
+    return rotations.euler_angles(np.nan_to_num(rotation))
 
 
 def _kept(good: BoolArray, new: Array, old: Array) -> Array:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.identification.data import TorqueData, TorqueSource
+from cpfls_cli.identification.data import OtherTorque, TorqueSource
 from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.least_squares import SMALLEST_SINGULAR_SHARE
 from cpfls_cli.identification.samples import Products, Ready
@@ -113,21 +112,9 @@ class BlockScores:
         return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
 
 
-@dataclass(frozen=True)
-class MissedTorque:
-    """The motion of a source with the torque that a model misses: measured minus predicted."""
-
-    source: TorqueSource
-    model: InertiaFunctions
-
-    def __len__(self) -> int:
-        """Count the samples."""
-        return len(self.source)
-
-    def chunks(self) -> Iterator[TorqueData]:
-        """Yield the samples, chunk by chunk."""
-        for data in self.source.chunks():
-            yield replace(data, torque=data.torque - self.model.torque(data.motion))
+def missed_torque(source: TorqueSource, model: InertiaFunctions) -> OtherTorque:
+    """Take the motion of a source with the torque that a model misses: measured minus predicted."""
+    return OtherTorque(source, lambda data: data.torque - model.torque(data.motion))
 
 
 @dataclass(frozen=True)
@@ -213,7 +200,7 @@ def bootstrap(
     learned, tolerance = evaluator.solver.learned, evaluator.solver.rank_tolerance
     label = blocks.labels(learned.ready.source)
     count = int(label[-1]) + 1
-    missed = Ready(MissedTorque(learned.ready.source, model), rigid=True)
+    missed = Ready(missed_torque(learned.ready.source, model), rigid=True)
     products = replace(learned, ready=missed, label=label, labels=count).products(model.partitions)
     weights = rng.standard_normal((settings.draws, count))
     hidden = _BIAS_DEVIATION * rng.standard_normal((settings.draws, 1))

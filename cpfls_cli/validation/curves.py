@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +11,7 @@ from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.fuzzy.inputs import wrap
-from cpfls_cli.identification.data import TorqueData, TorqueSource
+from cpfls_cli.identification.data import OtherTorque, TorqueData, TorqueSource
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import symmetric
@@ -115,31 +114,20 @@ def _ends(angle: Array) -> tuple[float, float]:
     return lowest - margin, highest + margin
 
 
-@dataclass(frozen=True)
-class SimulatedTorque:
-    """The motion of a source with the torque of a model, and what it missed as noise, turned over by block.
+def simulated_torque(source: TorqueSource, model: InertiaFunctions, blocks: TimeBlocks, factor: Array) -> OtherTorque:
+    """Take the motion of a source with the torque of a model, and what it missed as noise, turned over by block.
 
-    Attributes
+    Parameters
     ----------
     factor : array, shape (blocks,)
         What the errors of each block are multiplied with.
     """
 
-    source: TorqueSource
-    model: InertiaFunctions
-    blocks: TimeBlocks
-    factor: Array
+    def simulated(data: TorqueData) -> Array:
+        predicted = model.torque(data.motion)
+        return predicted + factor[blocks.number(data.time), None] * (data.torque - predicted)
 
-    def __len__(self) -> int:
-        """Count the samples."""
-        return len(self.source)
-
-    def chunks(self) -> Iterator[TorqueData]:
-        """Yield the samples, chunk by chunk."""
-        for data in self.source.chunks():
-            predicted = self.model.torque(data.motion)
-            noise = self.factor[self.blocks.number(data.time), None] * (data.torque - predicted)
-            yield replace(data, torque=predicted + noise)
+    return OtherTorque(source, simulated)
 
 
 @dataclass(frozen=True)
@@ -205,8 +193,8 @@ def _simulated(
     rows, parameters = 3 * len(learned), len(model.coefficients)
     strength = np.sqrt(rows / max(rows - parameters, 1))
     factor = strength * rng.choice([-1.0, 1.0], len(blocks.starts) + 1)
-    whole = SimulatedTorque(training, model, blocks, factor)
-    return whole, whole if learned is training else SimulatedTorque(learned, model, blocks, factor)
+    whole = simulated_torque(training, model, blocks, factor)
+    return whole, whole if learned is training else simulated_torque(learned, model, blocks, factor)
 
 
 def _identified_again(

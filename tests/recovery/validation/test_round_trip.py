@@ -13,8 +13,8 @@ from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor import uniform_breakpoints
-from cpfls_cli.validation.bootstrap import MissedTorque, bootstrap
-from cpfls_cli.validation.curves import SimulatedTorque, curves, round_trip
+from cpfls_cli.validation.bootstrap import bootstrap, missed_torque
+from cpfls_cli.validation.curves import curves, round_trip, simulated_torque
 from cpfls_cli.validation.timeline import time_blocks
 from tests.builders.flights import bent_torque, random_flight
 
@@ -83,9 +83,9 @@ def test_the_noise_is_what_the_model_missed_turned_over_block_by_block(monkeypat
     blocks = time_blocks(training, 2.0)
     monkeypatch.setattr(data, "CHUNK", 37)
     factor = np.array([1.0, -1.0, 0.0, 2.0])
-    source = SimulatedTorque(training, model, blocks, factor)
+    source = simulated_torque(training, model, blocks, factor)
     made = np.concatenate([chunk.torque for chunk in source.chunks()])
-    missed = np.concatenate([chunk.torque for chunk in MissedTorque(training, model).chunks()])
+    missed = np.concatenate([chunk.torque for chunk in missed_torque(training, model).chunks()])
     np.testing.assert_allclose(missed, training.torque - model.torque(training.motion), atol=1e-12)
     expected = model.torque(training.motion) + np.repeat(factor, 200)[:, None] * missed
     np.testing.assert_allclose(made, expected, atol=1e-12)
