@@ -29,7 +29,7 @@ import scipy.linalg
 from benchmarks.shared.studies import paper_flight, regressor_matrix
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.reduction.settings import CriterionName, ReductionSettings
-from cpfls_cli.reduction.training_set import reduce
+from tests.builders.reductions import reduce
 
 SIZES = (685, 80)
 CRITERIA: tuple[CriterionName, ...] = ("KD-exchange", "K-exchange", "sigma_min", "A", "D", "paper-literal")

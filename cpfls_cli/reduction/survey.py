@@ -195,22 +195,6 @@ class RowSpace(Spectrum):
         return -(-self.rank // 3)
 
 
-def row_space(Q: Array, rank_tolerance: float) -> RowSpace:
-    """Project a regressor on its numerical row space, ``R_i = Q_i V_r``.
-
-    Parameters
-    ----------
-    Q : array, shape (samples, 3, parameters)
-
-    Raises
-    ------
-    ComputationError
-        If the shape is wrong, a value is not finite, or all values are zero.
-    """
-    surveyed = survey(lambda: [Q], rank_tolerance)
-    return space_of(surveyed, np.concatenate(list(surveyed.projected())))
-
-
 def space_of(surveyed: Survey, rows: Array) -> RowSpace:
     """Place samples in the row space of a surveyed regressor.
 

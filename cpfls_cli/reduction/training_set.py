@@ -15,7 +15,7 @@ from cpfls_cli.reduction.factor import TriangularFactor
 from cpfls_cli.reduction.limits import every_nth, sample_limit, starting_samples, stop_reason
 from cpfls_cli.reduction.selection import Run, Selection, Subset
 from cpfls_cli.reduction.settings import ReductionSettings
-from cpfls_cli.reduction.survey import RowSpace, Survey, row_space, space_of, survey
+from cpfls_cli.reduction.survey import RowSpace, Survey, space_of
 
 Progress = Callable[[int, int], None]
 
@@ -26,41 +26,25 @@ _LOWEST_KEY = -np.finfo(float).max
 _WAITING_SAMPLES = 256
 
 
-def reduce(Q: Array, settings: ReductionSettings, progress: Progress | None = None) -> Selection:
+def choose(space: RowSpace, settings: ReductionSettings, progress: Progress | None = None) -> Selection:
     """Choose samples one by one, each the best next one by the criterion, or all of them by exchanges.
 
-    All criteria but `even` and the printed rule begin with the fewest samples that reach the full rank. Where all
-    samples together are rank deficient, the selection works in their row space. Samples chosen by exchanges are
-    returned, and traced, in the order in which the criterion D takes them.
+    All criteria but `even` and the printed rule begin with the fewest samples that reach the full rank. Samples chosen
+    by exchanges are returned, and traced, in the order in which the criterion D takes them.
 
     Parameters
     ----------
-    Q : array, shape (samples, 3, parameters)
-        Regressor, three rows per sample.
     progress : callable, optional
         Called with the samples chosen and the most there can be.
 
     Raises
     ------
-    ComputationError
-        If Q has the wrong shape or a value that is not finite, or is zero everywhere.
     SettingError
         If the size is larger than the number of samples or too small for the rank.
 
     References
     ----------
     Paper, section 8, eq. (19); method.md, section 6.
-    """
-    return choose(row_space(Q, settings.rank_tolerance), settings, progress)
-
-
-def choose(space: RowSpace, settings: ReductionSettings, progress: Progress | None = None) -> Selection:
-    """Choose samples of a row space as `reduce` does.
-
-    Raises
-    ------
-    SettingError
-        See `reduce`.
     """
     limit = sample_limit(space, settings)
     start = starting_samples(space, settings.criterion, limit)
@@ -76,7 +60,7 @@ def check_space(space: RowSpace, settings: ReductionSettings) -> None:
     Raises
     ------
     SettingError
-        See `reduce`.
+        See `choose`.
     """
     starting_samples(space, settings.criterion, sample_limit(space, settings))
 
@@ -190,7 +174,7 @@ def reduce_streamed(
 ) -> Selection:
     """Choose samples of a surveyed regressor, in one more pass.
 
-    Where all samples fit in the pool, the choice is that of `reduce`. Else it is made from a pool drawn by leverage;
+    Where all samples fit in the pool, the choice is that of `choose`. Else it is made from a pool drawn by leverage;
     rank and condition number of the full set are of all samples all the same.
 
     Parameters
@@ -212,7 +196,7 @@ def reduce_streamed(
     ComputationError
         If the samples of the pool do not determine all that the whole regressor determines.
     SettingError
-        See `reduce`.
+        See `choose`.
 
     References
     ----------
@@ -259,30 +243,8 @@ def pool_of(surveyed: Survey, wanted: IntArray) -> Pool:
     return Pool(wanted, space_of(surveyed, np.concatenate(blocks)))
 
 
-def random_selections(
-    Q: Array, size: int, count: int, rng: np.random.Generator, rank_tolerance: float = 1e-10
-) -> tuple[Subset, ...]:
-    """Choose samples at random, each with the same probability and none twice, several times over.
-
-    Parameters
-    ----------
-    Q : array, shape (samples, 3, parameters)
-    size : int
-        Samples to choose.
-    count : int
-        Subsets to choose, independently of each other.
-
-    Raises
-    ------
-    ComputationError
-        If Q has the wrong shape or a value that is not finite, or if the size is not between 1 and the number
-        of samples.
-    """
-    return random_streamed(survey(lambda: [Q], rank_tolerance), size, count, rng)
-
-
 def random_streamed(surveyed: Survey, size: int, count: int, rng: np.random.Generator) -> tuple[Subset, ...]:
-    """Choose samples of a surveyed regressor at random as `random_selections` does, in one pass.
+    """Choose samples at random, each with the same probability and none twice, several times over, in one pass.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """The regressor Q(q, qd, qdd) of a model structure: torque is linear in the coefficients of the inertia functions."""
 
 from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import InertiaValues, Regressor, data_ranges, torque_sensitivity, uniform_breakpoints
+from cpfls_cli.regressor.regressor import InertiaValues, Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import ModelStructure, StructureSettings, model_structure
 
 __all__ = [
@@ -12,6 +12,5 @@ __all__ = [
     "StructureSettings",
     "data_ranges",
     "model_structure",
-    "torque_sensitivity",
     "uniform_breakpoints",
 ]

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from cpfls_cli.reduction.settings import ReductionSettings
-from cpfls_cli.reduction.training_set import random_selections, reduce
 from cpfls_cli.regressor import (
     Motion,
     Regressor,
@@ -20,6 +19,7 @@ from cpfls_cli.regressor import (
 )
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings
+from tests.builders.reductions import random_selections, reduce
 
 
 @pytest.fixture(scope="module")

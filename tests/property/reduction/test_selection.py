@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cpfls_cli.reduction.settings import ReductionSettings
-from cpfls_cli.reduction.training_set import reduce
+from tests.builders.reductions import reduce
 
 seeds = st.integers(0, 2**32 - 1)
 criteria = st.sampled_from(["KD-exchange", "K-exchange", "sigma_min", "A", "D", "paper-literal"])

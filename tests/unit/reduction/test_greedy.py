@@ -5,7 +5,7 @@ import pytest
 
 from cpfls_cli.errors import SettingError
 from cpfls_cli.reduction.settings import ReductionSettings
-from cpfls_cli.reduction.training_set import reduce
+from tests.builders.reductions import reduce
 
 
 def problem(seed, samples=40, columns=8):

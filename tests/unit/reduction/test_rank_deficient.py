@@ -5,7 +5,7 @@ import pytest
 
 from cpfls_cli.errors import SettingError
 from cpfls_cli.reduction.settings import ReductionSettings
-from cpfls_cli.reduction.training_set import random_selections, reduce
+from tests.builders.reductions import random_selections, reduce
 
 
 def deficient(rank=7, columns=16, samples=60, seed=0):

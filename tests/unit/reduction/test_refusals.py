@@ -5,8 +5,8 @@ import pytest
 
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.reduction.settings import ReductionSettings
-from cpfls_cli.reduction.survey import row_space
-from cpfls_cli.reduction.training_set import check_space, random_selections, reduce
+from cpfls_cli.reduction.training_set import check_space
+from tests.builders.reductions import random_selections, reduce, row_space
 
 REGRESSOR = np.random.default_rng(0).standard_normal((20, 3, 10))
 

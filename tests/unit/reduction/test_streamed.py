@@ -9,11 +9,10 @@ from cpfls_cli.reduction.survey import survey
 from cpfls_cli.reduction.training_set import (
     check_streamed,
     draw_pool,
-    random_selections,
     random_streamed,
-    reduce,
     reduce_streamed,
 )
+from tests.builders.reductions import random_selections, reduce
 
 
 def regressor(samples=3000, columns=7, seed=0):

@@ -14,10 +14,10 @@ from cpfls_cli.regressor import (
     data_ranges,
     kernels,
     model_structure,
-    torque_sensitivity,
     uniform_breakpoints,
 )
 from cpfls_cli.regressor.table import mapped_inputs, padded_breakpoints, structure_table
+from tests.builders.torque_sensitivity import torque_sensitivity
 
 SEESAW = {"consequents": "seesaw", "products": "additive"}
 UNEQUAL = (1, 2, 3, 4, 5, 2)

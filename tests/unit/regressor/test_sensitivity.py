@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.identification.chromosome import decode, weight_jacobian
-from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure, torque_sensitivity
+from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure
+from tests.builders.torque_sensitivity import torque_sensitivity
 
 SEESAW = {"consequents": "seesaw", "products": "additive"}
 STRUCTURES = {
