@@ -136,9 +136,7 @@ def body_acceleration(attitude: Array, attitude_rate: Array, attitude_accelerati
 
     Parameters
     ----------
-    attitude : array, shape (time, 3), rad
-    attitude_rate : array, shape (time, 3), rad/s
-    attitude_acceleration : array, shape (time, 3), rad/s^2
+    attitude, attitude_rate, attitude_acceleration : array, shape (time, 3), rad, rad/s, rad/s^2
 
     Returns
     -------

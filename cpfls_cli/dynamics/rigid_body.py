@@ -70,9 +70,7 @@ def torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Array, 
 
     Parameters
     ----------
-    attitude : array, shape (time, 3), rad
-    attitude_rate : array, shape (time, 3), rad/s
-    attitude_acceleration : array, shape (time, 3), rad/s^2
+    attitude, attitude_rate, attitude_acceleration : array, shape (time, 3), rad, rad/s, rad/s^2
     inertia : array, shape (3, 3), kg m^2, body frame
 
     Returns
@@ -98,9 +96,7 @@ def newton_euler_torque(attitude: Array, attitude_rate: Array, attitude_accelera
 
     Parameters
     ----------
-    attitude : array, shape (time, 3), rad
-    attitude_rate : array, shape (time, 3), rad/s
-    attitude_acceleration : array, shape (time, 3), rad/s^2
+    attitude, attitude_rate, attitude_acceleration : array, shape (time, 3), rad, rad/s, rad/s^2
     inertia : array, shape (3, 3), kg m^2, body frame
 
     Returns
@@ -121,9 +117,7 @@ def body_torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Ar
 
     Parameters
     ----------
-    attitude : array, shape (time, 3), rad
-    attitude_rate : array, shape (time, 3), rad/s
-    attitude_acceleration : array, shape (time, 3), rad/s^2
+    attitude, attitude_rate, attitude_acceleration : array, shape (time, 3), rad, rad/s, rad/s^2
     inertia : array, shape (3, 3), kg m^2, body frame
 
     Returns
@@ -145,9 +139,7 @@ def rigid_body_regressor(attitude: Array, attitude_rate: Array, attitude_acceler
 
     Parameters
     ----------
-    attitude : array, shape (time, 3), rad
-    attitude_rate : array, shape (time, 3), rad/s
-    attitude_acceleration : array, shape (time, 3), rad/s^2
+    attitude, attitude_rate, attitude_acceleration : array, shape (time, 3), rad, rad/s, rad/s^2
 
     Returns
     -------

@@ -60,6 +60,8 @@ class Target(Form):
     levels : int
         Flights, each with half the step of the one before, that a step of no length follows from; 0 for a target that
         takes the very steps of a playback.
+    fly : callable
+        From the text of the file and a course to states at the samples behind each start, shape (run, horizon, ...).
     """
 
     fly: Callable[[str, Course], State]

@@ -234,6 +234,13 @@ def fill_template(template: str, words: dict[str, Any]) -> str:
     return environment.get_template(template).render(words)
 
 
+def executed(text: str) -> dict[str, Any]:
+    """Run exported Python, and give what it names."""
+    module: dict[str, Any] = {"__name__": "exported"}
+    exec(compile(text, "exported", "exec"), module)
+    return module
+
+
 def _common_words(sheet: Sheet, told: Sequence[str]) -> dict[str, Any]:
     """Gather what all languages ask for: names, numbers, and which parts of the code the model needs."""
     vehicle, rules = sheet.model.vehicle, sheet.rules

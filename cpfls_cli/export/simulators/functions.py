@@ -11,7 +11,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import Held
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.source import python_source
+from cpfls_cli.export.source import executed, python_source
 from cpfls_cli.playback.motion import State
 
 
@@ -25,26 +25,9 @@ def jax_text(sheet: Sheet, _held: Held, told: Sequence[str], file: str) -> str:
     return python_source(sheet, file, "jax", told)
 
 
-def _executed(text: str) -> dict[str, Any]:
-    module: dict[str, Any] = {"__name__": "exported"}
-    exec(compile(text, "exported", "exec"), module)
-    return module
-
-
 def fly_casadi(text: str, course: Course) -> State:
-    """Fly an exported vehicle in CasADi.
-
-    Parameters
-    ----------
-    text : str
-        Of the module.
-
-    Returns
-    -------
-    State
-        At the samples behind each start, shape (run, horizon, ...).
-    """
-    module, flight = _executed(text), course.flight
+    """Fly an exported vehicle in CasADi; see `Target.fly`."""
+    module, flight = executed(text), course.flight
     period = flight.motion.period
     made = module["functions"](period, flight.hold == "previous")
     parameters = np.array(module["PARAMETERS"])
@@ -60,11 +43,11 @@ def fly_casadi(text: str, course: Course) -> State:
 
 
 def fly_jax(text: str, course: Course) -> State:
-    """Fly an exported vehicle in JAX; parameters and result as `fly_casadi`."""
+    """Fly an exported vehicle in JAX; see `Target.fly`."""
     import jax
 
     with jax.enable_x64(True):
-        module, flight = _executed(text), course.flight
+        module, flight = executed(text), course.flight
         period, held = flight.motion.period, flight.hold == "previous"
 
         def along(memory: Any, pair: Any) -> Any:

@@ -152,18 +152,7 @@ def _attributes(actuator: _Actuator, lag: float) -> dict[str, str]:
 
 
 def fly_mjcf(text: str, course: Course) -> State:
-    """Fly an exported vehicle in MuJoCo.
-
-    Parameters
-    ----------
-    text : str
-        MJCF.
-
-    Returns
-    -------
-    State
-        At the samples behind each start, shape (run, horizon, ...).
-    """
+    """Fly an exported vehicle in MuJoCo; see `Target.fly`."""
     import mujoco
 
     model = mujoco.MjModel.from_xml_string(text)

@@ -15,7 +15,7 @@ from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.source import fill_template
+from cpfls_cli.export.source import executed, fill_template
 from cpfls_cli.export.text import comment_lines, comment_text, number, python_rows
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
@@ -97,25 +97,12 @@ def rotorpy_text(sheet: Sheet, held: Held, told: Sequence[str], file: str) -> st
 
 
 def fly_rotorpy(text: str, course: Course) -> State:
-    """Fly an exported vehicle in RotorPy.
-
-    Parameters
-    ----------
-    text : str
-        Of the module.
-
-    Returns
-    -------
-    State
-        At the samples behind each start, shape (run, horizon, ...).
-    """
+    """Fly an exported vehicle in RotorPy; see `Target.fly`."""
     from rotorpy.vehicles.multirotor import Multirotor
     from scipy.spatial.transform import Rotation
 
-    module: dict[str, object] = {"__name__": "exported"}
-    exec(text, module)
+    module = executed(text)
     parameters = module["quad_params"]
-    assert isinstance(parameters, dict)
     flown = Multirotor(parameters, control_abstraction="cmd_motor_speeds", integrator_kwargs=dict(_INTEGRATOR))
     lags, start = module["ROTORS_LAG"], course.start
     before = course.lagged(RotorResponse(lag_s=parameters["tau_m"]))

@@ -170,18 +170,7 @@ def _motor(sheet: Sheet, held: Held, rotor: int) -> dict[str, str | float]:
 
 
 def fly_sdf(text: str, course: Course) -> State:
-    """Fly an exported vehicle by the published equations of the plugin.
-
-    Parameters
-    ----------
-    text : str
-        SDF.
-
-    Returns
-    -------
-    State
-        At the samples behind each start, shape (run, horizon, ...).
-    """
+    """Fly an exported vehicle by the published equations of the plugin; see `Target.fly`."""
     model = ElementTree.fromstring(text).find("model")
     assert model is not None
     mass, inertia, hubs = _whole_body(model)
