@@ -19,9 +19,9 @@ from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.kernels import Loss, MeasuredMotion, errors_of_runs, sensitivities
 from cpfls_cli.playback.model import VehicleModel
 
-POSITION, VELOCITY, ATTITUDE, RATE = range(4)
 _SIGNAL_WEIGHTS = (0.0, 0.3, 0.5, 1.0)
-"""Position follows from velocity, and half of the attitude's error from the rate's: each says less that is new."""
+"""Of position, velocity, attitude and rate: position follows from velocity, and half of the attitude's error from the
+rate's, so that each says less that is new."""
 
 _ROBUST = 0.5
 _LEAST = 0.1

@@ -157,7 +157,7 @@ def _write_terms(motion: Array, airflow: Airflow, feature: Array, value: Array, 
     value : array, shape (terms,)
         Written to, in the order of `cpfls_cli.effects.polynomial.STATE_TERMS`.
     slope : array, shape (terms, 6), or (0, 6)
-        Written to, where it is not zero anyhow; without rows it is not asked for.
+        Written to where it is not always zero; without rows it is not asked for.
     """
     value[0] = 1.0
     for i in range(6):

@@ -114,6 +114,11 @@ class ReplayWindows:
     size: Array
     diverged: IntArray
 
+    @property
+    def of_model(self) -> Array:
+        """How far off the model was, shape (window,), rad/s."""
+        return np.asarray(self.size[PREDICTIONS.index(MODEL)])
+
     def worst(self, horizon: int, count: int) -> list[int]:
         """List the windows in which the model is farthest off, without overlap, the worst first.
 
@@ -125,7 +130,7 @@ class ReplayWindows:
             At most.
         """
         chosen: list[int] = []
-        for index in np.argsort(-self.size[0], kind="stable"):
+        for index in np.argsort(-self.of_model, kind="stable"):
             here = self.flight[chosen] == self.flight[index]
             if not np.any(here & (np.abs(self.start[chosen] - self.start[index]) <= horizon)):
                 chosen.append(int(index))
@@ -144,7 +149,7 @@ class ReplayWindows:
             Windows, at most.
         """
         stretches = [part for flight in np.unique(self.flight) for part in self._stretches(int(flight), horizon, count)]
-        sizes = np.array([self.size[0, part].mean() for part in stretches])
+        sizes = np.array([self.of_model[part].mean() for part in stretches])
         return stretches[int(np.argsort(sizes, kind="stable")[(len(sizes) - 1) // 2])]
 
     def _stretches(self, flight: int, horizon: int, count: int) -> Iterator[list[int]]:
@@ -194,8 +199,8 @@ class Region:
 
 def where_better(flights: Sequence[Played], windows: ReplayWindows) -> Region | None:
     """Find the speeds and rates at which a model is better; None where it is nowhere."""
-    model, *rivals = windows.size[:3]
-    better = model < np.min(rivals, axis=0)
+    rivals = [PREDICTIONS.index(name) for name in (NOTHING_MOVES, RATE_STAYS)]
+    better = windows.of_model < windows.size[rivals].min(axis=0)
     if not better.any():
         return None
     motions = [played.flight.motion for played in flights]
@@ -321,11 +326,12 @@ def drawn_runs(played: Played, starts: IntArray, horizon: int) -> Drawn:
         Samples.
     """
     errors = played.runs(MODEL, starts, horizon).errors
+    of_position, of_rate = (errors[:, :, SIGNALS.index(name)] for name in ("position", "body_rate"))
     samples = starts[:, None] + np.arange(horizon + 1)
     rate, position = played.flight.motion.rate[samples], played.flight.motion.position[samples]
     if not played.knows["position"]:
-        return Drawn(rate, _predicted(rate, errors[:, :, 3]), None, None)
-    return Drawn(rate, _predicted(rate, errors[:, :, 3]), position, _predicted(position, errors[:, :, 0]))
+        return Drawn(rate, _predicted(rate, of_rate), None, None)
+    return Drawn(rate, _predicted(rate, of_rate), position, _predicted(position, of_position))
 
 
 def _predicted(measured: Array, errors: Array) -> Array:
