@@ -114,7 +114,7 @@ def test_what_the_flight_lacks_is_named():
         made_ready(ground, logged(blind))
     # Air that nobody measured is taken as still, which `replay` says.
     _, player = made_ready(model_of({"rotor_drag": [3e-4]}), logged(blind))
-    assert player.feels_air
+    assert player.table.feels_air
 
 
 def test_stretches_are_played_apart():

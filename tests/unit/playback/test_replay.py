@@ -314,7 +314,7 @@ def test_a_stated_wrench_drives_a_flight_without_speeds_late_by_the_response():
 @pytest.mark.parametrize(("effects", "feels"), [(EFFECTS[:1], False), (EFFECTS[1:], True)], ids=["damping", "drag"])
 def test_a_model_that_needs_the_velocity_says_so(effects, feels):
     flight = flight_of()
-    assert player_of(VehicleModel(vehicle=VEHICLE, effects=effects), flight).feels_air is feels
+    assert player_of(VehicleModel(vehicle=VEHICLE, effects=effects), flight).table.feels_air is feels
 
 
 def test_half_a_turn_is_pi():
