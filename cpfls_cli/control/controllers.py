@@ -149,7 +149,6 @@ def gains(natural_frequency: tuple[float, float, float], damping: float) -> Gain
     ----------
     natural_frequency : tuple of float, Hz
         Of roll, pitch and yaw.
-    damping : float
     """
     return Gains(2 * pi * np.array(natural_frequency), damping)
 

@@ -61,9 +61,6 @@ class AttitudeLoop:
 
     Attributes
     ----------
-    plant : callable
-    gains : Gains
-    actuators : TorqueActuators
     sensing : Sensing or None
         None for exact measurements.
     integration_rate : float, Hz
@@ -91,9 +88,6 @@ def track(
 
     Parameters
     ----------
-    plan : Plan
-    controllers : sequence of Controller
-    loop : AttitudeLoop
     initial_error : array, shape (3,), rad
         Planned less flown angles at the start; the Euler rates are those of the plan.
     initial_torque : array, shape (3,), N m, body frame
@@ -138,7 +132,6 @@ def start_of(plan: Plan, initial_error: Array) -> Array:
 
     Parameters
     ----------
-    plan : Plan
     initial_error : array, shape (3,), rad
         Planned less flown angles.
 
@@ -203,11 +196,8 @@ def flown_signals(plan: Plan, tracked: Tracked, controller: int, plant: Rotation
 
     Parameters
     ----------
-    plan : Plan
-    tracked : Tracked
     controller : int
         Index.
-    plant : callable
 
     Returns
     -------
@@ -271,8 +261,6 @@ def scores(plan: Plan, tracked: Tracked, settling_time: float) -> Scores:
 
     Parameters
     ----------
-    plan : Plan
-    tracked : Tracked
     settling_time : float, s
         In which a perfect controller forgets an initial error.
     """

@@ -73,7 +73,6 @@ def coriolis_matrix(inertia: InertiaValues, rate: Array) -> Array:
 
     Parameters
     ----------
-    inertia : InertiaValues
     rate : array, shape (samples, 3), rad/s
 
     Returns

@@ -25,7 +25,6 @@ class InertiaFunctions:
 
     Attributes
     ----------
-    structure : ModelStructure
     ranges : tuple of InputRange
         Of roll and pitch over the training data.
     partitions : tuple of array, shape (functions,)

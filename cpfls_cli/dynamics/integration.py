@@ -51,7 +51,6 @@ def runge_kutta_step(equation: Equation[State, Slope], state: State, torque: tup
 
     Parameters
     ----------
-    equation : Equation
     state : State
         At the begin of the step.
     torque : tuple of array, shape (bodies, 3), N m, body frame
@@ -74,7 +73,6 @@ def advance(plant: RotationalPlant, state: Array, torque: Callable[[float], Arra
 
     Parameters
     ----------
-    plant : callable
     state : array, shape (vehicle, 6)
         Attitude in rad, body rate in rad/s.
     torque : callable
@@ -125,8 +123,6 @@ def free_runs(
 
     Parameters
     ----------
-    law : callable
-    start : RotationState
     time : array, shape (run, sample), s
     torque : array, shape (run, sample, 3), N m, body frame
     fastest : float, rad/s

@@ -45,8 +45,6 @@ def evolve(
         them (Lamarckian local search); the rewritten genes take their place.
     gene_count : int
         Genes of a chromosome, 16 bits each.
-    settings : EvolutionSettings
-    rng : numpy.random.Generator
     initial : array of int, shape (up to population, genes), optional
         Chromosomes to start with; the rest of the initial population is random.
 
@@ -81,7 +79,10 @@ def start(
     """Evaluate the initial population; the parameters are those of `evolve`."""
     genes = rng.integers(0, 2**BITS_PER_GENE, size=(settings.population, gene_count), dtype=np.int64)
     if initial is not None:
-        _require_chromosomes(initial, genes.shape)
+        if initial.ndim != 2 or initial.shape[1] != gene_count or len(initial) > len(genes):
+            expected = f"(up to {len(genes)}, {gene_count})"
+            raise ComputationError(f"initial: expected shape {expected}, got {initial.shape}")
+        _require_range("initial", initial)
         genes[: len(initial)] = initial
     archive = Archive()
     evaluation = archive.evaluate(genes, _checked(evaluate))
@@ -93,20 +94,18 @@ def start(
 def step(state: EvolutionState, evaluate: Evaluate, settings: EvolutionSettings) -> EvolutionState:
     """Breed one generation; the parameters are those of `evolve`.
 
-    Returns
-    -------
-    EvolutionState
-        Of the next generation. It shares the archive and the random generator with the given one, which is of
-        no use for another step, also where the evaluation raises an error.
+    The next state shares the archive and the random generator with the given one, which is of no use for another step,
+    also where the evaluation raises an error.
     """
-    offspring_genes, offspring_labels = _breed(state, settings)
-    offspring = state.archive.evaluate(offspring_genes, _checked(evaluate))
+    ranks = rank(state.objectives, settings.ranking, settings.first_objective_weight)
+    broods = [_brood(group, ranks, state, settings) for group in members(state.subpopulations)]
+    offspring_labels = np.repeat(np.arange(len(broods)), [len(brood) for brood in broods])
+    offspring = state.archive.evaluate(np.concatenate(broods), _checked(evaluate))
     genes = np.concatenate([state.genes, offspring.genes])
     objectives = np.concatenate([state.objectives, offspring.objectives])
-    ranks = rank(objectives, settings.ranking, settings.first_objective_weight)
     kept = reinsert(
         genes,
-        ranks,
+        rank(objectives, settings.ranking, settings.first_objective_weight),
         state.subpopulations,
         offspring_labels,
         settings.insertion_rate,
@@ -120,27 +119,18 @@ def step(state: EvolutionState, evaluate: Evaluate, settings: EvolutionSettings)
     return replace(state, index=index, genes=genes[kept], objectives=objectives[kept], history=history)
 
 
-def _breed(state: EvolutionState, settings: EvolutionSettings) -> tuple[IntArray, IntArray]:
-    ranks = rank(state.objectives, settings.ranking, settings.first_objective_weight)
-    broods = [_brood(group, ranks, state, settings) for group in members(state.subpopulations)]
-    genes = np.concatenate(broods)
-    labels = np.repeat(np.arange(len(broods)), [len(brood) for brood in broods])
-    return genes, labels
-
-
 def _brood(group: IntArray, ranks: IntArray, state: EvolutionState, settings: EvolutionSettings) -> IntArray:
     """Breed the offspring of one subpopulation."""
     count = max(int(settings.generation_gap * len(group) + 0.5), 2)
     fitness = linear_ranking_fitness(ranks[group], settings.selective_pressure)
     parents = group[stochastic_universal_sampling(fitness, count, state.rng)]
-    bits = gray_encode(_recombined(state.genes[parents], settings, state.rng))
-    return gray_decode(mutate(bits, settings.mutated_individuals, settings.mutated_bits, state.rng))
-
-
-def _recombined(genes: IntArray, settings: EvolutionSettings, rng: np.random.Generator) -> IntArray:
+    genes = state.genes[parents]
     if settings.recombination == "intermediate":
-        return intermediate_recombination(genes, settings.crossover_rate, 2**BITS_PER_GENE - 1, rng)
-    return gray_decode(single_point_crossover(gray_encode(genes), settings.crossover_rate, rng))
+        drawn = intermediate_recombination(genes, settings.crossover_rate, 2**BITS_PER_GENE - 1, state.rng)
+        bits = gray_encode(drawn)
+    else:
+        bits = single_point_crossover(gray_encode(genes), settings.crossover_rate, state.rng)
+    return gray_decode(mutate(bits, settings.mutated_individuals, settings.mutated_bits, state.rng))
 
 
 def _checked(evaluate: Evaluate) -> Evaluate:
@@ -150,13 +140,6 @@ def _checked(evaluate: Evaluate) -> Evaluate:
         return evaluation
 
     return evaluate_checked
-
-
-def _require_chromosomes(initial: IntArray, shape: tuple[int, ...]) -> None:
-    population, gene_count = shape
-    if initial.ndim != 2 or initial.shape[1] != gene_count or len(initial) > population:
-        raise ComputationError(f"initial: expected shape (up to {population}, {gene_count}), got {initial.shape}")
-    _require_range("initial", initial)
 
 
 def _require_range(name: str, genes: IntArray) -> None:

@@ -44,18 +44,7 @@ class History:
         return cls(none, np.empty((0, objectives)), none)
 
     def extended(self, archive: Archive) -> History:
-        """Add what has been evaluated by now.
-
-        Parameters
-        ----------
-        archive : Archive
-            Holds one evaluation at least.
-
-        Returns
-        -------
-        History
-            With one more row.
-        """
+        """Add a row of what has been evaluated by now, one chromosome at least."""
         front = archive.front.objectives
         # The front holds the smallest value of every objective, so the rest of the archive is not needed.
         return History(
@@ -114,7 +103,6 @@ class EvolutionState:
         Every chromosome evaluated so far.
     history : History
         One row for each generation, this one included.
-    rng : numpy.random.Generator
     """
 
     index: int
@@ -140,26 +128,14 @@ class EvolutionState:
 
 
 def best(generation: Generation) -> Array:
-    """Give the smallest value of each objective among all chromosomes ever evaluated.
-
-    Returns
-    -------
-    array, shape (objectives,)
-        +inf where no chromosome had a finite value.
-    """
+    """Give the smallest value of each objective among all chromosomes ever evaluated; +inf where none was finite."""
     # The front holds the smallest value of every objective, so the archive itself is not needed.
     smallest: Array = generation.front_objectives.min(axis=0)
     return smallest
 
 
 def ended(state: EvolutionState, settings: EvolutionSettings) -> End | None:
-    """Tell whether an evolution has reached its end.
-
-    Returns
-    -------
-    {"generations", "converged"} or None
-        None where another generation is to be bred.
-    """
+    """Tell why an evolution has reached its end; None where another generation is to be bred."""
     if state.index >= settings.generations:
         return "generations"
     return "converged" if stalled(state.history, settings.stall_generations, settings.stall_improvement) else None
@@ -172,16 +148,11 @@ def stalled(history: History, generations: int | None, improvement: float) -> bo
 
     Parameters
     ----------
-    history : History
     generations : int or None
         Generations looked back; never stalled if None.
     improvement : float
-        Relative improvement that is not enough.
-
-    Returns
-    -------
-    bool
-        False while the history is shorter. An objective that got its first finite value improved.
+        Relative improvement that is not enough. An objective that got its first finite value improved, and a history
+        that is shorter is not stalled.
     """
     if generations is None or len(history) <= generations:
         return False

@@ -34,7 +34,6 @@ class Excitation:
 
     Attributes
     ----------
-    path : RotationPath
     condition_number : float
         Of the regressor along the path.
     random : array, shape (starts,)
@@ -68,13 +67,11 @@ def optimised_rotation(
 
     Parameters
     ----------
-    settings : RotationSettings
     duration : float, s
     structure_settings : StructureSettings
         Model whose regressor is meant, with uniform partitions.
     vehicle : VehicleSettings
         Its inertia turns accelerations into torques, where the torque is limited.
-    rng : numpy.random.Generator
     progress : callable, optional
         Called with the paths and iterations done, their final number, and a word on what was reached.
 
@@ -133,8 +130,6 @@ def adam(gradient: Callable[[Array], Array], start: Array, iterations: int, step
     ----------
     gradient : callable
         Gradient at given variables, with noise of mean zero.
-    start : array
-    iterations : int
     step : float
         Of each variable, at the beginning.
 

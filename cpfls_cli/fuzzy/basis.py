@@ -172,7 +172,6 @@ def antecedent(mapped: MappedInput, breakpoints: Array, circular: bool) -> Antec
 
     Parameters
     ----------
-    mapped : MappedInput
     breakpoints : array, shape (functions,)
     circular : bool
         True joins the first and the last function: functions - 1 rules.

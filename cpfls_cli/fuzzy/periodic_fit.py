@@ -95,7 +95,6 @@ def fit_periodic(
         Any number of turns.
     values : array-like, shape (samples,)
         What the system shall give there; its unit is that of the output.
-    settings : PeriodicSettings, optional
     **keys
         Single settings by name, in place of those of `settings`.
 

@@ -101,7 +101,6 @@ class FitQuality:
 
     Attributes
     ----------
-    samples : int
     coefficients : int
         Number of coefficients of the system.
     rank : int
@@ -145,10 +144,8 @@ class PeriodicSystem:
 
     Attributes
     ----------
-    structure : PeriodicStructure
     coefficients : array, shape (coefficients,)
         Rule by rule, the rules of the second input fastest, in a rule feature by feature.
-    quality : FitQuality
     """
 
     structure: PeriodicStructure
@@ -232,7 +229,6 @@ def as_points(angles: npt.ArrayLike, inputs: int) -> tuple[Array, tuple[int, ...
     Parameters
     ----------
     angles : array-like, shape (samples, inputs) or (inputs,), rad; one input: (samples,) or () too
-    inputs : int
 
     Returns
     -------

@@ -157,7 +157,6 @@ class Response:
 
     Attributes
     ----------
-    delay : DelayLine
     lag, slow : HeldLag
         Of speeds in rad/s, and of squared speeds in rad^2/s^2.
     step : float, s
@@ -207,10 +206,8 @@ class Actuators:
     ----------
     lag : HeldLag
         Of the commanded speeds, rad/s.
-    links : tuple of callable
     supplies : tuple of callable
         Factors on the speed at a voltage.
-    battery : Battery
     step : float, s
     response : Response
         Of the model of a whole vehicle.
@@ -263,11 +260,8 @@ def actuators(
 
     Parameters
     ----------
-    effects : SimulatedEffects
     response : RotorResponse
         Behind the speeds that are logged.
-    vehicle : VehicleSettings
-    settings : ClosedLoopSettings
     speed : array, shape (rotor,), rad/s
         At the start.
     step, duration : float, s

@@ -168,7 +168,6 @@ class Clock:
     ----------
     parts : int
         Steps from sample to sample.
-    steps : int
     step : float, s
     instants : array, shape (1 + step,), s
         The start, then the middle of each step.
@@ -247,10 +246,6 @@ class Loop:
 
     Attributes
     ----------
-    autopilot : Autopilot
-    mixer : Mixer
-    actuators : Actuators
-    plant : Plant
     state : array, shape (state,)
     change : array, shape (state,)
         Derivative of the state in the step before.
@@ -323,8 +318,6 @@ def fly(
     planned : mapping of str to array
         `attitude`, `attitude_rate`, `attitude_acceleration`, `position`, `velocity`, `acceleration`, shape
         (time, 3) each.
-    vehicle : VehicleSettings
-    settings : ClosedLoopSettings
     model : VehicleModel or None
         In place of the vehicle, as far as its table of weights gives it.
     effects : SimulatedEffects

@@ -46,8 +46,6 @@ def simulate(
     planned : mapping of str to array
         `attitude`, `attitude_rate`, `attitude_acceleration`, `position`, `velocity`, `acceleration`, shape
         (time, 3) each; without the last three the vehicle is held at its centre of mass and only turns.
-    vehicle : VehicleSettings
-    settings : SimulationSettings
     rng : numpy.random.Generator
         Source of the noise.
 
@@ -83,7 +81,6 @@ class TooMuch:
     ----------
     what : str
         Thrust or tilt, with its unit.
-    limit, worst : float
     first, at, count : int
         Indices of the first sample beyond the limit and of the worst, and the number of samples beyond it.
     """
@@ -125,7 +122,6 @@ def flyability(planned: Mapping[str, Array], vehicle: VehicleSettings, tilt_max:
     planned : mapping of str to array
         `attitude`, `attitude_rate`, `attitude_acceleration` and, unless the vehicle is held at its centre of mass,
         `acceleration`, shape (time, 3) each.
-    vehicle : VehicleSettings
     tilt_max : float or None, rad
         Largest tilt allowed; None for any.
 
@@ -168,7 +164,6 @@ def collective_thrust(vehicle: VehicleSettings, body_torque: Array, acceleration
 
     Parameters
     ----------
-    vehicle : VehicleSettings
     body_torque : array, shape (time, 3), N m, body frame
     acceleration : array, shape (time, 3), m/s^2, world frame, or None
         None where the vehicle is held.

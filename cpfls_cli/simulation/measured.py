@@ -65,7 +65,6 @@ def measure(
         (time, 3) each.
     vehicle : VehicleSettings
         As its model has it.
-    settings : SimulationSettings
     rng : numpy.random.Generator
         Source of the noise.
     progress : callable
@@ -171,7 +170,6 @@ def noise_std(name: str, values: Array, settings: SimulationSettings) -> Array:
     name : str
         Name of the signal.
     values : array, shape (time, ...)
-    settings : SimulationSettings
 
     Returns
     -------
@@ -195,8 +193,6 @@ def noisy(
     ----------
     exact : mapping of str to array
         By name; time is the first axis.
-    settings : SimulationSettings
-    rng : numpy.random.Generator
 
     Returns
     -------

@@ -23,7 +23,6 @@ class SimulatedEffect:
 
     Attributes
     ----------
-    effect : Effect
     values : mapping of str to float
         Coefficients, then shapes, in the units of the catalogue.
     """
@@ -87,7 +86,6 @@ def simulated_effects(
     asked : mapping
         By name of the effect: values in the order of the catalogue, coefficients before shapes, or by their names;
         coefficients without a value are 0.
-    vehicle : VehicleSettings
 
     Raises
     ------

@@ -32,7 +32,6 @@ class EffectWrench:
 
     Attributes
     ----------
-    effects : tuple of SimulatedEffect
     added_inertia : array, shape (3, 3), kg m^2
         Minus the momentum by body rate.
     rotor_coupling : array, shape (3, rotor), kg m^2
@@ -71,7 +70,6 @@ def effect_wrench(chosen: SimulatedEffects, hover: Signals) -> EffectWrench:
 
     Parameters
     ----------
-    chosen : SimulatedEffects
     hover : Signals
         One instant, of any motion.
     """
@@ -119,11 +117,8 @@ class Plant:
 
     Attributes
     ----------
-    vehicle : VehicleSettings
     turning : callable
         Of the model.
-    wrench : EffectWrench
-    carried : tuple of CarriedBody
     whole : VehicleModel or None
         Gives torque and force in place of the rotors alone; then `vehicle` is its own.
     """
@@ -140,7 +135,6 @@ class Plant:
         Parameters
         ----------
         state : array, shape (state,)
-        rotors : Rotors
 
         Returns
         -------
@@ -181,7 +175,6 @@ def instant(vehicle: VehicleSettings, state: Array, rotor_speed: Array) -> Signa
 
     Parameters
     ----------
-    vehicle : VehicleSettings
     state : array, shape (state,)
     rotor_speed : array, shape (rotor,), rad/s
     """

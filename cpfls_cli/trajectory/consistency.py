@@ -112,13 +112,8 @@ def check_peaks(profile: BaseProfile, key: str) -> None:
 
     Parameters
     ----------
-    profile : BaseProfile
     key : str
         Setting that made it so.
-
-    Raises
-    ------
-    SettingError
     """
     if not profile.displacement:
         raise SettingError(
@@ -156,14 +151,9 @@ def check_duration(moves: int, needed: float, duration: float) -> None:
 
     Parameters
     ----------
-    moves : int
     needed : float, s
         By all of them.
     duration : float, s
-
-    Raises
-    ------
-    SettingError
     """
     if needed > duration * (1 + 1e-12):
         words = f"{moves} moves take" if moves > 1 else "the move takes"
@@ -175,7 +165,6 @@ def check_waypoints(waypoints: Sequence[WaypointSettings], paused: bool) -> None
 
     Parameters
     ----------
-    waypoints : sequence of WaypointSettings
     paused : bool
         Whether the points may have pauses of their own.
 

@@ -92,7 +92,6 @@ def samples_of_legs(legs: Sequence[Leg], time: Array) -> Iterator[tuple[Leg, sli
 
     Parameters
     ----------
-    legs : sequence of Leg
     time : array, shape (time,), s
         Ascending.
 
@@ -114,7 +113,6 @@ class Timing:
 
     Attributes
     ----------
-    limits : LimitSettings
     coordination : {"straight-line", "each-axis"}
     period : float or None, s
         None where the limits choose it.
@@ -137,7 +135,6 @@ class Shape:
 
     Attributes
     ----------
-    profiles : tuple of BaseProfile
     directions : array, shape (profiles, 3)
         World vector that one metre of each profile moves along.
     limited_by : tuple of str
@@ -183,7 +180,6 @@ def shape_of(vector: Array, timing: Timing) -> Shape:
     ----------
     vector : array, shape (3,), m, world frame
         Not zero.
-    timing : Timing
 
     Raises
     ------

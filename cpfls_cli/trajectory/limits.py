@@ -71,7 +71,6 @@ def require_positive(key: str, value: float | Array, remedy: str) -> None:
     ----------
     key : str
         Name of the value, for the message.
-    value : float or array
     remedy : str
         What else could be done about it, for the message.
 
@@ -94,7 +93,6 @@ def broadcast_to_moves(key: str, value: float | Array, moves: int) -> Array:
     key : str
         Name of the value, for the message.
     value : float or array, shape (moves,)
-    moves : int
 
     Returns
     -------

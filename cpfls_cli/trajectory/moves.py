@@ -57,7 +57,6 @@ class Move:
         Infinite where there is no solution.
     active : tuple of str
         Names of the limits that the move reaches.
-    outcome : Outcome
     """
 
     profile: BaseProfile

@@ -195,7 +195,6 @@ def held_rotation(path: RotationPath, sample_time: float) -> PlannedRotation:
 
     Parameters
     ----------
-    path : RotationPath
     sample_time : float, s
     """
     time = sample_times(path.duration, sample_time)

@@ -127,10 +127,8 @@ def full_rotation(
 
     Parameters
     ----------
-    settings : RotationSettings
     duration : float, s
         Of the whole path, which is closed on the circle.
-    rng : numpy.random.Generator
     inertia : sequence of float, length 3 or 6, kg m^2, optional
         Ixx, Iyy, Izz (, Ixy, Ixz, Iyz); only needed where the settings limit the torque.
 
@@ -189,7 +187,6 @@ class RotationLimits:
 
     Parameters
     ----------
-    settings : RotationSettings
     inertia : sequence of float, length 3 or 6, kg m^2, optional
         Ixx, Iyy, Izz (, Ixy, Ixz, Iyz); only needed where the torque is limited.
 

@@ -57,7 +57,6 @@ def plan_move(displacement: float, limits: Limits, period: float | None = None) 
     Parameters
     ----------
     displacement : float, m
-    limits : Limits
     period : float, s, optional
 
     Raises

@@ -73,7 +73,6 @@ def body_wrench(vehicle: VehicleSettings, rotor_speed: Array) -> BodyWrench:
 
     Parameters
     ----------
-    vehicle : VehicleSettings
     rotor_speed : array, shape (time, rotor), rad/s
     """
     require_columns("rotor_speed", rotor_speed, len(vehicle.rotors))
@@ -97,7 +96,6 @@ def rotor_demand(vehicle: VehicleSettings, thrust: Array, body_torque: Array) ->
 
     Parameters
     ----------
-    vehicle : VehicleSettings
     thrust : array, shape (time,), N
         Along body z.
     body_torque : array, shape (time, 3), N m, body frame
