@@ -10,11 +10,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.dynamics.equations_of_motion import (
-    AccelerationLaw,
-    RotationalPlant,
-    RotationState,
-)
+from cpfls_cli.dynamics.equations_of_motion import AccelerationLaw, RotationalPlant, RotationState
 
 # The error of a step of the classic Runge-Kutta method that turns by x is of the order x^5 / 120: 1e-7 rad here.
 _TURN_PER_STEP = 0.1
@@ -162,7 +158,8 @@ class _RotationMatrices:
 
     def slope(self, state: RotationState, torque: Array) -> _RotationSlope:
         acceleration = self.law(state, torque)
-        turning = _turning(state.rotation, state.body_rate)
+        # R [rate]_x is row by row a cross product with the rate.
+        turning = np.cross(state.rotation, state.body_rate[:, None])
         return _RotationSlope(turning, acceleration.value, state.exists & acceleration.exists)
 
     def moved(self, state: RotationState, slope: _RotationSlope, share: float) -> RotationState:
@@ -186,8 +183,3 @@ class _RotationMatrices:
             fourth.exists,
         )
         return self.moved(state, mean, 1.0)
-
-
-def _turning(rotation: Array, rate: Array) -> Array:
-    """Multiply ``R [rate]_x``: row by row a cross product with the rate."""
-    return np.cross(rotation, rate[:, None])

@@ -9,10 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.fuzzy.basis import (
-    Antecedent,
-    AntecedentSensitivity,
     Basis,
-    Features,
     antecedent,
     antecedent_sensitivity,
     basis,
@@ -20,7 +17,7 @@ from cpfls_cli.fuzzy.basis import (
     rule_firing,
 )
 from cpfls_cli.fuzzy.inputs import InputRange, MappedInput, input_range, map_input
-from cpfls_cli.fuzzy.membership import breakpoints, uniform_weights
+from cpfls_cli.fuzzy.membership import Memberships, MembershipSensitivity, breakpoints, uniform_weights
 from cpfls_cli.regressor.motion import Carrier, Motion, carrier
 from cpfls_cli.regressor.structure import PITCH, ROLL, Block, ModelStructure
 
@@ -107,7 +104,7 @@ class Regressor:
             for angle in (ROLL, PITCH)
         )
         self.carriers: tuple[Carrier, ...] = tuple(carrier(block.function, motion) for block in structure.blocks)
-        self.features: tuple[Features | None, ...] = tuple(self._features(block) for block in structure.blocks)
+        self.features: tuple[Basis | None, ...] = tuple(self._features(block) for block in structure.blocks)
 
     def matrix(self, partitions: Breakpoints) -> Array:
         """Build Q for given partitions.
@@ -169,7 +166,7 @@ class Regressor:
             return Basis(np.ones((len(self.motion), 1)), np.zeros((0, len(self.motion), 1)))
         return basis(self.antecedents(index, partitions), consequent)
 
-    def antecedents(self, index: int, partitions: Breakpoints) -> list[Antecedent]:
+    def antecedents(self, index: int, partitions: Breakpoints) -> list[Memberships]:
         """Evaluate the antecedents of one inertia function, one per input.
 
         Parameters
@@ -220,7 +217,7 @@ class Regressor:
                     dJ[:, angle, row, column] = gradient @ of_block
         return InertiaValues(J, dJ)
 
-    def _features(self, block: Block) -> Features | None:
+    def _features(self, block: Block) -> Basis | None:
         if not block.partitions:
             return None
         settings = self.structure.settings
@@ -303,7 +300,7 @@ def _function_sensitivity(
 
 
 def _by_antecedent(
-    outputs: Array, moved: AntecedentSensitivity, antecedents: list[Antecedent], input_index: int, direction: int
+    outputs: Array, moved: MembershipSensitivity, antecedents: list[Memberships], input_index: int, direction: int
 ) -> Array:
     if direction == input_index:
         return _contract(outputs, moved.slope, antecedents, input_index, slope=False)
@@ -318,7 +315,7 @@ def _along(rule_outputs: Array, rules: list[int], input_index: int) -> Array:
     return grid if input_index == 0 else grid.swapaxes(1, 2)
 
 
-def _contract(outputs: Array, moved: Array, antecedents: list[Antecedent], input_index: int, *, slope: bool) -> Array:
+def _contract(outputs: Array, moved: Array, antecedents: list[Memberships], input_index: int, *, slope: bool) -> Array:
     """Sum rule outputs over both inputs' rules; the other input fires by its value or by its slope."""
     if len(antecedents) == 1:
         return np.asarray(np.einsum("nl,nlb->nb", outputs[:, :, 0], moved))

@@ -62,12 +62,7 @@ class SimulatedEffects:
         return sorted(self.listed, key=lambda one: (one.effect.order, one.effect.name))
 
     def values(self, name: str) -> Mapping[str, float] | None:
-        """Give the values of an effect, None where it is not flown.
-
-        Returns
-        -------
-        mapping of str to float, or None
-        """
+        """Give the values of an effect, None where it is not flown."""
         return next((one.values for one in self.listed if one.effect.name == name), None)
 
     @property
