@@ -27,8 +27,7 @@ from benchmarks.shared.exact_move import integrated
 from cpfls_cli.report.canvas import legend_above, plot, style_of
 from cpfls_cli.trajectory.legs import synchronised
 from cpfls_cli.trajectory.limits import LIMIT_NAMES, Limits
-from cpfls_cli.trajectory.moves import Moves
-from cpfls_cli.trajectory.time_optimal import plan_move, plan_moves
+from cpfls_cli.trajectory.moves import Moves, plan_move, plan_moves
 
 PLOT = Path(__file__).resolve().parents[1] / "docs" / "planner-cost.svg"
 BATCH = 100_000

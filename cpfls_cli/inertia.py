@@ -22,10 +22,6 @@ def symmetric(parameters: Sequence[float] | Array) -> Array:
     ----------
     parameters : array or sequence, shape (6,) or (3,)
         In the order of `INERTIA_PARAMETERS`; off-diagonal entries that are left out are zero.
-
-    Returns
-    -------
-    array, shape (3, 3)
     """
     matrix = np.zeros((3, 3))
     rows, columns = np.array(INERTIA_ENTRIES[: len(parameters)]).T
@@ -34,17 +30,7 @@ def symmetric(parameters: Sequence[float] | Array) -> Array:
 
 
 def six_parameters(inertia: Sequence[float] | Array) -> Array:
-    """Extend three moments of inertia to six parameters.
-
-    Parameters
-    ----------
-    inertia : sequence of float, length 3 or 6, kg m^2
-
-    Returns
-    -------
-    array, shape (6,), kg m^2
-        Ixx, Iyy, Izz, Ixy, Ixz, Iyz.
-    """
+    """Extend three moments of inertia, or six parameters, kg m^2, to six in the order of `INERTIA_PARAMETERS`."""
     parameters = np.zeros(len(INERTIA_PARAMETERS))
     parameters[: len(inertia)] = inertia
     return parameters

@@ -131,7 +131,6 @@ def after_step(before: Array, wanted: Array, elapsed: float, time_constant: floa
 
     Parameters
     ----------
-    before, wanted : array
     elapsed, time_constant : float
         In one unit; a time constant of 0 is no lag.
     """

@@ -166,6 +166,24 @@ def attitude_rate(attitude: Array, body_rate: Array) -> Array:
         return np.column_stack([p + sp * yaw_rate, cr * q - sr * r, yaw_rate])
 
 
+def attitude_acceleration(attitude: Array, body_rate: Array, body_acceleration: Array) -> Array:
+    """Convert the derivative of the body rates to Euler accelerations, ``W^-1 (omegad - (dW/dt) qd)``.
+
+    Parameters
+    ----------
+    attitude : array, shape (time, 3), rad
+    body_rate, body_acceleration : array, shape (time, 3), rad/s and rad/s^2, body frame
+
+    Returns
+    -------
+    array, shape (time, 3), rad/s^2
+        Not finite where the pitch is exactly +-90 degrees.
+    """
+    rate = attitude_rate(attitude, body_rate)
+    turning = multiply(euler_rate_matrix_derivative(attitude, rate), rate)
+    return attitude_rate(attitude, body_acceleration - turning)
+
+
 def generalised_torque(attitude: Array, body_torque: Array) -> Array:
     """Convert a body torque to the generalised torque on the Euler coordinates, ``tau = W^T tau_body``.
 
@@ -215,6 +233,11 @@ def multiply(matrices: Array, vectors: Array) -> Array:
     """
     product: Array = np.einsum("nij,nj->ni", matrices, vectors)
     return product
+
+
+def wrapped(angle: Array) -> Array:
+    """Wrap angles of any shape, rad, to [-pi, pi)."""
+    return np.asarray(np.mod(angle + np.pi, 2 * np.pi) - np.pi, dtype=float)
 
 
 def turns(vector: Array) -> Array:

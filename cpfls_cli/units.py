@@ -86,46 +86,12 @@ KNOWN_UNITS: Final = MappingProxyType[str, Unit](
 
 
 def to_si(values: Array, unit: str) -> Array:
-    """Convert values to the SI unit of their quantity.
-
-    Parameters
-    ----------
-    values : array, any shape
-        Values in `unit`.
-    unit : str
-        One of `KNOWN_UNITS`; ``g`` is the standard acceleration of free fall.
-
-    Returns
-    -------
-    array, same shape
-        Values in SI.
-
-    Raises
-    ------
-    InputError
-        If the unit is not known; the message offers the nearest known ones.
-    """
+    """Convert values of any shape, in one of `KNOWN_UNITS`, to the SI unit of their quantity."""
     return values * known_unit(unit).factor
 
 
 def known_unit(unit: str) -> Unit:
-    """Look up a unit by its name.
-
-    Parameters
-    ----------
-    unit : str
-        One of `KNOWN_UNITS`.
-
-    Returns
-    -------
-    Unit
-        Its factor and its SI unit.
-
-    Raises
-    ------
-    InputError
-        If the unit is not known; the message offers the nearest known ones.
-    """
+    """Look up a unit by its name, one of `KNOWN_UNITS`; the message on any other offers the nearest."""
     if unit in KNOWN_UNITS:
         return KNOWN_UNITS[unit]
     nearest = [repr(name) for name in get_close_matches(unit, KNOWN_UNITS, n=2, cutoff=0.4)]

@@ -15,7 +15,7 @@ from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
 if TYPE_CHECKING:
     # What searches loads compiled kernels, which nobody waits for who only reads an artifact.
     from cpfls_cli.evolution.archive import Evaluation
-    from cpfls_cli.evolution.state import EvolutionState
+    from cpfls_cli.evolution.engine import EvolutionState
     from cpfls_cli.identification.search import Unfinished
     from cpfls_cli.playback.structure import Judged, Kept
 
@@ -140,7 +140,7 @@ class CheckpointRecord(Record):
     @classmethod
     def of_nothing(cls, unfinished: Unfinished) -> Self:
         """Arrange a search that has not evaluated its whole initial population, only this part of it."""
-        from cpfls_cli.evolution.state import History
+        from cpfls_cli.evolution.engine import History
 
         none, objectives = unfinished.submitted[:0], unfinished.evaluation.objectives[:0]
         empty = cls(
@@ -168,7 +168,7 @@ class CheckpointRecord(Record):
 
     def _state(self) -> EvolutionState:
         from cpfls_cli.evolution.archive import Archive
-        from cpfls_cli.evolution.state import EvolutionState, History
+        from cpfls_cli.evolution.engine import EvolutionState, History
 
         rng = np.random.default_rng()
         rng.bit_generator.state = json.loads(self.generator)

@@ -13,13 +13,13 @@ from cpfls_cli.dynamics.equations_of_motion import TorqueModel
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.lag import after_step
 from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.trajectory.planning import sample_interval
 
 VERTICAL = 0.1
 """Smallest |cos(pitch)| of a plan: nearer to a vertical pitch, Euler angles do not tell which way to turn."""
 
 _ROUNDING = 1e-6
-_SIGNALS = ("attitude", "attitude_rate", "attitude_acceleration")
-
+# What is left of an initial error that has died down.
 _SETTLED = 1e-6
 
 
@@ -70,16 +70,14 @@ def plan_of(time: Array, planned: Mapping[str, Array], control_rate: float) -> P
     ComputationError
         If there are fewer than two samples, they are not uniform, or the pitch comes near +-90 degrees.
     """
-    if len(time) < 2 or np.ptp(np.diff(time)) > _ROUNDING * (time[1] - time[0]):
-        raise ComputationError("attitude control needs a trajectory of two or more samples at one rate")
-    sample = float(time[-1] - time[0]) / (len(time) - 1)
+    sample = sample_interval(time, "attitude control")
     if control_rate * sample < 1 - _ROUNDING:
         slow = f"lower than the {1 / sample:.6g} samples in a second of the trajectory"
         raise SettingError(
             "computed_torque.control_rate_hz", f"{slow}; set it to {ceil(1 / sample - _ROUNDING)} or more"
         )
     parts = ceil(control_rate * sample - _ROUNDING)
-    q, qd, qdd = (planned[name] for name in _SIGNALS)
+    q, qd, qdd = (planned[name] for name in ("attitude", "attitude_rate", "attitude_acceleration"))
     at = time
     if parts > 1:
         from scipy.interpolate import BPoly
@@ -143,14 +141,7 @@ class Gains:
 
 
 def gains(natural_frequency: tuple[float, float, float], damping: float) -> Gains:
-    """Make gains from natural frequencies and damping.
-
-    Parameters
-    ----------
-    natural_frequency : tuple of float, Hz
-        Of roll, pitch and yaw.
-    damping : float
-    """
+    """Make gains from the natural frequencies of roll, pitch and yaw, Hz, and their damping."""
     return Gains(2 * pi * np.array(natural_frequency), damping)
 
 
@@ -217,15 +208,5 @@ class TorqueActuators:
         return command if self.torque_max is None else np.clip(command, -self.torque_max, self.torque_max)
 
     def torque(self, before: Array, command: Array, after: float) -> Array:
-        """Compute the torque some time after a command.
-
-        Parameters
-        ----------
-        before, command : array, shape (vehicle, 3), N m
-        after : float, s
-
-        Returns
-        -------
-        array, shape (vehicle, 3), N m
-        """
+        """Compute the torque, shape (vehicle, 3), N m, some time after a command, s."""
         return after_step(before, command, after, self.time_constant)

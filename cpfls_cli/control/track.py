@@ -61,9 +61,6 @@ class AttitudeLoop:
 
     Attributes
     ----------
-    plant : callable
-    gains : Gains
-    actuators : TorqueActuators
     sensing : Sensing or None
         None for exact measurements.
     integration_rate : float, Hz
@@ -91,9 +88,6 @@ def track(
 
     Parameters
     ----------
-    plan : Plan
-    controllers : sequence of Controller
-    loop : AttitudeLoop
     initial_error : array, shape (3,), rad
         Planned less flown angles at the start; the Euler rates are those of the plan.
     initial_torque : array, shape (3,), N m, body frame
@@ -109,7 +103,10 @@ def track(
     vehicles, instants = len(controllers), len(plan)
     state = np.tile(start_of(plan, initial_error), (vehicles, 1))
     torque = np.tile(initial_torque, (vehicles, 1))
-    steps = _steps(plan.period, loop.integration_rate, loop.actuators.time_constant)
+    lag = loop.actuators.time_constant
+    # A lag is followed in two or more steps of its time constant.
+    fastest = max(loop.integration_rate, 2 / lag if lag > 0 else 0.0)
+    steps = max(ceil(plan.period * fastest - _ROUNDING), 1)
     record = np.full((instants, vehicles, 12), np.nan)
     clipped = np.zeros((instants, vehicles), dtype=bool)
     # A vehicle that is lost may reach infinity before the next instant, where it is noticed.
@@ -138,7 +135,6 @@ def start_of(plan: Plan, initial_error: Array) -> Array:
 
     Parameters
     ----------
-    plan : Plan
     initial_error : array, shape (3,), rad
         Planned less flown angles.
 
@@ -162,20 +158,9 @@ def start_of(plan: Plan, initial_error: Array) -> Array:
     return np.asarray(state)
 
 
-def _wrapped(angle: Array) -> Array:
-    """Wrap angles to [-pi, pi)."""
-    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)
-
-
-def _steps(period: float, rate: float, time_constant: float) -> int:
-    """Count the steps of integration in one period of control, two or more in the time constant of a lag."""
-    fastest = max(rate, 2 / time_constant if time_constant > 0 else 0.0)
-    return max(ceil(period * fastest - _ROUNDING), 1)
-
-
 def _lost(state: Array, planned: Array) -> BoolArray:
     attitude = state[:, :3]
-    off = ~(np.abs(_wrapped(planned - attitude)) < 0.5 * np.pi).all(axis=1)
+    off = ~(np.abs(rotations.wrapped(planned - attitude)) < 0.5 * np.pi).all(axis=1)
     upright = np.cos(attitude[:, 1]) * np.sign(np.cos(planned[1]))
     return np.asarray(off | ~(upright > _VERTICAL) | ~np.isfinite(state).all(axis=1))
 
@@ -189,7 +174,7 @@ def _commands(
         attitude = attitude + loop.sensing.attitude[instant]
         body_rate = body_rate + loop.sensing.body_rate[instant]
     rate = rotations.attitude_rate(attitude, body_rate)
-    feedback = loop.gains.feedback(_wrapped(plan.attitude[instant] - attitude), plan.rate[instant] - rate)
+    feedback = loop.gains.feedback(rotations.wrapped(plan.attitude[instant] - attitude), plan.rate[instant] - rate)
     wanted = plan.acceleration[instant]
     torque = [law(*measured, wanted) for law, *measured in zip(laws, attitude, rate, feedback, strict=True)]
     return rotations.body_torque(attitude, np.array(torque).reshape(-1, 3))
@@ -203,11 +188,8 @@ def flown_signals(plan: Plan, tracked: Tracked, controller: int, plant: Rotation
 
     Parameters
     ----------
-    plan : Plan
-    tracked : Tracked
     controller : int
         Index.
-    plant : callable
 
     Returns
     -------
@@ -220,13 +202,12 @@ def flown_signals(plan: Plan, tracked: Tracked, controller: int, plant: Rotation
     body_torque = 0.5 * (tracked.body_torque + tracked.torque_before)[controller, kept]
     # Nothing is known of what acted before the flight.
     body_torque[0] = tracked.body_torque[controller, 0]
-    rate = rotations.attitude_rate(attitude, body_rate)
-    turning = rotations.multiply(rotations.euler_rate_matrix_derivative(attitude, rate), rate)
+    acceleration = plant(attitude, body_rate, body_torque)
     return {
         "time": plan.time[kept],
         "attitude": attitude,
-        "attitude_rate": rate,
-        "attitude_acceleration": rotations.attitude_rate(attitude, plant(attitude, body_rate, body_torque) - turning),
+        "attitude_rate": rotations.attitude_rate(attitude, body_rate),
+        "attitude_acceleration": rotations.attitude_acceleration(attitude, body_rate, acceleration),
         "body_rate": body_rate,
         "torque": rotations.generalised_torque(attitude, body_torque),
         "body_torque": body_torque,
@@ -271,12 +252,10 @@ def scores(plan: Plan, tracked: Tracked, settling_time: float) -> Scores:
 
     Parameters
     ----------
-    plan : Plan
-    tracked : Tracked
     settling_time : float, s
         In which a perfect controller forgets an initial error.
     """
-    error = _wrapped(plan.attitude - tracked.attitude)
+    error = rotations.wrapped(plan.attitude - tracked.attitude)
     alive = np.all(np.isfinite(error), axis=2)
     lost = np.where(alive.all(axis=1), np.nan, plan.time[np.argmin(alive, axis=1)])
     sampled = error[:, :: plan.parts]

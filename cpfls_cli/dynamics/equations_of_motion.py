@@ -73,7 +73,6 @@ def coriolis_matrix(inertia: InertiaValues, rate: Array) -> Array:
 
     Parameters
     ----------
-    inertia : InertiaValues
     rate : array, shape (samples, 3), rad/s
 
     Returns
@@ -186,10 +185,7 @@ def rigid_plant(inertia: Array) -> RotationalPlant:
 def model_plant(model: TorqueModel) -> RotationalPlant:
     """Make the plant of a model in Euler coordinates, ``D(q) qdd = W^T M - C(q, qd) qd``.
 
-    Returns
-    -------
-    callable
-        What it gives is not finite where the model has no inertia to turn.
+    What it gives is not finite where the model has no inertia to turn.
     """
 
     def derivative(attitude: Array, body_rate: Array, body_torque: Array) -> Array:

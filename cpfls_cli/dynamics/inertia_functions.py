@@ -25,7 +25,6 @@ class InertiaFunctions:
 
     Attributes
     ----------
-    structure : ModelStructure
     ranges : tuple of InputRange
         Of roll and pitch over the training data.
     partitions : tuple of array, shape (functions,)
@@ -45,9 +44,19 @@ class InertiaFunctions:
     visited: BoolArray
 
     def torque(self, motion: Motion) -> Array:
-        """Predict the generalised torque, ``J qdd + C qd``, shape (samples, 3), N m."""
-        starts = range(0, len(motion), _BATCH)
-        return np.concatenate([self._torque(motion[slice(start, start + _BATCH)]) for start in starts])
+        """Predict the generalised torque, ``J qdd + C qd``.
+
+        Returns
+        -------
+        array, shape (samples, 3), N m
+        """
+        batches = [motion[slice(start, start + _BATCH)] for start in range(0, len(motion), _BATCH)]
+        fuzzy = [
+            Regressor(self.structure, one, self.ranges).torque(self.partitions, self.coefficients) for one in batches
+        ]
+        return np.concatenate(
+            [part + rigid_columns(one) @ self.rigid_body for part, one in zip(fuzzy, batches, strict=True)]
+        )
 
     def inertia(self, attitude: Array) -> InertiaValues:
         """Evaluate J(q) and its gradient.
@@ -82,16 +91,7 @@ class InertiaFunctions:
         return coriolis_matrix(self.inertia(attitude), rate)
 
     def outside(self, attitude: Array) -> BoolArray:
-        """Flag attitudes outside the region that the training data visited.
-
-        Parameters
-        ----------
-        attitude : array, shape (samples, 3), rad
-
-        Returns
-        -------
-        array of bool, shape (samples,)
-        """
+        """Flag attitudes, shape (samples, 3), rad, outside the region that the training data visited."""
         return outside_visited(self.visited, attitude)
 
     @property
@@ -99,7 +99,3 @@ class InertiaFunctions:
         """Whether one rule acts at all attitudes, and training went all the way round in roll and in pitch."""
         one_rule = all(block.rules == 1 for block in self.structure.blocks)
         return one_rule and all(self.visited.any(axis=angle).all() for angle in (0, 1))
-
-    def _torque(self, motion: Motion) -> Array:
-        fuzzy = Regressor(self.structure, motion, self.ranges).torque(self.partitions, self.coefficients)
-        return np.asarray(fuzzy + rigid_columns(motion) @ self.rigid_body)

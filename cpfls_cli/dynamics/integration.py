@@ -10,11 +10,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.dynamics.equations_of_motion import (
-    AccelerationLaw,
-    RotationalPlant,
-    RotationState,
-)
+from cpfls_cli.dynamics.equations_of_motion import AccelerationLaw, RotationalPlant, RotationState
 
 # The error of a step of the classic Runge-Kutta method that turns by x is of the order x^5 / 120: 1e-7 rad here.
 _TURN_PER_STEP = 0.1
@@ -51,7 +47,6 @@ def runge_kutta_step(equation: Equation[State, Slope], state: State, torque: tup
 
     Parameters
     ----------
-    equation : Equation
     state : State
         At the begin of the step.
     torque : tuple of array, shape (bodies, 3), N m, body frame
@@ -74,7 +69,6 @@ def advance(plant: RotationalPlant, state: Array, torque: Callable[[float], Arra
 
     Parameters
     ----------
-    plant : callable
     state : array, shape (vehicle, 6)
         Attitude in rad, body rate in rad/s.
     torque : callable
@@ -125,8 +119,6 @@ def free_runs(
 
     Parameters
     ----------
-    law : callable
-    start : RotationState
     time : array, shape (run, sample), s
     torque : array, shape (run, sample, 3), N m, body frame
     fastest : float, rad/s
@@ -166,7 +158,8 @@ class _RotationMatrices:
 
     def slope(self, state: RotationState, torque: Array) -> _RotationSlope:
         acceleration = self.law(state, torque)
-        turning = _turning(state.rotation, state.body_rate)
+        # R [rate]_x is row by row a cross product with the rate.
+        turning = np.cross(state.rotation, state.body_rate[:, None])
         return _RotationSlope(turning, acceleration.value, state.exists & acceleration.exists)
 
     def moved(self, state: RotationState, slope: _RotationSlope, share: float) -> RotationState:
@@ -190,8 +183,3 @@ class _RotationMatrices:
             fourth.exists,
         )
         return self.moved(state, mean, 1.0)
-
-
-def _turning(rotation: Array, rate: Array) -> Array:
-    """Multiply ``R [rate]_x``: row by row a cross product with the rate."""
-    return np.cross(rotation, rate[:, None])

@@ -94,31 +94,14 @@ def torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Array, 
 def newton_euler_torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Array, inertia: Array) -> Array:
     """Compute the generalised torque from the body rates, ``tau = W^T (I omegad + omega x I omega)``.
 
-    Parameters
-    ----------
-    attitude, attitude_rate, attitude_acceleration : array, shape (time, 3), rad, rad/s, rad/s^2
-    inertia : array, shape (3, 3), kg m^2, body frame
-
-    Returns
-    -------
-    array, shape (time, 3), N m
-        Equal to `torque`, by an independent formula.
-
-    References
-    ----------
-    method.md section 2.
+    It is `torque` by an independent formula, and takes the same.
     """
     body = body_torque(attitude, attitude_rate, attitude_acceleration, inertia)
     return rotations.generalised_torque(attitude, body)
 
 
 def body_torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Array, inertia: Array) -> Array:
-    """Compute the torque about the body axes, ``I omegad + omega x I omega``.
-
-    Parameters
-    ----------
-    attitude, attitude_rate, attitude_acceleration : array, shape (time, 3), rad, rad/s, rad/s^2
-    inertia : array, shape (3, 3), kg m^2, body frame
+    """Compute the torque about the body axes, ``I omegad + omega x I omega``, of what `torque` takes.
 
     Returns
     -------
@@ -134,23 +117,19 @@ def body_torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Ar
     return np.asarray(alpha @ inertia.T + np.cross(omega, omega @ inertia.T))
 
 
-def rigid_body_regressor(attitude: Array, attitude_rate: Array, attitude_acceleration: Array) -> Array:
+def rigid_columns(motion: Motion) -> Array:
     """Write the generalised torque as a matrix times the six elements of the inertia tensor.
-
-    Parameters
-    ----------
-    attitude, attitude_rate, attitude_acceleration : array, shape (time, 3), rad, rad/s, rad/s^2
 
     Returns
     -------
-    array, shape (time, 3, 6)
+    array, shape (samples, 3, 6)
         Multiplies (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) in kg m^2 and gives N m.
     """
-    omega = rotations.body_rate(attitude, attitude_rate)
-    alpha = rotations.body_acceleration(attitude, attitude_rate, attitude_acceleration)
-    W = rotations.euler_rate_matrix(attitude)
-    regressor: Array = W.swapaxes(1, 2) @ body_torque_columns(omega, alpha)
-    return regressor
+    omega = rotations.body_rate(motion.attitude, motion.rate)
+    alpha = rotations.body_acceleration(motion.attitude, motion.rate, motion.acceleration)
+    W = rotations.euler_rate_matrix(motion.attitude)
+    columns: Array = W.swapaxes(1, 2) @ body_torque_columns(omega, alpha)
+    return columns
 
 
 def vertical(attitude: Array) -> BoolArray:
@@ -159,10 +138,6 @@ def vertical(attitude: Array) -> BoolArray:
     Parameters
     ----------
     attitude : array, shape (samples, 3), rad
-
-    Returns
-    -------
-    array of bool, shape (samples,)
     """
     return np.asarray(np.abs(np.cos(attitude[:, 1])) < VERTICAL)
 
@@ -174,10 +149,6 @@ def not_positive_definite(matrices: Array, attitude: Array) -> BoolArray:
     ----------
     matrices : array, shape (samples, 3, 3), kg m^2
     attitude : array, shape (samples, 3), rad
-
-    Returns
-    -------
-    array of bool, shape (samples,)
     """
     eigenvalues = np.linalg.eigvalsh(matrices)
     tolerance = np.where(vertical(attitude), _VERTICAL_ROUNDING, _ROUNDING)
@@ -185,17 +156,12 @@ def not_positive_definite(matrices: Array, attitude: Array) -> BoolArray:
 
 
 def why_unphysical(inertia: Array) -> str | None:
-    """Explain why six inertia parameters cannot be those of a body.
+    """Explain why six inertia parameters cannot be those of a body; None for a possible one.
 
     Parameters
     ----------
     inertia : array, shape (6,), kg m^2
         Ixx, Iyy, Izz, Ixy, Ixz, Iyz.
-
-    Returns
-    -------
-    str or None
-        None for a possible body.
     """
     smallest, middle, largest = np.linalg.eigvalsh(symmetric(inertia))
     moments = f"principal moments {smallest:.3g} {middle:.3g} {largest:.3g} kg m^2"
@@ -205,13 +171,3 @@ def why_unphysical(inertia: Array) -> str | None:
     if largest > 1.1 * (smallest + middle):
         return f"breaks the triangle inequality ({moments})"
     return None
-
-
-def rigid_columns(motion: Motion) -> Array:
-    """Build the columns of the six inertia parameters Ixx, Iyy, Izz, Ixy, Ixz, Iyz in the generalised torque.
-
-    Returns
-    -------
-    array, shape (samples, 3, 6)
-    """
-    return rigid_body_regressor(motion.attitude, motion.rate, motion.acceleration)

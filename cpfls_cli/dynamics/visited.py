@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.fuzzy.inputs import wrap
+from cpfls_cli.rotations import wrapped
 
 CELLS = 72
 """Cells per turn, 5 degrees each."""
@@ -40,14 +40,10 @@ def outside_visited(visited: BoolArray, attitude: Array) -> BoolArray:
     ----------
     visited : array of bool, shape (72, 72)
     attitude : array, shape (samples, 3), rad
-
-    Returns
-    -------
-    array of bool, shape (samples,)
     """
     return np.asarray(~visited[_cells(attitude[:, 0]), _cells(attitude[:, 1])])
 
 
 def _cells(angle: Array) -> IntArray:
-    cells: IntArray = np.floor((wrap(angle) + np.pi) * (CELLS / (2 * np.pi))).astype(np.int64)
+    cells: IntArray = np.floor((wrapped(angle) + np.pi) * (CELLS / (2 * np.pi))).astype(np.int64)
     return np.clip(cells, 0, CELLS - 1)

@@ -85,11 +85,6 @@ class Archive:
         evaluate : callable
             Called once with the unknown chromosomes, each once, in order of appearance; not called for none.
 
-        Returns
-        -------
-        Evaluation
-            One row for each individual.
-
         Raises
         ------
         ComputationError
@@ -116,7 +111,16 @@ class Archive:
         ComputationError
             If the evaluation does not fit the chromosomes.
         """
-        _require_fit(submitted, evaluation)
+        if evaluation.genes.shape != submitted.shape or not np.issubdtype(evaluation.genes.dtype, np.integer):
+            raise ComputationError(
+                f"evaluation.genes: expected integers of shape {submitted.shape}, "
+                f"got {evaluation.genes.dtype} of shape {evaluation.genes.shape}"
+            )
+        if evaluation.objectives.ndim != 2 or len(evaluation.objectives) != len(submitted):
+            raise ComputationError(
+                f"evaluation.objectives: expected shape ({len(submitted)}, objectives), "
+                f"got {evaluation.objectives.shape}"
+            )
         first_row = self._count
         self._count += len(submitted)
         self._submitted.append(np.array(submitted, dtype=np.int64))
@@ -144,15 +148,3 @@ def _whole(blocks: list[_Block]) -> _Block:
 
 def _key(chromosome: IntArray) -> bytes:
     return np.asarray(chromosome, dtype=np.int64).tobytes()
-
-
-def _require_fit(submitted: IntArray, evaluation: Evaluation) -> None:
-    if evaluation.genes.shape != submitted.shape or not np.issubdtype(evaluation.genes.dtype, np.integer):
-        raise ComputationError(
-            f"evaluation.genes: expected integers of shape {submitted.shape}, "
-            f"got {evaluation.genes.dtype} of shape {evaluation.genes.shape}"
-        )
-    if evaluation.objectives.ndim != 2 or len(evaluation.objectives) != len(submitted):
-        raise ComputationError(
-            f"evaluation.objectives: expected shape ({len(submitted)}, objectives), got {evaluation.objectives.shape}"
-        )

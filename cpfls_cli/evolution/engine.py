@@ -1,13 +1,14 @@
-"""The genetic algorithm: breed, evaluate, reinsert, migrate."""
+"""The genetic algorithm: its state, history and end; breed, evaluate, reinsert, migrate."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from cpfls_cli.arrays import IntArray
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.archive import Archive, Evaluate, Evaluation
 from cpfls_cli.evolution.operators import (
@@ -26,7 +27,158 @@ from cpfls_cli.evolution.operators import (
 )
 from cpfls_cli.evolution.ranking import rank
 from cpfls_cli.evolution.settings import EvolutionSettings
-from cpfls_cli.evolution.state import EvolutionState, Generation, History, ended
+from cpfls_cli.rounding import at_most
+
+End = Literal["generations", "converged"]
+
+
+@dataclass(frozen=True)
+class History:
+    """Course of the search, one row for each generation from the initial population on.
+
+    Attributes
+    ----------
+    evaluations : array of int, shape (generations + 1,)
+        Chromosomes evaluated so far.
+    best : array, shape (generations + 1, objectives)
+        Best of each objective so far; +inf where none had a finite value.
+    front_size : array of int, shape (generations + 1,)
+        Members of the Pareto front so far.
+    """
+
+    evaluations: IntArray
+    best: Array
+    front_size: IntArray
+
+    def __len__(self) -> int:
+        """Count the rows."""
+        return len(self.evaluations)
+
+    @classmethod
+    def empty(cls, objectives: int) -> History:
+        """Create the history of no generation, for this number of objectives."""
+        none = np.empty(0, dtype=np.int64)
+        return cls(none, np.empty((0, objectives)), none)
+
+    def extended(self, archive: Archive) -> History:
+        """Add a row of what has been evaluated by now, one chromosome at least."""
+        front = archive.front.objectives
+        # The front holds the smallest value of every objective, so the rest of the archive is not needed.
+        return History(
+            np.append(self.evaluations, len(archive)),
+            np.concatenate([self.best, front.min(axis=0, keepdims=True)]),
+            np.append(self.front_size, len(front)),
+        )
+
+
+@dataclass(frozen=True)
+class Generation:
+    """Report a population after one generation.
+
+    Parameters
+    ----------
+    index : int
+        Generations bred so far; 0 is the initial population.
+    genes : array of int, shape (population, genes)
+        Chromosomes, after the evaluator refined them.
+    objectives : array, shape (population, objectives)
+        To be minimised; +inf where the evaluator gave no finite value.
+    subpopulations : array of int, shape (population,)
+        Label of each individual's subpopulation.
+    evaluations : int
+        Chromosomes evaluated so far, each counted once.
+    front_genes : array of int, shape (front, genes)
+        Non-dominated chromosomes among all ever evaluated.
+    front_objectives : array, shape (front, objectives)
+        Their objectives.
+    """
+
+    index: int
+    genes: IntArray
+    objectives: Array
+    subpopulations: IntArray
+    evaluations: int
+    front_genes: IntArray
+    front_objectives: Array
+
+
+@dataclass(frozen=True)
+class EvolutionState:
+    """Hold all that the next generation depends on, and all that a stopped evolution needs to go on.
+
+    The archive and the random generator are carried along and change with each step; copy the state deeply, or
+    store its parts, to be able to return to it. One generator serves all subpopulations, in their order.
+
+    Parameters
+    ----------
+    index : int
+        Generations bred so far.
+    genes : array of int, shape (population, genes)
+    objectives : array, shape (population, objectives)
+    subpopulations : array of int, shape (population,)
+    archive : Archive
+        Every chromosome evaluated so far.
+    history : History
+        One row for each generation, this one included.
+    """
+
+    index: int
+    genes: IntArray
+    objectives: Array
+    subpopulations: IntArray
+    archive: Archive
+    history: History
+    rng: np.random.Generator
+
+    def report(self) -> Generation:
+        """Report this generation, with the front of the archive."""
+        front = self.archive.front
+        return Generation(
+            index=self.index,
+            genes=self.genes,
+            objectives=self.objectives,
+            subpopulations=self.subpopulations,
+            evaluations=len(self.archive),
+            front_genes=front.genes,
+            front_objectives=front.objectives,
+        )
+
+
+def best(generation: Generation) -> Array:
+    """Give the smallest value of each objective among all chromosomes ever evaluated; +inf where none was finite."""
+    # The front holds the smallest value of every objective, so the archive itself is not needed.
+    smallest: Array = generation.front_objectives.min(axis=0)
+    return smallest
+
+
+def ended(state: EvolutionState, settings: EvolutionSettings) -> End | None:
+    """Tell why an evolution has reached its end; None where another generation is to be bred."""
+    if state.index >= settings.generations:
+        return "generations"
+    return "converged" if stalled(state.history, settings.stall_generations, settings.stall_improvement) else None
+
+
+def stalled(history: History, generations: int | None, improvement: float) -> bool:
+    """Tell whether the best of no objective improved enough over the last generations.
+
+    ``best_before - best_now <= improvement * |best_before|`` for every objective.
+
+    Parameters
+    ----------
+    generations : int or None
+        Generations looked back; never stalled if None.
+    improvement : float
+        Relative improvement that is not enough. An objective that got its first finite value improved, and a history
+        that is shorter is not stalled.
+    """
+    if generations is None or len(history) <= generations:
+        return False
+    before, now = history.best[-1 - generations], history.best[-1]
+    known = np.isfinite(before)
+    if np.any(np.isfinite(now[~known])):
+        return False
+    size = np.abs(before[known])
+    return bool(np.all(at_most(before[known] - now[known], improvement * size, size)))
 
 
 def evolve(
@@ -45,8 +197,6 @@ def evolve(
         them (Lamarckian local search); the rewritten genes take their place.
     gene_count : int
         Genes of a chromosome, 16 bits each.
-    settings : EvolutionSettings
-    rng : numpy.random.Generator
     initial : array of int, shape (up to population, genes), optional
         Chromosomes to start with; the rest of the initial population is random.
 
@@ -81,7 +231,10 @@ def start(
     """Evaluate the initial population; the parameters are those of `evolve`."""
     genes = rng.integers(0, 2**BITS_PER_GENE, size=(settings.population, gene_count), dtype=np.int64)
     if initial is not None:
-        _require_chromosomes(initial, genes.shape)
+        if initial.ndim != 2 or initial.shape[1] != gene_count or len(initial) > len(genes):
+            expected = f"(up to {len(genes)}, {gene_count})"
+            raise ComputationError(f"initial: expected shape {expected}, got {initial.shape}")
+        _require_range("initial", initial)
         genes[: len(initial)] = initial
     archive = Archive()
     evaluation = archive.evaluate(genes, _checked(evaluate))
@@ -93,20 +246,18 @@ def start(
 def step(state: EvolutionState, evaluate: Evaluate, settings: EvolutionSettings) -> EvolutionState:
     """Breed one generation; the parameters are those of `evolve`.
 
-    Returns
-    -------
-    EvolutionState
-        Of the next generation. It shares the archive and the random generator with the given one, which is of
-        no use for another step, also where the evaluation raises an error.
+    The next state shares the archive and the random generator with the given one, which is of no use for another step,
+    also where the evaluation raises an error.
     """
-    offspring_genes, offspring_labels = _breed(state, settings)
-    offspring = state.archive.evaluate(offspring_genes, _checked(evaluate))
+    ranks = rank(state.objectives, settings.ranking, settings.first_objective_weight)
+    broods = [_brood(group, ranks, state, settings) for group in members(state.subpopulations)]
+    offspring_labels = np.repeat(np.arange(len(broods)), [len(brood) for brood in broods])
+    offspring = state.archive.evaluate(np.concatenate(broods), _checked(evaluate))
     genes = np.concatenate([state.genes, offspring.genes])
     objectives = np.concatenate([state.objectives, offspring.objectives])
-    ranks = rank(objectives, settings.ranking, settings.first_objective_weight)
     kept = reinsert(
         genes,
-        ranks,
+        rank(objectives, settings.ranking, settings.first_objective_weight),
         state.subpopulations,
         offspring_labels,
         settings.insertion_rate,
@@ -120,27 +271,18 @@ def step(state: EvolutionState, evaluate: Evaluate, settings: EvolutionSettings)
     return replace(state, index=index, genes=genes[kept], objectives=objectives[kept], history=history)
 
 
-def _breed(state: EvolutionState, settings: EvolutionSettings) -> tuple[IntArray, IntArray]:
-    ranks = rank(state.objectives, settings.ranking, settings.first_objective_weight)
-    broods = [_brood(group, ranks, state, settings) for group in members(state.subpopulations)]
-    genes = np.concatenate(broods)
-    labels = np.repeat(np.arange(len(broods)), [len(brood) for brood in broods])
-    return genes, labels
-
-
 def _brood(group: IntArray, ranks: IntArray, state: EvolutionState, settings: EvolutionSettings) -> IntArray:
     """Breed the offspring of one subpopulation."""
     count = max(int(settings.generation_gap * len(group) + 0.5), 2)
     fitness = linear_ranking_fitness(ranks[group], settings.selective_pressure)
     parents = group[stochastic_universal_sampling(fitness, count, state.rng)]
-    bits = gray_encode(_recombined(state.genes[parents], settings, state.rng))
-    return gray_decode(mutate(bits, settings.mutated_individuals, settings.mutated_bits, state.rng))
-
-
-def _recombined(genes: IntArray, settings: EvolutionSettings, rng: np.random.Generator) -> IntArray:
+    genes = state.genes[parents]
     if settings.recombination == "intermediate":
-        return intermediate_recombination(genes, settings.crossover_rate, 2**BITS_PER_GENE - 1, rng)
-    return gray_decode(single_point_crossover(gray_encode(genes), settings.crossover_rate, rng))
+        drawn = intermediate_recombination(genes, settings.crossover_rate, 2**BITS_PER_GENE - 1, state.rng)
+        bits = gray_encode(drawn)
+    else:
+        bits = single_point_crossover(gray_encode(genes), settings.crossover_rate, state.rng)
+    return gray_decode(mutate(bits, settings.mutated_individuals, settings.mutated_bits, state.rng))
 
 
 def _checked(evaluate: Evaluate) -> Evaluate:
@@ -150,13 +292,6 @@ def _checked(evaluate: Evaluate) -> Evaluate:
         return evaluation
 
     return evaluate_checked
-
-
-def _require_chromosomes(initial: IntArray, shape: tuple[int, ...]) -> None:
-    population, gene_count = shape
-    if initial.ndim != 2 or initial.shape[1] != gene_count or len(initial) > population:
-        raise ComputationError(f"initial: expected shape (up to {population}, {gene_count}), got {initial.shape}")
-    _require_range("initial", initial)
 
 
 def _require_range(name: str, genes: IntArray) -> None:

@@ -20,7 +20,6 @@ def gray_encode(genes: IntArray, bits_per_gene: int = BITS_PER_GENE) -> BoolArra
     ----------
     genes : array, shape (individuals, genes)
         Integers from 0 to ``2**bits_per_gene - 1``.
-    bits_per_gene : int
 
     Returns
     -------
@@ -39,7 +38,6 @@ def gray_decode(bits: BoolArray, bits_per_gene: int = BITS_PER_GENE) -> IntArray
     ----------
     bits : array of bool, shape (individuals, genes * bits_per_gene)
         Most significant bit first.
-    bits_per_gene : int
 
     Returns
     -------
@@ -84,9 +82,6 @@ def stochastic_universal_sampling(fitness: Array, count: int, rng: np.random.Gen
     ----------
     fitness : array, shape (individuals,)
         Not negative, with a positive sum.
-    count : int
-        Parents to choose.
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -114,11 +109,6 @@ def intermediate_recombination(genes: IntArray, rate: float, largest: int, rng: 
         Probability that a pair is recombined.
     largest : int
         Offspring are clipped to 0 and this.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    array of int, shape (individuals, genes)
 
     References
     ----------
@@ -143,7 +133,6 @@ def single_point_crossover(bits: BoolArray, rate: float, rng: np.random.Generato
         Rows 0 and 1 are a pair, rows 2 and 3, and so on; an odd last row stays as it is.
     rate : float
         Probability that a pair is crossed.
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -175,11 +164,6 @@ def mutate(bits: BoolArray, individuals_share: float, bits_share: float, rng: np
         Probability that an individual mutates.
     bits_share : float
         Probability that a bit of a mutating individual flips.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    array of bool, shape (individuals, bits)
     """
     mutating = rng.random((len(bits), 1)) < individuals_share
     flipped = rng.random(bits.shape) < bits_share
@@ -199,17 +183,7 @@ def subpopulation_labels(population: int, subpopulations: int) -> IntArray:
 
 
 def members(labels: IntArray) -> list[IntArray]:
-    """List the individuals of each subpopulation.
-
-    Parameters
-    ----------
-    labels : array of int, shape (population,)
-
-    Returns
-    -------
-    list of array of int
-        Indices into the population, one array per subpopulation.
-    """
+    """List the individuals of each subpopulation, as indices into the population."""
     return [np.flatnonzero(labels == label) for label in np.unique(labels)]
 
 
@@ -250,16 +224,12 @@ def reinsert(
         entering = parents + new[np.argsort(ranks[parents + new], kind="stable")][:count]
         if method == "elitist":
             source[old] = _fittest(np.append(old, entering), genes, ranks)[: len(old)]
-        else:
-            source[_replaced(old, ranks, method, rng)[:count]] = entering
+            continue
+        replaced = rng.permutation(old)
+        if method == "fitness":
+            replaced = replaced[np.argsort(-ranks[replaced], kind="stable")]
+        source[replaced[:count]] = entering
     return source
-
-
-def _replaced(old: IntArray, ranks: IntArray, method: Reinsertion, rng: np.random.Generator) -> IntArray:
-    shuffled = rng.permutation(old)
-    if method == "uniform":
-        return shuffled
-    return shuffled[np.argsort(-ranks[shuffled], kind="stable")]
 
 
 def _fittest(candidates: IntArray, genes: IntArray, ranks: IntArray) -> IntArray:
@@ -282,7 +252,6 @@ def migrate(labels: IntArray, rate: float, rng: np.random.Generator) -> IntArray
         Subpopulation of each individual.
     rate : float
         Share of a subpopulation that is replaced; nobody moves at 0, or in a single subpopulation.
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -293,14 +262,10 @@ def migrate(labels: IntArray, rate: float, rng: np.random.Generator) -> IntArray
     groups = members(labels)
     if rate == 0.0 or len(groups) == 1:
         return source
-    count = _migrants(rate, min(len(group) for group in groups))
+    # The small number keeps a product such as 0.29 * 100 from losing its last individual.
+    count = max(int(rate * min(len(group) for group in groups) + 1e-9), 1)
     emigrants = [rng.choice(group, count, replace=False) for group in groups]
     for index, group in enumerate(groups):
         pool = np.concatenate(emigrants[:index] + emigrants[index + 1 :])
         source[rng.choice(group, count, replace=False)] = rng.choice(pool, count, replace=False)
     return source
-
-
-def _migrants(rate: float, size: int) -> int:
-    # The small number keeps a product such as 0.29 * 100 from losing its last individual.
-    return max(int(rate * size + 1e-9), 1)

@@ -15,50 +15,13 @@ def comparable(objectives: Array) -> Array:
     Parameters
     ----------
     objectives : array, shape (individuals, objectives)
-
-    Returns
-    -------
-    array, shape (individuals, objectives)
     """
     return np.stack([levelled(cost) for cost in worst_where_not_finite(objectives).T], axis=1)
 
 
 def worst_where_not_finite(objectives: Array) -> Array:
-    """Replace every objective that is not finite by +inf, the worst value.
-
-    Parameters
-    ----------
-    objectives : array, shape (individuals, objectives)
-
-    Returns
-    -------
-    array, shape (individuals, objectives)
-        Without NaN, so every comparison is defined.
-    """
+    """Replace every objective that is not finite, NaN too, by +inf, so that every comparison is defined."""
     return np.where(np.isfinite(objectives), objectives, np.inf)
-
-
-def dominance_matrix(objectives: Array) -> BoolArray:
-    """Tell which individual Pareto-dominates which: nowhere worse, and better in one objective at least.
-
-    Parameters
-    ----------
-    objectives : array, shape (individuals, objectives)
-
-    Returns
-    -------
-    array of bool, shape (individuals, individuals)
-        Element (i, j) is true where i dominates j.
-
-    References
-    ----------
-    Paper, section 6.
-    """
-    costs = comparable(objectives)
-    nowhere_worse = np.ones((len(costs), len(costs)), dtype=np.bool_)
-    for cost in costs.T:
-        nowhere_worse &= cost[:, np.newaxis] <= cost
-    return nowhere_worse & ~nowhere_worse.T
 
 
 def pareto_front(objectives: Array) -> IntArray:
@@ -86,13 +49,19 @@ def pareto_front(objectives: Array) -> IntArray:
 def rank(objectives: Array, method: Ranking, first_weight: int = 1) -> IntArray:
     """Rank individuals by the method of this name.
 
+    Quantity dominance sums, over the population, the components in which others are better minus those in which they
+    are worse, ``rank_i = sum_j sum_k w_k sign(f_ik - f_jk)``: a Borda count, which sums to zero over the population,
+    with ties counted zero. The Pareto count ("block-type") is one more than the number of individuals that dominate.
+    Pareto fronts ("slice-type") are sorted out one after the other, and each gives its number.
+
     Parameters
     ----------
     objectives : array, shape (individuals, objectives)
         To be minimised. An objective that is not finite counts as worse than every finite one.
     method : {"quantity-dominance", "pareto-count", "pareto-fronts"}
     first_weight : int, optional
-        How often the first objective counts in quantity-dominance; the Pareto rankings know no weights.
+        Of the first objective in quantity dominance, positive, where that of the others is 1, as are all in the paper;
+        the Pareto rankings know no weights.
 
     Returns
     -------
@@ -101,35 +70,19 @@ def rank(objectives: Array, method: Ranking, first_weight: int = 1) -> IntArray:
 
     References
     ----------
-    Paper, section 6; method.md section 7.
-    """
-    if method == "quantity-dominance":
-        return quantity_dominance_ranks(objectives, first_weight)
-    return pareto_count_ranks(objectives) if method == "pareto-count" else pareto_front_ranks(objectives)
-
-
-def quantity_dominance_ranks(objectives: Array, first_weight: int = 1) -> IntArray:
-    """Sum, over the population, the components in which others are better minus those in which they are worse.
-
-    ``rank_i = sum_j sum_k w_k sign(f_ik - f_jk)``, a Borda count: in each objective the individual's position
-    among the sorted population tells both numbers, so the cost is n log n. In the paper all weights are 1.
-
-    Parameters
-    ----------
-    objectives : array, shape (individuals, objectives)
-    first_weight : int, optional
-        Weight of the first objective, positive; that of the others is 1.
-
-    Returns
-    -------
-    array of int, shape (individuals,)
-        Sums to zero over the population; ties count zero.
-
-    References
-    ----------
-    Paper, section 6, after its reference [6].
+    Paper, section 6, after its references [6], [5] and [4]; method.md section 7.
     """
     costs = comparable(objectives)
+    if method == "quantity-dominance":
+        return _quantity_dominance(costs, first_weight)
+    dominates = _dominance(costs)
+    if method == "pareto-count":
+        return 1 + np.asarray(np.count_nonzero(dominates, axis=0))
+    return _front_numbers(dominates)
+
+
+def _quantity_dominance(costs: Array, first_weight: int) -> IntArray:
+    """Sum the signs of the differences: the positions among the sorted population tell them, so it costs n log n."""
     # With ties averaged, position p of n has (smaller - larger) = 2 p - (n + 1), a whole number.
     signs = np.column_stack([2.0 * positions(cost) - (len(costs) + 1) for cost in costs.T]).astype(np.int64)
     signs[:, 0] *= first_weight
@@ -137,43 +90,16 @@ def quantity_dominance_ranks(objectives: Array, first_weight: int = 1) -> IntArr
     return ranks
 
 
-def pareto_count_ranks(objectives: Array) -> IntArray:
-    """Count the individuals that dominate, plus one ("block-type" ranking).
-
-    Parameters
-    ----------
-    objectives : array, shape (individuals, objectives)
-
-    Returns
-    -------
-    array of int, shape (individuals,)
-        One for the non-dominated.
-
-    References
-    ----------
-    Paper, section 6, after its reference [5].
-    """
-    dominating: IntArray = np.count_nonzero(dominance_matrix(objectives), axis=0)
-    return 1 + dominating
+def _dominance(costs: Array) -> BoolArray:
+    """Tell which individual (row) dominates which: nowhere worse, and better in one objective at least."""
+    nowhere_worse = np.ones((len(costs), len(costs)), dtype=np.bool_)
+    for cost in costs.T:
+        nowhere_worse &= cost[:, np.newaxis] <= cost
+    return nowhere_worse & ~nowhere_worse.T
 
 
-def pareto_front_ranks(objectives: Array) -> IntArray:
-    """Sort into non-dominated fronts and give each its number ("slice-type" ranking).
-
-    Parameters
-    ----------
-    objectives : array, shape (individuals, objectives)
-
-    Returns
-    -------
-    array of int, shape (individuals,)
-        One for the non-dominated, two for those non-dominated once these are removed, and so on.
-
-    References
-    ----------
-    Paper, section 6, after its reference [4].
-    """
-    dominates = dominance_matrix(objectives)
+def _front_numbers(dominates: BoolArray) -> IntArray:
+    """Give the fronts their numbers: one for the non-dominated, two for those that are it without these, and so on."""
     dominating = np.count_nonzero(dominates, axis=0)
     ranks = np.zeros(len(dominates), dtype=np.int64)
     front = 0

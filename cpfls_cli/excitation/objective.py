@@ -78,7 +78,6 @@ def regressor_of(structure: ModelStructure, motion: Array) -> Array:
 
     Parameters
     ----------
-    structure : ModelStructure
     motion : array, shape (3, samples, 3)
         Attitude, Euler rates, Euler accelerations.
 
@@ -95,7 +94,6 @@ def condition_number(path: RotationPath, structure: ModelStructure, samples: int
 
     Parameters
     ----------
-    path : RotationPath
     structure : ModelStructure
         Its partitions are taken to be uniform.
     samples : int
@@ -122,12 +120,8 @@ class Objective:
     ----------
     path : RotationPath
         Gives turns, harmonics and duration.
-    structure : ModelStructure
-    limits : RotationLimits
-    samples : int
     iterations : int
         Evaluations in all, over which the exponent of the smoothed condition number and the cost of the penalty grow.
-    rng : numpy.random.Generator
 
     Attributes
     ----------
@@ -173,7 +167,6 @@ def conditioning_gradient(structure: ModelStructure, motion: Array, exponent: fl
 
     Parameters
     ----------
-    structure : ModelStructure
     motion : array, shape (3, samples, 3)
         Attitude, Euler rates, Euler accelerations.
     exponent : float
@@ -196,7 +189,6 @@ def penalty_gradient(limits: RotationLimits, motion: Array, cost: float) -> Arra
 
     Parameters
     ----------
-    limits : RotationLimits
     motion : array, shape (3, samples, 3)
     cost : float
         Of a limit exceeded twofold, all the time.

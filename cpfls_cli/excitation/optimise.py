@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.excitation.objective import Objective, condition_number
 from cpfls_cli.excitation.variables import path_of, variables_of
-from cpfls_cli.regressor import ModelStructure, StructureSettings, model_structure
+from cpfls_cli.regressor import StructureSettings, model_structure
 from cpfls_cli.rounding import at_most, levelled
 from cpfls_cli.trajectory.rotation import RotationLimits, RotationPath, full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
@@ -34,7 +34,6 @@ class Excitation:
 
     Attributes
     ----------
-    path : RotationPath
     condition_number : float
         Of the regressor along the path.
     random : array, shape (starts,)
@@ -68,13 +67,11 @@ def optimised_rotation(
 
     Parameters
     ----------
-    settings : RotationSettings
     duration : float, s
     structure_settings : StructureSettings
         Model whose regressor is meant, with uniform partitions.
     vehicle : VehicleSettings
         Its inertia turns accelerations into torques, where the torque is limited.
-    rng : numpy.random.Generator
     progress : callable, optional
         Called with the paths and iterations done, their final number, and a word on what was reached.
 
@@ -89,7 +86,8 @@ def optimised_rotation(
     13(5).
     """
     structure, limits = model_structure(structure_settings), RotationLimits(settings, vehicle.inertia_kg_m2)
-    samples, report = _samples(structure, duration), _Report(progress, settings.starts + settings.iterations)
+    samples = max(_SAMPLES, _SAMPLES_PER_PARAMETER * structure.parameters, round(_SAMPLES_PER_SECOND * duration))
+    report = _Report(progress, settings.starts + settings.iterations)
     paths = [full_rotation(settings, duration, rng, vehicle.inertia_kg_m2) for _ in range(settings.starts)]
     random = [report(condition_number(path, structure, samples)) for path in paths]
     path = best = paths[int(np.argmin(levelled(np.array(random))))]
@@ -97,20 +95,12 @@ def optimised_rotation(
     for variables in adam(objective.gradient, variables_of(best), settings.iterations, _STEP):
         report(objective.history[-1])
         path = path_of(variables, best)
-    reached, path = _better(limits.enforced(path), best, structure, _FINER * samples)
+    # Enforced limits may cost a path what it had gained.
+    path = limits.enforced(path)
+    reached, before = (condition_number(either, structure, _FINER * samples) for either in (path, best))
+    if not at_most(reached, before):
+        reached, path = before, best
     return Excitation(path, reached, np.array(random), np.array(objective.history))
-
-
-def _samples(structure: ModelStructure, duration: float) -> int:
-    return max(_SAMPLES, _SAMPLES_PER_PARAMETER * structure.parameters, round(_SAMPLES_PER_SECOND * duration))
-
-
-def _better(
-    path: RotationPath, other: RotationPath, structure: ModelStructure, samples: int
-) -> tuple[float, RotationPath]:
-    """Choose by condition number: enforced limits may cost a path what it had gained."""
-    one, two = (condition_number(either, structure, samples) for either in (path, other))
-    return (one, path) if at_most(one, two) else (two, other)
 
 
 class _Report:
@@ -133,8 +123,6 @@ def adam(gradient: Callable[[Array], Array], start: Array, iterations: int, step
     ----------
     gradient : callable
         Gradient at given variables, with noise of mean zero.
-    start : array
-    iterations : int
     step : float
         Of each variable, at the beginning.
 

@@ -63,8 +63,7 @@ def variables_of(path: RotationPath) -> Array:
     array, shape (3, 1 + 2 harmonics)
         Start in rad, then the amplitudes of the rates of sine and cosine terms in rad/s: variables of equal weight.
     """
-    frequency = _frequency(path)
-    return np.hstack([path.start[:, None], path.sine * frequency, path.cosine * frequency])
+    return np.hstack([path.start[:, None], path.sine * path.frequency, path.cosine * path.frequency])
 
 
 def path_of(variables: Array, like: RotationPath) -> RotationPath:
@@ -77,8 +76,7 @@ def path_of(variables: Array, like: RotationPath) -> RotationPath:
         Gives turns and duration.
     """
     sine, cosine = np.split(variables[:, 1:], 2, axis=1)
-    frequency = _frequency(like)
-    return RotationPath(variables[:, 0], like.turns, sine / frequency, cosine / frequency, like.duration)
+    return RotationPath(variables[:, 0], like.turns, sine / like.frequency, cosine / like.frequency, like.duration)
 
 
 def design(like: RotationPath, time: Array) -> Design:
@@ -90,7 +88,7 @@ def design(like: RotationPath, time: Array) -> Design:
         Gives turns, number of harmonics and duration.
     time : array, shape (time,), s
     """
-    frequency = _frequency(like)
+    frequency = like.frequency
     sine, cosine = np.sin(time[:, None] * frequency), np.cos(time[:, None] * frequency)
     one, zero = np.ones((len(time), 1)), np.zeros((len(time), 1))
     matrices = np.stack(
@@ -103,9 +101,3 @@ def design(like: RotationPath, time: Array) -> Design:
     rate = 2 * np.pi / like.duration * like.turns
     turning = np.stack([time[:, None] * rate, np.broadcast_to(rate, (len(time), 3)), np.zeros((len(time), 3))])
     return Design(matrices, turning)
-
-
-def _frequency(path: RotationPath) -> Array:
-    """Angular frequencies of the harmonics, rad/s."""
-    harmonic = np.arange(1, path.harmonics + 1, dtype=np.float64)
-    return harmonic * (2 * np.pi / path.duration)

@@ -9,22 +9,30 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.fuzzy.inputs import MappedInput
-from cpfls_cli.fuzzy.membership import join_ends, membership_sensitivity, memberships
+from cpfls_cli.fuzzy.membership import (
+    Memberships,
+    MembershipSensitivity,
+    join_ends,
+    membership_sensitivity,
+    memberships,
+)
 
 Consequents = Literal["seesaw", "harmonic"]
 Products = Literal["additive", "tensor"]
 
 
 @dataclass(frozen=True)
-class Features:
-    """Consequent features of samples.
+class Basis:
+    """Functions of the input angles at samples: the features of a rule, or, times its firing, those of all rules.
+
+    A fuzzy system is ``f(q) = basis @ coefficients``.
 
     Attributes
     ----------
-    value : array, shape (samples, features)
-        The first feature is the constant 1.
-    gradient : array, shape (inputs, samples, features)
-        Derivative by each input angle, 1/rad.
+    value : array, shape (samples, functions)
+        The first feature of a rule is the constant 1.
+    gradient : array, shape (inputs, samples, functions), 1/rad
+        Derivative by each input angle.
     """
 
     value: Array
@@ -53,8 +61,8 @@ def features(
     consequents: Consequents,
     harmonic_order: int,
     products: Products,
-) -> Features:
-    """Evaluate the consequent features of a fuzzy system.
+) -> Basis:
+    """Evaluate the consequent features of a fuzzy system, which each rule adds up.
 
     `seesaw` gives ``1, s_1, s_2``, the paper's. `harmonic` puts ``sin k q, cos k q``, k = 1..order, in place of
     each s; it is smooth everywhere. `additive` joins the inputs' features side by side, `tensor` multiplies them.
@@ -78,8 +86,15 @@ def features(
         single = [_with_constant(*_harmonics(angle, harmonic_order)) for angle in angles]
     if len(single) == 1:
         value, slope = single[0]
-        return Features(value, slope[None])
-    return _tensor(*single) if products == "tensor" else _additive(*single)
+        return Basis(value, slope[None])
+    (value_1, slope_1), (value_2, slope_2) = single
+    if products == "tensor":
+        gradient = np.stack([row_products(slope_1, value_2), row_products(value_1, slope_2)])
+        return Basis(row_products(value_1, value_2), gradient)
+    # Side by side; the constant is that of the first.
+    by_first = np.hstack([slope_1, np.zeros_like(slope_2[:, 1:])])
+    by_second = np.hstack([np.zeros_like(slope_1), slope_2[:, 1:]])
+    return Basis(np.hstack([value_1, value_2[:, 1:]]), np.stack([by_first, by_second]))
 
 
 def _harmonics(angle: Array, order: int) -> tuple[Array, Array]:
@@ -92,20 +107,6 @@ def _harmonics(angle: Array, order: int) -> tuple[Array, Array]:
 def _with_constant(value: Array, slope: Array) -> tuple[Array, Array]:
     one = np.ones((len(value), 1))
     return np.hstack([one, value]), np.hstack([0.0 * one, slope])
-
-
-def _additive(first: tuple[Array, Array], second: tuple[Array, Array]) -> Features:
-    (value_1, slope_1), (value_2, slope_2) = first, second
-    value = np.hstack([value_1, value_2[:, 1:]])
-    by_first = np.hstack([slope_1, np.zeros_like(slope_2[:, 1:])])
-    by_second = np.hstack([np.zeros_like(slope_1), slope_2[:, 1:]])
-    return Features(value, np.stack([by_first, by_second]))
-
-
-def _tensor(first: tuple[Array, Array], second: tuple[Array, Array]) -> Features:
-    (value_1, slope_1), (value_2, slope_2) = first, second
-    gradient = np.stack([row_products(slope_1, value_2), row_products(value_1, slope_2)])
-    return Features(row_products(value_1, value_2), gradient)
 
 
 def row_products(first: Array, second: Array) -> Array:
@@ -124,55 +125,11 @@ def row_products(first: Array, second: Array) -> Array:
     return (first[:, :, None] * second[:, None, :]).reshape(len(first), -1)
 
 
-@dataclass(frozen=True)
-class Antecedent:
-    """Firing of the rules along one input.
-
-    Attributes
-    ----------
-    value : array, shape (samples, rules)
-    slope : array, shape (samples, rules), 1/rad
-        Derivative by the input angle.
-    """
-
-    value: Array
-    slope: Array
-
-
-@dataclass(frozen=True)
-class AntecedentSensitivity:
-    """Derivatives of an antecedent by the inner breakpoints of its partition.
-
-    Attributes
-    ----------
-    value, slope : array, shape (samples, rules, breakpoints)
-    """
-
-    value: Array
-    slope: Array
-
-
-@dataclass(frozen=True)
-class Basis:
-    """Basis functions of a fuzzy system, ``f(q) = basis @ coefficients``.
-
-    Attributes
-    ----------
-    value : array, shape (samples, rules * features)
-    gradient : array, shape (inputs, samples, rules * features), 1/rad
-        Derivative by each input angle.
-    """
-
-    value: Array
-    gradient: Array
-
-
-def antecedent(mapped: MappedInput, breakpoints: Array, circular: bool) -> Antecedent:
-    """Evaluate the firing of rules along one input.
+def antecedent(mapped: MappedInput, breakpoints: Array, circular: bool) -> Memberships:
+    """Evaluate the firing of rules along one input, shape (samples, rules), and its slope by the angle, 1/rad.
 
     Parameters
     ----------
-    mapped : MappedInput
     breakpoints : array, shape (functions,)
     circular : bool
         True joins the first and the last function: functions - 1 rules.
@@ -184,32 +141,21 @@ def antecedent(mapped: MappedInput, breakpoints: Array, circular: bool) -> Antec
     degrees = memberships(mapped.antecedent, breakpoints)
     slope = degrees.slope * mapped.antecedent_slope[:, None]
     if circular:
-        return Antecedent(join_ends(degrees.value), join_ends(slope))
-    return Antecedent(degrees.value, slope)
+        return Memberships(join_ends(degrees.value), join_ends(slope))
+    return Memberships(degrees.value, slope)
 
 
-def antecedent_sensitivity(mapped: MappedInput, breakpoints: Array, circular: bool) -> AntecedentSensitivity:
-    """Differentiate the firing of rules by the inner breakpoints.
-
-    Parameters
-    ----------
-    mapped, breakpoints, circular
-        See `antecedent`.
-    """
+def antecedent_sensitivity(mapped: MappedInput, breakpoints: Array, circular: bool) -> MembershipSensitivity:
+    """Differentiate what `antecedent` gives by the inner breakpoints, shape (samples, rules, breakpoints)."""
     by_breakpoint = membership_sensitivity(mapped.antecedent, breakpoints)
     slope = by_breakpoint.slope * mapped.antecedent_slope[:, None, None]
     if circular:
-        return AntecedentSensitivity(join_ends(by_breakpoint.value), join_ends(slope))
-    return AntecedentSensitivity(by_breakpoint.value, slope)
+        return MembershipSensitivity(join_ends(by_breakpoint.value), join_ends(slope))
+    return MembershipSensitivity(by_breakpoint.value, slope)
 
 
-def rule_firing(antecedents: list[Antecedent]) -> tuple[Array, Array]:
-    """Multiply the antecedents of all inputs.
-
-    Parameters
-    ----------
-    antecedents : list of Antecedent
-        One per input, one or two.
+def rule_firing(antecedents: list[Memberships]) -> tuple[Array, Array]:
+    """Multiply the antecedents of all inputs, one or two.
 
     Returns
     -------
@@ -224,7 +170,7 @@ def rule_firing(antecedents: list[Antecedent]) -> tuple[Array, Array]:
     return row_products(first.value, second.value), np.stack(gradient)
 
 
-def basis(antecedents: list[Antecedent], consequent: Features) -> Basis:
+def basis(antecedents: list[Memberships], consequent: Basis) -> Basis:
     """Combine rule firing and consequent features by the product rule.
 
     References

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.rotations import wrapped
 
 InputMap = Literal["full-circle", "data-range"]
 
@@ -49,20 +50,6 @@ class MappedInput:
     consequent_slope: Array
 
 
-def wrap(angle: Array) -> Array:
-    """Wrap angles to [-pi, pi).
-
-    Parameters
-    ----------
-    angle : array, rad
-
-    Returns
-    -------
-    array, rad
-    """
-    return np.asarray(np.mod(angle + np.pi, 2.0 * np.pi) - np.pi, dtype=float)
-
-
 def seesaw(angle: Array) -> tuple[Array, Array]:
     """Evaluate the triangle wave with value 0 at 0, 1 at pi/2, 0 at pi and -1 at 3 pi/2.
 
@@ -80,9 +67,9 @@ def seesaw(angle: Array) -> tuple[Array, Array]:
     ----------
     Equation (11); method.md section 5.
     """
-    wrapped = wrap(angle)
-    folded = np.abs(wrapped) > 0.5 * np.pi
-    value = np.where(folded, np.copysign(np.pi, wrapped) - wrapped, wrapped) * (2.0 / np.pi)
+    near = wrapped(angle)
+    folded = np.abs(near) > 0.5 * np.pi
+    value = np.where(folded, np.copysign(np.pi, near) - near, near) * (2.0 / np.pi)
     return value, np.where(folded, -2.0 / np.pi, 2.0 / np.pi)
 
 
@@ -95,7 +82,7 @@ def input_range(angle: Array, circular: bool) -> InputRange:
     circular : bool
         True for continuous periodic systems (range of the seesaw), False for classic ones (range of the angle).
     """
-    value = seesaw(angle)[0] if circular else wrap(angle)
+    value = seesaw(angle)[0] if circular else wrapped(angle)
     return InputRange(float(np.min(value)), float(np.max(value)))
 
 
@@ -119,10 +106,10 @@ def map_input(angle: Array, input_map: InputMap, circular: bool, data_range: Inp
     """
     if input_map == "full-circle":
         # A circular system has no seam; a classic one jumps, so its seam lies opposite to hover.
-        turns = np.mod(angle, 2.0 * np.pi) / (2.0 * np.pi) if circular else wrap(angle) / (2.0 * np.pi) + 0.5
+        turns = np.mod(angle, 2.0 * np.pi) / (2.0 * np.pi) if circular else wrapped(angle) / (2.0 * np.pi) + 0.5
         per_turn = np.full(len(angle), 0.5 / np.pi)
         consequent, slope = seesaw(angle) if circular else (turns, per_turn)
         return MappedInput(turns, per_turn, consequent, slope)
-    value, slope = seesaw(angle) if circular else (wrap(angle), np.ones(len(angle)))
+    value, slope = seesaw(angle) if circular else (wrapped(angle), np.ones(len(angle)))
     scaled, scaled_slope = (value - data_range.minimum) / data_range.width, slope / data_range.width
     return MappedInput(scaled, scaled_slope, scaled, scaled_slope)

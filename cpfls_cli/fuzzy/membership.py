@@ -59,30 +59,20 @@ def breakpoints(weights: Array) -> Array:
 
 
 def uniform_weights(functions: int) -> Array:
-    """Give the weights of the equidistant partition.
-
-    Parameters
-    ----------
-    functions : int
-        Number of membership functions, at least 1.
-
-    Returns
-    -------
-    array, shape (functions - 1,)
-    """
+    """Give the weights of the equidistant partition of one or more functions, shape (functions - 1,)."""
     return np.ones(functions - 1)
 
 
 @dataclass(frozen=True)
 class Memberships:
-    """Degrees of membership of samples in the functions of one partition.
+    """Degrees of membership of samples in the functions of one partition, or firing of the rules along one input.
 
     Attributes
     ----------
     value : array, shape (samples, functions)
-        Degrees of membership; every row sums to 1.
+        Every row sums to 1.
     slope : array, shape (samples, functions)
-        Derivative by the scaled input.
+        Derivative by the scaled input, or by the angle.
     """
 
     value: Array
@@ -95,8 +85,7 @@ class MembershipSensitivity:
 
     Attributes
     ----------
-    value : array, shape (samples, functions, functions - 2)
-    slope : array, shape (samples, functions, functions - 2)
+    value, slope : array, shape (samples, functions, functions - 2)
     """
 
     value: Array

@@ -95,7 +95,6 @@ def fit_periodic(
         Any number of turns.
     values : array-like, shape (samples,)
         What the system shall give there; its unit is that of the output.
-    settings : PeriodicSettings, optional
     **keys
         Single settings by name, in place of those of `settings`.
 
@@ -159,7 +158,12 @@ def _structure(settings: PeriodicSettings, samples: int, inputs: int) -> Periodi
         affordable = [one for one in candidates if _SAMPLES_PER_COEFFICIENT * one.coefficients <= samples]
         chosen = affordable[-1] if affordable else candidates[0]
     else:
-        chosen = _with(settings, _per_input(settings.membership_functions, inputs))
+        functions = settings.membership_functions
+        counts = (functions,) * inputs if isinstance(functions, int) else functions
+        if len(counts) != inputs:
+            message = f"membership_functions = {functions}: expected {inputs} numbers, one for each column of angles"
+            raise SettingError("membership_functions", message)
+        chosen = _with(settings, counts)
     if samples < max(chosen.coefficients if settings.ridge_weight == 0 else 1, 1):
         raise ValueError(
             f"angles: {samples} samples do not determine the {chosen.coefficients} coefficients of this system: "
@@ -167,14 +171,6 @@ def _structure(settings: PeriodicSettings, samples: int, inputs: int) -> Periodi
             "membership_functions, a lower harmonic_order, or a ridge_weight above 0"
         )
     return chosen
-
-
-def _per_input(functions: int | tuple[int, ...], inputs: int) -> tuple[int, ...]:
-    counts = (functions,) * inputs if isinstance(functions, int) else functions
-    if len(counts) != inputs:
-        message = f"membership_functions = {functions}: expected {inputs} numbers, one for each column of angles"
-        raise SettingError("membership_functions", message)
-    return counts
 
 
 def _with(settings: PeriodicSettings, functions: tuple[int, ...]) -> PeriodicStructure:
@@ -249,7 +245,11 @@ def solve_ridge(blocks: Blocks, weight: float, rank_tolerance: float) -> RidgeSo
         return np.asarray(vectors @ ((vectors.T @ right_side) / (squares + weight)))
 
     first = solved(moment)
-    square, back = _residual(blocks, first)
+    square, back = 0.0, np.zeros_like(first)
+    for columns, values in blocks():
+        residual = values - columns @ first
+        square += float(residual @ residual)
+        back += columns.T @ residual
     step = solved(back - weight * first)
     rank = len(squares)
     return RidgeSolution(
@@ -269,13 +269,3 @@ def _sums(blocks: Blocks) -> tuple[Array, Array]:
     if gram is None or moment is None:
         raise ValueError("no rows")
     return gram, moment
-
-
-def _residual(blocks: Blocks, coefficients: Array) -> tuple[float, Array]:
-    """Sum of the squared residuals, and the residuals times the columns."""
-    square, back = 0.0, np.zeros_like(coefficients)
-    for columns, values in blocks():
-        residual = values - columns @ coefficients
-        square += float(residual @ residual)
-        back += columns.T @ residual
-    return square, back

@@ -10,10 +10,8 @@ import numpy.typing as npt
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.fuzzy.basis import (
-    Antecedent,
     Basis,
     Consequents,
-    Features,
     Products,
     antecedent,
     basis,
@@ -21,7 +19,9 @@ from cpfls_cli.fuzzy.basis import (
     features,
     row_products,
 )
-from cpfls_cli.fuzzy.inputs import InputRange, map_input, wrap
+from cpfls_cli.fuzzy.inputs import InputRange, map_input
+from cpfls_cli.fuzzy.membership import Memberships
+from cpfls_cli.rotations import wrapped
 
 # The map of the full circle takes no range from the data.
 _NO_RANGE = InputRange(0.0, 1.0)
@@ -78,16 +78,11 @@ class PeriodicStructure:
         return row_products(firing, consequent.value)
 
     def basis(self, angles: Array) -> Basis:
-        """Evaluate the columns and their derivatives.
-
-        Parameters
-        ----------
-        angles : array, shape (samples, inputs), rad
-        """
+        """Evaluate the columns and their derivatives at angles, shape (samples, inputs), rad."""
         return basis(*self._parts(angles))
 
-    def _parts(self, angles: Array) -> tuple[list[Antecedent], Features]:
-        single = [wrap(angle) for angle in angles.T]
+    def _parts(self, angles: Array) -> tuple[list[Memberships], Basis]:
+        single = [wrapped(angle) for angle in angles.T]
         mapped = [map_input(angle, "full-circle", True, _NO_RANGE) for angle in single]
         rules = [
             antecedent(one, partition, circular=True) for one, partition in zip(mapped, self.breakpoints, strict=True)
@@ -101,7 +96,6 @@ class FitQuality:
 
     Attributes
     ----------
-    samples : int
     coefficients : int
         Number of coefficients of the system.
     rank : int
@@ -145,10 +139,8 @@ class PeriodicSystem:
 
     Attributes
     ----------
-    structure : PeriodicStructure
     coefficients : array, shape (coefficients,)
         Rule by rule, the rules of the second input fastest, in a rule feature by feature.
-    quality : FitQuality
     """
 
     structure: PeriodicStructure
@@ -198,24 +190,7 @@ class PeriodicSystem:
 
 
 def as_angles(angles: npt.ArrayLike, inputs: int | None = None) -> Array:
-    """Check input angles and give them one column per input.
-
-    Parameters
-    ----------
-    angles : array-like, shape (samples, 2), (samples, 1) or (samples,), rad
-        Any number of turns.
-    inputs : int, optional
-        Number of inputs that a system has.
-
-    Returns
-    -------
-    array, shape (samples, inputs), rad
-
-    Raises
-    ------
-    ValueError
-        Another shape, or a value that is not finite.
-    """
+    """Check input angles, shape (samples, 2), (samples, 1) or (samples,), rad, and give them one column per input."""
     given = _numbers("angles", angles)
     columns = given[:, None] if given.ndim == 1 else given
     expected = (
@@ -232,18 +207,12 @@ def as_points(angles: npt.ArrayLike, inputs: int) -> tuple[Array, tuple[int, ...
     Parameters
     ----------
     angles : array-like, shape (samples, inputs) or (inputs,), rad; one input: (samples,) or () too
-    inputs : int
 
     Returns
     -------
     columns : array, shape (samples, inputs), rad
     outer : tuple of int
         Shape of one result for each point: (samples,), or () for a single point.
-
-    Raises
-    ------
-    ValueError
-        Another shape, or a value that is not finite.
     """
     given = _numbers("angles", angles)
     if given.shape == _point_shape(inputs):
@@ -257,23 +226,7 @@ def _point_shape(inputs: int) -> tuple[int, ...]:
 
 
 def as_values(values: npt.ArrayLike, samples: int) -> Array:
-    """Check the values to fit.
-
-    Parameters
-    ----------
-    values : array-like, shape (samples,)
-    samples : int
-        Number of input angles that they belong to.
-
-    Returns
-    -------
-    array, shape (samples,)
-
-    Raises
-    ------
-    ValueError
-        Another shape, or a value that is not finite.
-    """
+    """Check the values to fit, one for each sample."""
     given = _numbers("values", values)
     if given.shape != (samples,):
         raise ValueError(f"values: expected shape ({samples},), one value for each row of angles, got {given.shape}")

@@ -12,7 +12,7 @@ from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
 from cpfls_cli.dynamics.visited import visited_cells
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.evolution.state import History
+from cpfls_cli.evolution.engine import History
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.cross_validation import RidgeCurve, with_folds
 from cpfls_cli.identification.data import TorqueSource, axis_scale

@@ -12,8 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.evolution.archive import Archive, Evaluate, Evaluation
-from cpfls_cli.evolution.engine import start, step
-from cpfls_cli.evolution.state import End, EvolutionState, History, ended
+from cpfls_cli.evolution.engine import End, EvolutionState, History, ended, start, step
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.evaluator import OBJECTIVES, Evaluator

@@ -9,16 +9,14 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.fuzzy.basis import (
-    Antecedent,
     Basis,
-    Features,
     antecedent,
     basis,
     features,
     rule_firing,
 )
 from cpfls_cli.fuzzy.inputs import InputRange, MappedInput, input_range, map_input
-from cpfls_cli.fuzzy.membership import breakpoints, uniform_weights
+from cpfls_cli.fuzzy.membership import Memberships, breakpoints, uniform_weights
 from cpfls_cli.regressor.motion import Carrier, Motion, carrier
 from cpfls_cli.regressor.structure import PITCH, ROLL, Block, ModelStructure
 
@@ -103,7 +101,7 @@ class Regressor:
             for angle in (ROLL, PITCH)
         )
         self.carriers: tuple[Carrier, ...] = tuple(carrier(block.function, motion) for block in structure.blocks)
-        self.features: tuple[Features | None, ...] = tuple(self._features(block) for block in structure.blocks)
+        self.features: tuple[Basis | None, ...] = tuple(self._features(block) for block in structure.blocks)
 
     def matrix(self, partitions: Breakpoints) -> Array:
         """Build Q for given partitions.
@@ -163,7 +161,7 @@ class Regressor:
             return Basis(np.ones((len(self.motion), 1)), np.zeros((0, len(self.motion), 1)))
         return basis(self.antecedents(index, partitions), consequent)
 
-    def antecedents(self, index: int, partitions: Breakpoints) -> list[Antecedent]:
+    def antecedents(self, index: int, partitions: Breakpoints) -> list[Memberships]:
         """Evaluate the antecedents of one inertia function, one per input.
 
         Parameters
@@ -211,7 +209,7 @@ class Regressor:
                     dJ[:, angle, row, column] = gradient @ of_block
         return InertiaValues(J, dJ)
 
-    def _features(self, block: Block) -> Features | None:
+    def _features(self, block: Block) -> Basis | None:
         if not block.partitions:
             return None
         settings = self.structure.settings

@@ -18,7 +18,7 @@ from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.errors import ComputationError, InputError, OutputError
-from cpfls_cli.evolution.state import EvolutionState
+from cpfls_cli.evolution.engine import EvolutionState
 from cpfls_cli.files import is_hdf5
 from cpfls_cli.identification.search import Unfinished
 

@@ -20,7 +20,9 @@ from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.vehicle.rotors import rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
 
+# Of a squared speed, in parts of the largest.
 _ROUNDING = 1e-12
+# Share of the full battery: what a load takes beyond it would turn rotors backwards.
 _LOWEST_VOLTAGE = 0.05
 
 
@@ -40,29 +42,11 @@ class Mixer:
     limit: float
 
     def demand(self, wrench: Array) -> Array:
-        """Compute the squared speeds that a wrench asks for, whether possible or not.
-
-        Parameters
-        ----------
-        wrench : array, shape (4,)
-
-        Returns
-        -------
-        array, shape (rotor,), rad^2/s^2
-        """
+        """Compute the squared speeds that a wrench, shape (4,), asks for, whether possible or not, rad^2/s^2."""
         return np.asarray(wrench @ self.inverse)
 
     def command(self, wrench: Array) -> Array:
-        """Compute rotor speeds that are possible.
-
-        Parameters
-        ----------
-        wrench : array, shape (4,)
-
-        Returns
-        -------
-        array, shape (rotor,), rad/s
-        """
+        """Compute the possible rotor speeds, shape (rotor,), rad/s, nearest to a wrench, shape (4,)."""
         upright, yaw = wrench[:3] @ self.inverse[:3], wrench[3] * self.inverse[3]
         room = np.where(yaw > 0, self.limit - upright, upright)
         # What yaw does not change by more than rounding sets no limit.
@@ -106,14 +90,7 @@ class Battery:
     hover_cubed: float
 
     def voltage(self, time: float, rotor_speed: Array) -> float:
-        """Compute the voltage.
-
-        Parameters
-        ----------
-        time : float, s
-            From take-off.
-        rotor_speed : array, shape (rotor,), rad/s
-        """
+        """Compute the voltage some time after take-off, s, at rotor speeds, shape (rotor,), rad/s."""
         power = float(np.sum(rotor_speed**3)) / self.hover_cubed
         return max(1 - self.use * time / self.duration - self.load * (power - 1), _LOWEST_VOLTAGE)
 
@@ -157,7 +134,6 @@ class Response:
 
     Attributes
     ----------
-    delay : DelayLine
     lag, slow : HeldLag
         Of speeds in rad/s, and of squared speeds in rad^2/s^2.
     step : float, s
@@ -207,10 +183,8 @@ class Actuators:
     ----------
     lag : HeldLag
         Of the commanded speeds, rad/s.
-    links : tuple of callable
     supplies : tuple of callable
         Factors on the speed at a voltage.
-    battery : Battery
     step : float, s
     response : Response
         Of the model of a whole vehicle.
@@ -232,12 +206,7 @@ class Actuators:
         Parameters
         ----------
         command : array, shape (rotor,), rad/s
-            In the middle of the step.
-
-        Returns
-        -------
-        Rotors
-            In the middle of the step.
+            In the middle of the step, as is what is returned.
         """
         lagged = motion = _behind(self.lag, command, self.step)
         self.steps += 1
@@ -263,11 +232,8 @@ def actuators(
 
     Parameters
     ----------
-    effects : SimulatedEffects
     response : RotorResponse
         Behind the speeds that are logged.
-    vehicle : VehicleSettings
-    settings : ClosedLoopSettings
     speed : array, shape (rotor,), rad/s
         At the start.
     step, duration : float, s

@@ -12,7 +12,6 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import identified_turning, rigid_turning
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
-from cpfls_cli.effects.hooks import CarriedBody
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
@@ -29,6 +28,7 @@ from cpfls_cli.simulation.plant import (
     instant,
 )
 from cpfls_cli.simulation.settings import ClosedLoopSettings
+from cpfls_cli.trajectory.planning import sample_interval
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _ROUNDING = 1e-6
@@ -67,11 +67,6 @@ def reference(planned: Mapping[str, Array], time: Array, at: Array) -> Reference
     time : array, shape (time,), s
     at : array, shape (step,), s
         Times asked for.
-
-    Returns
-    -------
-    Reference
-        Of shape (step, 3) each.
     """
     from scipy.interpolate import CubicSpline
 
@@ -168,7 +163,6 @@ class Clock:
     ----------
     parts : int
         Steps from sample to sample.
-    steps : int
     step : float, s
     instants : array, shape (1 + step,), s
         The start, then the middle of each step.
@@ -181,22 +175,8 @@ class Clock:
 
 
 def clock_of(time: Array, rate: float) -> Clock:
-    """Divide the samples of a plan into steps.
-
-    Parameters
-    ----------
-    time : array, shape (time,), s
-    rate : float, Hz
-        Of the steps, at least.
-
-    Raises
-    ------
-    ComputationError
-        If the plan is not sampled uniformly.
-    """
-    if len(time) < 2 or np.ptp(np.diff(time)) > _ROUNDING * (time[1] - time[0]):
-        raise ComputationError("a flight in closed loop needs a trajectory of two or more samples at one rate")
-    period = float(time[-1] - time[0]) / (len(time) - 1)
+    """Divide the samples of a plan, shape (time,), s, into steps of this rate at least, Hz."""
+    period = sample_interval(time, "a flight in closed loop")
     parts = ceil(period * rate - _ROUNDING)
     steps, step = (len(time) - 1) * parts, period / parts
     return Clock(parts, steps, step, time[0] + step * np.concatenate([[0.0], np.arange(steps) + 0.5]))
@@ -208,10 +188,7 @@ def between(middles: Array) -> Array:
     Parameters
     ----------
     middles : array, shape (step, ...)
-
-    Returns
-    -------
-    array, shape (1 + step, ...)
+        Those of the ends have the shape (1 + step, ...).
     """
     if len(middles) < 2:
         return np.concatenate([middles, middles])
@@ -247,10 +224,6 @@ class Loop:
 
     Attributes
     ----------
-    autopilot : Autopilot
-    mixer : Mixer
-    actuators : Actuators
-    plant : Plant
     state : array, shape (state,)
     change : array, shape (state,)
         Derivative of the state in the step before.
@@ -323,8 +296,6 @@ def fly(
     planned : mapping of str to array
         `attitude`, `attitude_rate`, `attitude_acceleration`, `position`, `velocity`, `acceleration`, shape
         (time, 3) each.
-    vehicle : VehicleSettings
-    settings : ClosedLoopSettings
     model : VehicleModel or None
         In place of the vehicle, as far as its table of weights gives it.
     effects : SimulatedEffects
@@ -367,7 +338,11 @@ def _loop(
     autopilot = Autopilot(vehicle, settings, reference(planned, time, clock.instants))
     flown = vehicle if model is None else model.vehicle
     carried = tuple(one.effect.carried(flown, one.values) for one in effects.ordered if one.effect.carried is not None)
-    state = _start(planned, carried)
+    attitude, rate = planned["attitude"][:1], planned["attitude_rate"][:1]
+    state = np.zeros(VEHICLE_STATES)
+    state[POSITION], state[VELOCITY] = planned["position"][0], planned["velocity"][0]
+    state[ATTITUDE], state[BODY_RATE] = attitude[0], rotations.body_rate(attitude, rate)[0]
+    state = np.concatenate([state, *(body.start for body in carried)])
     mix = mixer(vehicle)
     speed = mix.command(_wrench(autopilot, 0, state))
     fuzzy = None if model is None else model.fuzzy
@@ -378,14 +353,6 @@ def _loop(
     response = RotorResponse() if model is None else model.response
     chain = actuators(effects, response, vehicle, settings, speed, clock.step, float(time[-1] - time[0]))
     return Loop(autopilot, mix, chain, plant, state, change)
-
-
-def _start(planned: Mapping[str, Array], carried: Sequence[CarriedBody]) -> Array:
-    state = np.zeros(VEHICLE_STATES)
-    state[POSITION], state[VELOCITY] = planned["position"][0], planned["velocity"][0]
-    state[ATTITUDE] = planned["attitude"][0]
-    state[BODY_RATE] = rotations.body_rate(planned["attitude"][:1], planned["attitude_rate"][:1])[0]
-    return np.concatenate([state, *(body.start for body in carried)])
 
 
 def _wrench(autopilot: Autopilot, number: int, state: Array) -> Array:
@@ -409,11 +376,16 @@ def _refuse_lost(state: Array, planned: Array, time: float, limit: float) -> Non
 
 def _sampled(states: Array, steps: Sequence[LoopStep], parts: int) -> SimulatedMotion:
     """Interpolate values in the middle of steps to the samples."""
-    change, demand = ([getattr(step, name) for step in steps] for name in ("change", "demand"))
-    rotors = [step.rotors for step in steps]
-    command, lagged, speed, voltage = (
-        between(np.array([getattr(one, name) for one in rotors]))[::parts]
-        for name in ("command", "lagged", "measured", "voltage")
+
+    def at_samples(of_step: Callable[[LoopStep], Array | float]) -> Array:
+        return between(np.array([of_step(step) for step in steps]))[::parts]
+
+    return SimulatedMotion(
+        state=states,
+        change=at_samples(lambda step: step.change),
+        command=at_samples(lambda step: step.rotors.command),
+        lagged=at_samples(lambda step: step.rotors.lagged),
+        speed=at_samples(lambda step: step.rotors.measured),
+        voltage=at_samples(lambda step: step.rotors.voltage),
+        demand=at_samples(lambda step: step.demand),
     )
-    change_, demand_ = (between(np.array(values))[::parts] for values in (change, demand))
-    return SimulatedMotion(states, change_, command, lagged, speed, voltage, demand_)

@@ -46,8 +46,6 @@ def simulate(
     planned : mapping of str to array
         `attitude`, `attitude_rate`, `attitude_acceleration`, `position`, `velocity`, `acceleration`, shape
         (time, 3) each; without the last three the vehicle is held at its centre of mass and only turns.
-    vehicle : VehicleSettings
-    settings : SimulationSettings
     rng : numpy.random.Generator
         Source of the noise.
 
@@ -62,12 +60,10 @@ def simulate(
     ----------
     Equations (1) and (2); method.md sections 1 and 2.
     """
-    q, qd, qdd = (planned[name] for name in ("attitude", "attitude_rate", "attitude_acceleration"))
-    inertia = inertia_tensor(vehicle)
-    about_body = body_torque(q, qd, qdd, inertia)
-    thrust = collective_thrust(vehicle, about_body, planned.get("acceleration"))
+    about_body, thrust = _needed(planned, vehicle)
     demand = rotor_demand(vehicle, thrust, about_body)
-    exact = {**planned, "torque": torque(q, qd, qdd, inertia), "body_torque": about_body, "rotor_speed": demand.speed}
+    generalised = torque(*_rotation(planned), inertia_tensor(vehicle))
+    exact = {**planned, "torque": generalised, "body_torque": about_body, "rotor_speed": demand.speed}
     _refuse_noise_of_nothing(exact, settings)
     signals, noise_std = noisy(exact, settings, rng)
     signals["torque"], signals["body_torque"] = _torques(signals, frozenset(noise_std))
@@ -83,7 +79,6 @@ class TooMuch:
     ----------
     what : str
         Thrust or tilt, with its unit.
-    limit, worst : float
     first, at, count : int
         Indices of the first sample beyond the limit and of the worst, and the number of samples beyond it.
     """
@@ -125,7 +120,6 @@ def flyability(planned: Mapping[str, Array], vehicle: VehicleSettings, tilt_max:
     planned : mapping of str to array
         `attitude`, `attitude_rate`, `attitude_acceleration` and, unless the vehicle is held at its centre of mass,
         `acceleration`, shape (time, 3) each.
-    vehicle : VehicleSettings
     tilt_max : float or None, rad
         Largest tilt allowed; None for any.
 
@@ -138,23 +132,28 @@ def flyability(planned: Mapping[str, Array], vehicle: VehicleSettings, tilt_max:
     ----------
     Section 2 of the paper; method.md sections 2 and 3.
     """
-    attitude = planned["attitude"]
-    rate, acceleration = planned["attitude_rate"], planned["attitude_acceleration"]
-    about_body = body_torque(attitude, rate, acceleration, inertia_tensor(vehicle))
-    thrust = collective_thrust(vehicle, about_body, planned.get("acceleration"))
-    tilt = _tilt(attitude)
-    limits = [("thrust, N", thrust, _most_thrust(vehicle))] + ([("tilt, rad", tilt, tilt_max)] if tilt_max else [])
+    about_body, thrust = _needed(planned, vehicle)
+    (sr, cr), (sp, cp) = ((np.sin(angle), np.cos(angle)) for angle in planned["attitude"].T[:2])
+    # The arc cosine of the vertical component of body z would lose small angles.
+    tilt = np.asarray(np.arctan2(np.hypot(sp * cr, sr), cr * cp))
+    most = sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors) * vehicle.rotor_speed_max_rad_s**2
+    limits = [("thrust, N", thrust, most)] + ([("tilt, rad", tilt, tilt_max)] if tilt_max else [])
     excesses = [too_much for name, values, limit in limits for too_much in _beyond(name, values, limit)]
     return Flyability(thrust, tilt, tuple(excesses), rotor_demand(vehicle, thrust, about_body).violations)
 
 
-def single_axis_torque(vehicle: VehicleSettings) -> Array:
-    """Compute the largest torque about each axis alone, in either direction, of a held vehicle.
+def _rotation(planned: Mapping[str, Array]) -> tuple[Array, Array, Array]:
+    return planned["attitude"], planned["attitude_rate"], planned["attitude_acceleration"]
 
-    Returns
-    -------
-    array, shape (3,), N m, body frame
-    """
+
+def _needed(planned: Mapping[str, Array], vehicle: VehicleSettings) -> tuple[Array, Array]:
+    """Compute the body torque, shape (time, 3), N m, and the thrust, shape (time,), N, that a motion needs."""
+    about_body = body_torque(*_rotation(planned), inertia_tensor(vehicle))
+    return about_body, collective_thrust(vehicle, about_body, planned.get("acceleration"))
+
+
+def single_axis_torque(vehicle: VehicleSettings) -> Array:
+    """Compute the largest torque about each axis alone, in either direction, of a held vehicle, shape (3,), N m."""
     both = np.concatenate([np.eye(3), -np.eye(3)])
     needed = rotor_demand(vehicle, collective_thrust(vehicle, both, None), both).squared_speed.max(axis=1)
     return np.asarray(vehicle.rotor_speed_max_rad_s**2 / np.maximum(needed[:3], needed[3:]))
@@ -168,7 +167,6 @@ def collective_thrust(vehicle: VehicleSettings, body_torque: Array, acceleration
 
     Parameters
     ----------
-    vehicle : VehicleSettings
     body_torque : array, shape (time, 3), N m, body frame
     acceleration : array, shape (time, 3), m/s^2, world frame, or None
         None where the vehicle is held.
@@ -207,16 +205,6 @@ def _torques(signals: Mapping[str, Array], noised: frozenset[str]) -> tuple[Arra
     if noised & {"torque", "attitude"}:
         return signals["torque"], rotations.body_torque(signals["attitude"], signals["torque"])
     return signals["torque"], signals["body_torque"]
-
-
-def _tilt(attitude: Array) -> Array:
-    """Angle between body z and vertical; the arc cosine of its vertical component would lose small angles."""
-    (sr, cr), (sp, cp) = ((np.sin(angle), np.cos(angle)) for angle in attitude.T[:2])
-    return np.asarray(np.arctan2(np.hypot(sp * cr, sr), cr * cp))
-
-
-def _most_thrust(vehicle: VehicleSettings) -> float:
-    return sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors) * vehicle.rotor_speed_max_rad_s**2
 
 
 def _beyond(what: str, values: Array, limit: float) -> Iterator[TooMuch]:

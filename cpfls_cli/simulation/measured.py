@@ -65,7 +65,6 @@ def measure(
         (time, 3) each.
     vehicle : VehicleSettings
         As its model has it.
-    settings : SimulationSettings
     rng : numpy.random.Generator
         Source of the noise.
     progress : callable
@@ -120,12 +119,10 @@ def _logged(
 
 def _motion(motion: SimulatedMotion) -> dict[str, Array]:
     attitude, body_rate = motion.state[:, ATTITUDE], motion.state[:, BODY_RATE]
-    rate = rotations.attitude_rate(attitude, body_rate)
-    turning = rotations.multiply(rotations.euler_rate_matrix_derivative(attitude, rate), rate)
     return {
         "attitude": attitude,
-        "attitude_rate": rate,
-        "attitude_acceleration": rotations.attitude_rate(attitude, motion.change[:, BODY_RATE] - turning),
+        "attitude_rate": rotations.attitude_rate(attitude, body_rate),
+        "attitude_acceleration": rotations.attitude_acceleration(attitude, body_rate, motion.change[:, BODY_RATE]),
         "position": motion.state[:, POSITION],
         "velocity": motion.state[:, VELOCITY],
         "acceleration": motion.change[:, VELOCITY],
@@ -168,10 +165,7 @@ def noise_std(name: str, values: Array, settings: SimulationSettings) -> Array:
 
     Parameters
     ----------
-    name : str
-        Name of the signal.
     values : array, shape (time, ...)
-    settings : SimulationSettings
 
     Returns
     -------
@@ -182,8 +176,9 @@ def noise_std(name: str, values: Array, settings: SimulationSettings) -> Array:
     relative = {str(key): value for key, value in settings.relative_noise.items()}.get(name, 0.0)
     if relative == 0.0:
         return np.full(values.shape[1:], absolute)
-    spread = [_spread(channel) for channel in values.reshape(len(values), -1).T]
-    return np.hypot(absolute, relative * np.array(spread).reshape(values.shape[1:]))
+    known = [channel[np.isfinite(channel)] for channel in values.reshape(len(values), -1).T]
+    spread = np.array([float(np.std(channel)) if len(channel) else 0.0 for channel in known])
+    return np.hypot(absolute, relative * spread.reshape(values.shape[1:]))
 
 
 def noisy(
@@ -195,8 +190,6 @@ def noisy(
     ----------
     exact : mapping of str to array
         By name; time is the first axis.
-    settings : SimulationSettings
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -210,8 +203,3 @@ def noisy(
         for name, values in exact.items()
     }
     return signals, std
-
-
-def _spread(channel: Array) -> float:
-    known = channel[np.isfinite(channel)]
-    return float(np.std(known)) if len(known) else 0.0

@@ -23,7 +23,6 @@ class SimulatedEffect:
 
     Attributes
     ----------
-    effect : Effect
     values : mapping of str to float
         Coefficients, then shapes, in the units of the catalogue.
     """
@@ -63,12 +62,7 @@ class SimulatedEffects:
         return sorted(self.listed, key=lambda one: (one.effect.order, one.effect.name))
 
     def values(self, name: str) -> Mapping[str, float] | None:
-        """Give the values of an effect, None where it is not flown.
-
-        Returns
-        -------
-        mapping of str to float, or None
-        """
+        """Give the values of an effect, None where it is not flown."""
         return next((one.values for one in self.listed if one.effect.name == name), None)
 
     @property
@@ -87,7 +81,6 @@ def simulated_effects(
     asked : mapping
         By name of the effect: values in the order of the catalogue, coefficients before shapes, or by their names;
         coefficients without a value are 0.
-    vehicle : VehicleSettings
 
     Raises
     ------

@@ -9,7 +9,7 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import TurningLaw
-from cpfls_cli.effects.effect import Columns, Effect
+from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.hooks import CarriedBody, Carrier
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.playback.model import VehicleModel
@@ -32,7 +32,6 @@ class EffectWrench:
 
     Attributes
     ----------
-    effects : tuple of SimulatedEffect
     added_inertia : array, shape (3, 3), kg m^2
         Minus the momentum by body rate.
     rotor_coupling : array, shape (3, rotor), kg m^2
@@ -44,24 +43,16 @@ class EffectWrench:
     rotor_coupling: Array
 
     def direct(self, signals: Signals) -> Array:
-        """Evaluate the direct part of the wrench.
-
-        Parameters
-        ----------
-        signals : Signals
-            Of one instant.
-
-        Returns
-        -------
-        array, shape (6,), N m and N, body frame
-        """
+        """Evaluate the direct part of the wrench at one instant, shape (6,), N m and N, body frame."""
         total = np.zeros(6)
         for one in self.effects:
             if one.effect.kind == "wrench" and one.effect.apply is not None:
                 signals = one.effect.apply(signals, one.shape)
         # What has a lever for all forces comes last.
         for one in sorted(self.effects, key=lambda each: each.effect.of_all_forces):
-            felt = _with_force(signals, total[3:]) if one.effect.of_all_forces else signals
+            felt = signals
+            if one.effect.of_all_forces:
+                felt = replace(signals, specific_force=(signals.wrench[:, 3:] + total[3:]) / signals.vehicle.mass_kg)
             total += _columns(one, felt).direct[0] @ one.acting
         return total
 
@@ -71,11 +62,16 @@ def effect_wrench(chosen: SimulatedEffects, hover: Signals) -> EffectWrench:
 
     Parameters
     ----------
-    chosen : SimulatedEffects
     hover : Signals
         One instant, of any motion.
     """
-    effects = tuple(one for one in chosen.listed if _by_columns(one.effect))
+    effects = tuple(
+        one
+        for one in chosen.listed
+        if one.effect.columns is not None
+        and one.effect.carried is None
+        and (one.effect.kind != "actuator" or one.effect.vehicle is not None)
+    )
     rates = [replace(hover, body_rate=rate[None]) for rate in np.eye(3)]
     by_rate = _slopes(effects, rates, replace(hover, body_rate=np.zeros((1, 3))))
     speeds = np.eye(len(hover.vehicle.rotors))
@@ -83,11 +79,6 @@ def effect_wrench(chosen: SimulatedEffects, hover: Signals) -> EffectWrench:
         effects, [hover.with_rotor_speed(speed[None]) for speed in speeds], hover.with_rotor_speed(0 * speeds[:1])
     )
     return EffectWrench(effects, -by_rate, by_speed)
-
-
-def _by_columns(effect: Effect) -> bool:
-    elsewhere = effect.carried is not None or (effect.kind == "actuator" and effect.vehicle is None)
-    return effect.columns is not None and not elsewhere
 
 
 def _slopes(effects: tuple[SimulatedEffect, ...], moved: list[Signals], still: Signals) -> Array:
@@ -104,10 +95,6 @@ def _momentum(effects: tuple[SimulatedEffect, ...], signals: Signals) -> Array:
     return total
 
 
-def _with_force(signals: Signals, force: Array) -> Signals:
-    return replace(signals, specific_force=(signals.wrench[:, 3:] + force) / signals.vehicle.mass_kg)
-
-
 def _columns(one: SimulatedEffect, signals: Signals) -> Columns:
     assert one.effect.columns is not None, "chosen so"
     return one.effect.columns(signals, one.shape)
@@ -119,11 +106,8 @@ class Plant:
 
     Attributes
     ----------
-    vehicle : VehicleSettings
     turning : callable
         Of the model.
-    wrench : EffectWrench
-    carried : tuple of CarriedBody
     whole : VehicleModel or None
         Gives torque and force in place of the rotors alone; then `vehicle` is its own.
     """
@@ -135,20 +119,15 @@ class Plant:
     whole: VehicleModel | None = None
 
     def derivative(self, state: Array, rotors: Rotors) -> Array:
-        """Differentiate the state.
-
-        Parameters
-        ----------
-        state : array, shape (state,)
-        rotors : Rotors
-
-        Returns
-        -------
-        array, shape (state,)
-        """
+        """Differentiate the state, shape (state,)."""
         body_rate = state[BODY_RATE]
         signals = instant(self.vehicle, state, rotors.speed)
-        wrench = self._rotor_wrench(signals, rotors) + self.wrench.direct(signals)
+        by_rotors = signals.wrench[0]
+        if self.whole is not None:
+            squared = rotors.speed**2
+            terms = np.concatenate([[1.0], rotors.speed, squared, rotors.acceleration, rotors.slow - squared])
+            by_rotors = self.whole.table.wrench(signals.air_velocity, signals.body_rate, terms[None])[0]
+        wrench = np.asarray(by_rotors) + self.wrench.direct(signals)
         inertial = self.turning(state[ATTITUDE], body_rate)
         torque = wrench[:3] - inertial.direct + self.wrench.rotor_coupling @ rotors.acceleration
         acceleration = signals.rotation[0] @ wrench[3:] / self.vehicle.mass_kg
@@ -168,20 +147,12 @@ class Plant:
         change[BODY_RATE] = turning
         return change
 
-    def _rotor_wrench(self, signals: Signals, rotors: Rotors) -> Array:
-        if self.whole is None:
-            return np.asarray(signals.wrench[0])
-        squared = rotors.speed**2
-        terms = np.concatenate([[1.0], rotors.speed, squared, rotors.acceleration, rotors.slow - squared])
-        return np.asarray(self.whole.table.wrench(signals.air_velocity, signals.body_rate, terms[None])[0])
-
 
 def instant(vehicle: VehicleSettings, state: Array, rotor_speed: Array) -> Signals:
     """Build the signals of one instant.
 
     Parameters
     ----------
-    vehicle : VehicleSettings
     state : array, shape (state,)
     rotor_speed : array, shape (rotor,), rad/s
     """

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,26 +11,10 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.trajectory.legs import Leg, samples_of_legs
 from cpfls_cli.trajectory.profile import BaseProfile, covering
+from cpfls_cli.trajectory.rotation import RotationMotion
 
 # Fraction of gravity below which the direction of the thrust is rounding error.
 _NO_THRUST = 1e-9
-
-
-@dataclass(frozen=True, kw_only=True)
-class FlatAttitude:
-    """Attitude along a path, with its derivatives.
-
-    Attributes
-    ----------
-    attitude : array, shape (time, 3), rad
-        Roll, pitch, yaw.
-    attitude_rate : array, shape (time, 3), rad/s
-    attitude_acceleration : array, shape (time, 3), rad/s^2
-    """
-
-    attitude: Array
-    attitude_rate: Array
-    attitude_acceleration: Array
 
 
 def along(time: Array, motion: Array, heading: Array, gravity: float) -> dict[str, Array]:
@@ -53,20 +36,29 @@ def along(time: Array, motion: Array, heading: Array, gravity: float) -> dict[st
     """
     flat = flat_attitude(time, motion[2:5], heading, gravity)
     names = ("position", "velocity", "acceleration", "jerk", "snap", "crackle", "pop")
+    return dict(zip(names, motion, strict=True)) | rotation_samples(time, flat, heading)
+
+
+def rotation_samples(time: Array, motion: RotationMotion, heading: Array) -> dict[str, Array]:
+    """Arrange the samples of a rotation by their names in a `PlannedRotation`.
+
+    Parameters
+    ----------
+    time : array, shape (time,), s
+    heading : array, shape (3, time), rad and s
+        Yaw, its rate and its acceleration.
+    """
     return {
         "time": time,
-        **dict(zip(names, motion, strict=True)),
         "yaw": heading[0],
         "yaw_rate": heading[1],
         "yaw_acceleration": heading[2],
-        "attitude": flat.attitude,
-        "attitude_rate": flat.attitude_rate,
-        "attitude_acceleration": flat.attitude_acceleration,
-        "body_rate": rotations.body_rate(flat.attitude, flat.attitude_rate),
+        **vars(motion),
+        "body_rate": rotations.body_rate(motion.attitude, motion.attitude_rate),
     }
 
 
-def flat_attitude(time: Array, translation: Array, heading: Array, gravity: float) -> FlatAttitude:
+def flat_attitude(time: Array, translation: Array, heading: Array, gravity: float) -> RotationMotion:
     """Derive roll and pitch from acceleration and yaw, and their derivatives from jerk and snap.
 
     ``phi = asin((ax sin psi - ay cos psi) / |f|)``, ``theta = atan2(ax cos psi + ay sin psi, az + g)`` with
@@ -96,7 +88,7 @@ def flat_attitude(time: Array, translation: Array, heading: Array, gravity: floa
     tilted = _length(forward, up)
     _refuse_sideways(time, tilted[0], gravity)
     attitude, rate, acceleration = np.stack([_angle(right, tilted), _angle(forward, up), heading], axis=2)
-    return FlatAttitude(attitude=attitude, attitude_rate=rate, attitude_acceleration=acceleration)
+    return RotationMotion(attitude, rate, acceleration)
 
 
 def _in_heading_frame(force: Array, heading: Array) -> tuple[Array, Array, Array]:

@@ -179,11 +179,6 @@ class _Piece:
     pop: float
 
     @property
-    def is_wave(self) -> bool:
-        """Whether the crackle is not zero."""
-        return self.crackle != 0
-
-    @property
     def end(self) -> Array:
         """Displacement to snap at the end, shape (5,)."""
         end: Array = self.coefficients[:, :6].sum(axis=1) + self.coefficients[:, 7]
@@ -213,13 +208,12 @@ class _Piece:
         motion : array, shape (7, time)
             To write to; holds zeros.
         """
-        degree = 5 if self.is_wave else 4
+        is_wave = self.crackle != 0
+        degree = 5 if is_wave else 4
         for order, row in enumerate(self.coefficients):
             _polynomial(row[: degree - order + 1], tau, motion[order])
-        if self.is_wave:
-            self._add_wave(tau, motion)
-
-    def _add_wave(self, tau: Array, motion: Array) -> None:
+        if not is_wave:
+            return
         angle = _TURN * tau
         sine, cosine = np.sin(angle), np.cos(angle)
         for order, (_, wave) in enumerate(zip(motion, (sine, cosine, sine, cosine, sine), strict=False)):
@@ -230,20 +224,10 @@ class _Piece:
 
 
 def _pieces(peaks: Array, spans: Array) -> list[_Piece]:
-    """Cut the first half of a move into its pieces: eight waves, seven holds between and half the last hold.
-
-    Parameters
-    ----------
-    peaks : array, shape (7,), m and s
-        With the sign of the displacement; infinite where a derivative jumps.
-    spans : array, shape (5,), s
-
-    Returns
-    -------
-    list of Piece
-        Without those that last no time.
-    """
-    lengths, signs = _lengths(spans), np.zeros(16)
+    """Cut the first half of a move into its pieces: eight waves, seven holds between and half the last hold."""
+    snap, jerk, acceleration, velocity = holds_of(spans)
+    lengths, signs = np.full(16, spans[0]), np.zeros(16)
+    lengths[1::4], lengths[3::8], lengths[7], lengths[15] = snap, jerk, acceleration, velocity / 2
     signs[0::2] = _SIGNS[:8]
     starts = np.cumsum(lengths) - lengths
     # What jumps does so inside pieces of no length, which nobody samples.
@@ -254,13 +238,6 @@ def _pieces(peaks: Array, spans: Array) -> list[_Piece]:
         state = made[-1].end if made else np.zeros(5)
         made.append(_piece(start, length, sign * bounded, np.where(np.isnan(exact), state, exact)))
     return [piece for piece in made if piece.length > 0]
-
-
-def _lengths(spans: Array) -> Array:
-    snap, jerk, acceleration, velocity = holds_of(spans)
-    lengths = np.full(16, spans[0])
-    lengths[1::4], lengths[3::8], lengths[7], lengths[15] = snap, jerk, acceleration, velocity / 2
-    return lengths
 
 
 def _known_states(peaks: Array) -> Array:

@@ -15,17 +15,12 @@ if TYPE_CHECKING:
 
 _LARGEST_PEAK = 1e100
 _MAY_JUMP = ("crackle", "pop")
+# Samples of a path, of 34 numbers each: 2.7 GB.
 _LARGEST_SIZE = 10_000_000
 
 
 def check_consistency(settings: TrajectorySettings) -> None:
-    """Refuse combinations of settings that do not describe a path.
-
-    Raises
-    ------
-    SettingError
-        If the direction, the size of a move, its limits or the time it needs contradicts another setting.
-    """
+    """Refuse a direction, a size of a move, limits or a duration that contradicts another setting."""
     if settings.held:
         _check_held(settings)
     _check_clock(settings)
@@ -112,13 +107,8 @@ def check_peaks(profile: BaseProfile, key: str) -> None:
 
     Parameters
     ----------
-    profile : BaseProfile
     key : str
         Setting that made it so.
-
-    Raises
-    ------
-    SettingError
     """
     if not profile.displacement:
         raise SettingError(
@@ -133,18 +123,7 @@ def check_peaks(profile: BaseProfile, key: str) -> None:
 
 
 def check_samples(duration: float, sample_time: float) -> None:
-    """Refuse a sample time that does not suit a duration.
-
-    Parameters
-    ----------
-    duration : float, s
-    sample_time : float, s
-
-    Raises
-    ------
-    SettingError
-        If there would be one sample, or more than memory holds.
-    """
+    """Refuse a sample time with which there would be one sample, or more than memory holds; both in s."""
     if duration > _LARGEST_SIZE * sample_time:
         raise SettingError("sample_time_s", f"makes more than {_LARGEST_SIZE} samples of {duration:g} s; raise it")
     if sample_time > duration:
@@ -156,14 +135,9 @@ def check_duration(moves: int, needed: float, duration: float) -> None:
 
     Parameters
     ----------
-    moves : int
     needed : float, s
         By all of them.
     duration : float, s
-
-    Raises
-    ------
-    SettingError
     """
     if needed > duration * (1 + 1e-12):
         words = f"{moves} moves take" if moves > 1 else "the move takes"
@@ -175,7 +149,6 @@ def check_waypoints(waypoints: Sequence[WaypointSettings], paused: bool) -> None
 
     Parameters
     ----------
-    waypoints : sequence of WaypointSettings
     paused : bool
         Whether the points may have pauses of their own.
 

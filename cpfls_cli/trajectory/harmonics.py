@@ -103,7 +103,6 @@ def random_path(duration: float, frequency_max: float, harmonics: int, rng: np.r
     frequency_max : float, Hz
     harmonics : int
         Of each axis, fewer where the duration has no room for them.
-    rng : numpy.random.Generator
     """
     highest = max(int(frequency_max * duration + 1e-9), 1)
     count = min(harmonics, highest)
@@ -120,7 +119,6 @@ def harmonic_trajectory(path: HarmonicPath, sample_time: float, gravity: float) 
 
     Parameters
     ----------
-    path : HarmonicPath
     sample_time : float, s
     gravity : float, m/s^2
 

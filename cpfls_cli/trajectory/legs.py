@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -11,45 +11,55 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import SettingError
 from cpfls_cli.trajectory.limits import Limits, LimitSettings
-from cpfls_cli.trajectory.moves import Move, Moves, Outcome, moves_of
+from cpfls_cli.trajectory.moves import Move, Outcome, moves_of, plan_move, plan_moves
 from cpfls_cli.trajectory.profile import BaseProfile, Holds, covering
-from cpfls_cli.trajectory.time_optimal import plan_move, plan_moves
 
 Measure = Literal["along-path", "per-axis"]
 Synchronisation = Literal["straight-line", "each-axis"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Leg:
-    """One move from rest to rest.
+class MoveInSpace:
+    """One move from rest to rest, wherever and whenever it begins.
+
+    Attributes
+    ----------
+    profiles : tuple of BaseProfile
+        One along a straight line; one for each axis that moves where every axis is planned by itself. All take
+        the same time.
+    directions : array, shape (profiles, 3)
+        World vector that one metre of each profile moves along.
+    limited_by : tuple of str
+        Derivatives that reach their limit on any axis, or ``period`` where none does; empty where the move was not
+        planned under limits.
+    """
+
+    profiles: tuple[BaseProfile, ...]
+    directions: Array
+    limited_by: tuple[str, ...] = ()
+
+    @property
+    def duration(self) -> float:
+        """Time from rest to rest, s."""
+        return max(profile.duration for profile in self.profiles)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Leg(MoveInSpace):
+    """A move of a path.
 
     Attributes
     ----------
     begin : float, s
         When it starts.
     start : array, shape (3,), m, world frame
-    profiles : tuple of BaseProfile
-        One along a straight line; one for each axis that moves where every axis is planned by itself. All take
-        the same time.
-    directions : array, shape (profiles, 3)
-        World vector that one metre of each profile moves along.
     yaw : tuple of float or None, rad
         At its start and its end; None where the yaw does not belong to the legs.
-    limited_by : tuple of str
-        Derivatives that reach their limit; empty where the move was not planned under limits.
     """
 
     begin: float
     start: Array
-    profiles: tuple[BaseProfile, ...]
-    directions: Array
     yaw: tuple[float, float] | None
-    limited_by: tuple[str, ...]
-
-    @property
-    def duration(self) -> float:
-        """Time from rest to rest, s."""
-        return max(profile.duration for profile in self.profiles)
 
     @property
     def end(self) -> float:
@@ -92,7 +102,6 @@ def samples_of_legs(legs: Sequence[Leg], time: Array) -> Iterator[tuple[Leg, sli
 
     Parameters
     ----------
-    legs : sequence of Leg
     time : array, shape (time,), s
         Ascending.
 
@@ -114,7 +123,6 @@ class Timing:
 
     Attributes
     ----------
-    limits : LimitSettings
     coordination : {"straight-line", "each-axis"}
     period : float or None, s
         None where the limits choose it.
@@ -129,30 +137,6 @@ class Timing:
     period: float | None
     holds: Holds
     measure: Measure
-
-
-@dataclass(frozen=True, kw_only=True)
-class Shape:
-    """Profiles of one move in space.
-
-    Attributes
-    ----------
-    profiles : tuple of BaseProfile
-    directions : array, shape (profiles, 3)
-        World vector that one metre of each profile moves along.
-    limited_by : tuple of str
-        Derivatives that reach their limit on any axis, or ``period`` where none does; empty where the move was not
-        planned under limits.
-    """
-
-    profiles: tuple[BaseProfile, ...]
-    directions: Array
-    limited_by: tuple[str, ...] = ()
-
-    @property
-    def duration(self) -> float:
-        """Time from rest to rest, s."""
-        return max(profile.duration for profile in self.profiles)
 
 
 def unit_of(vector: Array, measure: Measure) -> tuple[float, Array]:
@@ -176,14 +160,13 @@ def unit_of(vector: Array, measure: Measure) -> tuple[float, Array]:
     return largest * length, unit / length
 
 
-def shape_of(vector: Array, timing: Timing) -> Shape:
-    """Find the shape of the move over a displacement.
+def move_in_space(vector: Array, timing: Timing) -> MoveInSpace:
+    """Plan the move over a displacement.
 
     Parameters
     ----------
     vector : array, shape (3,), m, world frame
         Not zero.
-    timing : Timing
 
     Raises
     ------
@@ -193,16 +176,16 @@ def shape_of(vector: Array, timing: Timing) -> Shape:
     length, direction = unit_of(vector, timing.measure)
     if not timing.limits.given:
         period = 1.0 if timing.period is None else timing.period
-        return Shape(profiles=(covering(length, period, timing.holds),), directions=direction[None])
+        return MoveInSpace(profiles=(covering(length, period, timing.holds),), directions=direction[None])
     if timing.coordination == "straight-line":
         move = plan_move(length, timing.limits.along(direction), timing.period)
         return _smooth((move,), direction[None])
     axes = np.flatnonzero(vector)
-    moves = synchronised(vector[axes], timing.limits.of_axes(axes), timing.period, "each-axis")
+    moves = synchronised(vector[axes], timing.limits.of_axes(axes), timing.period)
     return _smooth(moves, np.eye(3)[axes])
 
 
-def _smooth(moves: tuple[Move, ...], directions: Array) -> Shape:
+def _smooth(moves: tuple[Move, ...], directions: Array) -> MoveInSpace:
     """Refuse moves of unbounded snap, from which the acceleration of the attitude follows."""
     for move in moves:
         if not move.outcome.solved:
@@ -213,13 +196,11 @@ def _smooth(moves: tuple[Move, ...], directions: Array) -> Shape:
     # Where no limit is reached, the period that was given decides.
     reached = dict.fromkeys(name for move in moves for name in move.active) or {"period": None}
     profiles = tuple(move.profile for move in moves)
-    return Shape(profiles=profiles, directions=directions, limited_by=tuple(reached))
+    return MoveInSpace(profiles=profiles, directions=directions, limited_by=tuple(reached))
 
 
-def synchronised(
-    displacements: Array, limits: Limits, period: float | None = None, method: Synchronisation = "straight-line"
-) -> tuple[Move, ...]:
-    """Plan one move for each axis, all of the same duration.
+def synchronised(displacements: Array, limits: Limits, period: float | None = None) -> tuple[Move, ...]:
+    """Plan the shortest move of every axis, all stretched in time to the duration of the slowest.
 
     Parameters
     ----------
@@ -228,38 +209,15 @@ def synchronised(
     limits : Limits
         One of each for all axes, or one for each axis.
     period : float, s, optional
-        P, of the straight line, or of the slowest axis.
-    method : {"straight-line", "each-axis"}
-        One profile for all axes, which is the shortest that keeps the limits of each; or the shortest of every axis,
-        stretched in time to the slowest. Both take as long as the slowest axis alone, or longer; on a straight line
-        the slowest derivative of any axis may set the pace.
+        P, of the slowest axis.
 
     Raises
     ------
     SettingError
         If a displacement is not finite, or a limit or the period is not greater than zero; it names the key.
     """
-    covered = np.asarray(displacements, dtype=np.float64)
-    together = _straight_line if method == "straight-line" else _each_axis
-    moves = together(covered, limits, period)
-    return tuple(moves[axis] for axis in range(len(covered)))
-
-
-def _straight_line(displacements: Array, limits: Limits, period: float | None) -> Moves:
-    """Plan the common fraction of the way under the strictest limit of all axes."""
-    bounds = limits.broadcast(len(displacements))
-    largest = max(np.abs(displacements).max(initial=0.0), np.finfo(float).tiny)
-    shares = np.abs(displacements) / largest
-    with np.errstate(divide="ignore", over="ignore"):
-        strictest = (bounds / shares).min(axis=1, initial=np.inf)
-    names = (field.name for field in fields(Limits))
-    line = plan_moves(np.array([largest]), Limits(**dict(zip(names, strictest.tolist(), strict=True))), period)
-    outcome = np.where(displacements == 0, Outcome.ZERO_DISPLACEMENT, line.outcome)
-    return moves_of(displacements, line.spans, bounds, outcome)
-
-
-def _each_axis(displacements: Array, limits: Limits, period: float | None) -> Moves:
-    moves = plan_moves(displacements, limits, period)
-    taken = np.where(moves.outcome == Outcome.SOLVED, moves.duration, 0.0)
-    stretched = moves.spans * np.divide(taken.max(initial=0.0), taken, out=np.ones_like(taken), where=taken > 0)
-    return moves_of(displacements, stretched, limits.broadcast(len(displacements)), moves.outcome)
+    alone = plan_moves(displacements, limits, period)
+    taken = np.where(alone.outcome == Outcome.SOLVED, alone.duration, 0.0)
+    stretched = alone.spans * np.divide(taken.max(initial=0.0), taken, out=np.ones_like(taken), where=taken > 0)
+    moves = moves_of(displacements, stretched, limits.broadcast(len(displacements)), alone.outcome)
+    return tuple(moves[axis] for axis in range(len(displacements)))

@@ -35,13 +35,7 @@ class Limits:
     pop: float | Array = np.inf
 
     def __post_init__(self) -> None:
-        """Refuse limits that are not greater than zero.
-
-        Raises
-        ------
-        SettingError
-            If a limit is zero, negative or not a number; it names the limit.
-        """
+        """Refuse limits that are zero, negative or no numbers."""
         for field in fields(self):
             require_positive(field.name, getattr(self, field.name), "leave it out for no limit")
 
@@ -71,14 +65,8 @@ def require_positive(key: str, value: float | Array, remedy: str) -> None:
     ----------
     key : str
         Name of the value, for the message.
-    value : float or array
     remedy : str
         What else could be done about it, for the message.
-
-    Raises
-    ------
-    SettingError
-        Names the key and the first wrong value.
     """
     values = np.atleast_1d(np.asarray(value, dtype=np.float64))
     wrong = ~(values > 0)
@@ -91,10 +79,7 @@ def broadcast_to_moves(key: str, value: float | Array, moves: int) -> Array:
 
     Parameters
     ----------
-    key : str
-        Name of the value, for the message.
     value : float or array, shape (moves,)
-    moves : int
 
     Returns
     -------
@@ -129,18 +114,8 @@ class LimitSettings(Settings):
         return {key: value for key, value in values.items() if value is not None}
 
     def of_axes(self, axes: IntArray) -> Limits:
-        """Limits of some of the axes x, y, z, each for itself.
-
-        Parameters
-        ----------
-        axes : array of int, shape (n,)
-
-        Returns
-        -------
-        Limits
-            Every entry of shape (n,), infinite where there is none.
-        """
-        return Limits(**{_derivative(key): _three(value)[axes] for key, value in self.given.items()})
+        """Limits of some of the axes x, y, z, each for itself; every entry has the shape of `axes`, (n,)."""
+        return Limits(**{_derivative(key): np.broadcast_to(value, 3)[axes] for key, value in self.given.items()})
 
     def along(self, direction: Array) -> Limits:
         """Limits on a move along a straight line.
@@ -156,10 +131,6 @@ class LimitSettings(Settings):
 
 def _derivative(key: str) -> str:
     return key.split("_", 1)[0]
-
-
-def _three(value: float | tuple[float, float, float]) -> Array:
-    return np.array(value if isinstance(value, tuple) else (value,) * 3)
 
 
 def _along(value: float | tuple[float, float, float], direction: Array) -> float:

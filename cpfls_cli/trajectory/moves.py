@@ -1,19 +1,27 @@
-"""Results of planning: moves, the limits that they reach, and the reason where there is no move."""
+"""The shortest rest-to-rest moves of the family under limits on any derivative: results, and how they are planned."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.errors import SettingError
 from cpfls_cli.trajectory.closed_form import holds_of, peaks_of, spans_of
-from cpfls_cli.trajectory.limits import LIMIT_NAMES
+from cpfls_cli.trajectory.limits import LIMIT_NAMES, Limits, broadcast_to_moves, require_positive
 from cpfls_cli.trajectory.profile import BaseProfile, Holds, Peaks, covering
 
 # A peak this near to its limit, in parts of it, has reached it.
 _REACHED = 1e-9
+# By how much a peak may lie above its limit, in parts of it.
+_ROUNDING = 1e-12
+# Spans of a rise without holds, in periods.
+_DOUBLING = np.array([1.0, 1.0, 2.0, 4.0, 8.0])[:, np.newaxis]
+# The start is within 7 % of the root, and every step squares the error.
+_NEWTON_STEPS = 5
 
 
 class Outcome(IntEnum):
@@ -57,7 +65,6 @@ class Move:
         Infinite where there is no solution.
     active : tuple of str
         Names of the limits that the move reaches.
-    outcome : Outcome
     """
 
     profile: BaseProfile
@@ -69,11 +76,6 @@ class Move:
     def peaks(self) -> Peaks:
         """Largest absolute value of every derivative, in m and s."""
         return self.profile.peaks
-
-    @property
-    def integral_of_absolute_jerk(self) -> float:
-        """The paper's measure of energy, m/s^2."""
-        return self.profile.integral_of_absolute_jerk
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,12 +127,6 @@ class Moves:
         """Durations T1 to T5, shape (5, moves), s."""
         return spans_of(self.period, self.holds)
 
-    @property
-    def integral_of_absolute_jerk(self) -> Array:
-        """The paper's measure of energy, shape (moves,), m/s^2."""
-        integral: Array = 4 * self.peaks[2]
-        return integral
-
 
 def moves_of(displacement: Array, spans: Array, bounds: Array, outcome: IntArray) -> Moves:
     """Build moves from their spans.
@@ -158,3 +154,157 @@ def moves_of(displacement: Array, spans: Array, bounds: Array, outcome: IntArray
         active=np.isfinite(bounds) & (peaks[1:] >= bounds * (1 - _REACHED)),
         outcome=outcome,
     )
+
+
+def plan_moves(displacement: Array, limits: Limits, period: float | Array | None = None) -> Moves:
+    """Plan the shortest moves under limits, all at once.
+
+    Minimise ``16 P + 8 Ts + 4 Tj + 2 Ta + Tv`` over A, P and the holds, with the displacement covered and no
+    derivative above its limit.
+
+    Parameters
+    ----------
+    displacement : array, shape (moves,), m
+        Of any sign; a negative one moves backwards.
+    limits : Limits
+        One of each for all moves, or one for each move; those that are left out do not limit.
+    period : float or array, shape (moves,), s, optional
+        The paper's parameter P; chosen where it is not given. With crackle and pop not limited the choice is 0,
+        and the snap jumps.
+
+    Raises
+    ------
+    SettingError
+        If a displacement is not finite, or a limit or the period is not greater than zero; it names the key.
+
+    References
+    ----------
+    Section 7 of the paper; method.md section 3.
+    """
+    covered = _finite(displacement)
+    bounds = limits.broadcast(len(covered))
+    spans = _shortest_spans(np.abs(covered), bounds, _positive(period, len(covered)))
+    return moves_of(covered, spans, bounds, _outcome(covered, bounds, spans, period))
+
+
+def plan_move(displacement: float, limits: Limits, period: float | None = None) -> Move:
+    """Plan the shortest move under limits, by `plan_moves`, which plans many moves in little more time than one."""
+    return plan_moves(np.array([displacement]), limits, period)[0]
+
+
+def _finite(displacement: Array) -> Array:
+    covered = np.asarray(displacement, dtype=np.float64)
+    if covered.ndim != 1:
+        raise SettingError("displacement", f"has shape {covered.shape}; give one length for each move")
+    if not np.isfinite(covered).all():
+        wrong = covered[~np.isfinite(covered)][0]
+        raise SettingError("displacement", f"is {wrong:g}; give a finite length in m")
+    return covered
+
+
+def _positive(period: float | Array | None, moves: int) -> Array | None:
+    if period is None:
+        return None
+    require_positive("period", period, "leave it out to have it chosen")
+    if not np.isfinite(period).all():
+        raise SettingError("period", "is not finite; give a time in s, or leave it out to have it chosen")
+    return broadcast_to_moves("period", period, moves)
+
+
+def _outcome(displacement: Array, bounds: Array, spans: Array, period: float | Array | None) -> IntArray:
+    with np.errstate(over="ignore", invalid="ignore"):
+        duration = spans.sum(axis=0)
+    # Limits are not kept only where numbers overflowed or vanished on the way.
+    within = (peaks_of(displacement, spans)[1:] <= bounds * (1 + _ROUNDING)).all(axis=0)
+    solved = np.isfinite(duration) & (duration > 0) & within
+    outcome = np.where(solved, Outcome.SOLVED, Outcome.OUT_OF_RANGE)
+    limited = np.isfinite(bounds).any(axis=0) | (period is not None)
+    outcome = np.where(limited, outcome, Outcome.NO_LIMIT)
+    return np.where(displacement == 0, Outcome.ZERO_DISPLACEMENT, outcome).astype(np.int64)
+
+
+def _shortest_spans(displacement: Array, limits: Array, period: Array | None) -> Array:
+    """Compute the spans of the shortest move of the family.
+
+    Let ``S_k(x)`` be the shortest time in which derivative k (1 snap, 2 jerk, 3 acceleration, 4 velocity,
+    5 displacement) rises to x. It grows no faster than x, so that what is below is best raised as far as its
+    limit allows: if ``x >= L_m K (2 K)^n 2^(n (n - 1) / 2)``, with ``K = S_m(L_m)``, ``n = k - m - 1`` and the
+    highest such m, derivative m is held at its limit, nothing above is held, and
+    ``x = L_m t (K + t)^n 2^(n (n - 1) / 2)`` with the spans ``t, K + t, 2 (K + t), 4 (K + t)`` above m. If there
+    is no such m, nothing is held at all.
+
+    Parameters
+    ----------
+    displacement : array, shape (moves,), m
+        Greater than zero.
+    limits : array, shape (6, moves)
+        On velocity, acceleration, jerk, snap, crackle, pop; infinite where there is none.
+    period : array, shape (moves,), s, or None
+        P, where it is not to be chosen.
+
+    Returns
+    -------
+    array, shape (5, moves), s
+        T1 to T5; zero where nothing limits the derivative below.
+
+    References
+    ----------
+    Section 7 of the paper; the derivation is in docs/trajectory.md.
+    """
+    velocity, acceleration, jerk, snap, crackle, pop = limits
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore", under="ignore"):
+        if period is not None:
+            snap = np.minimum(snap, period * np.minimum(crackle / 2, pop * period / (2 * np.pi)))
+        targets = [snap, jerk, acceleration, velocity, displacement]
+        rises: list[Array] = []
+        for target in targets:
+            free = _without_holds(target, len(rises) + 1, crackle, pop, period)
+            rises.append(_with_holds(free, target, targets, rises))
+    return rises[-1]
+
+
+def _without_holds(target: Array, level: int, crackle: Array, pop: Array, period: Array | None) -> Array:
+    """Spans of a rise that holds nothing, limited by crackle and pop only, shape (level, moves)."""
+    if period is None:
+        scaled = target / 2.0 ** ((level - 1) * (level - 2) // 2)
+        by_crackle = (2 * scaled / crackle) ** (1 / level)
+        by_pop = (2 * np.pi * scaled / pop) ** (1 / (level + 1))
+        period = np.maximum(by_crackle, by_pop)
+    spans: Array = _DOUBLING[:level] * period
+    return spans
+
+
+def _with_holds(spans: Array, target: Array, limits: Sequence[Array], rises: Sequence[Array]) -> Array:
+    """Replace the spans where a derivative below is held at its limit, the highest such first."""
+    undecided = np.isfinite(target)
+    for below in reversed(range(len(rises))):
+        above = len(rises) - below - 1
+        here = undecided & _held(target, limits[below], rises[below], above)
+        if here.any():
+            spans[:, here] = _holding(target[here], limits[below][here], rises[below][:, here], above)
+            undecided &= ~here
+    return spans
+
+
+def _held(target: Array, limit: Array, rise: Array, above: int) -> BoolArray:
+    reach = rise.sum(axis=0)
+    least = limit * reach * (2 * reach) ** above * 2.0 ** (above * (above - 1) // 2)
+    held: BoolArray = np.isfinite(limit) & (target >= least)
+    return held
+
+
+def _holding(target: Array, limit: Array, rise: Array, above: int) -> Array:
+    """Spans of a rise that holds the derivative `above` + 1 below its target at the limit."""
+    reach = rise.sum(axis=0)
+    unit = (target / limit / 2.0 ** (above * (above - 1) // 2)) ** (1 / (above + 1))
+    held = unit * _root(reach / unit, above)
+    return np.concatenate([rise, held[np.newaxis], (reach + held) * 2.0 ** np.arange(above)[:, np.newaxis]])
+
+
+def _root(offset: Array, power: int) -> Array:
+    """Solve ``z (c + z)^n = 1`` for z >= c >= 0 by Newton's method, from a lower bound of the root."""
+    root = 1 - power / (power + 1) * offset
+    for _ in range(_NEWTON_STEPS if power else 0):
+        total = offset + root
+        root = root - (root * total - total ** (1 - power)) / (offset + (power + 1) * root)
+    return root

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.trajectory.attitude import along, heading_of_legs, stretched_heading, uniform_heading
+from cpfls_cli.trajectory.attitude import along, heading_of_legs, rotation_samples, stretched_heading, uniform_heading
 from cpfls_cli.trajectory.consistency import check_duration, check_peaks, check_samples, check_waypoints
-from cpfls_cli.trajectory.legs import Leg, Shape, evaluate_legs, shape_of
+from cpfls_cli.trajectory.legs import Leg, MoveInSpace, evaluate_legs, move_in_space
 from cpfls_cli.trajectory.rotation import RotationPath
 from cpfls_cli.trajectory.settings import TrajectorySettings
+
+# By how much two intervals of a uniform plan differ by rounding, in parts of one.
+_UNIFORM = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,21 +96,17 @@ def plan(settings: TrajectorySettings, gravity: float) -> Trajectory:
     """
     # Overflow is reported at the end, with a remedy.
     with np.errstate(over="ignore", invalid="ignore"):
-        planned = _planned(settings, gravity)
+        legs = _itinerary(settings)
+        duration = _duration_of(settings, legs)
+        time = sample_times(duration, settings.sample_time_s)
+        heading = _heading(settings, legs, time, duration)
+        flown = along(time, evaluate_legs(legs, time), heading, gravity)
+        planned = Trajectory(duration=duration, legs=legs, maxima=_maxima(legs), **flown)
     if not all(np.isfinite(values).all() for values in vars(planned).values() if isinstance(values, np.ndarray)):
         raise ComputationError(
             "the attitude's derivatives are too large for numbers to hold; lower trajectory.yaw_turn_rad"
         )
     return planned
-
-
-def _planned(settings: TrajectorySettings, gravity: float) -> Trajectory:
-    legs = _itinerary(settings)
-    duration = _duration_of(settings, legs)
-    time = sample_times(duration, settings.sample_time_s)
-    motion = evaluate_legs(legs, time)
-    flown = along(time, motion, _heading(settings, legs, time, duration), gravity)
-    return Trajectory(duration=duration, legs=legs, maxima=_maxima(legs), **flown)
 
 
 def _heading(settings: TrajectorySettings, legs: tuple[Leg, ...], time: Array, duration: float) -> Array:
@@ -122,13 +120,20 @@ def _heading(settings: TrajectorySettings, legs: tuple[Leg, ...], time: Array, d
 
 def _itinerary(settings: TrajectorySettings) -> tuple[Leg, ...]:
     """Plan the legs of a path in space, in the order of time."""
-    shapes = _between_waypoints(settings) if settings.path == "waypoints" else _to_and_fro(settings)
-    begins = _begins(settings, np.array([shape.duration for shape in shapes]))
-    start, yaw = _start(settings)
+    start, yaw = np.zeros(3), []
+    if settings.path == "waypoints":
+        moves = _between_waypoints(settings)
+        start = np.array(settings.waypoints[0].position_m)
+        yaw = [waypoint.yaw_rad for waypoint in settings.waypoints if waypoint.yaw_rad is not None]
+    else:
+        out = settings.line
+        back = replace(out, directions=-out.directions)
+        moves = [back if leg % 2 else out for leg in range(settings.legs)]
+    begins = _begins(settings, np.array([move.duration for move in moves]))
     legs: list[Leg] = []
-    for number, (shape, begin) in enumerate(zip(shapes, begins, strict=True)):
-        heading = (yaw[number], yaw[number + 1]) if yaw is not None else None
-        legs.append(Leg(begin=float(begin), start=start, yaw=heading, **vars(shape)))
+    for number, (move, begin) in enumerate(zip(moves, begins, strict=True)):
+        heading = (yaw[number], yaw[number + 1]) if yaw else None
+        legs.append(Leg(begin=float(begin), start=start, yaw=heading, **vars(move)))
         start = start + legs[-1].vector
     return tuple(legs)
 
@@ -137,33 +142,19 @@ def _duration_of(settings: TrajectorySettings, legs: tuple[Leg, ...]) -> float:
     """Compute the duration of a path, s: as set, or up to the first sample at which all is at rest."""
     if settings.duration_s is not None:
         return settings.duration_s
-    duration = legs[-1].end + _last_pause(settings)
+    duration = legs[-1].end + (settings.waypoints[-1].pause_s if settings.path == "waypoints" else 0.0)
     check_samples(duration, settings.sample_time_s)
     steps = np.ceil(duration / settings.sample_time_s - 1e-6)
     return float(steps * settings.sample_time_s)
 
 
-def _to_and_fro(settings: TrajectorySettings) -> list[Shape]:
-    out = settings.line
-    back = Shape(profiles=out.profiles, directions=-out.directions, limited_by=out.limited_by)
-    return [back if leg % 2 else out for leg in range(settings.legs)]
-
-
-def _between_waypoints(settings: TrajectorySettings) -> list[Shape]:
+def _between_waypoints(settings: TrajectorySettings) -> list[MoveInSpace]:
     check_waypoints(settings.waypoints, settings.duration_s is None)
     points = [np.array(waypoint.position_m) for waypoint in settings.waypoints]
-    shapes = [shape_of(end - start, settings.timing) for start, end in pairwise(points)]
-    for profile in (profile for shape in shapes for profile in shape.profiles):
+    moves = [move_in_space(end - start, settings.timing) for start, end in pairwise(points)]
+    for profile in (profile for move in moves for profile in move.profiles):
         check_peaks(profile, "limits" if settings.limits.given else "period_s")
-    return shapes
-
-
-def _start(settings: TrajectorySettings) -> tuple[Array, list[float] | None]:
-    """Find the start position, and the yaw at the ends of all legs where the points have one."""
-    if settings.path != "waypoints":
-        return np.zeros(3), None
-    yaw = [waypoint.yaw_rad for waypoint in settings.waypoints if waypoint.yaw_rad is not None]
-    return np.array(settings.waypoints[0].position_m), yaw or None
+    return moves
 
 
 def _begins(settings: TrajectorySettings, durations: Array) -> Array:
@@ -180,10 +171,6 @@ def _begins(settings: TrajectorySettings, durations: Array) -> Array:
     return np.asarray(np.cumsum(durations) - durations + pause * np.arange(len(durations)))
 
 
-def _last_pause(settings: TrajectorySettings) -> float:
-    return settings.waypoints[-1].pause_s if settings.path == "waypoints" else 0.0
-
-
 def _maxima(legs: tuple[Leg, ...]) -> dict[str, float]:
     """Find the largest peak of every derivative over all legs; infinite for crackle and pop without a limit."""
     peaks = [asdict(profile.peaks) for leg in legs for profile in leg.profiles]
@@ -195,33 +182,30 @@ def held_rotation(path: RotationPath, sample_time: float) -> PlannedRotation:
 
     Parameters
     ----------
-    path : RotationPath
     sample_time : float, s
     """
     time = sample_times(path.duration, sample_time)
     motion = path.sample(time)
     planes = (motion.attitude, motion.attitude_rate, motion.attitude_acceleration)
-    yaw, yaw_rate, yaw_acceleration = (np.ascontiguousarray(values[:, 2]) for values in planes)
-    return PlannedRotation(
-        duration=path.duration,
-        time=time,
-        yaw=yaw,
-        yaw_rate=yaw_rate,
-        yaw_acceleration=yaw_acceleration,
-        attitude=motion.attitude,
-        attitude_rate=motion.attitude_rate,
-        attitude_acceleration=motion.attitude_acceleration,
-        body_rate=rotations.body_rate(motion.attitude, motion.attitude_rate),
-    )
+    heading = np.stack([values[:, 2] for values in planes])
+    return PlannedRotation(duration=path.duration, **rotation_samples(time, motion, heading))
+
+
+def sample_interval(time: Array, what: str) -> float:
+    """Find the time between the samples of a plan, s; words say what needs them to be uniform.
+
+    Raises
+    ------
+    ComputationError
+        If there are fewer than two samples, or they are not uniform.
+    """
+    if len(time) < 2 or np.ptp(np.diff(time)) > _UNIFORM * (time[1] - time[0]):
+        raise ComputationError(f"{what} needs a trajectory of two or more samples at one rate")
+    return float(time[-1] - time[0]) / (len(time) - 1)
 
 
 def sample_times(duration: float, sample_time: float) -> Array:
     """Compute the sample times of a duration.
-
-    Parameters
-    ----------
-    duration : float, s
-    sample_time : float, s
 
     Returns
     -------

@@ -142,7 +142,6 @@ def covering(displacement: float, period: float, holds: Holds) -> BaseProfile:
         A negative one moves backwards.
     period : float, s
         May be zero, if a hold is not.
-    holds : Holds
 
     Returns
     -------

@@ -26,7 +26,7 @@ _LIMITS = ("rate_max_rad_s", "acceleration_max_rad_s2", "torque_max_n_m")
 
 @dataclass(frozen=True)
 class RotationMotion:
-    """Attitude along a path of rotations, with its derivatives.
+    """Attitude along a path, with its derivatives.
 
     Attributes
     ----------
@@ -75,6 +75,11 @@ class RotationPath:
         """Number of harmonics of each angle."""
         return len(self.sine.T)
 
+    @property
+    def frequency(self) -> Array:
+        """Angular frequencies of the harmonics, shape (harmonics,), rad/s."""
+        return np.asarray(2 * np.pi / self.duration * np.arange(1, self.harmonics + 1))
+
     def sample(self, time: Array) -> RotationMotion:
         """Evaluate the path and its derivatives in closed form.
 
@@ -83,10 +88,9 @@ class RotationPath:
         time : array, shape (time,), s
             Any order and any value; the path goes on for ever.
         """
-        base = 2 * np.pi / self.duration
-        frequency = base * np.arange(1, self.harmonics + 1)
+        frequency = self.frequency
         sine, cosine = np.sin(time[:, None] * frequency), np.cos(time[:, None] * frequency)
-        turning = base * self.turns
+        turning = 2 * np.pi / self.duration * self.turns
         rate = cosine @ (frequency * self.sine).T - sine @ (frequency * self.cosine).T
         acceleration = -sine @ (frequency**2 * self.sine).T - cosine @ (frequency**2 * self.cosine).T
         return RotationMotion(
@@ -107,13 +111,7 @@ class RotationPath:
         return times
 
     def scaled(self, factor: float) -> RotationPath:
-        """Multiply the amplitudes of the harmonics.
-
-        Returns
-        -------
-        RotationPath
-            With the same turns.
-        """
+        """Multiply the amplitudes of the harmonics; the turns stay."""
         return replace(self, sine=factor * self.sine, cosine=factor * self.cosine)
 
 
@@ -127,10 +125,8 @@ def full_rotation(
 
     Parameters
     ----------
-    settings : RotationSettings
     duration : float, s
         Of the whole path, which is closed on the circle.
-    rng : numpy.random.Generator
     inertia : sequence of float, length 3 or 6, kg m^2, optional
         Ixx, Iyy, Izz (, Ixy, Ixz, Iyz); only needed where the settings limit the torque.
 
@@ -189,7 +185,6 @@ class RotationLimits:
 
     Parameters
     ----------
-    settings : RotationSettings
     inertia : sequence of float, length 3 or 6, kg m^2, optional
         Ixx, Iyy, Izz (, Ixy, Ixz, Iyz); only needed where the torque is limited.
 
@@ -238,28 +233,33 @@ class RotationLimits:
         array, shape (3,)
             Share of the limit on rates, accelerations and torques; the last is zero where there is no limit.
         """
-        count = _PER_PERIOD * (path.harmonics + _turns_at_the_fastest(path))
+        rate = path.sample(path.times(8 * path.harmonics)).attitude_rate
+        turns_at_the_fastest = int(np.ceil(np.abs(rate).max() * path.duration / (2 * np.pi)))
+        count = _PER_PERIOD * (path.harmonics + turns_at_the_fastest)
         loads = self.loads(path.sample(path.times(count)))
         ahead, behind = np.roll(loads, -1, axis=0), np.roll(loads, 1, axis=0)
         bounds = (np.abs(loads) + 0.25 * np.abs(ahead - 2 * loads + behind)).max(axis=0)
         return np.array([bounds[:6].max(), bounds[6:12].max(), bounds[12:].max(initial=0.0)])
 
     def fitted(self, path: RotationPath) -> RotationPath:
-        """Scale the harmonics of a path to the largest amplitudes that the limits allow.
-
-        Returns
-        -------
-        RotationPath
-            Uses up one of the limits.
+        """Scale the harmonics of a path to the largest amplitudes that the limits allow, which uses up one of them.
 
         Raises
         ------
         SettingError
             If the turns alone exceed a limit.
         """
-        self._require_turns(path)
-
         from scipy.optimize import brentq
+
+        peaks = self.peaks(path.scaled(0.0))
+        worst = int(peaks.argmax())
+        if peaks[worst] > 1:
+            turns = ", ".join(str(count) for count in path.turns)
+            raise SettingError(
+                _LIMITS[worst],
+                f"{turns} complete turns of roll, pitch and yaw in {path.duration:g} s need {peaks[worst]:.3g} times "
+                "as much; raise it or the duration, or lower turns",
+            )
 
         def excess(factor: float) -> float:
             return float(self.peaks(path.scaled(factor)).max()) - 1.0
@@ -273,33 +273,5 @@ class RotationLimits:
         return path.scaled(factor)
 
     def enforced(self, path: RotationPath) -> RotationPath:
-        """Scale the harmonics of a path down where it exceeds a limit.
-
-        Returns
-        -------
-        RotationPath
-            The same path where it exceeds none.
-
-        Raises
-        ------
-        SettingError
-            If the turns alone exceed a limit.
-        """
+        """Scale the harmonics of a path down where it exceeds a limit; raises what `fitted` raises."""
         return path if self.peaks(path).max() <= 1 else self.fitted(path)
-
-    def _require_turns(self, path: RotationPath) -> None:
-        peaks = self.peaks(path.scaled(0.0))
-        worst = int(peaks.argmax())
-        if peaks[worst] > 1:
-            turns = ", ".join(str(count) for count in path.turns)
-            raise SettingError(
-                _LIMITS[worst],
-                f"{turns} complete turns of roll, pitch and yaw in {path.duration:g} s need {peaks[worst]:.3g} times "
-                "as much; raise it or the duration, or lower turns",
-            )
-
-
-def _turns_at_the_fastest(path: RotationPath) -> int:
-    """Count the turns that the fastest rate of any angle would make over the duration."""
-    rate = path.sample(path.times(8 * path.harmonics)).attitude_rate
-    return int(np.ceil(np.abs(rate).max() * path.duration / (2 * np.pi)))

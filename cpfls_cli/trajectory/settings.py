@@ -13,7 +13,7 @@ from typing_extensions import Doc
 from cpfls_cli.errors import SettingError
 from cpfls_cli.settings import Settings
 from cpfls_cli.trajectory.consistency import check_consistency
-from cpfls_cli.trajectory.legs import Shape, Timing, shape_of, unit_of
+from cpfls_cli.trajectory.legs import MoveInSpace, Timing, move_in_space, unit_of
 from cpfls_cli.trajectory.limits import LimitSettings
 from cpfls_cli.trajectory.profile import BaseProfile, Holds
 
@@ -164,13 +164,7 @@ class TrajectorySettings(Settings):
     ] = "stop"
 
     def __post_init__(self) -> None:
-        """Refuse combinations of settings that do not describe a path.
-
-        Raises
-        ------
-        SettingError
-            If the direction, the size of a move, its limits or the time it needs contradicts another setting.
-        """
+        """Refuse combinations of settings that do not describe a path."""
         check_consistency(self)
 
     @property
@@ -212,12 +206,12 @@ class TrajectorySettings(Settings):
         )
 
     @property
-    def line(self) -> Shape:
-        """Shape of the first move of a path to and fro."""
+    def line(self) -> MoveInSpace:
+        """First move of a path to and fro."""
         unit = unit_of(np.array(self.direction), self.displacement_measure)[1]
         if self.amplitude_m_s5 is not None:
             given = BaseProfile(amplitude=self.amplitude_m_s5, period=self.period or _USUAL_PERIOD, holds=self.holds)
-            return Shape(profiles=(given,), directions=unit[None])
+            return MoveInSpace(profiles=(given,), directions=unit[None])
         if self.displacement_m is None:
             raise SettingError("displacement_m", "is missing")
-        return shape_of(self.displacement_m * unit, self.timing)
+        return move_in_space(self.displacement_m * unit, self.timing)

@@ -10,12 +10,12 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.fuzzy.inputs import wrap
 from cpfls_cli.identification.data import OtherTorque, TorqueData, TorqueSource
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.structure import PITCH, ROLL
+from cpfls_cli.rotations import wrapped
 from cpfls_cli.validation.bands import inertia_band
 from cpfls_cli.validation.bootstrap import Draws
 from cpfls_cli.validation.timeline import TimeBlocks, time_blocks
@@ -83,7 +83,7 @@ def curves(model: InertiaFunctions, draws: Draws, best_rigid_body: Array, traini
     best_rigid_body : array, shape (6,), kg m^2
     """
     every = len(training) // _LOOKED_AT + 1
-    visited = wrap(np.concatenate([data.motion.attitude[::every, :2] for data in training.chunks()]))
+    visited = wrapped(np.concatenate([data.motion.attitude[::every, :2] for data in training.chunks()]))
     attitude = np.stack([_along(visited, angle) for angle in (ROLL, PITCH)])
     flat, shape = attitude.reshape(-1, 3), (*attitude.shape[:2], 3, 3)
     low, high = inertia_band(model, draws, flat)

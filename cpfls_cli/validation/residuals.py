@@ -10,9 +10,9 @@ from scipy.special import chdtrc, ndtri, stdtr
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import mean_error
-from cpfls_cli.fuzzy.inputs import wrap
 from cpfls_cli.identification.data import TorqueData, TorqueSource
 from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.rotations import wrapped
 from cpfls_cli.validation.timeline import lagged_pairs, leading_samples, sample_numbers, sample_period
 
 # More do not change a picture; 0.1 GB of signals.
@@ -262,7 +262,7 @@ def model_inputs(data: TorqueData, predicted: Array) -> ModelInputs:
     """
     motion, axes = data.motion, ("roll", "pitch", "yaw")
     kinds = {
-        "{}": wrap(motion.attitude[:, :2]),
+        "{}": wrapped(motion.attitude[:, :2]),
         "{} rate": motion.rate,
         "{} acceleration": motion.acceleration,
         "predicted {} torque": predicted,

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, require_columns
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 _AXES = ("thrust", "roll", "pitch", "yaw")
 ViolationKind = Literal["negative squared speed", "above the limit"]
@@ -30,6 +30,30 @@ class BodyWrench(NamedTuple):
 
     thrust: Array
     body_torque: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class RotorViolation:
+    """Samples at which a rotor cannot reach the demanded squared speed.
+
+    Attributes
+    ----------
+    rotor : int
+        Index of the rotor, from 0.
+    kind : str
+        "negative squared speed" or "above the limit".
+    first, last, count : int
+        Indices of the first and the last sample, and the number of samples, which need not be all between.
+    worst : float, rad^2/s^2
+        The most negative, or the largest, squared speed.
+    """
+
+    rotor: int
+    kind: ViolationKind
+    first: int
+    last: int
+    count: int
+    worst: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +89,12 @@ def allocation_matrix(vehicle: VehicleSettings) -> Array:
     ----------
     Section 2 of the paper.
     """
-    return np.array([_effect(rotor) for rotor in vehicle.rotors]).T
+    columns = []
+    for rotor in vehicle.rotors:
+        x, y, _ = rotor.position_m
+        k, b = rotor.thrust_factor_n_s2, rotor.drag_factor_n_m_s2
+        columns.append([k, y * k, -x * k, -rotor.spin * b])
+    return np.array(columns).T
 
 
 def body_wrench(vehicle: VehicleSettings, rotor_speed: Array) -> BodyWrench:
@@ -73,7 +102,6 @@ def body_wrench(vehicle: VehicleSettings, rotor_speed: Array) -> BodyWrench:
 
     Parameters
     ----------
-    vehicle : VehicleSettings
     rotor_speed : array, shape (time, rotor), rad/s
     """
     require_columns("rotor_speed", rotor_speed, len(vehicle.rotors))
@@ -97,7 +125,6 @@ def rotor_demand(vehicle: VehicleSettings, thrust: Array, body_torque: Array) ->
 
     Parameters
     ----------
-    vehicle : VehicleSettings
     thrust : array, shape (time,), N
         Along body z.
     body_torque : array, shape (time, 3), N m, body frame
@@ -118,19 +145,10 @@ def rotor_demand(vehicle: VehicleSettings, thrust: Array, body_torque: Array) ->
         sample = int(np.flatnonzero(~np.isfinite(wrench).all(axis=1))[0])
         raise ComputationError(f"the demanded thrust or torque is not finite at sample {sample}")
     squared_speed = wrench @ _allocation_inverse(allocation_matrix(vehicle)).T
-    possible = _feasible(squared_speed, vehicle.rotor_speed_max_rad_s)
-    speed = np.sqrt(np.where(possible, np.maximum(squared_speed, 0.0), np.nan))
-    return RotorDemand(
-        squared_speed=squared_speed,
-        speed=speed,
-        violations=violations(squared_speed, vehicle.rotor_speed_max_rad_s),
-    )
-
-
-def _effect(rotor: RotorSettings) -> list[float]:
-    x, y, _ = rotor.position_m
-    k, b = rotor.thrust_factor_n_s2, rotor.drag_factor_n_m_s2
-    return [k, y * k, -x * k, -rotor.spin * b]
+    most = vehicle.rotor_speed_max_rad_s
+    impossible = _negative(squared_speed, most) | _above(squared_speed, most)
+    speed = np.sqrt(np.where(impossible, np.nan, np.maximum(squared_speed, 0.0)))
+    return RotorDemand(squared_speed=squared_speed, speed=speed, violations=violations(squared_speed, most))
 
 
 def _allocation_inverse(allocation: Array) -> Array:
@@ -140,49 +158,14 @@ def _allocation_inverse(allocation: Array) -> Array:
     left, singular_values, _ = np.linalg.svd(scaled)
     rank = int((singular_values > 1e-9 * singular_values[0]).sum())
     if rank < 4:
-        _refuse(left[:, rank:])
+        unreachable = np.abs(left[:, rank:]).max(axis=1) > 1e-6
+        missing = [axis for axis, beyond in zip(_AXES, unreachable, strict=True) if beyond]
+        raise ComputationError(
+            f"vehicle.rotors: the rotors cannot produce {', '.join(missing)} independently of the rest; check their "
+            "positions and spins"
+        )
     inverse: Array = np.linalg.pinv(scaled) / length
     return inverse
-
-
-def _refuse(unreachable: Array) -> None:
-    """Raise an error that names the axes with a share in the wrenches out of reach."""
-    missing = [axis for axis, row in zip(_AXES, unreachable, strict=True) if np.abs(row).max() > 1e-6]
-    raise ComputationError(
-        f"vehicle.rotors: the rotors cannot produce {', '.join(missing)} independently of the rest; check their "
-        "positions and spins"
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class RotorViolation:
-    """Samples at which a rotor cannot reach the demanded squared speed.
-
-    Attributes
-    ----------
-    rotor : int
-        Index of the rotor, from 0.
-    kind : str
-        "negative squared speed" or "above the limit".
-    first, last : int
-        Indices of the first and the last sample.
-    count : int
-        Number of samples; those between first and last need not all be among them.
-    worst : float, rad^2/s^2
-        The most negative, or the largest, squared speed.
-    """
-
-    rotor: int
-    kind: ViolationKind
-    first: int
-    last: int
-    count: int
-    worst: float
-
-
-def _feasible(squared_speed: Array, speed_max: float) -> BoolArray:
-    """Mark the squared speeds that a rotor can reach."""
-    return ~(_negative(squared_speed, speed_max) | _above(squared_speed, speed_max))
 
 
 def violations(squared_speed: Array, speed_max: float) -> tuple[RotorViolation, ...]:
@@ -218,6 +201,5 @@ def _above(squared_speed: Array, speed_max: float) -> BoolArray:
 
 def _summary(rotor: int, kind: ViolationKind, where: BoolArray, worst: float) -> RotorViolation:
     samples = np.flatnonzero(where)
-    return RotorViolation(
-        rotor=rotor, kind=kind, first=int(samples[0]), last=int(samples[-1]), count=len(samples), worst=worst
-    )
+    first, last = int(samples[0]), int(samples[-1])
+    return RotorViolation(rotor=rotor, kind=kind, first=first, last=last, count=len(samples), worst=worst)

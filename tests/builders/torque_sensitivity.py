@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.fuzzy.basis import Antecedent, AntecedentSensitivity, antecedent_sensitivity
+from cpfls_cli.fuzzy.basis import antecedent_sensitivity
+from cpfls_cli.fuzzy.membership import Memberships, MembershipSensitivity
 from cpfls_cli.regressor.regressor import Breakpoints, Regressor
 
 
@@ -72,7 +73,7 @@ def _function_sensitivity(
 
 
 def _by_antecedent(
-    outputs: Array, moved: AntecedentSensitivity, antecedents: list[Antecedent], input_index: int, direction: int
+    outputs: Array, moved: MembershipSensitivity, antecedents: list[Memberships], input_index: int, direction: int
 ) -> Array:
     if direction == input_index:
         return _contract(outputs, moved.slope, antecedents, input_index, slope=False)
@@ -87,7 +88,7 @@ def _along(rule_outputs: Array, rules: list[int], input_index: int) -> Array:
     return grid if input_index == 0 else grid.swapaxes(1, 2)
 
 
-def _contract(outputs: Array, moved: Array, antecedents: list[Antecedent], input_index: int, *, slope: bool) -> Array:
+def _contract(outputs: Array, moved: Array, antecedents: list[Memberships], input_index: int, *, slope: bool) -> Array:
     """Sum rule outputs over both inputs' rules; the other input fires by its value or by its slope."""
     if len(antecedents) == 1:
         return np.asarray(np.einsum("nl,nlb->nb", outputs[:, :, 0], moved))

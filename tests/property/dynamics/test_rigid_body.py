@@ -6,9 +6,10 @@ from cpfls_cli.dynamics.rigid_body import (
     inertia_matrix,
     inertia_matrix_gradient,
     newton_euler_torque,
-    rigid_body_regressor,
+    rigid_columns,
     torque,
 )
+from cpfls_cli.regressor.motion import Motion
 
 
 def vectors(low, high):
@@ -48,7 +49,7 @@ def test_christoffel_form_is_newton_and_euler(attitude, rate, acceleration, iner
 
 @given(attitudes, rates, accelerations, inertias())
 def test_regressor_times_inertia_is_the_torque(attitude, rate, acceleration, inertia):
-    predicted = rigid_body_regressor(attitude, rate, acceleration) @ elements(inertia)
+    predicted = rigid_columns(Motion(attitude, rate, acceleration)) @ elements(inertia)
     difference = predicted - torque(attitude, rate, acceleration, inertia)
     assert np.abs(difference).max() <= 1e-12 * torque_scale(inertia, rate, acceleration)
 

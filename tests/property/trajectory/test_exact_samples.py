@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.shared.exact_move import integrated
 from cpfls_cli.trajectory.limits import LIMIT_NAMES, Limits
-from cpfls_cli.trajectory.time_optimal import plan_moves
+from cpfls_cli.trajectory.moves import plan_moves
 
 
 def test_samples_are_the_integral_of_the_pop():

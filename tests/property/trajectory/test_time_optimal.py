@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.trajectory.limits import LIMIT_NAMES, Limits
-from cpfls_cli.trajectory.moves import Outcome
-from cpfls_cli.trajectory.time_optimal import plan_moves
+from cpfls_cli.trajectory.moves import Outcome, plan_moves
 
 CASES = 50_000
 

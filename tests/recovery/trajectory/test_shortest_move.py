@@ -5,8 +5,7 @@ import pytest
 
 from benchmarks.shared.brute_force import shortest_duration
 from cpfls_cli.trajectory.limits import LIMIT_NAMES, Limits
-from cpfls_cli.trajectory.moves import Outcome
-from cpfls_cli.trajectory.time_optimal import plan_moves
+from cpfls_cli.trajectory.moves import Outcome, plan_moves
 
 
 @pytest.mark.parametrize("chosen", [True, False], ids=["chosen-period", "given-period"])

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.evolution import Evaluation, EvolutionSettings, History, ended, evolve, start, step
-from cpfls_cli.evolution.state import stalled
+from cpfls_cli.evolution.engine import stalled
 
 
 def course(*best):

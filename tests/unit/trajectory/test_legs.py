@@ -5,8 +5,7 @@ import pytest
 
 from cpfls_cli.trajectory.legs import synchronised
 from cpfls_cli.trajectory.limits import Limits
-from cpfls_cli.trajectory.moves import Outcome
-from cpfls_cli.trajectory.time_optimal import plan_moves
+from cpfls_cli.trajectory.moves import Outcome, plan_moves
 
 DISPLACEMENTS = np.array([10.0, -4.0, 0.0, 0.5])
 LIMITS = Limits(
@@ -18,9 +17,9 @@ LIMITS = Limits(
 )
 
 
-@pytest.fixture(params=["straight-line", "each-axis"])
-def moves(request):
-    return synchronised(DISPLACEMENTS, LIMITS, method=request.param)
+@pytest.fixture
+def moves():
+    return synchronised(DISPLACEMENTS, LIMITS)
 
 
 def test_all_axes_begin_and_end_together_within_their_limits(moves):
@@ -36,36 +35,20 @@ def test_an_axis_that_stays_is_told(moves):
     assert moves[2].profile.duration == 0.0
 
 
-def test_on_a_straight_line_all_axes_share_one_profile():
-    moves = synchronised(DISPLACEMENTS, LIMITS)
-    time = np.linspace(0, moves[0].duration, 200)
-    first, second = (moves[axis].profile.sample(time)[:, 0] / DISPLACEMENTS[axis] for axis in (0, 1))
-    np.testing.assert_allclose(first, second, atol=1e-14)
-
-
 def test_each_axis_takes_as_long_as_the_slowest_alone():
     alone = plan_moves(DISPLACEMENTS, LIMITS).duration
-    moves = synchronised(DISPLACEMENTS, LIMITS, method="each-axis")
+    moves = synchronised(DISPLACEMENTS, LIMITS)
     slowest = int(alone.argmax())
     assert moves[0].duration == pytest.approx(alone.max(), rel=1e-14)
     assert moves[slowest].active == plan_moves(DISPLACEMENTS, LIMITS)[slowest].active
-    assert synchronised(DISPLACEMENTS, LIMITS)[0].duration >= alone.max() * (1 - 1e-12)
 
 
 def test_axes_that_nothing_limits_have_no_solution():
     limits = Limits(velocity=np.array([1.0, np.inf]))
-    each = synchronised(np.array([1.0, 1.0]), limits, method="each-axis")
+    each = synchronised(np.array([1.0, 1.0]), limits)
     assert [move.outcome for move in each] == [Outcome.SOLVED, Outcome.NO_LIMIT]
-    # On a straight line the one limit paces both.
-    assert [move.duration for move in synchronised(np.array([1.0, 1.0]), limits)] == [1.0, 1.0]
 
 
 def test_nothing_moves_where_nothing_is_asked():
-    for method in ("straight-line", "each-axis"):
-        moves = synchronised(np.zeros(3), Limits(velocity=1.0), method=method)
-        assert [(move.outcome, move.duration) for move in moves] == [(Outcome.ZERO_DISPLACEMENT, 0.0)] * 3
-
-
-def test_a_given_period_is_kept_on_a_straight_line():
-    moves = synchronised(np.array([3.0, 1.0]), Limits(velocity=1.0), period=0.25)
-    assert [move.profile.period for move in moves] == [0.25, 0.25]
+    moves = synchronised(np.zeros(3), Limits(velocity=1.0))
+    assert [(move.outcome, move.duration) for move in moves] == [(Outcome.ZERO_DISPLACEMENT, 0.0)] * 3

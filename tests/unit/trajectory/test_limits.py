@@ -3,7 +3,7 @@ import pytest
 
 from cpfls_cli.errors import SettingError
 from cpfls_cli.trajectory.limits import LIMIT_NAMES, Limits
-from cpfls_cli.trajectory.time_optimal import plan_move, plan_moves
+from cpfls_cli.trajectory.moves import plan_move, plan_moves
 
 
 @pytest.mark.parametrize("key", LIMIT_NAMES)

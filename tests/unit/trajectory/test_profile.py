@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.trajectory.limits import Limits
+from cpfls_cli.trajectory.moves import plan_move
 from cpfls_cli.trajectory.profile import BaseProfile, Holds, covering
-from cpfls_cli.trajectory.time_optimal import plan_move
 
 PRINTED = [64.0, 8.0, 2.0, 1.0, 1.0, 2.0, 2 * np.pi]
 
