@@ -35,6 +35,7 @@ from cpfls_cli.gap.naming.results import Diagnosis, GapVerdict, NamedEffect, gap
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.preparation import Preparation
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.windows import Recording, common_windows
 
 _EXCITED_FLOORS = 3.0
@@ -208,7 +209,7 @@ def _concluded(
     audited: Audit,
 ) -> Diagnosis:
     (hypothesis, _, estimates), held_out = judgement
-    named = sorted((each.effect for each in judged), key=lambda effect: -effect.share)
+    named = ascending((each.effect for each in judged), lambda effect: -effect.share)
     effects = [*faults, *named]
     numbers = wrong_numbers(estimates, effects, held_out.removed_by_numbers(), _pull(hypothesis, steps[-1].floor))
     effects += [numbers] if numbers is not None else []

@@ -13,6 +13,7 @@ from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import Runs, apart, free_runs, made_ready
 from cpfls_cli.playback.replay import MODEL, STATED, Played, Replay, drawn_runs, replay
+from cpfls_cli.rounding import largest
 from cpfls_cli.weak_form.windows import Recording
 
 # Samples between starts of free runs, which are alike.
@@ -160,7 +161,7 @@ def worst_stretch(pairs: Sequence[PlayedPair]) -> WorstStretch:
     """
     samples = max(2, round(_RUN_S / pairs[0].flight.motion.period))
     found = [_worst(index, pair, samples) for index, pair in enumerate(pairs)]
-    return max(found, key=lambda stretch: float(((stretch.before - stretch.measured) ** 2).mean()))
+    return largest(found, lambda stretch: float(((stretch.before - stretch.measured) ** 2).mean()))
 
 
 def _worst(index: int, pair: PlayedPair, samples: int) -> WorstStretch:

@@ -15,6 +15,7 @@ from cpfls_cli.effects.catalogue.parameter_error import Change, physical, too_li
 from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.rounding import at_most, levelled, smallest
 
 # Of one shape between the neighbours of its grid point, to a thousandth of that; of all shapes from there.
 _EVALUATIONS = 14
@@ -311,7 +312,7 @@ def refitted(hypothesis: System, weight: Array) -> System:
         for share in _SHARES:
             ahead = _moved(hypothesis, share * step)
             left = _squares(ahead, weight, rotor_wrench)
-            if left <= error:
+            if at_most(left, error):
                 break
         else:
             return hypothesis
@@ -408,7 +409,7 @@ def _in_deepest_valley(
         return float(((left / floor) ** 2).sum())
 
     tried = (Candidate(newest.effect, dict(zip(names, values, strict=True))) for values in product(*grids))
-    return min(tried, key=error)
+    return smallest(tried, error)
 
 
 def _steps(shape: Shape, value: float) -> list[float]:
@@ -421,7 +422,7 @@ def _steps(shape: Shape, value: float) -> list[float]:
 
 def _bracket(grid: Sequence[float], value: float) -> tuple[float, float]:
     """Find the neighbours of a value on its grid."""
-    nearest = int(np.argmin(np.abs(np.asarray(grid) - value)))
+    nearest = int(np.argmin(levelled(np.abs(np.asarray(grid) - value))))
     return float(grid[max(0, nearest - 1)]), float(grid[min(len(grid) - 1, nearest + 1)])
 
 

@@ -13,13 +13,24 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.refine import compensation, refined, weighted_residual
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.ranking import NEAR, SearchStep, best_floor, block_index, least_gain, rows, surely_less
+from cpfls_cli.gap.naming.ranking import (
+    NEAR,
+    SearchStep,
+    best_floor,
+    block_index,
+    chance_of_ranks,
+    least_gain,
+    more_left,
+    rows,
+    surely_less,
+)
 from cpfls_cli.gap.naming.scoring import (
     Scored,
     layout,
     normal_equations,
 )
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.rounding import ascending, largest
 
 
 def late(chosen: Sequence[Candidate]) -> list[Candidate]:
@@ -43,7 +54,7 @@ def moved(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], step: Sear
     if best not in near or len(near) < 2:
         return step.ranking
     there = [(_rescored(refined(flights, [*chosen, s.candidate], step.floor), step), s.candidate) for s in near]
-    return sorted((replace(scored, candidate=own) for scored, own in there), key=lambda scored: -scored.gain)
+    return ascending((replace(scored, candidate=own) for scored, own in there), lambda scored: -scored.gain)
 
 
 def parted(refitted: System, step: SearchStep) -> System:
@@ -52,7 +63,7 @@ def parted(refitted: System, step: SearchStep) -> System:
     if not _stands_for_two(refitted.chosen, last):
         return refitted
     pairs = _pairs(refitted.flights, others, step)
-    best = max([refitted, *pairs], key=lambda each: _rescored(each, step).gain)
+    best = largest([refitted, *pairs], lambda each: _rescored(each, step).gain)
     for wider in _wider_pairs(refitted.flights, others, refitted.chosen[last], step):
         if _is_needed(_rescored(wider, step), _rescored(best, step), step):
             best = wider
@@ -147,15 +158,12 @@ def chance_beside_its_like(
     effects : sequence of Effect
         That the search tried.
     """
-    # Slow to load, and needed only here and where two effects explain almost the same.
-    from scipy.stats import wilcoxon
-
     together = system(flights, chosen)
     floor = best_floor(together)
     without = refined(flights, [other for place, other in enumerate(chosen) if place != index], floor)
-    margin = _unseen(without, floor, settings) - _unseen(together, floor, settings)
+    margin = more_left(_unseen(without, floor, settings), _unseen(together, floor, settings))
     tried = sum(effect.actuation is not None for effect in effects)
-    return float(min(1.0, tried * wilcoxon(margin, alternative="greater").pvalue)) if len(margin) > 1 else 1.0
+    return min(1.0, tried * chance_of_ranks(margin)) if len(margin) > 1 else 1.0
 
 
 def _unseen(hypothesis: System, floor: Array, settings: GapSettings) -> Array:

@@ -23,6 +23,7 @@ from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect
 from cpfls_cli.gap.naming.scoring import Scored
 from cpfls_cli.gap.naming.search import alternatives
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.rounding import at_most
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _MATTERS = 0.02
@@ -85,15 +86,11 @@ def judge_effect(
 
 def _frequency(chosen: Scored, ranking: Sequence[Scored]) -> float:
     """Compute the share of blocks whose omission leaves the effect the best candidate."""
-    if not _real(chosen):
+    if not np.isfinite(chosen.gain):
         return 0.0
-    others = [scored.block_error for scored in ranking if _real(scored)]
-    total = np.array([error.sum() - error for error in (chosen.block_error, *others)])
-    return float(np.mean(np.argmin(total, axis=0) == 0))
-
-
-def _real(scored: Scored) -> bool:
-    return bool(np.isfinite(scored.gain))
+    others = [scored.block_error for scored in ranking if np.isfinite(scored.gain)]
+    own, *total = (error.sum() - error for error in (chosen.block_error, *others))
+    return float(np.mean(np.all([at_most(own, other) for other in [own, *total]], axis=0)))
 
 
 def shares(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], estimates: Estimates, floor: Array) -> Array:

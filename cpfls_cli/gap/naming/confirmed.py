@@ -19,6 +19,7 @@ from cpfls_cli.gap.naming.held_out import HeldOut, held_out, share_removed
 from cpfls_cli.gap.naming.leftover import Leftover, leftover
 from cpfls_cli.gap.naming.ranking import SearchStep, block_index
 from cpfls_cli.gap.settings import CLEAR, ERRORS, VISIBLE, WORSE, GapSettings
+from cpfls_cli.rounding import ascending, largest, levelled, smallest
 
 _FILLS = 0.01
 """Share of what the largest effect takes off, in squares, below which another may fill what its formula is off by."""
@@ -88,13 +89,12 @@ class Judge:
         compared = {each.effect.name: self._without(judgement, each.effect.name) for each in chosen}
         harmful = {name: one for name, one in compared.items() if one.worse(judgement.held_out).any()}
         if harmful:
-            name = max(harmful, key=lambda each: harmful[each].ratio(judgement.held_out))
+            name = largest(harmful, lambda each: harmful[each].ratio(judgement.held_out))
             return Refusal(name, harmful[name].harm(judgement.held_out))
-        raised = {name: one.visibly for name, one in compared.items()}
-        least = min(raised, key=lambda each: raised[each], default=None)
-        if least is None:
+        if not compared:
             return None
-        if raised[least] < VISIBLE**2:
+        least = smallest(compared, lambda each: compared[each].visibly)
+        if compared[least].visibly < VISIBLE**2:
             return Refusal(least, "on the flights held out the gap is as small without it")
         return _elsewhere(judgement, compared) or _filling(judgement, compared)
 
@@ -142,7 +142,7 @@ class Without(NamedTuple):
     @property
     def channel(self) -> int:
         """Channel in which it shows most."""
-        return int(np.argmax(self.seen))
+        return int(np.argmax(levelled(self.seen)))
 
     def worse(self, unseen: HeldOut) -> Array:
         """Mark the channels that the effect makes visibly and surely worse."""
@@ -177,11 +177,12 @@ def _elsewhere(judgement: Judgement, compared: dict[str, Without]) -> Refusal | 
         if len(ends) != 1 or not reaching or not is_free(candidate):
             continue
         channel = compared[candidate.effect.name].channel
-        largest = max(compared, key=lambda each: compared[each].seen[channel])
-        if largest != candidate.effect.name:
+        seen = {name: one.seen[channel] for name, one in compared.items()}
+        most = largest(seen, seen.__getitem__)
+        if most != candidate.effect.name:
             return Refusal(
                 candidate.effect.name,
-                f"its {reaching[0]} may be at the bound of what is possible, and what the formula of {largest} is"
+                f"its {reaching[0]} may be at the bound of what is possible, and what the formula of {most} is"
                 f" off by in the {CHANNELS[channel]} would then look no different",
             )
     return None
@@ -194,7 +195,7 @@ def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | No
     """
     floors = judgement.held_out.size(judgement.held_out.after).floors
     beyond = _FILLS * max((one.visibly for one in compared.values()), default=0.0)
-    for name in sorted(compared, key=lambda each: compared[each].visibly):
+    for name in ascending(compared, lambda each: compared[each].visibly):
         channel, off = compared[name].channel, compared[name].visibly
         left = float(floors[channel])
         beside = max(beyond, *(one.seen[channel] for one in compared.values()))
@@ -228,7 +229,7 @@ def differences(
     seen = _size(start.hypothesis.residual - start.hypothesis.base @ fit(start.hypothesis, start.floor), start.floor)
     held = last.held_out
     # Numbers of the vehicle that took up what only one of the roles has are wrong for the other.
-    unseen = min((held.size(each).floors for each in (held.before, held.parameters)), key=np.nanmax)
+    unseen = smallest((held.size(each).floors for each in (held.before, held.parameters)), np.nanmax)
     if last.found.hypothesis.chosen:
         return _other_numbers(first, judge, settings)
     there, here = _largest(seen), _largest(unseen)

@@ -15,6 +15,7 @@ from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, free_est
 from cpfls_cli.gap.naming.ranking import block_index, rank_effects, surely_less
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.rounding import levelled, smallest
 
 _ON_BOUND = 1e-3
 """Share of its range that a number is from its bound at most to be on it."""
@@ -148,7 +149,7 @@ def _main(found: Fitted, index: int, numbers: Sequence[Estimate], floor: Array) 
     if not names or candidate.effect.physical is not None or len(linear) != len(names):
         return numbers
     columns = found.hypothesis.columns(candidate) * linear / floor[:, None]
-    largest = names[int(np.argmax((columns**2).sum(axis=(0, 1))))]
+    largest = names[int(np.argmax(levelled((columns**2).sum(axis=(0, 1)))))]
     return [number for number in numbers if number.name == largest]
 
 
@@ -180,7 +181,7 @@ def _lesser(found: Fitted, floor: Array, *pair: int) -> tuple[list[Candidate], R
         others = [candidate for position, candidate in enumerate(chosen) if position != index]
         without, estimates = weighted_estimates(system(found.hypothesis.flights, others), floor, found.block)
         left[index] = float((((without.residual - without.base @ estimates.linear) / floor) ** 2).sum())
-    out = min(left, key=lambda index: left[index])
+    out = smallest(left, lambda index: left[index])
     other = next(index for index in pair if index != out)
     names = chosen[out].effect.name, chosen[other].effect.name
     return [chosen[out]], Refusal(names[0], f"{names[0]} and {names[1]} nearly cancel, and one of them does as well")

@@ -15,6 +15,7 @@ from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.naming.results import GapSize
 from cpfls_cli.gap.preparation import Preparation
 from cpfls_cli.gap.settings import CLEAR, COUNTS, NOISE, VISIBLE
+from cpfls_cli.rounding import largest
 from cpfls_cli.weak_form.windows import Recording
 
 
@@ -84,7 +85,7 @@ class HeldOut:
             for (name, share), kind, size in zip(of_kind.items(), kinds, sizes, strict=True)
             if size > COUNTS * sum(sizes) and _largest(before[:, kind]) > CLEAR
         }
-        better = max(of_kind, key=lambda name: of_kind[name])
+        better = largest(of_kind, lambda name: of_kind[name])
         return clear or {better: of_kind[better]}
 
     def removed_by_numbers(self) -> Array:

@@ -21,6 +21,7 @@ from cpfls_cli.gap.naming.scoring import (
     score,
 )
 from cpfls_cli.gap.settings import ERRORS, VISIBLE, GapSettings
+from cpfls_cli.rounding import tied
 from cpfls_cli.weak_form.resampling import blocks_of, mirror_shifted
 
 NEAR = 0.6
@@ -161,15 +162,26 @@ def rows(hypothesis: System) -> int:
 
 def surely_less(one: Scored, other: Scored) -> bool:
     """Tell whether one explanation leaves less than another, by more than the scatter over blocks."""
-    # Slow to load, and needed only where two explain almost the same.
-    from scipy.stats import wilcoxon
-
-    margin = other.block_error - one.block_error
+    margin = more_left(other.block_error, one.block_error)
     if len(margin) < 2 or margin.sum() <= 0:
         return False
     spread = len(margin) * float(mean_error(margin))
     # Effects act in some blocks and not in others: where sizes differ that much, ranks tell more than the mean.
-    return bool(margin.sum() > ERRORS * spread or wilcoxon(margin, alternative="greater").pvalue < _CHANCE)
+    return bool(margin.sum() > ERRORS * spread or chance_of_ranks(margin) < _CHANCE)
+
+
+def more_left(one: Array, other: Array) -> Array:
+    """Compute by how much more one explanation leaves of each block than another; 0 where that is rounding."""
+    return np.where(tied(one, other), 0.0, one - other)
+
+
+def chance_of_ranks(margin: Array) -> float:
+    """Compute how likely chance makes such margins over blocks, by the signed-rank test of Wilcoxon."""
+    # Slow to load, and needed only where two explain almost the same.
+    from scipy.stats import wilcoxon
+
+    differing = margin[margin != 0]
+    return float(wilcoxon(differing, alternative="greater").pvalue) if len(differing) else 1.0
 
 
 def least_gain(above_floor: float, windows: int) -> float:

@@ -15,6 +15,7 @@ from cpfls_cli.gap.balance.balance_system import System
 from cpfls_cli.gap.balance.refine import compensation, fit, free_shapes, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.settings import ERRORS
+from cpfls_cli.rounding import ascending
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.resampling import Beside, Folds, folds
 
@@ -146,7 +147,7 @@ def score(arranged: Layout, beside: Beside, hypothesis: System) -> tuple[list[Sc
         error = _error(placed, placed.columns, beside)
         chance = np.maximum(chance, (beside.before - error)[:, 1:].sum(axis=0))
         scored.append(_scored(placed, error[:, 0], beside, vehicle))
-    return sorted(scored, key=lambda candidate: -candidate.gain), chance
+    return ascending(scored, lambda candidate: -candidate.gain), chance
 
 
 def normal_equations(arranged: Layout, right: Array, floor: Array, block: IntArray) -> Folds:

@@ -18,6 +18,7 @@ from cpfls_cli.gap.naming.leftover import usual_size
 from cpfls_cli.gap.naming.results import Alternative, NamedEffect
 from cpfls_cli.gap.naming.scoring import candidates_of, information
 from cpfls_cli.gap.next_flight.separation import SURE, Question, SizedEffect, gathered, judged, shared_noise
+from cpfls_cli.rounding import smallest
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -177,7 +178,7 @@ def fitted_rival(
         balance = system(flights, [*besides, candidate])
         return float((((balance.residual - balance.base @ fit(balance, floor)) / floor) ** 2).sum())
 
-    best = min(candidates_of([rival]), key=error)
+    best = smallest(candidates_of([rival]), error)
     return fitted_effects(flights, refined(flights, [*besides, best], floor).chosen, floor)[-1]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.rigid_body import body_torque, inertia_tensor
 from cpfls_cli.errors import ComputationError, SettingError
+from cpfls_cli.rounding import at_most
 from cpfls_cli.simulation.inverse import collective_thrust
 from cpfls_cli.trajectory.harmonics import HarmonicPath, harmonic_trajectory, random_path
 from cpfls_cli.trajectory.planning import Trajectory
@@ -90,7 +91,7 @@ class Room:
 
     def _share(self, path: HarmonicPath, halvings: int) -> float:
         """Find the largest share of a path that keeps the limits on motion and rotors, by bisection."""
-        if self.load(path) <= 1:
+        if at_most(self.load(path), 1.0):
             return 1.0
         low, high = 0.0, 1.0
         for _ in range(halvings):

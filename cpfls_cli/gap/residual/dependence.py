@@ -11,6 +11,7 @@ from numpy.polynomial import chebyshev
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
+from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.resampling import about_flight_mean, folds, mirror_shifted
 
 # Curves with two bends, and with six zeros around a circle: what formulas leave out is hardly more crooked.
@@ -104,7 +105,7 @@ def _ranked(shares: list[tuple[int, str, Array]], shifts: int) -> tuple[Dependen
         Dependence(CHANNELS[channel], name, float(share[0]), float((1 + (chance >= share[0]).sum()) / (1 + shifts)))
         for channel, name, share in shares
     ]
-    return tuple(sorted(ranked, key=lambda one: -one.r2))
+    return tuple(ascending(ranked, lambda one: -one.r2))
 
 
 def _where_known(residual: Array, flight_index: IntArray, finite: BoolArray) -> Iterator[tuple[IntArray, IntArray]]:
