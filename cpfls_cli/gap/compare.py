@@ -158,9 +158,8 @@ def _rms(rows: Array, known: Array) -> Array:
 
 def _activity(hypothesis: System, known: Array) -> Array:
     """Compute the root mean square of inertial or rotor wrench, whichever is larger."""
-    pairs = list(zip(hypothesis.flights, hypothesis.signals, strict=True))
-    taken = np.concatenate([flight.averaged(flight.inertial) for flight, _ in pairs])
-    given = np.concatenate([flight.windows.average(signals.wrench) for flight, signals in pairs])
+    taken = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
+    given = hypothesis.by_flight(lambda flight, signals: flight.windows.average(signals.wrench))
     size = np.maximum(_rms(taken, known), _rms(given, known))
     # Sideways, too, a vehicle is moved by its thrust.
     return np.concatenate([size[:3], np.full(3, np.sqrt((size[3:] ** 2).sum()))])

@@ -14,9 +14,9 @@ from cpfls_cli.consistency.numbers import impossible
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance.balance_system import System
+from cpfls_cli.gap.balance.balance_system import System, has_force
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
-from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
+from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     impossible_ratios,
@@ -63,10 +63,7 @@ class DiagnosisRun:
 
     def model(self, base: InertiaModel | None) -> ExtendedModel:
         """Build the model with the effects of the diagnosis."""
-        chosen, by_effect = self.hypothesis.chosen, self.estimates.of_effect
-        effects = tuple(FittedEffect(*pair) for pair in zip(chosen, by_effect, strict=True))
-        width = len(self.estimates.linear) - sum(len(linear) for linear in by_effect)
-        return ExtendedModel(base, self.estimates.linear[:width], effects, self.audit)
+        return ExtendedModel.of(base, self.hypothesis, self.estimates, self.audit)
 
 
 def diagnose(
@@ -189,7 +186,7 @@ def _torque_alone(
     weak: Sequence[WeakFlight], settings: GapSettings, effects: Sequence[Effect]
 ) -> tuple[tuple[str, float], ...]:
     """List the effects that the torques alone would name first, where the force balance was used too."""
-    if not any(flight.known[3:].any() for flight in weak):
+    if not has_force(weak):
         return ()
     step = rank_effects([flight.without_force() for flight in weak], (), effects, settings, None)
     best = [scored for scored in step.ranking[:3] if np.isfinite(scored.gain) and scored.gain > 0]
@@ -269,5 +266,5 @@ def _pull(hypothesis: System, floor: Array) -> Array:
 
 
 def _excited(hypothesis: System, floor: Array) -> bool:
-    rows = np.concatenate([flight.averaged(flight.inertial) for flight in hypothesis.flights])
+    rows = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
     return bool((rows[:, :3].std(axis=0) > _EXCITED_FLOORS * floor[:3]).any())

@@ -14,7 +14,7 @@ from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.gap.balance.balance_system import System, is_free, scatter_size, scatter_variance, system
+from cpfls_cli.gap.balance.balance_system import System, is_free, relative_scatter, system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import (
     CHANNELS,
@@ -26,7 +26,7 @@ from cpfls_cli.gap.balance.weak_flight import (
     translation_balance,
 )
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, weighted_estimates
-from cpfls_cli.gap.naming.held_out import HeldOut, judged_unseen
+from cpfls_cli.gap.naming.held_out import HeldOut, held_out
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.preparation import Preparation
@@ -65,6 +65,12 @@ class ExtendedModel:
     parameters: Array
     effects: tuple[FittedEffect, ...] = ()
     audit: Audit | None = None
+
+    @classmethod
+    def of(cls, base: InertiaModel | None, hypothesis: System, estimates: Estimates, audit: Audit) -> ExtendedModel:
+        """Build the model that a fit found."""
+        fitted = tuple(FittedEffect(*pair) for pair in zip(hypothesis.chosen, estimates.of_effect, strict=True))
+        return cls(base, estimates.of_vehicle, fitted, audit)
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
@@ -105,7 +111,7 @@ class ExtendedModel:
         array, shape (window, 6), N m and N
         """
         hypothesis = self.system(flights)
-        return np.asarray(hypothesis.residual - hypothesis.base @ self.linear)
+        return hypothesis.left(self.linear)
 
 
 def plain(base: InertiaModel | None) -> ExtendedModel:
@@ -203,19 +209,16 @@ def extend(
     start = refined(flights, chosen, best_floor(system(flights, chosen)))
     floor = best_floor(start)
     hypothesis, estimates = weighted_estimates(start, floor, block_index(start, settings))
-    residual = hypothesis.residual - hypothesis.base @ estimates.linear
-    scatter = scatter_size(scatter_variance(hypothesis), residual, floor)
-    held_out = judged_unseen(held, prepared, hypothesis, estimates.linear, scatter)
-    _require_smaller(held_out)
-    fitted = tuple(FittedEffect(*pair) for pair in zip(hypothesis.chosen, estimates.of_effect, strict=True))
-    width = len(estimates.linear) - sum(len(linear) for linear in estimates.of_effect)
-    model = ExtendedModel(base, estimates.linear[:width], fitted, audit)
-    return Refit(model, tuple(_renewed(effects, hypothesis, estimates)), estimates, held_out)
+    scatter = relative_scatter(hypothesis, estimates.linear, floor)
+    unseen = held_out(prepared.logged(held), prepared.repaired(held), hypothesis, estimates.linear, scatter)
+    _require_smaller(unseen)
+    model = ExtendedModel.of(base, hypothesis, estimates, audit)
+    return Refit(model, tuple(_renewed(effects, hypothesis, estimates)), estimates, unseen)
 
 
-def _require_smaller(held_out: HeldOut) -> None:
-    before, after = held_out.size(held_out.before).floors, held_out.size(held_out.after).floors
-    moved = held_out.size(held_out.before - held_out.after).floors > VISIBLE
+def _require_smaller(unseen: HeldOut) -> None:
+    before, after = unseen.size(unseen.before).floors, unseen.size(unseen.after).floors
+    moved = unseen.size(unseen.before - unseen.after).floors > VISIBLE
     if not moved.any():
         raise ComputationError("not extended: what is named changes no channel of the held-out flights by its noise")
     if (after[moved] ** 2).sum() >= (before[moved] ** 2).sum():
@@ -244,6 +247,6 @@ def _renewed(effects: Sequence[NamedEffect], hypothesis: System, estimates: Esti
             renewed.append(effect)
             continue
         candidate, linear, numbers = fitted[effect.name]
-        sentence = effect_sentence(candidate.effect, numbers, hypothesis.flights[0].signals.vehicle)
+        sentence = effect_sentence(candidate.effect, numbers, hypothesis.vehicle)
         renewed.append(replace(effect, candidate=candidate, linear=linear, coefficients=numbers, sentence=sentence))
     return renewed

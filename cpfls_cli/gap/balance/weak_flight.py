@@ -44,6 +44,10 @@ class Candidate(NamedTuple):
         effect = self.effect
         return effect.name, effect.columns, len(effect.coefficients), tuple(self.shape.values())
 
+    def at(self, values: Mapping[str, float]) -> Candidate:
+        """Give some shapes other values."""
+        return self._replace(shape={**self.shape, **values})
+
 
 @dataclass(frozen=True, eq=False)
 class WeakFlight:

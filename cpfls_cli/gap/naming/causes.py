@@ -124,9 +124,8 @@ def _remaining(
 ) -> Array:
     """Compute the residual with some of the effects only, at the coefficients of all of them."""
     hypothesis = system(flights, [chosen[index] for index in kept])
-    parameters = estimates.linear[: len(estimates.linear) - sum(len(linear) for linear in estimates.of_effect)]
     linear = [estimates.of_effect[index] for index in kept if is_free(chosen[index])]
-    return np.asarray(hypothesis.residual - hypothesis.base @ np.concatenate([parameters, *linear]))
+    return hypothesis.left(np.concatenate([estimates.of_vehicle, *linear]))
 
 
 def wrong_numbers(
@@ -200,7 +199,7 @@ def sensor_fault(
     """
     logged, repaired = system(as_logged), system(as_repaired)
     weight = np.sqrt(np.mean(repaired.residual**2, axis=0)) + 1e-12
-    before, after = ((s.residual - s.base @ fit(s, weight)) / weight for s in (logged, repaired))
+    before, after = (s.left(fit(s, weight)) / weight for s in (logged, repaired))
     share = float(np.clip(1 - (after**2).sum() / max((before**2).sum(), 1e-12), 0, 1))
     coefficients = _sensor_estimates(finding, as_repaired[0].signals.vehicle)
     return NamedEffect(finding.name, None, np.zeros(0), coefficients, finding.p_value, share, 1.0, finding.sentence)

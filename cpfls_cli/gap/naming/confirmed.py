@@ -57,11 +57,8 @@ class Judge:
     def judge(self, found: Fitted) -> Judgement:
         """Evaluate effects on the held-out flights, beside the model with its own numbers refitted."""
         hypothesis, _, estimates = found
-        plain = system(hypothesis.flights)
-        weight = np.where(plain.residual.any(axis=0), np.sqrt(np.mean(plain.residual**2, axis=0)), 1.0)
         scatter = relative_scatter(hypothesis, estimates.linear, self.floor)
-        unseen = held_out(self.logged, self.repaired, hypothesis, estimates.linear, fit(plain, weight), scatter)
-        return Judgement(found, unseen)
+        return Judgement(found, held_out(self.logged, self.repaired, hypothesis, estimates.linear, scatter))
 
     def remainder(self, found: Fitted) -> Leftover:
         """Analyse what effects leave of the flights that they were found in."""
@@ -103,7 +100,7 @@ class Judge:
         kept = [each for each in judgement.found.hypothesis.chosen if each.effect.name != name]
         without = fitted(self.training, kept, self.floor, self.settings)
         there = system(self.repaired, without.hypothesis.chosen)
-        residual, unseen = there.residual - there.base @ without.estimates.linear, judgement.held_out
+        residual, unseen = there.left(without.estimates.linear), judgement.held_out
         squares = [((each / unseen.noise) ** 2) * unseen.known for each in (residual, unseen.after)]
         count = np.maximum(unseen.known.sum(axis=0), 1)
         difference, block = squares[0] - squares[1], block_index(there, self.settings)
@@ -226,7 +223,7 @@ def differences(
     tuple of str
         Sentences; none where the flights agree, in a gap or in none.
     """
-    seen = _size(start.hypothesis.residual - start.hypothesis.base @ fit(start.hypothesis, start.floor), start.floor)
+    seen = _size(start.hypothesis.left(fit(start.hypothesis, start.floor)), start.floor)
     held = last.held_out
     # Numbers of the vehicle that took up what only one of the roles has are wrong for the other.
     unseen = smallest((held.size(each).floors for each in (held.before, held.parameters)), np.nanmax)
@@ -259,9 +256,8 @@ def _other_numbers(first: Judgement, judge: Judge, settings: GapSettings) -> tup
     # Shapes are held: a load that swings from another start would ask for another cable, and is the same load.
     refit = system(judge.repaired, hypothesis.chosen)
     own = estimates(refit, channel_weight(refit, unseen.floor), block_index(refit, settings))
-    after = refit.residual - refit.base @ own.linear
-    before = unseen.parameters
-    if share_removed(before / unseen.noise, after / unseen.noise, unseen.known) < settings.named_share:
+    after = refit.left(own.linear)
+    if share_removed(unseen.parameters / unseen.noise, after / unseen.noise, unseen.known) < settings.named_share:
         return ()
     if _size(after * unseen.known, unseen.floor).max() > CLEAR:
         return ()

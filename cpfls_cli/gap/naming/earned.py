@@ -180,7 +180,7 @@ def _lesser(found: Fitted, floor: Array, *pair: int) -> tuple[list[Candidate], R
     for index in pair:
         others = [candidate for position, candidate in enumerate(chosen) if position != index]
         without, estimates = weighted_estimates(system(found.hypothesis.flights, others), floor, found.block)
-        left[index] = float((((without.residual - without.base @ estimates.linear) / floor) ** 2).sum())
+        left[index] = float(((without.left(estimates.linear) / floor) ** 2).sum())
     out = smallest(left, lambda index: left[index])
     other = next(index for index in pair if index != out)
     names = chosen[out].effect.name, chosen[other].effect.name

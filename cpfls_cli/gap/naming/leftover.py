@@ -12,7 +12,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance.balance_system import System, left_over, scatter_size, scatter_variance
+from cpfls_cli.gap.balance.balance_system import System, left_over, window_noise
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
 from cpfls_cli.gap.naming.bends import bends_of
 from cpfls_cli.gap.naming.earned import Fitted, fitted
@@ -82,17 +82,15 @@ def leftover(
     floor : array, shape (6,)
     block : array of int, shape (window,)
     """
-    residual = hypothesis.residual - hypothesis.base @ linear
-    variance = scatter_variance(hypothesis)
-    scatter = scatter_size(variance, residual, floor)
-    in_floors = residual / np.sqrt(floor**2 + scatter * variance)
+    residual = hypothesis.left(linear)
+    in_floors = residual / window_noise(hypothesis, residual, floor)
     sizes = np.sqrt(np.mean(in_floors**2, axis=0))
     states = joined_states([state_signals(f, s) for f, s in zip(hypothesis.flights, hypothesis.signals, strict=True)])
     dependence = rank_dependence(
         in_floors, hypothesis.flight_index, block, without_actuation(states), settings.shifts, rng
     )
     band = _band(hypothesis, linear, settings, rng)
-    rates = np.concatenate([flight.windows.average(flight.signals.body_rate) for flight in hypothesis.flights])
+    rates = hypothesis.by_flight(lambda flight, _: flight.windows.average(flight.signals.body_rate))
     # A force turns nothing.
     directions = [*energy_directions(residual[:, :3], rates, block), *["neither"] * 3]
     unexplained = [
@@ -276,7 +274,7 @@ def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
     shape = {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes}
     columns = hypothesis.columns(Candidate(effect, shape)) / floor[:, None]
     new = _beyond_base(hypothesis.base / floor[:, None], columns) * usual_size(
-        effect, hypothesis.flights[0].signals.vehicle, columns.shape[2]
+        effect, hypothesis.vehicle, columns.shape[2]
     )
     # The best channel of the best coefficient decides.
     if np.sqrt((new**2).mean(axis=0)).max(initial=0.0) >= VISIBLE:

@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.gap.balance.balance_system import System, floors, system
+from cpfls_cli.gap.balance.balance_system import System, channel_size, floors, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
 from cpfls_cli.gap.naming.scoring import (
@@ -107,7 +107,7 @@ def rank_effects(
     block = block_index(hypothesis, settings)
     right = hypothesis.residual[..., None]
     if rng is not None:
-        unexplained = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
+        unexplained = hypothesis.left(fit(hypothesis, floor))
         shifted = mirror_shifted(unexplained, hypothesis.flight_index, settings.shifts, rng)
         right = np.concatenate([right, shifted], axis=2)
     beside = normal_equations(arranged, right, floor, block).beside(arranged.base)
@@ -130,8 +130,7 @@ def best_floor(hypothesis: System) -> Array:
 
 
 def _best_floor(hypothesis: System) -> Array:
-    rows = hypothesis.residual
-    floor = np.where(rows.any(axis=0), np.sqrt(np.mean(rows**2, axis=0)), 1.0)
+    floor = channel_size(hypothesis.residual)
     for _ in range(2):
         floor = floors(hypothesis, fit(hypothesis, floor))
     return floor

@@ -12,7 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System
-from cpfls_cli.gap.balance.refine import compensation, fit, free_shapes, shape_columns
+from cpfls_cli.gap.balance.refine import compensation, fit, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.settings import ERRORS
 from cpfls_cli.rounding import ascending
@@ -110,18 +110,11 @@ def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) ->
         indices = np.arange(first, first + columns.shape[2])
         placed.append(PlacedCandidate(candidate, indices, _weight(hypothesis, candidate)))
         first += columns.shape[2]
-    widths = [(each, hypothesis.columns(each).shape[2]) for each in hypothesis.free]
-    widths += [(one.candidate, len(one.columns)) for one in placed]
-    vehicle = hypothesis.flights[0].signals.vehicle
-    known = [information(each.effect, width, vehicle) for each, width in widths]
-    free, offered = known[: len(hypothesis.free)], known[len(hypothesis.free) :]
-    shapes = np.array([1.0 / np.ptp(_grid(each, name)) ** 2 for each, name in free_shapes(hypothesis)])
+    free = [information(each.effect, place.stop - place.start, hypothesis.vehicle) for each, place in hypothesis.places]
+    shapes = np.array([1.0 / np.ptp(shape.grid) ** 2 for shape in hypothesis.shapes])
+    offered = [information(one.candidate.effect, len(one.columns), hypothesis.vehicle) for one in placed]
     prior = np.concatenate([*free, shapes, *offered])
     return Layout(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(placed), prior)
-
-
-def _grid(candidate: Candidate, name: str) -> tuple[float, ...]:
-    return next(shape.grid for shape in candidate.effect.shapes if shape.name == name)
 
 
 def score(arranged: Layout, beside: Beside, hypothesis: System) -> tuple[list[Scored], Array]:
@@ -141,12 +134,12 @@ def score(arranged: Layout, beside: Beside, hypothesis: System) -> tuple[list[Sc
     chance : array, shape (shift,)
         Gain of the best candidate on each of the shifted residuals.
     """
-    vehicle, scored = hypothesis.flights[0].signals.vehicle, []
+    scored = []
     chance = np.full(beside.before.shape[1] - 1, -np.inf)
     for placed in arranged.candidates:
         error = _error(placed, placed.columns, beside)
         chance = np.maximum(chance, (beside.before - error)[:, 1:].sum(axis=0))
-        scored.append(_scored(placed, error[:, 0], beside, vehicle))
+        scored.append(_scored(placed, error[:, 0], beside, hypothesis.vehicle))
     return ascending(scored, lambda candidate: -candidate.gain), chance
 
 

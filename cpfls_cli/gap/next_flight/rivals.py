@@ -145,18 +145,17 @@ def fitted_effects(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], f
         Their shapes are kept.
     floor : array, shape (6,), N m and N
     """
-    balance, vehicle = system(flights, chosen), flights[0].signals.vehicle
-    widths = [balance.columns(each).shape[2] for each in balance.free]
-    matrix = (balance.base / floor[:, None]).reshape(-1, sum(widths))
-    pairs = zip(balance.free, widths, strict=True)
-    prior = np.concatenate([information(each.effect, width, vehicle) for each, width in pairs])
+    balance = system(flights, chosen)
+    matrix = (balance.base / floor[:, None]).reshape(-1, balance.base.shape[2])
+    widths = [(each, place.stop - place.start) for each, place in balance.places]
+    prior = np.concatenate([information(each.effect, width, balance.vehicle) for each, width in widths])
     # Rows of the prior beside those of the flights; lengths of columns differ by decades.
     matrix = np.concatenate([matrix, np.diag(np.sqrt(prior))])
     right = np.concatenate([(balance.residual / floor).reshape(-1), np.zeros(len(prior))])
     length = np.linalg.norm(matrix, axis=0)
     scale = 1.0 / np.where(length > 0, length, 1.0)
-    parts = np.split(np.linalg.lstsq(matrix * scale, right, rcond=1e-9)[0] * scale, np.cumsum(widths)[:-1])
-    by_name = {each.effect.name: part for each, part in zip(balance.free, parts, strict=True)}
+    linear = np.linalg.lstsq(matrix * scale, right, rcond=1e-9)[0] * scale
+    by_name = {each.effect.name: linear[place] for each, place in balance.places}
     return tuple(SizedEffect(each, by_name.get(each.effect.name, np.ones(1))) for each in chosen)
 
 
@@ -176,7 +175,7 @@ def fitted_rival(
 
     def error(candidate: Candidate) -> float:
         balance = system(flights, [*besides, candidate])
-        return float((((balance.residual - balance.base @ fit(balance, floor)) / floor) ** 2).sum())
+        return float(((balance.left(fit(balance, floor)) / floor) ** 2).sum())
 
     best = smallest(candidates_of([rival]), error)
     return fitted_effects(flights, refined(flights, [*besides, best], floor).chosen, floor)[-1]
