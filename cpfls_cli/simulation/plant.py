@@ -86,7 +86,7 @@ def effect_wrench(chosen: SimulatedEffects, hover: Signals) -> EffectWrench:
 
 
 def _by_columns(effect: Effect) -> bool:
-    elsewhere = effect.carried is not None or (effect.kind == "actuator" and effect.vehicle is None)
+    elsewhere = effect.carried is not None or (effect.kind == "actuator" and effect.in_vehicle is None)
     return effect.columns is not None and not elsewhere
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, thrust_wrench
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, a_few_percent, thrust_wrench
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -132,7 +132,7 @@ EFFECT = Effect(
     },
     source="Bauersfeld et al. 2021, NeuroBEM, eq. 19; Bangura and Mahony (0.5 < x < 2); the sources disagree in sign",
     columns=_columns,
-    accounts=lambda _number, _values: 0.05,
+    accounts=a_few_percent,
     shapes=(Shape("sideways", "1", (0.4, 0.7, 1.0, 1.5), "sideways speed over v_h that blows the effect away"),),
     scatter=_scatter,
     describe=_describe,

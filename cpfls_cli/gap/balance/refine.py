@@ -331,7 +331,7 @@ def _exact(hypothesis: System, weight: Array) -> System:
 
 def _in_place_of(effect: Effect, exact: Effect, linear: Array) -> Candidate:
     """Start the shapes at what the linear coefficients say."""
-    physical = linear if effect.physical is None else np.nan_to_num(effect.physical(linear))
+    physical = linear if effect.physical is None else np.nan_to_num(effect.physical.of(linear))
     values = {known.name: float(value) for known, value in zip(effect.coefficients, physical, strict=True)}
     shapes = {s.name: float(np.clip(values[s.name], s.grid[0], s.grid[-1])) for s in exact.shapes}
     return Candidate(exact, shapes)

@@ -195,7 +195,7 @@ def _of(
     vehicle = hypothesis.vehicle
     estimates = []
     if len(linear):
-        to_physical = effect.physical or (lambda values: values)
+        to_physical = effect.physical.of if effect.physical else lambda values: values
         value = to_physical(linear)
         scatter = _interval(value, np.array([to_physical(row) for row in linear_out]))
         estimates += [

@@ -297,8 +297,8 @@ def usual_size(effect: Effect, vehicle: VehicleSettings, width: int) -> Array:
     bounds = [max(abs(bound) for bound in c.bounds(vehicle)) for c in effect.coefficients]
     if effect.unit_coefficient or not bounds:
         return np.ones(width)
-    if effect.linear is not None:
-        return np.abs(effect.linear(_USUAL_OF_BOUND * np.array(bounds)))
+    if effect.physical is not None:
+        return np.abs(effect.physical.linear(_USUAL_OF_BOUND * np.array(bounds)))
     return _USUAL_OF_BOUND * np.array(bounds)[:width]
 
 

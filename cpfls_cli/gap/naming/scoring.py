@@ -216,8 +216,8 @@ def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleS
     keep = np.ones(len(linear), dtype=bool)
     listed = effect.coefficients
     if effect.physical is not None:
-        ends = np.array([effect.physical(linear + way * ERRORS * error) for way in (-1, 1)])
-        physical = effect.physical(linear)
+        ends = np.array([effect.physical.of(linear + way * ERRORS * error) for way in (-1, 1)])
+        physical = effect.physical.of(linear)
         low, high = np.array([each.bounds(vehicle) for each in listed])[: len(physical)].T
         unsure = np.isnan(ends).any(axis=0) | np.isnan(physical)
         return keep, bool(np.all(unsure | ((ends.max(axis=0) >= low) & (ends.min(axis=0) <= high))))

@@ -131,9 +131,8 @@ def _sized(named: NamedEffect) -> SizedEffect:
 
 
 def _width(effect: Effect) -> int:
-    if effect.linear is None:
-        return len(effect.coefficients)
-    return len(effect.linear(np.ones(len(effect.coefficients))))
+    numbers = np.ones(len(effect.coefficients))
+    return len(numbers if effect.physical is None else effect.physical.linear(numbers))
 
 
 def fitted_effects(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> tuple[SizedEffect, ...]:
@@ -186,6 +185,6 @@ def physical_values(sized: SizedEffect) -> dict[str, float]:
     effect, shape = sized.candidate
     if effect.unit_coefficient:
         return dict(shape)
-    physical = np.nan_to_num(sized.linear if effect.physical is None else effect.physical(sized.linear))
+    physical = np.nan_to_num(sized.linear if effect.physical is None else effect.physical.of(sized.linear))
     names = (coefficient.name for coefficient in effect.coefficients)
     return {**dict(zip(names, physical.tolist(), strict=False)), **shape}
