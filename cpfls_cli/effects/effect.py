@@ -132,13 +132,17 @@ class Columns:
         -------
         array, shape (time, 6)
         """
-        direct = np.asarray(self.direct @ coefficients)
+        momentum = None if self.momentum is None else self.momentum @ coefficients
+        return Columns(np.asarray(self.direct @ coefficients), momentum).along(time)
+
+    def along(self, time: Array) -> Array:
+        """Evaluate what has no coefficients, ``direct + d/dt momentum``, at times in s."""
         if self.momentum is None:
-            return direct
+            return self.direct
         # Slow to load, and who lists or shows effects differentiates nothing.
         from scipy.interpolate import CubicSpline
 
-        return np.asarray(direct + CubicSpline(time, self.momentum @ coefficients)(time, 1))
+        return np.asarray(self.direct + CubicSpline(time, self.momentum)(time, 1))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.consistency.audit import Audit, audit
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight, weak_flight
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
 from cpfls_cli.gap.naming.leftover import not_excited
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import NotExcited
@@ -123,7 +123,7 @@ def compare(
     centres = np.concatenate([windows.centres(flight.signals.time) for flight in flights])
     index = hypothesis.flight_index
     dependence = rank_dependence(residual / floor, index, block, states, settings.shifts, rng)
-    known = _known(flights)
+    known = np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in flights])
     rms = _rms(residual, known)
     effects = [effect for name, effect in CATALOGUE.items() if name not in settings.ignore]
     repairing = replace(model, repairs=audited)
@@ -144,10 +144,6 @@ def compare(
         played,
         errors_by_horizon(played, settings.horizon_s),
     )
-
-
-def _known(flights: Sequence[WeakFlight]) -> Array:
-    return np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in flights])
 
 
 def _rms(rows: Array, known: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -11,14 +12,12 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
-from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.gap.balance.balance_system import System, is_free, relative_scatter, system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import (
     CHANNELS,
-    Balance,
     Candidate,
     WeakFlight,
     nuisance,
@@ -99,8 +98,12 @@ class ExtendedModel:
         InputError
             If a flight lacks a signal that an effect needs.
         """
-        for flight in flights:
-            _require(flight.signals, self.chosen, flight.name)
+        for flight, candidate in product(flights, self.chosen):
+            missing = candidate.effect.missing(flight.signals)
+            if missing:
+                lacking = ", ".join(each.replace("_", " ") for each in missing)
+                name = candidate.effect.name
+                raise InputError(f"{flight.name}: lacks {lacking}, which the model's effect {name} needs")
         return system(flights, self.chosen)
 
     def residual(self, flights: Sequence[WeakFlight]) -> Array:
@@ -133,7 +136,7 @@ def inertial_torque(signals: Signals, model: InertiaModel | None) -> Array:
     -------
     array, shape (time, 3), N m, body frame
     """
-    return _at_samples(rotation_balance(signals, model), signals.time)
+    return rotation_balance(signals, model).along(signals.time)
 
 
 def inertial_force(signals: Signals) -> Array:
@@ -148,19 +151,7 @@ def inertial_force(signals: Signals) -> Array:
     -------
     array, shape (time, 3), N, body frame
     """
-    return _at_samples(translation_balance(signals), signals.time)
-
-
-def _at_samples(balance: Balance, time: Array) -> Array:
-    return Columns(balance.direct[:, :, None], balance.momentum[:, :, None]).at_samples(np.ones(1), time)
-
-
-def _require(signals: Signals, chosen: Sequence[Candidate], name: str) -> None:
-    for candidate in chosen:
-        missing = candidate.effect.missing(signals)
-        if missing:
-            lacking = ", ".join(each.replace("_", " ") for each in missing)
-            raise InputError(f"{name}: lacks {lacking}, which the model's effect {candidate.effect.name} needs")
+    return translation_balance(signals).along(signals.time)
 
 
 @dataclass(frozen=True)

@@ -54,15 +54,13 @@ def played_pairs(recordings: Sequence[Recording], model: VehicleModel, given: Ve
     InputError
         If a flight lacks a signal that an effect needs.
     """
-    return [_pair(LoggedFlight.of(recording.name, recording.signals), model, given) for recording in recordings]
-
-
-def _pair(flight: LoggedFlight, model: VehicleModel, given: VehicleModel) -> PlayedPair:
-    along, player = made_ready(model, flight)
-    if given is model:
-        return PlayedPair(along, player, player, along)
-    logged, stated = made_ready(given, flight)
-    return PlayedPair(along, player, stated, logged)
+    pairs = []
+    for recording in recordings:
+        flight = LoggedFlight.of(recording.name, recording.signals)
+        along, player = made_ready(model, flight)
+        logged, stated = (along, player) if given is model else made_ready(given, flight)
+        pairs.append(PlayedPair(along, player, stated, logged))
+    return pairs
 
 
 class LeftOut(NamedTuple):

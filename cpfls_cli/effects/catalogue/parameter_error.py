@@ -16,8 +16,9 @@ from cpfls_cli.effects.hooks import SensorLog, TrueMotion
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_COUPLING = slice(3, 6)
-_THRUST_SCALE = 6
+# Places among the coefficients.
+_COUPLING, _THRUST_SCALE = slice(3, 6), 6
+# A tenth and four times of what is stated: farther off the number was not measured but mistyped.
 _BOUNDS = (-0.9, 3.0)
 _COUPLED = (
     "coupling of the two other rates beyond that of the moments of inertia, which a wrong scale of the rotor torque"

@@ -305,7 +305,7 @@ def refitted(hypothesis: System, weight: Array) -> System:
     error = _squares(hypothesis, weight, rotor_wrench)
     low, high = np.array([shape.bounds(hypothesis.vehicle) for shape in hypothesis.shapes]).T
     for _ in range(_STEPS):
-        step = _newton_step(hypothesis, weight, rotor_wrench)
+        step = _newton_step(hypothesis, weight / compensation(rotor_wrench, hypothesis.rotor_wrench), rotor_wrench)
         for share in _SHARES:
             ahead = hypothesis.with_shapes(np.clip(hypothesis.shape_values + share * step, low, high))
             left = _squares(ahead, weight, rotor_wrench)
@@ -345,7 +345,6 @@ def _squares(hypothesis: System, weight: Array, rotor_wrench: Array) -> float:
 
 def _newton_step(hypothesis: System, weight: Array, rotor_wrench: Array) -> Array:
     """Solve for the change of the shapes, with the coefficients that no bound holds beside them, shape (shape,)."""
-    weight = weight / compensation(rotor_wrench, hypothesis.rotor_wrench)
     linear, held = fit_within_bounds(hypothesis, weight)
     shapes = shape_columns(hypothesis, linear, rotor_wrench)
     rows = equations(hypothesis, weight).around(linear, ~held, shapes / weight[..., None])

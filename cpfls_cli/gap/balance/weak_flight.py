@@ -193,13 +193,10 @@ def _weak_flight(
     floor: Array | None,
 ) -> WeakFlight:
     with_force = force and signals.has_force
-    rotation = rotation_balance(signals, model)
     nothing = np.zeros((len(signals), 3))
-    translation = translation_balance(signals) if with_force else Balance(nothing, nothing)
-    inertial = Columns(
-        np.concatenate([rotation.direct, translation.direct], axis=1),
-        np.concatenate([rotation.momentum, translation.momentum], axis=1),
-    )
+    sides = rotation_balance(signals, model), translation_balance(signals) if with_force else Columns(nothing)
+    momenta = [nothing if side.momentum is None else side.momentum for side in sides]
+    inertial = Columns(np.concatenate([side.direct for side in sides], axis=1), np.concatenate(momenta, axis=1))
     known = np.array([signals.torque is not None and axis in axes for axis in _AXES] + [with_force] * 3)
     everything = np.ones(len(nuisance().effect.coefficients))
     cut_off = channel_cut_offs(signals, model is not None)
@@ -256,20 +253,7 @@ def actuated(signals: Signals, chosen: Iterable[Candidate]) -> Signals:
     return signals
 
 
-@dataclass(frozen=True)
-class Balance:
-    """One side of a balance, ``d/dt momentum + direct``.
-
-    Attributes
-    ----------
-    momentum, direct : array, shape (time, 3), body axes
-    """
-
-    momentum: Array
-    direct: Array
-
-
-def rotation_balance(signals: Signals, model: InertiaModel | None = None) -> Balance:
+def rotation_balance(signals: Signals, model: InertiaModel | None = None) -> Columns:
     """Compute the inertial body torque in momentum form.
 
     A rigid body: momentum ``I omega``, direct ``omega x I omega``. A model in Euler coordinates: ``W^-T (d/dt (J qd) -
@@ -282,28 +266,25 @@ def rotation_balance(signals: Signals, model: InertiaModel | None = None) -> Bal
 
     Returns
     -------
-    Balance
-        N m s and N m.
+    Columns
+        Of shape (time, 3), N m s and N m, body axes.
 
     Raises
     ------
     InputError
         If the model needs an attitude that the flight lacks.
     """
-    if model is not None:
-        return _euler_balance(signals, model)
-    momentum = signals.body_rate @ inertia_tensor(signals.vehicle)
-    return Balance(momentum, np.cross(signals.body_rate, momentum))
-
-
-def _euler_balance(signals: Signals, model: InertiaModel) -> Balance:
+    if model is None:
+        momentum = signals.body_rate @ inertia_tensor(signals.vehicle)
+        return Columns(np.cross(signals.body_rate, momentum), momentum)
     attitude = signals.attitude
     if attitude is None:
         raise InputError("the model needs the attitude, which the flight lacks")
-    return Balance(*momentum_form(attitude, signals.body_rate, model.inertia(attitude)))
+    momentum, direct = momentum_form(attitude, signals.body_rate, model.inertia(attitude))
+    return Columns(direct, momentum)
 
 
-def translation_balance(signals: Signals) -> Balance:
+def translation_balance(signals: Signals) -> Columns:
     """Compute mass times specific force in momentum form, body axes.
 
     From the accelerometer, else from the acceleration, else from the velocity: ``d/dt (m v_b) + m omega x v_b +
@@ -316,15 +297,15 @@ def translation_balance(signals: Signals) -> Balance:
 
     Returns
     -------
-    Balance
-        N s and N.
+    Columns
+        Of shape (time, 3), N s and N, body axes; without momentum unless from the velocity.
     """
     mass, gravity = signals.vehicle.mass_kg, signals.vehicle.gravity_m_s2
     if signals.specific_force is not None:
-        return Balance(np.zeros((len(signals), 3)), mass * signals.specific_force)
+        return Columns(mass * signals.specific_force)
     weight = mass * gravity * signals.rotation[:, 2]
     if signals.acceleration is not None:
         felt = np.einsum("tji,tj->ti", signals.rotation, signals.acceleration)
-        return Balance(np.zeros((len(signals), 3)), mass * felt + weight)
+        return Columns(mass * felt + weight)
     momentum = mass * signals.ground_velocity
-    return Balance(momentum, np.cross(signals.body_rate, momentum) + weight)
+    return Columns(np.cross(signals.body_rate, momentum) + weight, momentum)

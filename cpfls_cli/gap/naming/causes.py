@@ -29,6 +29,9 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 _MATTERS = 0.02
 """Relative error of a moment of inertia or of the thrust from which on it is told."""
 
+_SURE = 1.5
+"""Half widths of its interval that an error exceeds: four numbers are asked."""
+
 _LEAST_SHARE = 0.2
 """Share of the gap of its own channel that a refitted number of the vehicle has to take off unseen flights."""
 
@@ -170,21 +173,16 @@ def impossible_ratios(numbers: Sequence[Estimate]) -> dict[str, float]:
 
 
 def _is_wrong(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
+    """Tell whether a number is surely wrong, by as much as matters and more than named effects account for."""
     if number.name not in NUMBERS:
         return False
     half = 0.5 * (number.high - number.low)
-    sure = abs(number.value) > 1.5 * half and abs(number.value) > _MATTERS
-    return sure and abs(number.value) > _accounted(number.name, effects)
-
-
-def _accounted(name: str, effects: Sequence[NamedEffect]) -> float:
-    """Sum the relative error of a number that named effects account for."""
     accounted = 0.0
     for effect in effects:
         accounts = CATALOGUE[effect.name].accounts
         if accounts is not None:
-            accounted += accounts(name, {c.name: c.value for c in effect.coefficients})
-    return accounted
+            accounted += accounts(number.name, {c.name: c.value for c in effect.coefficients})
+    return abs(number.value) > max(_SURE * half, _MATTERS) and abs(number.value) > accounted
 
 
 def sensor_fault(

@@ -99,7 +99,12 @@ def on_bound(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | N
     chosen = found.hypothesis.chosen
     for candidate, estimates in zip(chosen, found.estimates.effects, strict=True):
         names = [shape.name for shape in candidate.effect.shapes]
-        if len(names) > 1 and all(_at_an_end(number) for number in estimates if number.name in names):
+        ends = (
+            any(bound and number.low <= bound <= number.high for bound in number.plausible)
+            for number in estimates
+            if number.name in names
+        )
+        if len(names) > 1 and all(ends):
             says = f"{' and '.join(names)} may all be at the bounds of what is possible"
             return [candidate], Refusal(candidate.effect.name, says, True)
     reached = {
@@ -122,11 +127,6 @@ def on_bound(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | N
             says = f"its {main[0]} sits on the bound of what is possible, {bounds[main[0]]}"
             return [chosen[index]], Refusal(name, says, True)
     return None
-
-
-def _at_an_end(number: Estimate) -> bool:
-    """Tell whether a bound other than zero lies within the interval of a number."""
-    return any(bound and number.low <= bound <= number.high for bound in number.plausible)
 
 
 def _reached(numbers: Sequence[Estimate]) -> dict[str, str]:

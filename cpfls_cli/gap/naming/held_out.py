@@ -81,7 +81,7 @@ class HeldOut:
         clear = {
             name: share
             for (name, share), kind, size in zip(of_kind.items(), kinds, sizes, strict=True)
-            if size > COUNTS * sum(sizes) and _largest(before[:, kind]) > CLEAR
+            if size > COUNTS * sum(sizes) and np.sqrt(np.mean(before[:, kind] ** 2, axis=0)).max() > CLEAR
         }
         better = largest(of_kind, lambda name: of_kind[name])
         return clear or {better: of_kind[better]}
@@ -98,10 +98,6 @@ class HeldOut:
         gone = ((before**2 - after**2) * self.known).sum(axis=0) / rows
         each = [share_removed(before[:, [c]], after[:, [c]], self.known[:, [c]]) for c in range(before.shape[1])]
         return np.where(gone > VISIBLE**2, each, 0.0)
-
-
-def _largest(residual: Array) -> float:
-    return float(np.sqrt(np.mean(residual**2, axis=0)).max())
 
 
 def share_removed(before: Array, after: Array, known: Array) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -164,22 +163,9 @@ def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[
     return ["neither" if not s else "feeds" if m > 0 else "drains" for m, s in zip(mean, sure, strict=True)]
 
 
-class Beside(NamedTuple):
-    """Numbers of the named effects, and what is there beside them without a name.
-
-    Attributes
-    ----------
-    estimates : Estimates
-        Intervals hold what the numbers are with the unnamed effects and without them.
-    """
-
-    estimates: Estimates
-    unnamed: tuple[str, ...]
-
-
 def beside_the_unnamed(
     found: Fitted, last: SearchStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
-) -> Beside:
+) -> tuple[Estimates, tuple[str, ...]]:
     """Widen the intervals of named effects by what is more than chance and too small for a name.
 
     A drag of the fuselage that shows in no channel on its own still takes its part from the drag of the rotors. And a
@@ -193,10 +179,16 @@ def beside_the_unnamed(
         Of the search, with nothing to add.
     effects : sequence of Effect
         To be tried.
+
+    Returns
+    -------
+    estimates : Estimates
+        Intervals hold what the numbers are with the unnamed effects and without them.
+    unnamed : tuple of str
     """
     named = found.hypothesis.chosen
     if not named:
-        return Beside(found.estimates, ())
+        return found.estimates, ()
     flights = found.hypothesis.flights
     step = last
     if {each.effect.name for each in named} != {each.effect.name for each in last.hypothesis.chosen}:
@@ -206,11 +198,11 @@ def beside_the_unnamed(
     if bends:
         chosen = _beyond_chance(rank_effects(flights, chosen, bends, settings, rng), bends, settings, rng)
     if len(chosen) == len(named):
-        return Beside(found.estimates, ())
+        return found.estimates, ()
     wider = fitted(flights, chosen, last.floor, settings).estimates
     pairs = zip(found.estimates.effects, wider.effects, strict=False)
     held = tuple(tuple(_both(number, there) for number in numbers) for numbers, there in pairs)
-    return Beside(replace(found.estimates, effects=held), tuple(each.effect.name for each in chosen[len(named) :]))
+    return replace(found.estimates, effects=held), tuple(each.effect.name for each in chosen[len(named) :])
 
 
 def _beyond_chance(

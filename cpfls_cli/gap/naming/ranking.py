@@ -113,7 +113,10 @@ def rank_effects(
     beside = normal_equations(arranged, right, floor, block).beside(arranged.base)
     scored, chance = score(arranged, beside, hypothesis)
     above_floor = float(max(beside.before[:, 0].sum() - rows(hypothesis), 1e-9))
-    return SearchStep(hypothesis, floor, _each_once(scored), chance, above_floor, block)
+    once: dict[str, Scored] = {}
+    for each in scored:
+        once.setdefault(each.candidate.effect.name, each)
+    return SearchStep(hypothesis, floor, tuple(once.values()), chance, above_floor, block)
 
 
 def best_floor(hypothesis: System) -> Array:
@@ -125,15 +128,15 @@ def best_floor(hypothesis: System) -> Array:
     -------
     array, shape (6,)
     """
+
+    def settled() -> Array:
+        floor = channel_size(hypothesis.residual)
+        for _ in range(2):
+            floor = floors(hypothesis, fit(hypothesis, floor))
+        return floor
+
     key = (best_floor, hypothesis.flights, tuple(candidate.key for candidate in hypothesis.chosen))
-    return hypothesis.flights[0].signals.once(key, lambda: _best_floor(hypothesis))
-
-
-def _best_floor(hypothesis: System) -> Array:
-    floor = channel_size(hypothesis.residual)
-    for _ in range(2):
-        floor = floors(hypothesis, fit(hypothesis, floor))
-    return floor
+    return hypothesis.flights[0].signals.once(key, settled)
 
 
 def block_index(hypothesis: System, settings: GapSettings) -> IntArray:
@@ -145,13 +148,6 @@ def block_index(hypothesis: System, settings: GapSettings) -> IntArray:
     """
     centres = np.concatenate([f.windows.centres(f.signals.time) for f in hypothesis.flights])
     return blocks_of(hypothesis.flight_index, centres, settings.block_s)
-
-
-def _each_once(ranking: Sequence[Scored]) -> tuple[Scored, ...]:
-    seen: dict[str, Scored] = {}
-    for scored in ranking:
-        seen.setdefault(scored.candidate.effect.name, scored)
-    return tuple(seen.values())
 
 
 def rows(hypothesis: System) -> int:

@@ -20,6 +20,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.resampling import Beside, Folds, folds
 
 REFUSED = -np.inf
+"""Gain of a candidate with a coefficient beyond its bounds: below that of any other."""
 
 
 @dataclass(frozen=True)

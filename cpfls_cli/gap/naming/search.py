@@ -170,7 +170,7 @@ def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> l
         for other in ranking
         if other.candidate.effect.name != chosen.candidate.effect.name
         and other.gain > NEAR * chosen.gain
-        and not _beats(chosen, other, above_floor)
+        and not (_clearly_less(chosen, other, above_floor) and surely_less(chosen, other))
     ]
 
 
@@ -204,9 +204,10 @@ def alternatives(chosen: Scored, ranking: Sequence[Scored], above_floor: float) 
     ]
 
 
-def _beats(chosen: Scored, other: Scored, above_floor: float) -> bool:
+def _clearly_less(chosen: Scored, other: Scored, above_floor: float) -> bool:
+    """Tell whether one explanation leaves less than another by more than next to nothing."""
     margin = float(more_left(other.block_error, chosen.block_error).sum())
-    return margin > least_margin(above_floor, float(chosen.block_error.sum())) and surely_less(chosen, other)
+    return margin > least_margin(above_floor, float(chosen.block_error.sum()))
 
 
 def _numbers(scored: Scored) -> int:

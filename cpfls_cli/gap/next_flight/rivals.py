@@ -75,7 +75,9 @@ def _is_open(question: Question) -> bool:
 def usual(effect: Effect, vehicle: VehicleSettings) -> SizedEffect:
     """Give an effect a size that is large but not unheard of."""
     candidate = Candidate(effect, {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes})
-    return SizedEffect(candidate, usual_size(effect, vehicle, 1 if effect.unit_coefficient else _width(effect)))
+    numbers = np.ones(len(effect.coefficients) or 1)
+    width = len(numbers if effect.physical is None else effect.physical.linear(numbers))
+    return SizedEffect(candidate, usual_size(effect, vehicle, width))
 
 
 def questions_left(
@@ -95,7 +97,11 @@ def questions_left(
         Of the diagnosis, repaired.
     floor : array, shape (6,), N m and N
     """
-    sized = {each.name: _sized(each) for each in named if each.candidate is not None}
+    sized = {
+        each.name: SizedEffect(each.candidate, each.linear if len(each.linear) else np.ones(1))
+        for each in named
+        if each.candidate is not None
+    }
     questions, beside = [], []
     for rival in rivals:
         one = sized[rival.instead_of]
@@ -123,16 +129,6 @@ def _is_told(question: Question, flights: Sequence[WeakFlight], floor: Array) ->
         return False
     answer = judged(*gathered(question, flights, floor), shared_noise(flights[0].windows))
     return answer.sure >= SURE
-
-
-def _sized(named: NamedEffect) -> SizedEffect:
-    assert named.candidate is not None, "an effect of the motion has its shapes"
-    return SizedEffect(named.candidate, named.linear if len(named.linear) else np.ones(1))
-
-
-def _width(effect: Effect) -> int:
-    numbers = np.ones(len(effect.coefficients))
-    return len(numbers if effect.physical is None else effect.physical.linear(numbers))
 
 
 def fitted_effects(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> tuple[SizedEffect, ...]:

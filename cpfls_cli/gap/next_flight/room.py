@@ -23,6 +23,7 @@ TILT_MAX = np.radians(35.0)
 
 _ROTOR_SHARE = 0.85
 """Of the largest speed of a rotor, and of the way down from hovering to rest, in squares: the rest is for control."""
+# Half of a turn to either side shows every heading.
 _MOST_YAW = np.pi
 # Of the fastest wave: between them a load is at most 1 % larger.
 _SAMPLES_PER_PERIOD = 20
@@ -54,11 +55,6 @@ class Room:
     settings: TrajectorySettings
     vehicle: VehicleSettings
     period: float
-
-    @property
-    def _seen_at(self) -> float:
-        """Time between samples at which loads are looked at, s."""
-        return 1 / (_SAMPLES_PER_PERIOD * self.settings.next_flight.frequency_max_hz)
 
     def planned(self, path: HarmonicPath, period: float | None = None) -> Trajectory:
         """Sample a path, about the middle of the room."""
@@ -102,7 +98,7 @@ class Room:
     def load(self, path: HarmonicPath) -> float:
         """Compute the largest share of any limit on motion, tilt and rotors that a path takes."""
         try:
-            planned = self.planned(path, self._seen_at)
+            planned = self.planned(path, 1 / (_SAMPLES_PER_PERIOD * self.settings.next_flight.frequency_max_hz))
         except ComputationError:
             return np.inf
         signals = vars(planned)
