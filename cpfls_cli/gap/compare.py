@@ -17,7 +17,7 @@ from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import NotExcited
 from cpfls_cli.gap.playback import PlayedPair, errors_by_horizon, played_pairs
 from cpfls_cli.gap.residual.dependence import Dependence, joined_states, rank_dependence, state_signals
-from cpfls_cli.gap.residual.views import HeatMap, Stretch, heat_map, stretches
+from cpfls_cli.gap.residual.views import GapStretch, HeatMap, heat_map, stretches
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.whole_vehicle import with_effects
 from cpfls_cli.playback.model import VehicleModel
@@ -67,7 +67,7 @@ class Disagreement:
     centres: Array
     flight_index: IntArray
     states: dict[str, Array]
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[GapStretch, ...]
     dependence: tuple[Dependence, ...]
     worst: WorstChannel | None
     not_excited: tuple[NotExcited, ...]

@@ -26,7 +26,7 @@ from cpfls_cli.gap.naming.causes import (
     wrong_numbers,
 )
 from cpfls_cli.gap.naming.confirmed import Judge, Judgement, differences
-from cpfls_cli.gap.naming.earned import Fitted, Refusal, earned
+from cpfls_cli.gap.naming.earned import NamedFit, Refusal, earned
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.naming.leftover import Leftover, beside_the_unnamed, not_excited, untried
@@ -150,7 +150,7 @@ def not_judged(unseen: HeldOut) -> Iterator[str]:
 
 def _searched(
     weak: Sequence[WeakFlight], settings: GapSettings, rng: np.random.Generator, progress: Callable[[float, str], None]
-) -> tuple[list[Effect], list[SearchStep], Fitted, list[Refusal]]:
+) -> tuple[list[Effect], list[SearchStep], NamedFit, list[Refusal]]:
     """Search for effects that earn their names; once more without those that stand on a bound, or beyond.
 
     Such an effect takes up what others would explain, and has to go before they can be seen.

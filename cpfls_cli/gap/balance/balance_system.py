@@ -17,6 +17,10 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 NEGLIGIBLE = 0.003
 """Share of the torque or force below which nobody could use a correction; sampling alone leaves about as much."""
+_QUIET_AXIS = 0.3
+"""Torque of the most active axis that counts on every axis: what is negligible about one is so about the others."""
+_SCATTERING = 0.2
+"""Share of its largest variance from which on a window is one that scatters."""
 _LEAST_RATIO = 1.5
 """Mean square inside the scattering stretches over that outside from which scatter is believed."""
 
@@ -231,7 +235,7 @@ def _activity(hypothesis: System) -> Array:
     rows = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
     torque = np.sqrt(np.mean(rows[:, :3] ** 2, axis=0))
     weight = np.sqrt(np.mean(rows[:, 3:] ** 2))
-    return np.array([*np.maximum(torque, 0.3 * torque.max()), *[weight] * 3])
+    return np.array([*np.maximum(torque, _QUIET_AXIS * torque.max()), *[weight] * 3])
 
 
 def scatter_variance(hypothesis: System) -> Array:
@@ -242,11 +246,10 @@ def scatter_variance(hypothesis: System) -> Array:
     array, shape (window, 6)
         Zero where no effect scatters.
     """
-    scattering = [candidate for candidate in hypothesis.chosen if candidate.effect.scatter is not None]
 
     def of_flight(flight: WeakFlight, signals: Signals) -> Array:
         total = np.zeros((len(flight), 6))
-        for effect, shape in scattering:
+        for effect, shape in hypothesis.chosen:
             if effect.scatter is not None and not effect.missing(signals):
                 total += flight.windows.average(effect.scatter(signals, shape))
         return total * flight.known
@@ -290,7 +293,7 @@ def scatter_size(variance: Array, residual: Array, floor: Array) -> float:
     if not expected.any():
         return 0.0
     square = (residual / floor) ** 2
-    inside = expected > 0.2 * expected.max(axis=0, initial=0.0, keepdims=True) * np.sign(expected.max(axis=0))
+    inside = expected > _SCATTERING * expected.max(axis=0, initial=0.0, keepdims=True) * np.sign(expected.max(axis=0))
     inside &= expected > 0
     if not inside.any() or square[inside].mean() < _LEAST_RATIO * max(1.0, square[~inside].mean()):
         return 0.0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -177,7 +176,10 @@ def weak_flight(
     floor : array, shape (6,), N m and N, or None
         Noise of a flight that is planned; None: as its residual shows it.
     """
-    make = partial(_weak_flight, name, signals, windows, model, force, axes, floor)
+
+    def make() -> WeakFlight:
+        return _weak_flight(name, signals, windows, model, force and signals.has_force, axes, floor)
+
     # Each stage rebuilds its model, and a flight is planned once.
     shared = model is None and floor is None
     return signals.once((weak_flight, name, windows, force, tuple(axes)), make) if shared else make()
@@ -188,11 +190,10 @@ def _weak_flight(
     signals: Signals,
     windows: Windows,
     model: InertiaModel | None,
-    force: bool,
+    with_force: bool,
     axes: Sequence[str],
     floor: Array | None,
 ) -> WeakFlight:
-    with_force = force and signals.has_force
     nothing = np.zeros((len(signals), 3))
     sides = rotation_balance(signals, model), translation_balance(signals) if with_force else Columns(nothing)
     momenta = [nothing if side.momentum is None else side.momentum for side in sides]
@@ -200,20 +201,13 @@ def _weak_flight(
     known = np.array([signals.torque is not None and axis in axes for axis in _AXES] + [with_force] * 3)
     everything = np.ones(len(nuisance().effect.coefficients))
     cut_off = channel_cut_offs(signals, model is not None)
-    hardly = WeakFlight(name, signals, windows, inertial, known, everything, cut_off)
-    return replace(hardly, turns=_turns(hardly, floor))
-
-
-def _turns(flight: WeakFlight, known: Array | None) -> Array:
-    """Mark the vehicle's own numbers that the flight can show.
-
-    Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to be rid of the noise
-    of the gyroscope, which is not what anybody asked.
-    """
-    left = flight.residual(flight.signals)
-    floor = noise_floor(left, flight.windows, flight.cut_off) if known is None else known
-    moved = flight.averaged(flight.inertial)[:, :3].std(axis=0) > _TURNING * floor[:3]
-    return shown(moved)
+    flight = WeakFlight(name, signals, windows, inertial, known, everything, cut_off)
+    if floor is None:
+        floor = noise_floor(flight.residual(signals), windows, cut_off)
+    # Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to lose the noise
+    # of the gyroscope, which is not what anybody asked.
+    turning = flight.averaged(inertial)[:, :3].std(axis=0) > _TURNING * floor[:3]
+    return replace(flight, turns=shown(turning))
 
 
 def columns_of(candidate: Candidate, signals: Signals) -> Columns:

@@ -26,8 +26,8 @@ from cpfls_cli.gap.naming.ranking import (
 )
 from cpfls_cli.gap.naming.scoring import (
     Scored,
-    layout,
     normal_equations,
+    scoring_matrix,
 )
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rounding import ascending, largest
@@ -172,7 +172,7 @@ def _unseen(hypothesis: System, floor: Array, settings: GapSettings) -> Array:
     """Compute what a hypothesis leaves of each block that a fit of coefficients and shapes did not see."""
     plain = system(hypothesis.flights)
     weight = floor / compensation(plain.rotor_wrench, hypothesis.rotor_wrench)
-    arranged = layout(hypothesis, (), weight)
+    arranged = scoring_matrix(hypothesis, (), weight)
     normal = normal_equations(arranged, hypothesis.residual, weight, block_index(hypothesis, settings))
     return np.asarray(normal.solve(arranged.base)[1][:, 0])
 

@@ -13,7 +13,7 @@ from cpfls_cli.blocks import mean_error
 from cpfls_cli.gap.balance.balance_system import is_free, relative_scatter, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
-from cpfls_cli.gap.naming.earned import Fitted, Refusal, fitted, on_bound
+from cpfls_cli.gap.naming.earned import NamedFit, Refusal, fitted, on_bound
 from cpfls_cli.gap.naming.estimate import channel_weight, estimates
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out, share_removed
 from cpfls_cli.gap.naming.leftover import Leftover, leftover
@@ -31,7 +31,7 @@ _BESIDE = 0.7
 class Judgement(NamedTuple):
     """Effects with what they leave of the flights held out."""
 
-    found: Fitted
+    found: NamedFit
     held_out: HeldOut
 
 
@@ -54,13 +54,13 @@ class Judge:
     settings: GapSettings
     rng: np.random.Generator
 
-    def judge(self, found: Fitted) -> Judgement:
+    def judge(self, found: NamedFit) -> Judgement:
         """Evaluate effects on the held-out flights, beside the model with its own numbers refitted."""
         hypothesis, _, estimates = found
         scatter = relative_scatter(hypothesis, estimates.linear, self.floor)
         return Judgement(found, held_out(self.logged, self.repaired, hypothesis, estimates.linear, scatter))
 
-    def remainder(self, found: Fitted) -> Leftover:
+    def remainder(self, found: NamedFit) -> Leftover:
         """Analyse what effects leave of the flights that they were found in."""
         hypothesis, block, estimates = found
         return leftover(hypothesis, estimates.linear, self.floor, block, self.settings, self.rng)

@@ -14,7 +14,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, left_over, window_noise
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
 from cpfls_cli.gap.naming.bends import bends_of
-from cpfls_cli.gap.naming.earned import Fitted, fitted
+from cpfls_cli.gap.naming.earned import NamedFit, fitted
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.ranking import SearchStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect, NotExcited, Unexplained
@@ -164,7 +164,7 @@ def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[
 
 
 def beside_the_unnamed(
-    found: Fitted, last: SearchStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
+    found: NamedFit, last: SearchStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
 ) -> tuple[Estimates, tuple[str, ...]]:
     """Widen the intervals of named effects by what is more than chance and too small for a name.
 
@@ -173,7 +173,7 @@ def beside_the_unnamed(
 
     Parameters
     ----------
-    found : Fitted
+    found : NamedFit
         The named effects.
     last : SearchStep
         Of the search, with nothing to add.

@@ -16,9 +16,9 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
 from cpfls_cli.gap.naming.scoring import (
     Scored,
     candidates_of,
-    layout,
     normal_equations,
     score,
+    scoring_matrix,
 )
 from cpfls_cli.gap.settings import ERRORS, VISIBLE, GapSettings
 from cpfls_cli.rounding import tied
@@ -103,7 +103,7 @@ def rank_effects(
     names = {candidate.effect.name for candidate in chosen}
     listed = [*candidates_of([effect for effect in effects if effect.name not in names]), *also]
     tried = [candidate for candidate in listed if hypothesis.can(candidate)]
-    arranged = layout(hypothesis, tried, floor)
+    arranged = scoring_matrix(hypothesis, tried, floor)
     block = block_index(hypothesis, settings)
     right = hypothesis.residual[..., None]
     if rng is not None:

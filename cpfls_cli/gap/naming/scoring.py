@@ -30,7 +30,7 @@ class Scored:
     Attributes
     ----------
     columns : array of int
-        Of the layout; without those that a bound at 0 took out.
+        Of the matrix; without those that a bound at 0 took out.
     gain : float
         Sum of squares taken off the blocks that the fits did not see, in squared floors; minus infinity where refused.
     block_error : array, shape (block,)
@@ -50,7 +50,7 @@ class Scored:
 
 
 class PlacedCandidate(NamedTuple):
-    """Where a candidate stands in a layout.
+    """Where a candidate stands in the matrix.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class PlacedCandidate(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Layout:
+class ScoringMatrix:
     """Base columns and candidates side by side.
 
     Attributes
@@ -90,7 +90,7 @@ def candidates_of(effects: Sequence[Effect]) -> list[Candidate]:
     ]
 
 
-def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) -> Layout:
+def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: Array) -> ScoringMatrix:
     """Arrange base and candidates, in floors.
 
     The shapes of the chosen effects stand in the base by their derivatives, so that a candidate is judged by what it
@@ -115,10 +115,10 @@ def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) ->
     shapes = np.array([1.0 / np.ptp(shape.grid) ** 2 for shape in hypothesis.shapes])
     offered = [information(one.candidate.effect, len(one.columns), hypothesis.vehicle) for one in placed]
     prior = np.concatenate([*free, shapes, *offered])
-    return Layout(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(placed), prior)
+    return ScoringMatrix(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(placed), prior)
 
 
-def score(arranged: Layout, beside: Beside, hypothesis: System) -> tuple[list[Scored], Array]:
+def score(arranged: ScoringMatrix, beside: Beside, hypothesis: System) -> tuple[list[Scored], Array]:
     """Score every candidate, and the best of them on what is chance.
 
     Signs and bounds are not used on chance, so that it is given more than its due.
@@ -144,8 +144,8 @@ def score(arranged: Layout, beside: Beside, hypothesis: System) -> tuple[list[Sc
     return ascending(scored, lambda candidate: -candidate.gain), chance
 
 
-def normal_equations(arranged: Layout, right: Array, floor: Array, block: IntArray) -> Folds:
-    """Build the normal equations of a layout.
+def normal_equations(arranged: ScoringMatrix, right: Array, floor: Array, block: IntArray) -> Folds:
+    """Build the normal equations of base and candidates.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ _OUTER_PERCENT = 1.0
 _FEWEST_PER_LAG = 4
 
 
-class Stretch(NamedTuple):
+class GapStretch(NamedTuple):
     """A stretch of a flight with a large gap.
 
     Attributes
@@ -50,7 +50,7 @@ class Stretch(NamedTuple):
 
 def stretches(
     residual: Array, centres: Array, flight_index: IntArray, level: float = 2.0, most: int = 5
-) -> tuple[Stretch, ...]:
+) -> tuple[GapStretch, ...]:
     """Find the stretches of time in which the gap is largest.
 
     Windows whose root mean square over their neighbours is above the level and among the largest tenth of the channel;
@@ -69,7 +69,7 @@ def stretches(
 
     Returns
     -------
-    tuple of Stretch
+    tuple of GapStretch
         Largest first.
     """
     largest = []
@@ -81,7 +81,7 @@ def stretches(
 
 def _of_channel(
     channel: int, residual: Array, centres: Array, flight_index: IntArray, level: float
-) -> Iterator[Stretch]:
+) -> Iterator[GapStretch]:
     flights = [np.flatnonzero(flight_index == flight) for flight in np.unique(flight_index)]
     # What is averaged over neighbours has no zero crossings; the filter's running sum can end below 0 by rounding.
     square = [uniform_filter1d(residual[rows] ** 2, _AVERAGED_WINDOWS, mode="nearest") for rows in flights]
@@ -93,7 +93,7 @@ def _of_channel(
             inside = rows[run]
             rms = float(np.sqrt(np.mean(residual[inside] ** 2)))
             start, end = float(centres[inside[0]]) - hop / 2, float(centres[inside[-1]]) + hop / 2
-            yield Stretch(int(flight_index[rows[0]]), start, end, CHANNELS[channel], rms)
+            yield GapStretch(int(flight_index[rows[0]]), start, end, CHANNELS[channel], rms)
 
 
 def _runs(above: BoolArray, pause: int) -> list[slice]:
