@@ -40,13 +40,7 @@ class Coefficient:
     of_log: bool = False
 
     def bounds(self, vehicle: VehicleSettings) -> tuple[float, float]:
-        """Bound the coefficient on a vehicle.
-
-        Returns
-        -------
-        tuple of float
-            In `unit`.
-        """
+        """Bound the coefficient on a vehicle, in `unit`."""
         scale = 1.0 if self.scale is None else self.scale(vehicle)
         return self.low * scale, self.high * scale
 
@@ -89,13 +83,7 @@ class Shape:
     valley: float | None = None
 
     def bounds(self, _vehicle: VehicleSettings) -> tuple[float, float]:
-        """Bound the shape, on any vehicle.
-
-        Returns
-        -------
-        tuple of float
-            In `unit`.
-        """
+        """Bound the shape, on any vehicle, in `unit`."""
         return self.grid[0], self.grid[-1]
 
     @property

@@ -21,8 +21,6 @@ from cpfls_cli.gap.balance.weak_flight import (
     Candidate,
     WeakFlight,
     nuisance,
-    rotation_balance,
-    translation_balance,
 )
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, weighted_estimates
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out
@@ -107,12 +105,7 @@ class ExtendedModel:
         return system(flights, self.chosen)
 
     def residual(self, flights: Sequence[WeakFlight]) -> Array:
-        """Compute the gap that the model leaves.
-
-        Returns
-        -------
-        array, shape (window, 6), N m and N
-        """
+        """Compute the gap that the model leaves, shape (window, 6), N m and N."""
         hypothesis = self.system(flights)
         return hypothesis.left(self.linear)
 
@@ -120,38 +113,6 @@ class ExtendedModel:
 def plain(base: InertiaModel | None) -> ExtendedModel:
     """Make a model without effects."""
     return ExtendedModel(base, np.zeros(len(nuisance().effect.coefficients)))
-
-
-def inertial_torque(signals: Signals, model: InertiaModel | None) -> Array:
-    """Compute the body torque that the motion takes.
-
-    Parameters
-    ----------
-    signals : Signals
-        With the faults of sensors taken out.
-    model : InertiaModel or None
-        None for the rigid body of the vehicle.
-
-    Returns
-    -------
-    array, shape (time, 3), N m, body frame
-    """
-    return rotation_balance(signals, model).along(signals.time)
-
-
-def inertial_force(signals: Signals) -> Array:
-    """Compute the force that the motion takes, without weight.
-
-    Parameters
-    ----------
-    signals : Signals
-        With `has_force`, and the faults of sensors taken out.
-
-    Returns
-    -------
-    array, shape (time, 3), N, body frame
-    """
-    return translation_balance(signals).along(signals.time)
 
 
 @dataclass(frozen=True)

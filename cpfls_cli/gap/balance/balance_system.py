@@ -45,14 +45,13 @@ class System:
     cache: dict[CandidateKey, Array] = field(default_factory=dict, repr=False)
 
     def columns(self, candidate: Candidate) -> Array:
-        """Evaluate a candidate; a flight that lacks a signal it needs has zeros.
-
-        Returns
-        -------
-        array, shape (window, 6, coefficient)
-        """
+        """Evaluate a candidate, shape (window, 6, coefficient); zeros for a flight that lacks a signal it needs."""
         if candidate.key not in self.cache:
-            self.cache[candidate.key] = self._evaluate(candidate)
+            pairs = zip(self.flights, self.signals, strict=True)
+            rows = [None if candidate.effect.missing(signals) else f.rows(candidate, signals) for f, signals in pairs]
+            width = max((there.shape[2] for there in rows if there is not None), default=0)
+            known = (np.zeros((len(f), 6, width)) if r is None else r for f, r in zip(self.flights, rows, strict=True))
+            self.cache[candidate.key] = np.concatenate(list(known))
         return self.cache[candidate.key]
 
     def by_flight(self, make: Callable[[WeakFlight, Signals], Array]) -> Array:
@@ -145,19 +144,6 @@ class System:
     def can(self, candidate: Candidate) -> bool:
         """Tell whether any flight has the signals that a candidate needs."""
         return any(not candidate.effect.missing(signals) for signals in self.signals)
-
-    def _evaluate(self, candidate: Candidate) -> Array:
-        rows = [
-            None if candidate.effect.missing(signals) else flight.rows(candidate, signals)
-            for flight, signals in zip(self.flights, self.signals, strict=True)
-        ]
-        width = max((there.shape[2] for there in rows if there is not None), default=0)
-        return np.concatenate(
-            [
-                np.zeros((len(flight), 6, width)) if there is None else there
-                for flight, there in zip(self.flights, rows, strict=True)
-            ]
-        )
 
 
 def system(flights: Sequence[WeakFlight], chosen: Sequence[Candidate] = ()) -> System:

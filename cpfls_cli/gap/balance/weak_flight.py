@@ -144,12 +144,7 @@ class WeakFlight:
         return replace(self, known=known, seen=seen)
 
     def averaged(self, columns: Columns) -> Array:
-        """Average columns, or a residual, over the windows.
-
-        Returns
-        -------
-        array, shape (window, 6, ...)
-        """
+        """Average columns, or a residual, over the windows, shape (window, 6, ...)."""
         rows = self.windows.average(columns.direct)
         if columns.momentum is not None:
             rows = rows + self.windows.derivative(columns.momentum)

@@ -84,12 +84,18 @@ class Judge:
         if beyond is not None:
             return beyond[1]
         compared = {each.effect.name: self._without(judgement, each.effect.name) for each in chosen}
-        harmful = {name: one for name, one in compared.items() if one.worse(judgement.held_out).any()}
-        if harmful:
-            name = largest(harmful, lambda each: harmful[each].ratio(judgement.held_out))
-            return Refusal(name, harmful[name].harm(judgement.held_out))
         if not compared:
             return None
+        after = judgement.held_out.size(judgement.held_out.after).floors
+        harm = {name: one.worsened(after) for name, one in compared.items()}
+        worst = largest(harm, lambda name: float(harm[name].max()))
+        if harm[worst].any():
+            channel = int(np.argmax(harm[worst]))
+            return Refusal(
+                worst,
+                f"on the flights held out it makes the {CHANNELS[channel]} worse, "
+                f"{compared[worst].left[channel]:.2g} floors without it and {after[channel]:.2g} with it",
+            )
         least = smallest(compared, lambda each: compared[each].visibly)
         if compared[least].visibly < VISIBLE**2:
             return Refusal(least, "on the flights held out the gap is as small without it")
@@ -141,25 +147,11 @@ class Without(NamedTuple):
         """Channel in which it shows most."""
         return int(np.argmax(levelled(self.seen)))
 
-    def worse(self, unseen: HeldOut) -> Array:
-        """Mark the channels that the effect makes visibly and surely worse."""
-        after = unseen.size(unseen.after).floors
+    def worsened(self, after: Array) -> Array:
+        """Compute how much worse the effect makes channels that it leaves `after` floors in, as ratios; 0 if unsure."""
         surely = -self.raised > ERRORS * self.error
-        return np.asarray((after > CLEAR) & (after > WORSE * self.left) & surely)
-
-    def ratio(self, unseen: HeldOut) -> float:
-        """Give how much worse the worst channel gets."""
-        after = unseen.size(unseen.after).floors
-        return float(np.where(self.worse(unseen), after / np.maximum(self.left, 1e-9), 0.0).max())
-
-    def harm(self, unseen: HeldOut) -> str:
-        """Say which channel gets worse."""
-        after = unseen.size(unseen.after).floors
-        channel = int(np.argmax(np.where(self.worse(unseen), after / np.maximum(self.left, 1e-9), 0.0)))
-        return (
-            f"on the flights held out it makes the {CHANNELS[channel]} worse, {self.left[channel]:.2g} floors without "
-            f"it and {after[channel]:.2g} with it"
-        )
+        worse = (after > CLEAR) & (after > WORSE * self.left) & surely
+        return np.where(worse, after / np.maximum(self.left, 1e-9), 0.0)
 
 
 def _elsewhere(judgement: Judgement, compared: dict[str, Without]) -> Refusal | None:

@@ -140,12 +140,7 @@ def best_floor(hypothesis: System) -> Array:
 
 
 def block_index(hypothesis: System, settings: GapSettings) -> IntArray:
-    """Assign each window to a block of the cross-validation.
-
-    Returns
-    -------
-    array of int, shape (window,)
-    """
+    """Assign each window to a block of the cross-validation, shape (window,)."""
     centres = np.concatenate([f.windows.centres(f.signals.time) for f in hypothesis.flights])
     return blocks_of(hypothesis.flight_index, centres, settings.block_s)
 
