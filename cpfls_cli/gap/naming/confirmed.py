@@ -218,7 +218,9 @@ def differences(
     seen = _size(start.hypothesis.left(fit(start.hypothesis, start.floor)), start.floor)
     held = last.held_out
     # Numbers of the vehicle that took up what only one of the roles has are wrong for the other.
-    unseen = smallest((held.size(each).floors for each in (held.before, held.parameters)), np.nanmax)
+    unseen = smallest(
+        (held.size(each).floors for each in (held.before, held.parameters)), lambda each: float(np.nanmax(each))
+    )
     if last.found.hypothesis.chosen:
         return _other_numbers(first, judge, settings)
     there, here = _largest(seen), _largest(unseen)

@@ -216,7 +216,7 @@ def pooled_power(series: Sequence[Array], on: Grid) -> Array:
     -------
     array, shape (..., frequency)
     """
-    total = 0.0
+    total: Array = np.zeros(())
     for values in series:
         taper = np.hanning(values.shape[-1] + 2)[1:-1]
         tapered = (values - values.mean(axis=-1, keepdims=True)) * taper
