@@ -223,7 +223,7 @@ def settle(opened: OpenSet, rng: np.random.Generator) -> dict[str, tuple[str, fl
 def outcome(opened: OpenSet, asked, path: HarmonicPath, rng: np.random.Generator) -> tuple[str, float]:
     """Fly, diagnose again with the flight among those that train, and judge by the hidden effect."""
     name, room = opened.hidden.candidate.effect.name, opened.room
-    answers = asked.judgements(planned_signals(room.planned(path), room, asked.logging))
+    answers = asked.answers(planned_signals(room.planned(path), room, asked.logging))
     more = fly(room, path, opened.hidden, rng, "next")
     pairs = zip(asked.questions, answers, strict=True)
     sure = min([a.sure for q, a in pairs if q.true.candidate.effect.name == name], default=0.0)

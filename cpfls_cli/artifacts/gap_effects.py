@@ -15,7 +15,7 @@ from cpfls_cli.gap.settings import CLEAR
 if TYPE_CHECKING:
     # Reading a record does not need the numerics that fit a gap.
     from cpfls_cli.gap.naming.results import Estimate, GapSize, NamedEffect
-    from cpfls_cli.gap.residual.views import Stretch
+    from cpfls_cli.gap.residual.views import GapStretch
     from cpfls_cli.playback.replay import Played, Replay
 
 _GROWN = 1.05
@@ -428,7 +428,7 @@ class StretchGroup:
     floors: Array = dataset("floors", "root mean square of the gap there, in floors", "stretch")
 
     @classmethod
-    def of(cls, stretches: Sequence[Stretch]) -> Self:
+    def of(cls, stretches: Sequence[GapStretch]) -> Self:
         """Arrange stretches of time."""
         return cls(
             flight=np.fromiter((stretch.flight for stretch in stretches), float),

@@ -36,7 +36,7 @@ from cpfls_cli.gap.next_flight.logged import (
 from cpfls_cli.gap.next_flight.rivals import physical_values, questions_between, questions_left, require_tellable
 from cpfls_cli.gap.next_flight.room import Room, room_of
 from cpfls_cli.gap.next_flight.search import Goal, NextFlight, goal, next_flight
-from cpfls_cli.gap.next_flight.separation import Judgement, Question
+from cpfls_cli.gap.next_flight.separation import Answer, Question
 from cpfls_cli.gap.preparation import Preparation
 from cpfls_cli.pages.next_flight import advice_words, notes_blocks, size_words
 from cpfls_cli.pages.source import source_of
@@ -227,9 +227,9 @@ def _open_effects(
 def _told(study: Study, asked: Goal, found: NextFlight, planned: Trajectory) -> tuple[QuestionGroup, list[str]]:
     """Judge the path that was found, as planned and as flown, beside other flights."""
     room, logging = asked.room, asked.logging
-    answers = asked.judgements(planned_signals(planned, room, logging))
-    others = [asked.judgements(planned_signals(room.planned(path), room, logging)) for path in found.random]
-    again = asked.judgements(None, again=2)
+    answers = asked.answers(planned_signals(planned, room, logging))
+    others = [asked.answers(planned_signals(room.planned(path), room, logging)) for path in found.random]
+    again = asked.answers(None, again=2)
     known = any(evidence.rows for evidence in asked.known)
     flown, notes = _flown(study, asked, planned)
     names = [(each.true.candidate.effect.name, each.rival.name if each.rival else "") for each in asked.questions]
@@ -249,7 +249,7 @@ def _told(study: Study, asked: Goal, found: NextFlight, planned: Trajectory) -> 
     ), notes
 
 
-def _smallest(question: Question, answer: Judgement) -> str:
+def _smallest(question: Question, answer: Answer) -> str:
     """Write the size from which on an effect is surely told, where it is linear in its numbers."""
     effect = question.true.candidate.effect
     if effect.unit_coefficient or effect.physical is not None:
@@ -263,14 +263,14 @@ def _flown(study: Study, asked: Goal, planned: Trajectory) -> tuple[list[float],
     """Fly the plan in closed loop with each effect that may be true; not known where no autopilot flies it."""
     sure, notes = [], []
     loop = study.simulation.closed_loop
-    judged: dict[str, tuple[Judgement, ...] | None] = {}
+    judged: dict[str, tuple[Answer, ...] | None] = {}
     for row, question in enumerate(asked.questions):
         name = question.true.candidate.effect.name
         if name not in judged:
             try:
                 effects = [question.true, *question.besides]
                 signals = flown_signals(planned, effects, study.vehicle, asked.logging, loop)
-                judged[name] = asked.judgements(signals)
+                judged[name] = asked.answers(signals)
             except (ComputationError, SettingError) as error:
                 judged[name] = None
                 notes.append(f"with {name} the flight was not simulated in closed loop: {error}")

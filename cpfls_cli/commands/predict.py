@@ -29,7 +29,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.flight_source import Stretch, Stretches, check_file, flight_source, flight_stretches
 from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles, read_model, rebuilt
-from cpfls_cli.gap.extended import inertial_force, inertial_torque
+from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_balance
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.logs.formats import is_log
@@ -123,12 +123,12 @@ def _of_vehicle(path: Path, flight: Path, study: Study) -> _Predicted:
         signals = model.acting(model.repaired(recording.signals))
         wrench = model.wrench_along(signals)
         recorded = stretch.known.get("body_torque") if told else None
-        against = inertial_torque(signals, model.fuzzy) if recorded is None else recorded
+        against = rotation_balance(signals, model.fuzzy).along(signals.time) if recorded is None else recorded
         return replace(
             _prediction(signals, model, wrench[:, :3], against),
             held_against="motion" if recorded is None else "recorded",
             force=wrench[:, 3:],
-            measured_force=inertial_force(signals) if signals.has_force else None,
+            measured_force=translation_balance(signals).along(signals.time) if signals.has_force else None,
         )
 
     return predicted

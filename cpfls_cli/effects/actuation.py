@@ -9,9 +9,9 @@ from math import pi, tan
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.effects.effect import Columns, stack
 from cpfls_cli.effects.hooks import Link, RotorMotion
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.lag import delayed
 
 _HIGHEST = 0.45
 """Frequency of a filter over that of the sampling, above which it is taken to be there."""
@@ -77,15 +77,9 @@ def with_actuation(signals: Signals, change: Callable[[Array], Array]) -> Signal
     return replace(signals, stated_torque=torque, stated_thrust=thrust)
 
 
-def wrench_change(before: Signals, after: Signals) -> Columns:
-    """Compute the change of wrench by another actuation as a column.
-
-    Returns
-    -------
-    Columns
-        One column.
-    """
-    return Columns(stack(after.wrench - before.wrench))
+def shifted(signals: Signals, shape: Mapping[str, float]) -> Signals:
+    """Shift what drives the rotors by a delay of ``delay_s``."""
+    return with_actuation(signals, lambda values: delayed(values, shape["delay_s"] / signals.period))
 
 
 @dataclass
@@ -138,10 +132,6 @@ class CommandFilter:
     def apply(self, signals: Signals, shape: Mapping[str, float]) -> Signals:
         """Filter what drives the rotors of a flight."""
         return with_actuation(signals, self._passing(shape, signals.period).along)
-
-    def columns(self, signals: Signals, shape: Mapping[str, float]) -> Columns:
-        """Compute the change of wrench by the filter."""
-        return wrench_change(signals, self.apply(signals, shape))
 
     def link(self, values: Mapping[str, float], step: float) -> Link:
         """Filter speeds and accelerations of the rotors, which were settled before the first step."""

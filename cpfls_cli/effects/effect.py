@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.effects.hooks import Actuation, CarriedBody, SensorLog, SensorTest
+from cpfls_cli.effects.hooks import Actuation, CarriedBody, PhysicalNumbers, SensorLog, SensorTest, VehicleParts
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -40,15 +40,25 @@ class Coefficient:
     of_log: bool = False
 
     def bounds(self, vehicle: VehicleSettings) -> tuple[float, float]:
-        """Bound the coefficient on a vehicle.
-
-        Returns
-        -------
-        tuple of float
-            In `unit`.
-        """
+        """Bound the coefficient on a vehicle, in `unit`."""
         scale = 1.0 if self.scale is None else self.scale(vehicle)
         return self.low * scale, self.high * scale
+
+
+def of_axes(
+    name: str,
+    unit: str,
+    low: float,
+    high: float,
+    meaning: str,
+    scale: Callable[[VehicleSettings], float] | Sequence[Callable[[VehicleSettings], float]] | None = None,
+) -> tuple[Coefficient, ...]:
+    """Make a coefficient of each axis; ``{}`` in name and meaning is its letter, and scales may be three."""
+    scales = (scale,) * 3 if scale is None or callable(scale) else scale
+    return tuple(
+        Coefficient(name.format(letter), unit, low, high, meaning.format(letter), own)
+        for letter, own in zip("xyz", scales, strict=True)
+    )
 
 
 @dataclass(frozen=True)
@@ -73,13 +83,7 @@ class Shape:
     valley: float | None = None
 
     def bounds(self, _vehicle: VehicleSettings) -> tuple[float, float]:
-        """Bound the shape, on any vehicle.
-
-        Returns
-        -------
-        tuple of float
-            In `unit`.
-        """
+        """Bound the shape, on any vehicle, in `unit`."""
         return self.grid[0], self.grid[-1]
 
     @property
@@ -116,13 +120,17 @@ class Columns:
         -------
         array, shape (time, 6)
         """
-        direct = np.asarray(self.direct @ coefficients)
+        momentum = None if self.momentum is None else self.momentum @ coefficients
+        return Columns(np.asarray(self.direct @ coefficients), momentum).along(time)
+
+    def along(self, time: Array) -> Array:
+        """Evaluate what has no coefficients, ``direct + d/dt momentum``, at times in s."""
         if self.momentum is None:
-            return direct
+            return self.direct
         # Slow to load, and who lists or shows effects differentiates nothing.
         from scipy.interpolate import CubicSpline
 
-        return np.asarray(direct + CubicSpline(time, self.momentum @ coefficients)(time, 1))
+        return np.asarray(self.direct + CubicSpline(time, self.momentum)(time, 1))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,15 +158,10 @@ class Effect:
     rivals : mapping of str to str
         Effects that look alike, each with the flight that tells them apart.
     columns : callable or None
-        ``columns(signals, shape) -> Columns``, linear in the linear coefficients; None for what only the audit of the
-        sensors can see.
-    unit_coefficient : bool
-        The columns are right only with the coefficient 1: everything is in the shape.
-    physical : callable or None
-        From linear to physical coefficients, NaN where the data left one open; None: they are the same, and the
-        bounds of the physical ones bound the linear ones.
-    linear : callable or None
-        The reverse.
+        ``columns(signals, shape) -> Columns``, linear in the linear coefficients; of an actuator the change of wrench.
+        None for what only the audit of the sensors can see.
+    physical : PhysicalNumbers or None
+        None: the linear coefficients are the physical ones, whose bounds bound them.
     apply : callable or None
         For effects that change what the others meet: ``apply(signals, shape) -> Signals`` as they would be without the
         effect's error, or with its air, so that all other columns can be computed from them.
@@ -184,18 +187,15 @@ class Effect:
         For effects on the log: how they are simulated.
     test : SensorTest or None
         For effects that the sensor audit finds.
-    inertia : callable or None
-        ``inertia(linear) -> array, shape (3, 3)``: for effects that are a change of the inertia tensor, in kg m^2.
     accounts : callable or None
         ``accounts(number, values) -> float``: relative error of a number of the vehicle that the effect itself leaves,
         so that the number is not called wrong.
-    vehicle : callable or None
-        ``vehicle(stated, shape) -> VehicleSettings``: for effects that are a wrong number of the vehicle.
+    in_vehicle : callable or None
+        ``in_vehicle(parts, shape, linear) -> VehicleParts``: for effects that have a place of their own in the model
+        of a whole vehicle.
     exact : Effect or None
         What takes the place of this one once it is chosen: the same effect with numbers for which alone another effect
         would do as well, or with those that others depend on as shapes, under the same names.
-    still : str
-        Effect with the same linear coefficients that it is in still air; empty for an effect that is not of the air.
     lever : callable or None
         ``lever(linear, error, vehicle) -> array of bool, shape (coefficient,)``: coefficients that the others leave
         possible, a torque being no larger than its force on a lever as long as the body.
@@ -206,16 +206,14 @@ class Effect:
     kind: Kind
     formula: str
     sentence: str
-    coefficients: tuple[Coefficient, ...]
     needs: frozenset[str]
     excitation: str
     rivals: Mapping[str, str]
     source: str
-    columns: Callable[[Signals, Mapping[str, float]], Columns] | None
+    coefficients: tuple[Coefficient, ...] = ()
     shapes: tuple[Shape, ...] = ()
-    unit_coefficient: bool = False
-    physical: Callable[[Array], Array] | None = None
-    linear: Callable[[Array], Array] | None = None
+    columns: Callable[[Signals, Mapping[str, float]], Columns] | None = None
+    physical: PhysicalNumbers | None = None
     apply: Callable[[Signals, Mapping[str, float]], Signals] | None = None
     scatter: Callable[[Signals, Mapping[str, float]], Array] | None = None
     describe: Callable[[VehicleSettings, Mapping[str, float]], str] | None = None
@@ -227,12 +225,21 @@ class Effect:
     carried: Callable[[VehicleSettings, Mapping[str, float]], CarriedBody] | None = None
     log: SensorLog | None = None
     test: SensorTest | None = None
-    inertia: Callable[[Array], Array] | None = None
     accounts: Callable[[str, Mapping[str, float]], float] | None = None
-    vehicle: Callable[[VehicleSettings, Mapping[str, float]], VehicleSettings] | None = None
+    in_vehicle: Callable[[VehicleParts, Mapping[str, float], Array], VehicleParts] | None = None
     exact: Effect | None = None
-    still: str = ""
     lever: Callable[[Array, Array, VehicleSettings], BoolArray] | None = None
+
+    def __post_init__(self) -> None:
+        """Give an actuator the change of wrench as its column."""
+        apply = self.apply
+        if self.columns is None and self.kind == "actuator" and apply is not None:
+            object.__setattr__(self, "columns", lambda signals, shape: wrench_change(signals, apply(signals, shape)))
+
+    @property
+    def unit_coefficient(self) -> bool:
+        """Whether the columns are right only with the coefficient 1: everything is in the shape."""
+        return not self.coefficients
 
     def form(self, coefficients: int, shapes: Collection[str]) -> Effect:
         """Tell by the numbers that were fitted whether it is this effect or what took its place."""
@@ -315,3 +322,30 @@ def thrust_wrench(hubs: Array, thrust: Array) -> Array:
     force = np.zeros((*thrust.shape, 3))
     force[..., 2] = thrust
     return hub_wrench(hubs, force)
+
+
+def wrench_change(before: Signals, after: Signals) -> Columns:
+    """Compute the change of wrench by another actuation as a column."""
+    return Columns(stack(after.wrench - before.wrench))
+
+
+def thrust_column(signals: Signals, thrust: Array) -> Columns:
+    """Make a column of changes of thrust, shape (time, rotor), N."""
+    return Columns(stack(thrust_wrench(signals.hubs, thrust)))
+
+
+def torque_column(torque: Array) -> Columns:
+    """Make a column of a body torque, shape (time, 3), N m."""
+    return Columns(stack(wrench(torque)))
+
+
+def torque_by_axis(torque: Array) -> Columns:
+    """Make three columns of a body torque, shape (time, 3), N m: one for each axis."""
+    direct = np.zeros((len(torque), 6, 3))
+    direct[:, :3] = torque[:, :, None] * np.eye(3)
+    return Columns(direct)
+
+
+def a_few_percent(_number: str, _values: Mapping[str, float]) -> float:
+    """Account for an error of any number as small as formulas of thrust are off by: it is not called wrong for it."""
+    return 0.05

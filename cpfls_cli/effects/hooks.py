@@ -10,6 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 class RotorMotion(NamedTuple):
@@ -49,6 +50,39 @@ class Actuation:
     link: Callable[[Mapping[str, float], float], Link] | None = None
     delay: Callable[[Mapping[str, float]], float] | None = None
     supply: Callable[[Mapping[str, float], float], float] | None = None
+
+
+class PhysicalNumbers(NamedTuple):
+    """How linear coefficients are written as physical ones, which are not linear in the columns.
+
+    Attributes
+    ----------
+    of : callable
+        ``of(linear) -> physical``, NaN where the data left one open.
+    linear : callable
+        The reverse.
+    """
+
+    of: Callable[[Array], Array]
+    linear: Callable[[Array], Array]
+
+
+class VehicleParts(NamedTuple):
+    """What effects become in the model of a whole vehicle.
+
+    Attributes
+    ----------
+    inertia : array, shape (3, 3), kg m^2
+        Added to that of the vehicle.
+    wind : tuple of float, m/s, world frame
+    effects : tuple of (str, mapping of str to float, array)
+        Those without a place of their own: name, shape, linear coefficients.
+    """
+
+    vehicle: VehicleSettings
+    inertia: Array
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    effects: tuple[tuple[str, Mapping[str, float], Array], ...] = ()
 
 
 class Carrier(NamedTuple):
@@ -143,6 +177,15 @@ class SensorLog:
     does: str = "needs measured rotor speeds"
 
 
+def gyroscope_log(reading: Callable[[Array, Array], Array]) -> SensorLog:
+    """Log body rates as ``reading(rate, numbers)``, both of three axes."""
+
+    def change(signals: Mapping[str, Array], _: TrueMotion, values: Mapping[str, float]) -> dict[str, Array]:
+        return {"body_rate": np.asarray(reading(signals["body_rate"], np.array(list(values.values()))))}
+
+    return SensorLog(change=change)
+
+
 class ReadingError(NamedTuple):
     """Error of a sensor of three axes, ``reading(t) = matrix @ truth(t - delay) + offset``."""
 
@@ -203,12 +246,12 @@ class SensorTest:
     """
 
     estimate: str | Callable[[Sequence[Signals]], FaultFit | None]
-    labels: tuple[str, ...]
     smallest: float
     number: Callable[[str, float], str]
     found: str
     nothing: str
     error: Callable[[Array], ReadingError]
+    labels: tuple[str, ...] = ("x", "y", "z")
     smallest_samples: float = 0.0
     signal: str = "body_rate"
     integrated: bool = False

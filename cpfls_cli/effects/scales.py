@@ -66,20 +66,12 @@ def lift_at_ten_metres_per_second(vehicle: VehicleSettings) -> float:
     return drag_at_ten_metres_per_second(vehicle) / len(vehicle.rotors)
 
 
-def moment_of_inertia(axis: int) -> Callable[[VehicleSettings], float]:
-    """Size a damping that takes 1 rad/s off each rad/s in a second, or any share of the inertia about an axis.
-
-    Parameters
-    ----------
-    axis : int
-        0, 1, 2 for x, y, z.
-
-    Returns
-    -------
-    callable
-        Gives the moment of inertia of a vehicle, kg m^2.
-    """
-    return lambda vehicle: float(vehicle.inertia_kg_m2[axis])
+MOMENTS: tuple[Callable[[VehicleSettings], float], ...] = (
+    lambda vehicle: float(vehicle.inertia_kg_m2[0]),
+    lambda vehicle: float(vehicle.inertia_kg_m2[1]),
+    lambda vehicle: float(vehicle.inertia_kg_m2[2]),
+)
+"""Moments of inertia about x, y, z, kg m^2: a damping of that size takes 1 rad/s off each rad/s in a second."""
 
 
 def smallest_inertia(vehicle: VehicleSettings) -> float:

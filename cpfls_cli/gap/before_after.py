@@ -12,7 +12,7 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
 from cpfls_cli.gap.extended import ExtendedModel, plain
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.playback import PlayedPair, WorstStretch, errors_by_horizon, played_pairs, worst_stretch
-from cpfls_cli.gap.residual.views import Stretch, Whiteness, stretches, whiteness
+from cpfls_cli.gap.residual.views import GapStretch, Whiteness, stretches, whiteness
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.whole_vehicle import whole_vehicle
 from cpfls_cli.playback.replay import Replay
@@ -54,7 +54,7 @@ class BeforeAfter:
     ----------
     centres : array, shape (window,), s
     flight_index : array of int, shape (window,)
-    stretches : tuple of Stretch
+    stretches : tuple of GapStretch
         Of the model as given, largest gap first.
     lag_s : float
         Between windows without common samples.
@@ -66,7 +66,7 @@ class BeforeAfter:
     flight_index: IntArray
     played: list[PlayedPair]
     playback: Replay
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[GapStretch, ...]
     white_before: Whiteness
     white_after: Whiteness
     lag_s: float
@@ -110,14 +110,14 @@ def before_after(
 
 
 def _picture(
-    held: Sequence[Recording], stretch: Stretch, windows: Windows, model: ExtendedModel, settings: GapSettings
+    held: Sequence[Recording], stretch: GapStretch, windows: Windows, model: ExtendedModel, settings: GapSettings
 ) -> StretchCurves:
     channel = CHANNELS.index(stretch.channel)
     dense = replace(windows, hop=max(1, len(windows.weight) // _PER_WINDOW))
     recording = held[stretch.flight]
-    raw = weak_flight(recording.name, recording.signals, dense, model.base, settings.force, settings.axes)
-    repaired = weak_flight(
-        recording.name, model.repaired(recording.signals), dense, model.base, settings.force, settings.axes
+    raw, repaired = (
+        weak_flight(recording.name, signals, dense, model.base, settings.force, settings.axes)
+        for signals in (recording.signals, model.repaired(recording.signals))
     )
     time = dense.centres(recording.signals.time)
     middle, half = 0.5 * (stretch.start_s + stretch.end_s), 0.5 * max(_SHORTEST_S, stretch.end_s - stretch.start_s)

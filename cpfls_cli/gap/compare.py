@@ -11,13 +11,13 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.consistency.audit import Audit, audit
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight, weak_flight
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
 from cpfls_cli.gap.naming.leftover import not_excited
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import NotExcited
 from cpfls_cli.gap.playback import PlayedPair, errors_by_horizon, played_pairs
 from cpfls_cli.gap.residual.dependence import Dependence, joined_states, rank_dependence, state_signals
-from cpfls_cli.gap.residual.views import HeatMap, Stretch, heat_map, stretches
+from cpfls_cli.gap.residual.views import GapStretch, HeatMap, heat_map, stretches
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.whole_vehicle import with_effects
 from cpfls_cli.playback.model import VehicleModel
@@ -67,7 +67,7 @@ class Disagreement:
     centres: Array
     flight_index: IntArray
     states: dict[str, Array]
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[GapStretch, ...]
     dependence: tuple[Dependence, ...]
     worst: WorstChannel | None
     not_excited: tuple[NotExcited, ...]
@@ -123,7 +123,7 @@ def compare(
     centres = np.concatenate([windows.centres(flight.signals.time) for flight in flights])
     index = hypothesis.flight_index
     dependence = rank_dependence(residual / floor, index, block, states, settings.shifts, rng)
-    known = _known(flights)
+    known = np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in flights])
     rms = _rms(residual, known)
     effects = [effect for name, effect in CATALOGUE.items() if name not in settings.ignore]
     repairing = replace(model, repairs=audited)
@@ -146,10 +146,6 @@ def compare(
     )
 
 
-def _known(flights: Sequence[WeakFlight]) -> Array:
-    return np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in flights])
-
-
 def _rms(rows: Array, known: Array) -> Array:
     count = known.sum(axis=0)
     square = (rows**2 * known).sum(axis=0) / np.maximum(count, 1)
@@ -158,9 +154,8 @@ def _rms(rows: Array, known: Array) -> Array:
 
 def _activity(hypothesis: System, known: Array) -> Array:
     """Compute the root mean square of inertial or rotor wrench, whichever is larger."""
-    pairs = list(zip(hypothesis.flights, hypothesis.signals, strict=True))
-    taken = np.concatenate([flight.averaged(flight.inertial) for flight, _ in pairs])
-    given = np.concatenate([flight.windows.average(signals.wrench) for flight, signals in pairs])
+    taken = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
+    given = hypothesis.by_flight(lambda flight, signals: flight.windows.average(signals.wrench))
     size = np.maximum(_rms(taken, known), _rms(given, known))
     # Sideways, too, a vehicle is moved by its thrust.
     return np.concatenate([size[:3], np.full(3, np.sqrt((size[3:] ** 2).sum()))])

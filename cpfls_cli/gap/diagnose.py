@@ -14,9 +14,9 @@ from cpfls_cli.consistency.numbers import impossible
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance.balance_system import System
+from cpfls_cli.gap.balance.balance_system import System, has_force
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
-from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
+from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     impossible_ratios,
@@ -26,7 +26,7 @@ from cpfls_cli.gap.naming.causes import (
     wrong_numbers,
 )
 from cpfls_cli.gap.naming.confirmed import Judge, Judgement, differences
-from cpfls_cli.gap.naming.earned import Fitted, Refusal, earned
+from cpfls_cli.gap.naming.earned import NamedFit, Refusal, earned
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.naming.leftover import Leftover, beside_the_unnamed, not_excited, untried
@@ -35,6 +35,7 @@ from cpfls_cli.gap.naming.results import Diagnosis, GapVerdict, NamedEffect, gap
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.preparation import Preparation
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.windows import Recording, common_windows
 
 _EXCITED_FLOORS = 3.0
@@ -62,10 +63,7 @@ class DiagnosisRun:
 
     def model(self, base: InertiaModel | None) -> ExtendedModel:
         """Build the model with the effects of the diagnosis."""
-        chosen, by_effect = self.hypothesis.chosen, self.estimates.of_effect
-        effects = tuple(FittedEffect(*pair) for pair in zip(chosen, by_effect, strict=True))
-        width = len(self.estimates.linear) - sum(len(linear) for linear in by_effect)
-        return ExtendedModel(base, self.estimates.linear[:width], effects, self.audit)
+        return ExtendedModel.of(base, self.hypothesis, self.estimates, self.audit)
 
 
 def diagnose(
@@ -122,28 +120,23 @@ def diagnose(
     progress(0.9, "sensor faults")
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
     torque_alone = _torque_alone(weak, settings, effects)
-    notes = (*_too_small(unnamed), *_unsure(judged, settings), *(refused.sentence for refused in refusals))
-    notes = () if differ else notes
-    notes = (*not_judged(judgement.held_out), *notes)
+    notes = [] if differ else [*_doubts(unnamed, judged, settings), *(refused.sentence for refused in refusals)]
+    notes = [*not_judged(judgement.held_out), *notes]
     remainder = judge.remainder(judgement.found)
     diagnosis = _concluded(judged, faults, judgement, remainder, differ, notes, steps, settings, torque_alone, audited)
     return DiagnosisRun(diagnosis, audited, hypothesis, estimates, remainder, judgement.held_out)
 
 
-def _unsure(judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[str]:
-    """Say which effects chance could stand for, once the others have done what they can."""
-    for effect in (each.effect for each in judged):
-        if effect.p_value > settings.significance:
-            yield f"{effect.name} is not sure: chance explains as much beside the others, p = {effect.p_value:.2g}"
-
-
-def _too_small(unnamed: Sequence[str]) -> Iterator[str]:
-    """Say what intervals of the named effects leave room for."""
+def _doubts(unnamed: Sequence[str], judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[str]:
+    """Say what intervals leave room for, and which effects chance could stand for once the others did what they can."""
     if unnamed:
         yield (
             f"beside these, what is not named explains more than chance ({', '.join(unnamed)}); the intervals hold the"
             " numbers with and without"
         )
+    for effect in (each.effect for each in judged):
+        if effect.p_value > settings.significance:
+            yield f"{effect.name} is not sure: chance explains as much beside the others, p = {effect.p_value:.2g}"
 
 
 def not_judged(unseen: HeldOut) -> Iterator[str]:
@@ -157,7 +150,7 @@ def not_judged(unseen: HeldOut) -> Iterator[str]:
 
 def _searched(
     weak: Sequence[WeakFlight], settings: GapSettings, rng: np.random.Generator, progress: Callable[[float, str], None]
-) -> tuple[list[Effect], list[SearchStep], Fitted, list[Refusal]]:
+) -> tuple[list[Effect], list[SearchStep], NamedFit, list[Refusal]]:
     """Search for effects that earn their names; once more without those that stand on a bound, or beyond.
 
     Such an effect takes up what others would explain, and has to go before they can be seen.
@@ -188,7 +181,7 @@ def _torque_alone(
     weak: Sequence[WeakFlight], settings: GapSettings, effects: Sequence[Effect]
 ) -> tuple[tuple[str, float], ...]:
     """List the effects that the torques alone would name first, where the force balance was used too."""
-    if not any(flight.known[3:].any() for flight in weak):
+    if not has_force(weak):
         return ()
     step = rank_effects([flight.without_force() for flight in weak], (), effects, settings, None)
     best = [scored for scored in step.ranking[:3] if np.isfinite(scored.gain) and scored.gain > 0]
@@ -201,16 +194,17 @@ def _concluded(
     judgement: Judgement,
     remainder: Leftover,
     differ: tuple[str, ...],
-    refusals: tuple[str, ...],
+    notes: Sequence[str],
     steps: Sequence[SearchStep],
     settings: GapSettings,
     torque_alone: tuple[tuple[str, float], ...],
     audited: Audit,
 ) -> Diagnosis:
     (hypothesis, _, estimates), held_out = judgement
-    named = sorted((each.effect for each in judged), key=lambda effect: -effect.share)
+    named = ascending((each.effect for each in judged), lambda effect: -effect.share)
     effects = [*faults, *named]
-    numbers = wrong_numbers(estimates, effects, held_out.removed_by_numbers(), _pull(hypothesis, steps[-1].floor))
+    floor = steps[-1].floor
+    numbers = wrong_numbers(estimates, effects, held_out.removed_by_numbers(), _pull(hypothesis, floor))
     effects += [numbers] if numbers is not None else []
     removed = held_out.shares()
     if not named:
@@ -224,15 +218,9 @@ def _concluded(
     stays = gap_stays(
         held_out.size(held_out.parameters).floors, held_out.size(held_out.after).floors, least, len(named)
     )
-    verdict = verdict_of(
-        effects,
-        rivals,
-        known,
-        tuple(removed.values()) or (1.0,),
-        stays,
-        _excited(hypothesis, steps[-1].floor),
-        settings,
-    )
+    inertial = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
+    excited = bool((inertial[:, :3].std(axis=0) > _EXCITED_FLOORS * floor[:3]).any())
+    verdict = verdict_of(effects, rivals, known, tuple(removed.values()) or (1.0,), stays, excited, settings)
     # A fit that asks for numbers that no vehicle has says that the log is wrong, not the vehicle.
     wrong = (*audited.contradictions, *contradictions(impossible(impossible_ratios(estimates.parameters))))
     if wrong:
@@ -246,14 +234,14 @@ def _concluded(
         tuple(named) if refused else (),
         rivals,
         tuple(known) if verdict is GapVerdict.NAMED else remainder.unexplained,
-        not_excited(hypothesis, [e for n, e in CATALOGUE.items() if n not in settings.ignore], steps[-1].floor),
+        not_excited(hypothesis, [e for n, e in CATALOGUE.items() if n not in settings.ignore], floor),
         {number.name: number for number in estimates.parameters},
         share,
         held_out.size(held_out.before),
         held_out.size(held_out.after),
         held_out.floor,
         torque_alone,
-        (*audited.filtered, *audited.settled, *differ, *wrong, *refusals, *audited.warnings, *audited.notes),
+        (*audited.filtered, *audited.settled, *differ, *wrong, *notes, *audited.warnings, *audited.notes),
         wrong,
         differ,
         removed,
@@ -265,8 +253,3 @@ def _pull(hypothesis: System, floor: Array) -> Array:
     columns = hypothesis.columns(hypothesis.free[0]) / floor[:, None]
     information = (columns**2).mean(axis=0).max(axis=0)
     return np.asarray(1.0 / np.maximum(information, 1e-12))
-
-
-def _excited(hypothesis: System, floor: Array) -> bool:
-    rows = np.concatenate([flight.averaged(flight.inertial) for flight in hypothesis.flights])
-    return bool((rows[:, :3].std(axis=0) > _EXCITED_FLOORS * floor[:3]).any())

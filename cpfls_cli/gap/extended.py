@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -11,22 +12,18 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
-from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.gap.balance.balance_system import System, is_free, scatter_size, scatter_variance, system
+from cpfls_cli.gap.balance.balance_system import System, is_free, relative_scatter, system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import (
     CHANNELS,
-    Balance,
     Candidate,
     WeakFlight,
     nuisance,
-    rotation_balance,
-    translation_balance,
 )
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, weighted_estimates
-from cpfls_cli.gap.naming.held_out import HeldOut, judged_unseen
+from cpfls_cli.gap.naming.held_out import HeldOut, held_out
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.preparation import Preparation
@@ -66,6 +63,12 @@ class ExtendedModel:
     effects: tuple[FittedEffect, ...] = ()
     audit: Audit | None = None
 
+    @classmethod
+    def of(cls, base: InertiaModel | None, hypothesis: System, estimates: Estimates, audit: Audit) -> ExtendedModel:
+        """Build the model that a fit found."""
+        fitted = tuple(FittedEffect(*pair) for pair in zip(hypothesis.chosen, estimates.of_effect, strict=True))
+        return cls(base, estimates.of_vehicle, fitted, audit)
+
     @property
     def chosen(self) -> tuple[Candidate, ...]:
         """Effects with their shapes."""
@@ -93,68 +96,23 @@ class ExtendedModel:
         InputError
             If a flight lacks a signal that an effect needs.
         """
-        for flight in flights:
-            _require(flight.signals, self.chosen, flight.name)
+        for flight, candidate in product(flights, self.chosen):
+            missing = candidate.effect.missing(flight.signals)
+            if missing:
+                lacking = ", ".join(each.replace("_", " ") for each in missing)
+                name = candidate.effect.name
+                raise InputError(f"{flight.name}: lacks {lacking}, which the model's effect {name} needs")
         return system(flights, self.chosen)
 
     def residual(self, flights: Sequence[WeakFlight]) -> Array:
-        """Compute the gap that the model leaves.
-
-        Returns
-        -------
-        array, shape (window, 6), N m and N
-        """
+        """Compute the gap that the model leaves, shape (window, 6), N m and N."""
         hypothesis = self.system(flights)
-        return np.asarray(hypothesis.residual - hypothesis.base @ self.linear)
+        return hypothesis.left(self.linear)
 
 
 def plain(base: InertiaModel | None) -> ExtendedModel:
     """Make a model without effects."""
     return ExtendedModel(base, np.zeros(len(nuisance().effect.coefficients)))
-
-
-def inertial_torque(signals: Signals, model: InertiaModel | None) -> Array:
-    """Compute the body torque that the motion takes.
-
-    Parameters
-    ----------
-    signals : Signals
-        With the faults of sensors taken out.
-    model : InertiaModel or None
-        None for the rigid body of the vehicle.
-
-    Returns
-    -------
-    array, shape (time, 3), N m, body frame
-    """
-    return _at_samples(rotation_balance(signals, model), signals.time)
-
-
-def inertial_force(signals: Signals) -> Array:
-    """Compute the force that the motion takes, without weight.
-
-    Parameters
-    ----------
-    signals : Signals
-        With `has_force`, and the faults of sensors taken out.
-
-    Returns
-    -------
-    array, shape (time, 3), N, body frame
-    """
-    return _at_samples(translation_balance(signals), signals.time)
-
-
-def _at_samples(balance: Balance, time: Array) -> Array:
-    return Columns(balance.direct[:, :, None], balance.momentum[:, :, None]).at_samples(np.ones(1), time)
-
-
-def _require(signals: Signals, chosen: Sequence[Candidate], name: str) -> None:
-    for candidate in chosen:
-        missing = candidate.effect.missing(signals)
-        if missing:
-            lacking = ", ".join(each.replace("_", " ") for each in missing)
-            raise InputError(f"{name}: lacks {lacking}, which the model's effect {candidate.effect.name} needs")
 
 
 @dataclass(frozen=True)
@@ -203,19 +161,16 @@ def extend(
     start = refined(flights, chosen, best_floor(system(flights, chosen)))
     floor = best_floor(start)
     hypothesis, estimates = weighted_estimates(start, floor, block_index(start, settings))
-    residual = hypothesis.residual - hypothesis.base @ estimates.linear
-    scatter = scatter_size(scatter_variance(hypothesis), residual, floor)
-    held_out = judged_unseen(held, prepared, hypothesis, estimates.linear, scatter)
-    _require_smaller(held_out)
-    fitted = tuple(FittedEffect(*pair) for pair in zip(hypothesis.chosen, estimates.of_effect, strict=True))
-    width = len(estimates.linear) - sum(len(linear) for linear in estimates.of_effect)
-    model = ExtendedModel(base, estimates.linear[:width], fitted, audit)
-    return Refit(model, tuple(_renewed(effects, hypothesis, estimates)), estimates, held_out)
+    scatter = relative_scatter(hypothesis, estimates.linear, floor)
+    unseen = held_out(prepared.logged(held), prepared.repaired(held), hypothesis, estimates.linear, scatter)
+    _require_smaller(unseen)
+    model = ExtendedModel.of(base, hypothesis, estimates, audit)
+    return Refit(model, tuple(_renewed(effects, hypothesis, estimates)), estimates, unseen)
 
 
-def _require_smaller(held_out: HeldOut) -> None:
-    before, after = held_out.size(held_out.before).floors, held_out.size(held_out.after).floors
-    moved = held_out.size(held_out.before - held_out.after).floors > VISIBLE
+def _require_smaller(unseen: HeldOut) -> None:
+    before, after = unseen.size(unseen.before).floors, unseen.size(unseen.after).floors
+    moved = unseen.size(unseen.before - unseen.after).floors > VISIBLE
     if not moved.any():
         raise ComputationError("not extended: what is named changes no channel of the held-out flights by its noise")
     if (after[moved] ** 2).sum() >= (before[moved] ** 2).sum():
@@ -244,6 +199,6 @@ def _renewed(effects: Sequence[NamedEffect], hypothesis: System, estimates: Esti
             renewed.append(effect)
             continue
         candidate, linear, numbers = fitted[effect.name]
-        sentence = effect_sentence(candidate.effect, numbers, hypothesis.flights[0].signals.vehicle)
+        sentence = effect_sentence(candidate.effect, numbers, hypothesis.vehicle)
         renewed.append(replace(effect, candidate=candidate, linear=linear, coefficients=numbers, sentence=sentence))
     return renewed

@@ -13,6 +13,7 @@ from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import Runs, apart, free_runs, made_ready
 from cpfls_cli.playback.replay import MODEL, STATED, Played, Replay, drawn_runs, replay
+from cpfls_cli.rounding import largest
 from cpfls_cli.weak_form.windows import Recording
 
 # Samples between starts of free runs, which are alike.
@@ -53,15 +54,13 @@ def played_pairs(recordings: Sequence[Recording], model: VehicleModel, given: Ve
     InputError
         If a flight lacks a signal that an effect needs.
     """
-    return [_pair(LoggedFlight.of(recording.name, recording.signals), model, given) for recording in recordings]
-
-
-def _pair(flight: LoggedFlight, model: VehicleModel, given: VehicleModel) -> PlayedPair:
-    along, player = made_ready(model, flight)
-    if given is model:
-        return PlayedPair(along, player, player, along)
-    logged, stated = made_ready(given, flight)
-    return PlayedPair(along, player, stated, logged)
+    pairs = []
+    for recording in recordings:
+        flight = LoggedFlight.of(recording.name, recording.signals)
+        along, player = made_ready(model, flight)
+        logged, stated = (along, player) if given is model else made_ready(given, flight)
+        pairs.append(PlayedPair(along, player, stated, logged))
+    return pairs
 
 
 class LeftOut(NamedTuple):
@@ -160,7 +159,7 @@ def worst_stretch(pairs: Sequence[PlayedPair]) -> WorstStretch:
     """
     samples = max(2, round(_RUN_S / pairs[0].flight.motion.period))
     found = [_worst(index, pair, samples) for index, pair in enumerate(pairs)]
-    return max(found, key=lambda stretch: float(((stretch.before - stretch.measured) ** 2).mean()))
+    return largest(found, lambda stretch: float(((stretch.before - stretch.measured) ** 2).mean()))
 
 
 def _worst(index: int, pair: PlayedPair, samples: int) -> WorstStretch:

@@ -11,7 +11,8 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.catalogue.parameter_error import inertia_correction
 from cpfls_cli.effects.effect import Columns, Effect
-from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
+from cpfls_cli.effects.hooks import VehicleParts
+from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.gap.balance.weak_flight import Candidate
@@ -43,37 +44,39 @@ def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings, inertia: Ar
     """
     constant = extended.base is None or inertia is not None
     given = inertia_tensor(vehicle) if inertia is None else inertia
-    correction = inertia_correction(extended.parameters, vehicle)
-    # Found in still air, a wind is no part of the vehicle, and what it blows against is one.
-    wind = _wind(extended)
-    effects, times = list(_numbers(extended.parameters, vehicle, given + correction)), {"delay_s": 0.0, "lag_s": 0.0}
-    for (known, shape), linear in extended.effects:
-        hooks = known.actuation
-        if known.kind not in ("wrench", "actuator"):
-            continue
-        if known.still and known.apply:
-            effects.append(ModelEffect(CATALOGUE[known.still].name, {}, linear))
-        elif known.vehicle is not None:
-            vehicle = known.vehicle(vehicle, shape)
-        elif known.inertia is not None:
-            correction = correction + known.inertia(linear)
-        elif hooks is not None and (hooks.lag or hooks.delay):
-            times |= {"lag_s": hooks.lag(shape)} if hooks.lag else {}
-            times |= {"delay_s": hooks.delay(shape)} if hooks.delay else {}
-        else:
-            effects.append(ModelEffect(known.name, dict(shape), linear))
+    parts, times = _parts(extended, vehicle)
+    corrected = given + inertia_correction(extended.parameters, vehicle)
+    effects = (*_numbers(extended.parameters, vehicle, corrected), *(ModelEffect(*each) for each in parts.effects))
     fuzzy = extended.base if not constant else None
     return VehicleModel(
-        vehicle=_with_inertia(vehicle, given + correction),
+        vehicle=_with_inertia(parts.vehicle, given + parts.inertia),
         response=RotorResponse(**times),
-        effects=tuple(effects),
-        fuzzy=fuzzy.corrected(correction) if fuzzy is not None and correction.any() else fuzzy,
-        wind=wind,
+        effects=effects,
+        fuzzy=fuzzy.corrected(parts.inertia) if fuzzy is not None and parts.inertia.any() else fuzzy,
+        wind=parts.wind,
         # The lag and the delay of the catalogue are those behind a command.
         commanded=any(times.values()),
         hold="linear" if any(times.values()) else None,
         repairs=extended.audit,
     )
+
+
+def _parts(extended: ExtendedModel, vehicle: VehicleSettings) -> tuple[VehicleParts, dict[str, float]]:
+    """Put each effect where the model of a whole vehicle has it, and tell how late the rotors are, s."""
+    parts = VehicleParts(vehicle, inertia_correction(extended.parameters, vehicle))
+    times = {"delay_s": 0.0, "lag_s": 0.0}
+    for (known, shape), linear in extended.effects:
+        hooks = known.actuation
+        if known.kind not in ("wrench", "actuator"):
+            continue
+        if known.in_vehicle is not None:
+            parts = known.in_vehicle(parts, shape, linear)
+        elif hooks is not None and (hooks.lag or hooks.delay):
+            times |= {"lag_s": hooks.lag(shape)} if hooks.lag else {}
+            times |= {"delay_s": hooks.delay(shape)} if hooks.delay else {}
+        else:
+            parts = parts._replace(effects=(*parts.effects, (known.name, dict(shape), linear)))
+    return parts, times
 
 
 def _with_inertia(vehicle: VehicleSettings, inertia: Array) -> VehicleSettings:
@@ -101,15 +104,8 @@ def require_body(extended: ExtendedModel, vehicle: VehicleSettings) -> None:
     ------
     ComputationError
     """
-    added = (known.inertia(linear) for (known, _), linear in extended.effects if known.inertia is not None)
-    inertia = inertia_tensor(vehicle) + sum(added, start=inertia_correction(extended.parameters, vehicle))
-    if extended.base is None and not is_body(inertia):
+    if extended.base is None and not is_body(inertia_tensor(vehicle) + _parts(extended, vehicle)[0].inertia):
         raise ComputationError("not extended: with the effects that are named the inertia is that of no body")
-
-
-def _wind(extended: ExtendedModel) -> tuple[float, float, float]:
-    shapes = [shape for (known, shape), _ in extended.effects if known.still and known.apply]
-    return (shapes[0]["W_x"], shapes[0]["W_y"], 0.0) if shapes else (0.0, 0.0, 0.0)
 
 
 def _numbers(parameters: Array, vehicle: VehicleSettings, corrected: Array) -> tuple[ModelEffect, ...]:
@@ -179,11 +175,9 @@ def _beyond_rigid_body(model: VehicleModel) -> Effect:
         kind="wrench",
         formula="(M, F) = G(rotors) x(R'v, omega) - (M, F) of squared rotor speeds",
         sentence="The vehicle is as a whole model of it says.",
-        coefficients=(),
         needs=frozenset(),
         excitation="",
         rivals={},
         source="`cpfls vehicle`",
         columns=columns,
-        unit_coefficient=True,
     )

@@ -66,7 +66,7 @@ class ModelEffect(NamedTuple):
     def values(self) -> dict[str, float]:
         """Its numbers by name, as the catalogue has them."""
         known = self.known
-        physical = self.coefficients if known.physical is None else known.physical(self.coefficients)
+        physical = self.coefficients if known.physical is None else known.physical.of(self.coefficients)
         values = zip((each.name for each in known.coefficients), physical.tolist(), strict=True)
         # Of the vehicle's own numbers those that stand in the vehicle are 0 here.
         return {name: value for name, value in values if value or known.kind != "parameter"} | dict(self.shape)

@@ -36,7 +36,7 @@ class SimulatedEffect:
         if self.effect.unit_coefficient:
             return np.ones(1)
         physical = np.array([self.values[coefficient.name] for coefficient in self.effect.coefficients])
-        return physical if self.effect.linear is None else self.effect.linear(physical)
+        return physical if self.effect.physical is None else self.effect.physical.linear(physical)
 
     @property
     def acting(self) -> Array:

@@ -70,7 +70,7 @@ def effect_wrench(chosen: SimulatedEffects, hover: Signals) -> EffectWrench:
         for one in chosen.listed
         if one.effect.columns is not None
         and one.effect.carried is None
-        and (one.effect.kind != "actuator" or one.effect.vehicle is not None)
+        and (one.effect.kind != "actuator" or one.effect.in_vehicle is not None)
     )
     rates = [replace(hover, body_rate=rate[None]) for rate in np.eye(3)]
     by_rate = _slopes(effects, rates, replace(hover, body_rate=np.zeros((1, 3))))

@@ -199,13 +199,12 @@ def test_the_page_lists_what_an_export_cannot_hold():
     probe, refused = Probe.of(QUAD), []
     for known in CATALOGUE.values():
         hooks = known.actuation
-        of_vehicle = known.inertia is not None or known.vehicle is not None
-        held = of_vehicle or (hooks is not None and (hooks.lag or hooks.delay))
+        held = known.in_vehicle is not None or (hooks is not None and (hooks.lag or hooks.delay))
         if known.kind in ("wrench", "actuator") and not held:
             shape = {one.name: one.grid[0] for one in known.shapes}
             if known.carried is not None or polynomial(known, probe, shape) is None:
                 refused.append(known.name)
-        if known.exact is not None and known.exact.still:
+        if known.exact is not None and known.exact.in_vehicle:
             refused.remove(known.name)
     (said,) = re.findall(r"Not every effect is such a sum: (.*?) are not", PAGE, re.DOTALL)
     assert sorted(re.findall(r"`(\w+)`", said)) == sorted(refused)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from cpfls_cli.effects.actuation import wrench_change
-from cpfls_cli.effects.effect import Columns, Effect, Shape
+from cpfls_cli.effects.effect import Effect, Shape, a_few_percent
 from cpfls_cli.effects.hooks import Actuation
 from cpfls_cli.effects.signals import Signals
 
@@ -16,10 +15,6 @@ def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
     return signals.with_rotor_speed(signals.speed * signals.voltage[:, None] ** (shape["exponent"] / 2))
 
 
-def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-    return wrench_change(signals, _apply(signals, shape))
-
-
 EFFECT = Effect(
     name="battery_sag",
     order=170,
@@ -27,7 +22,6 @@ EFFECT = Effect(
     kind="actuator",
     formula="T_i = k w_i,commanded^2 (V/V_0)^n, drag torque alike;  M = M_rot(T) - M_rot(commanded)",
     sentence="As the battery empties, the same command gives less thrust.",
-    coefficients=(),
     needs=frozenset({"body_rate", "rotor_speed", "voltage"}),
     excitation="a flight from a full to an empty battery",
     rivals={
@@ -36,10 +30,8 @@ EFFECT = Effect(
         "vertical_descent": "repeat the descent with a full and with an empty battery",
     },
     source="SkyFlow (motor.py, motor_electrical.py); SkyDreamer (thrust over a discharge)",
-    columns=_columns,
     shapes=(Shape("exponent", "1", (0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0), "power of the voltage"),),
-    unit_coefficient=True,
     apply=_apply,
     actuation=Actuation(supply=lambda values, voltage: float(voltage ** (values["exponent"] / 2))),
-    accounts=lambda _number, _values: 0.05,
+    accounts=a_few_percent,
 )

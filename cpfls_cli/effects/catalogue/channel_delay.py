@@ -5,19 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.effects.actuation import with_actuation, wrench_change
-from cpfls_cli.effects.effect import Columns, Effect, Shape
+from cpfls_cli.effects.actuation import shifted
+from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.effects.hooks import ReadingError, SensorLog, SensorTest, TrueMotion
-from cpfls_cli.effects.signals import Signals
 from cpfls_cli.lag import delayed
-
-
-def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
-    return with_actuation(signals, lambda values: delayed(values, shape["delay_s"] / signals.period))
-
-
-def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-    return wrench_change(signals, _apply(signals, shape))
 
 
 def _log(signals: Mapping[str, Array], motion: TrueMotion, values: Mapping[str, float]) -> dict[str, Array]:
@@ -31,7 +22,6 @@ EFFECT = Effect(
     kind="actuator",
     formula="w(t) = w_logged(t - d);  M = M_rot(w) - M_rot(w_logged)",
     sentence="Rotor speeds and rates are logged at different times, so that cause and effect do not meet.",
-    coefficients=(),
     needs=frozenset({"measured_rotor_speed"}),
     excitation="roll and pitch torque sweeps from 0.5 to 3 Hz",
     rivals={
@@ -39,7 +29,6 @@ EFFECT = Effect(
         "rotor_acceleration": "compare yaw with roll and pitch: a shift acts on all axes alike",
     },
     source="alignment of clocks; SkyDreamer (11 ms)",
-    columns=_columns,
     shapes=(
         Shape(
             "delay_s",
@@ -48,8 +37,7 @@ EFFECT = Effect(
             "the rotors act this much later than logged",
         ),
     ),
-    unit_coefficient=True,
-    apply=_apply,
+    apply=shifted,
     log=SensorLog(change=_log, does="shifts measured rotor speeds"),
     test=SensorTest(
         estimate="delay",

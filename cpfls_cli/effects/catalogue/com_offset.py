@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect, a_few_percent
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.rotations import cross
 
@@ -39,7 +39,7 @@ _EFFECT = Effect(
     source="geometry; RotorPy (hub positions relative to the centre of mass)",
     columns=lambda signals, _shape: _levers(signals, 2),
     of_all_forces=True,
-    accounts=lambda _number, _values: 0.05,
+    accounts=a_few_percent,
 )
 
 # Height alone is the moment of a flapping disc; beside the other two it is the third number of one cause.

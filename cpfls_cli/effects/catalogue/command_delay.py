@@ -2,22 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from cpfls_cli.effects.actuation import DelayLine, with_actuation, wrench_change
-from cpfls_cli.effects.effect import Columns, Effect, Shape
+from cpfls_cli.effects.actuation import DelayLine, shifted
+from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.effects.hooks import Actuation
-from cpfls_cli.effects.signals import Signals
-from cpfls_cli.lag import delayed
-
-
-def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
-    return with_actuation(signals, lambda values: delayed(values, shape["delay_s"] / signals.period))
-
-
-def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-    return wrench_change(signals, _apply(signals, shape))
-
 
 EFFECT = Effect(
     name="command_delay",
@@ -26,7 +13,6 @@ EFFECT = Effect(
     kind="actuator",
     formula="w(t) = w_commanded(t - d);  M = M_rot(w) - M_rot(w_commanded)",
     sentence="The command takes time to reach the motors.",
-    coefficients=(),
     needs=frozenset({"body_rate", "command", "torque"}),
     excitation="roll and pitch torque sweeps from 0.5 to 3 Hz",
     rivals={
@@ -34,10 +20,8 @@ EFFECT = Effect(
         "linear_damping": "log measured rotor speeds; a delay looks like damping below zero",
     },
     source="SkyFlow (command transport delay)",
-    columns=_columns,
     shapes=(Shape("delay_s", "s", (0.004, 0.008, 0.012, 0.02, 0.03, 0.04, 0.055, 0.07, 0.09, 0.12), "time of travel"),),
-    unit_coefficient=True,
-    apply=_apply,
+    apply=shifted,
     actuation=Actuation(
         link=lambda values, step: DelayLine(values["delay_s"] / step), delay=lambda values: values["delay_s"]
     ),

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from cpfls_cli.effects.actuation import wrench_change
-from cpfls_cli.effects.effect import Columns, Effect, Shape
+from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -19,10 +18,6 @@ def _vehicle(vehicle: VehicleSettings, shape: Mapping[str, float]) -> VehicleSet
 
 def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
     return replace(signals, vehicle=_vehicle(signals.vehicle, shape))
-
-
-def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-    return wrench_change(signals, _apply(signals, shape))
 
 
 def _accounts(number: str, values: Mapping[str, float]) -> float:
@@ -39,17 +34,14 @@ EFFECT = Effect(
     sentence="The rotors turn the vehicle in yaw with another torque than the config says. It shows beside an effect "
     "that also pushes the vehicle, because the force tells how large its torque is; from yaw alone only the ratio of "
     "the drag factor to Izz is known.",
-    coefficients=(),
     needs=frozenset({"body_rate", "rotor_speed"}),
     excitation="turns in yaw while flying fast; or weigh and swing the vehicle, so that Izz is known",
     rivals={
         "linear_damping": "yaw at several rates in hover: a damping stays, a wrong factor needs air speed",
     },
     source="definition; the drag factor is the number that data sheets lack",
-    columns=_columns,
     shapes=(Shape("error", "1", (-0.6, -0.4, -0.2, -0.1, 0.1, 0.2, 0.4, 0.8, 1.5), "true factor over stated, less 1"),),
-    unit_coefficient=True,
     apply=_apply,
-    vehicle=_vehicle,
+    in_vehicle=lambda parts, shape, _: parts._replace(vehicle=_vehicle(parts.vehicle, shape)),
     accounts=_accounts,
 )

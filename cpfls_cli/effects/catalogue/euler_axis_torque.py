@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from cpfls_cli import rotations
-from cpfls_cli.effects.effect import Columns, Effect, stack, wrench
+from cpfls_cli.effects.effect import Columns, Effect, torque_column
 from cpfls_cli.effects.signals import Signals
 
 
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     assert signals.attitude is not None, "declared among the needs"
     torque = signals.wrench[:, :3]
-    return Columns(stack(wrench(rotations.body_torque(signals.attitude, torque) - torque)))
+    return torque_column(rotations.body_torque(signals.attitude, torque) - torque)
 
 
 EFFECT = Effect(
@@ -23,7 +23,6 @@ EFFECT = Effect(
     formula="M = (W^-T - 1) M_rot",
     sentence="The log gives torques about the axes of the Euler angles, and the model takes them for body axes; they "
     "differ as soon as the vehicle tilts.",
-    coefficients=(),
     needs=frozenset({"attitude", "torque"}),
     excitation="roll, pitch and yaw torque at large tilt",
     rivals={
@@ -32,5 +31,4 @@ EFFECT = Effect(
     },
     source="definition of the generalised torque, tau = W^T M",
     columns=_columns,
-    unit_coefficient=True,
 )

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, stack, wrench
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect, torque_column
 from cpfls_cli.effects.signals import Signals
 
 
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     x, y, _ = np.moveaxis((signals.speed[..., None] * signals.hub_velocity).sum(axis=1), 1, 0)
-    return Columns(stack(wrench(-np.column_stack([y, -x, np.zeros_like(x)]))))
+    return torque_column(-np.column_stack([y, -x, np.zeros_like(x)]))
 
 
 EFFECT = Effect(

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.actuation import SecondOrder
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape
+from cpfls_cli.effects.effect import Columns, Effect, Shape, of_axes
 from cpfls_cli.effects.hooks import Carrier, Pull
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -48,10 +48,6 @@ def _carried(_vehicle: VehicleSettings, values: Mapping[str, float]) -> _Spring:
     return _Spring(share, 2 * np.pi * values["frequency_hz"], values["damping"])
 
 
-def _share(axis: str) -> Coefficient:
-    return Coefficient(f"share_{axis}", "1", 0.0, 0.8, f"share of the inertia about {axis} that is on springs")
-
-
 EFFECT = Effect(
     name="flexible_mount",
     order=225,
@@ -59,7 +55,7 @@ EFFECT = Effect(
     kind="wrench",
     formula="M = d/dt (share I s^2/(s^2 + 2 zeta W s + W^2) omega), W = 2 pi f, for each axis",
     sentence="A part of the vehicle swings on springs: what turns fast turns without it.",
-    coefficients=tuple(_share(axis) for axis in "xyz"),
+    coefficients=of_axes("share_{}", "1", 0.0, 0.8, "share of the inertia about {} that is on springs"),
     needs=frozenset({"body_rate", "torque"}),
     excitation="roll and pitch sweeps through the resonance, from 0.5 to 8 Hz, then hands off for a second",
     rivals={

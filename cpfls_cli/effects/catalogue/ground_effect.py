@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cpfls_cli.effects.effect import Columns, Effect, Shape, stack, thrust_wrench
+from cpfls_cli.effects.effect import Columns, Effect, Shape, a_few_percent, thrust_column
 from cpfls_cli.effects.signals import Signals
 
 # Below this share the formula leaves its range: the thrust at most doubles.
@@ -17,7 +17,7 @@ def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
     height = np.maximum(signals.hub_height, 1e-3 * signals.radii)
     ratio = (signals.radii / (4 * height)) ** 2
     gain = 1 / np.maximum(1 - shape["G"] * ratio, _SMALLEST_DENOMINATOR)
-    return Columns(stack(thrust_wrench(signals.hubs, signals.rotor_thrust * (gain - 1))))
+    return thrust_column(signals, signals.rotor_thrust * (gain - 1))
 
 
 EFFECT = Effect(
@@ -27,7 +27,6 @@ EFFECT = Effect(
     kind="wrench",
     formula="dT_i = T_i (1 / (1 - G (R/4z_i)^2) - 1),  M = sum r_i x dT_i z",
     sentence="Near the ground the rotors pull more, the lower ones most, so that the vehicle is levelled.",
-    coefficients=(),
     needs=frozenset({"height", "rotor_speed", "rotor_radius"}),
     excitation="slow hover and tilt at heights of one, two and four rotor radii",
     rivals={
@@ -38,7 +37,6 @@ EFFECT = Effect(
     },
     source="Cheeseman and Bennett, R&M 3021 (G = 1); gym-pybullet-drones (G = 11.4 for a Crazyflie)",
     columns=_columns,
-    accounts=lambda _number, _values: 0.05,
+    accounts=a_few_percent,
     shapes=(Shape("G", "1", (0.25, 0.5, 1.0, 2.0, 4.0, 7.0, 11.0, 16.0), "strength; 1 is a single rotor"),),
-    unit_coefficient=True,
 )

@@ -2,20 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cpfls_cli.arrays import Array
-from cpfls_cli.effects.effect import Coefficient, Effect
-from cpfls_cli.effects.hooks import ReadingError, SensorLog, SensorTest, TrueMotion
-
-
-def _log(signals: Mapping[str, Array], _motion: TrueMotion, values: Mapping[str, float]) -> dict[str, Array]:
-    rate = signals["body_rate"]
-    return {"body_rate": np.asarray(rate - np.cross(np.array(list(values.values())), rate))}
-
+from cpfls_cli.effects.effect import Effect, of_axes
+from cpfls_cli.effects.hooks import ReadingError, SensorTest, gyroscope_log
 
 EFFECT = Effect(
     name="imu_misalignment",
@@ -24,9 +15,7 @@ EFFECT = Effect(
     kind="sensor",
     formula="gyro = omega - delta x omega",
     sentence="The IMU is mounted askew, so that turning about one axis shows on another.",
-    coefficients=tuple(
-        Coefficient(f"delta_{letter}", "rad", -0.35, 0.35, f"turn of the IMU about {letter}") for letter in "xyz"
-    ),
+    coefficients=of_axes("delta_{}", "rad", -0.35, 0.35, "turn of the IMU about {}"),
     needs=frozenset({"attitude"}),
     excitation="large turns about each axis; the attitude must not come from the gyro alone",
     rivals={
@@ -35,11 +24,9 @@ EFFECT = Effect(
         "rotor_gyroscopic": "repeat the roll rates with the yaw effort reversed: misalignment stays",
     },
     source="definition; comparison of the gyro with the derivative of the attitude",
-    columns=None,
-    log=SensorLog(change=_log),
+    log=gyroscope_log(lambda rate, turn: rate - np.cross(turn, rate)),
     test=SensorTest(
         estimate="misalignment",
-        labels=("x", "y", "z"),
         smallest=0.0025,
         number=lambda axis, value: f"{np.degrees(value):+.2f} deg about {axis}",
         found="The gyroscope sits turned against the attitude: {}.",

@@ -2,16 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, stack, thrust_wrench
-from cpfls_cli.effects.signals import Signals
-
-
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    return Columns(stack(thrust_wrench(signals.hubs, -signals.speed * signals.hub_velocity[..., 2])))
-
+from cpfls_cli.effects.effect import Coefficient, Effect, thrust_column
 
 EFFECT = Effect(
     name="inflow",
@@ -38,5 +30,5 @@ EFFECT = Effect(
         "vertical_descent": "climb as well as descend: in a climb only inflow acts",
     },
     source="RotorPy multirotor.py (k_z of the rotor drag matrix); PX4 data-driven-dynamics rotor_model.py",
-    columns=_columns,
+    columns=lambda signals, _: thrust_column(signals, -signals.speed * signals.hub_velocity[..., 2]),
 )

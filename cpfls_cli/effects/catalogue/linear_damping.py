@@ -2,25 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-import numpy as np
-
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect
-from cpfls_cli.effects.signals import Signals
-
-
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    direct = np.zeros((len(signals), 6, 3))
-    direct[:, :3] = -signals.body_rate[:, :, None] * np.eye(3)
-    return Columns(direct)
-
-
-def _damping(axis: int) -> Coefficient:
-    letter = "xyz"[axis]
-    return Coefficient(f"d_{letter}", "N m s/rad", 0.0, 3.0, f"damping about {letter}", scales.moment_of_inertia(axis))
-
+from cpfls_cli.effects.effect import Effect, of_axes, torque_by_axis
 
 EFFECT = Effect(
     name="linear_damping",
@@ -29,7 +12,7 @@ EFFECT = Effect(
     kind="wrench",
     formula="M = -(d_x p, d_y q, d_z r)",
     sentence="The air brakes rotation in proportion to the rate.",
-    coefficients=(_damping(0), _damping(1), _damping(2)),
+    coefficients=of_axes("d_{}", "N m s/rad", 0.0, 3.0, "damping about {}", scales.MOMENTS),
     needs=frozenset(),
     excitation="roll, pitch and yaw rate sweeps from 0.3 to 2 Hz at several amplitudes",
     rivals={
@@ -41,5 +24,5 @@ EFFECT = Effect(
         "command_delay": "log measured rotor speeds; a delay looks like damping below zero",
     },
     source="PX4 sih.cpp (Ma = -KDW omega); simulator of ArduPilot (terminal rotation rate)",
-    columns=_columns,
+    columns=lambda signals, _: torque_by_axis(-signals.body_rate),
 )

@@ -15,7 +15,6 @@ EFFECT = Effect(
     kind="actuator",
     formula="w_i = W^2/(s^2 + 2 b W s + W^2) w_i,commanded, W = 2 pi f;  M = M_rot(w) - M_rot(w_commanded)",
     sentence="A filter of the autopilot, or a drive with its speed control, passes slow commands and loses fast ones.",
-    coefficients=(),
     needs=frozenset({"body_rate", "command", "torque"}),
     excitation="roll and pitch torque sweeps to beyond the cut-off, or steps of the command",
     rivals={
@@ -24,12 +23,10 @@ EFFECT = Effect(
         "notch_filter": "sweep the torque through the notch and beyond: behind a notch the motion follows again",
     },
     source="second-order low-pass; ArduPilot LowPassFilter2p.cpp, PX4 LowPassFilter2p.hpp (bilinear transform)",
-    columns=_FILTER.columns,
     shapes=(
         Shape("frequency_hz", "Hz", (1.5, 2.2, 3.2, 4.7, 7.0, 11.0), "natural frequency"),
         Shape("damping", "1", (0.4, 0.7, 1.5), "damping ratio b; 0.71 for a Butterworth filter", first=0.7),
     ),
-    unit_coefficient=True,
     apply=_FILTER.apply,
     actuation=Actuation(link=_FILTER.link),
 )

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from cpfls_cli.effects.actuation import with_actuation, wrench_change
-from cpfls_cli.effects.effect import Columns, Effect, Shape
+from cpfls_cli.effects.actuation import with_actuation
+from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.effects.hooks import Actuation
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.lag import lagged
@@ -15,10 +15,6 @@ def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
     return with_actuation(signals, lambda values: lagged(values, shape["time_constant_s"] / signals.period).start)
 
 
-def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-    return wrench_change(signals, _apply(signals, shape))
-
-
 EFFECT = Effect(
     name="motor_lag",
     order=150,
@@ -26,7 +22,6 @@ EFFECT = Effect(
     kind="actuator",
     formula="tau w_i' + w_i = w_i,commanded;  M = M_rot(w) - M_rot(w_commanded)",
     sentence="The motors need time to reach the speed that they are told.",
-    coefficients=(),
     needs=frozenset({"body_rate", "command", "torque"}),
     excitation="roll and pitch torque sweeps from 0.5 to 3 Hz",
     rivals={
@@ -35,7 +30,6 @@ EFFECT = Effect(
         "parameter_error": "compare slow with fast torque: a wrong inertia acts in both",
     },
     source="RotorS and PX4 (first-order filter, 12.5 and 25 ms); RotorPy (tau_m)",
-    columns=_columns,
     shapes=(
         Shape(
             "time_constant_s",
@@ -44,7 +38,6 @@ EFFECT = Effect(
             "time to reach 63 % of a step",
         ),
     ),
-    unit_coefficient=True,
     apply=_apply,
     actuation=Actuation(lag=lambda values: values["time_constant_s"]),
 )

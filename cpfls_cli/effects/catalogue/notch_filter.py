@@ -15,7 +15,6 @@ EFFECT = Effect(
     kind="actuator",
     formula="w_i = (s^2 + W^2)/(s^2 + 2 b W s + W^2) w_i,commanded, W = 2 pi f;  M = M_rot(w) - M_rot(w_commanded)",
     sentence="The autopilot takes a band of frequencies out of its commands before the rotors get them.",
-    coefficients=(),
     needs=frozenset({"body_rate", "command", "torque"}),
     excitation="roll and pitch torque sweeps through the frequency of the notch, from 0.5 to 6 Hz",
     rivals={
@@ -23,12 +22,10 @@ EFFECT = Effect(
         "motor_lag": "sweep the torque through the notch and beyond: behind the notch the motion follows again",
     },
     source="second-order notch; ArduPilot NotchFilter.cpp, PX4 NotchFilter.hpp (bilinear transform, frequency kept)",
-    columns=_FILTER.columns,
     shapes=(
         Shape("frequency_hz", "Hz", (2.0, 2.8, 4.0, 5.5, 8.0, 12.0), "middle of the band that is taken out"),
         Shape("width", "1", (0.2, 0.7, 1.5), "half of the band's width over its middle", first=0.7),
     ),
-    unit_coefficient=True,
     apply=_FILTER.apply,
     actuation=Actuation(link=_FILTER.link),
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,14 +11,20 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect, of_axes
 from cpfls_cli.effects.hooks import SensorLog, TrueMotion
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_COUPLING = slice(3, 6)
-_THRUST_SCALE = 6
+# Places among the coefficients.
+_COUPLING, _THRUST_SCALE = slice(3, 6), 6
+# A tenth and four times of what is stated: farther off the number was not measured but mistyped.
 _BOUNDS = (-0.9, 3.0)
+_COUPLED = (
+    "coupling of the two other rates beyond that of the moments of inertia, which a wrong scale of the rotor torque"
+    " leaves"
+)
+_MEASURED = "where acceleration or velocity is measured, relative to the centre of mass; seen in force only"
 _MEASURING_POINT = ("reference_x", "reference_y", "reference_z")
 
 NUMBERS = {
@@ -178,34 +185,10 @@ EFFECT = Effect(
     sentence="The vehicle is as modelled, but a number of it is wrong. Rates and rotor speeds show only the ratio of "
     "inertia to rotor torque; the force balance shows the scale of the thrust.",
     coefficients=(
-        *(
-            Coefficient(f"inertia_{axis}", "1", *_BOUNDS, f"true I{axis}{axis} over that of the model, less 1")
-            for axis in "xyz"
-        ),
-        *(
-            Coefficient(
-                f"coupling_{axis}",
-                "1",
-                -3.0,
-                3.0,
-                "coupling of the two other rates beyond that of the moments of inertia, which a wrong scale of the"
-                " rotor torque leaves",
-            )
-            for axis in "xyz"
-        ),
-        Coefficient("thrust_scale", "1", -0.9, 3.0, "true thrust over that of the model, less 1; seen in force only"),
-        *(
-            Coefficient(
-                f"reference_{axis}",
-                "m",
-                -1.0,
-                1.0,
-                "where acceleration or velocity is measured, relative to the centre of mass; seen in force only",
-                scales.arm,
-                of_log=True,
-            )
-            for axis in "xyz"
-        ),
+        *of_axes("inertia_{}", "1", *_BOUNDS, "true I{0}{0} over that of the model, less 1"),
+        *of_axes("coupling_{}", "1", -3.0, 3.0, _COUPLED),
+        Coefficient("thrust_scale", "1", *_BOUNDS, "true thrust over that of the model, less 1; seen in force only"),
+        *(replace(each, of_log=True) for each in of_axes("reference_{}", "m", -1.0, 1.0, _MEASURED, scales.arm)),
     ),
     needs=frozenset({"torque"}),
     excitation="roll, pitch and yaw sweeps; hover, with a known mass, for the thrust",

@@ -8,7 +8,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect
+from cpfls_cli.effects.effect import Columns, Effect, of_axes
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -23,14 +23,9 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     return Columns(direct)
 
 
-def _force(letter: str) -> Coefficient:
-    meaning = f"half of air density times drag area along {letter}"
-    return Coefficient(f"c_{letter}", "N s^2/m^2", 0.0, 0.6, meaning, scales.drag_at_ten_metres_per_second)
-
-
-def _torque(letter: str) -> Coefficient:
-    meaning = f"drag times the {letter} of the centre of pressure"
-    return Coefficient(f"cr_{letter}", "N s^2/m", -0.2, 0.2, meaning, scales.arm_drag_at_ten_metres_per_second)
+_FORCE, _TORQUE = scales.drag_at_ten_metres_per_second, scales.arm_drag_at_ten_metres_per_second
+_FORCES = of_axes("c_{}", "N s^2/m^2", 0.0, 0.6, "half of air density times drag area along {}", _FORCE)
+_TORQUES = of_axes("cr_{}", "N s^2/m", -0.2, 0.2, "drag times the {} of the centre of pressure", _TORQUE)
 
 
 def _lever(linear: Array, error: Array, vehicle: VehicleSettings) -> BoolArray:
@@ -49,7 +44,7 @@ EFFECT = Effect(
     formula="F = -|v| (c_x v_x, c_y v_y, c_z v_z),  M = cr x (-|v| v)",
     sentence="The fuselage drags behind with the square of the air speed, and turns the vehicle where the drag acts "
     "beside the centre of mass.",
-    coefficients=(*(_force(letter) for letter in "xyz"), *(_torque(letter) for letter in "xyz")),
+    coefficients=(*_FORCES, *_TORQUES),
     needs=frozenset({"velocity"}),
     excitation="legs at two or more speeds, in both directions",
     rivals={

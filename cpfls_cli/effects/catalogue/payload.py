@@ -15,6 +15,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.settings import VehicleSettings
 
+# Square of the part of the cable across the vertical, 80 degrees: beyond, its length says nothing about its height.
 _LARGEST_ACROSS = 0.97
 
 

@@ -40,5 +40,5 @@ EFFECT = Effect(
     source="Newton-Euler equations; RotorPy and PX4 sih.cpp (Ixy, Ixz, Iyz)",
     columns=_columns,
     rate_derivative=True,
-    inertia=lambda linear: symmetric([0.0, 0.0, 0.0, *linear]),
+    in_vehicle=lambda parts, _, linear: parts._replace(inertia=parts.inertia + symmetric([0.0, 0.0, 0.0, *linear])),
 )

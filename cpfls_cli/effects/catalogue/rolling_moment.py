@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, stack, wrench
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect, torque_column
 from cpfls_cli.effects.signals import Signals
 
 
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     spinning = (signals.spins * signals.speed)[..., None]
-    return Columns(stack(wrench(-(spinning * signals.hub_velocity).sum(axis=1) * [1.0, 1.0, 0.0])))
+    return torque_column(-(spinning * signals.hub_velocity).sum(axis=1) * [1.0, 1.0, 0.0])
 
 
 EFFECT = Effect(

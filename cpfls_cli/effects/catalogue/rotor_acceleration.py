@@ -24,9 +24,7 @@ EFFECT = Effect(
     kind="wrench",
     formula="M_z = -d/dt (J_r S),  S = sum s_i w_i",
     sentence="A rotor that speeds up pushes the body the other way, so that yaw answers at once and then less.",
-    coefficients=(
-        Coefficient("J_r", "kg m^2", 0.0, 0.01, "inertia of one rotor about its axis", scales.moment_of_inertia(0)),
-    ),
+    coefficients=(Coefficient("J_r", "kg m^2", 0.0, 0.01, "inertia of one rotor about its axis", scales.MOMENTS[0]),),
     needs=frozenset({"body_rate", "rotor_speed"}),
     excitation="yaw steps, and a yaw sweep from 0.3 to 2 Hz, with rotor speeds logged at 100 Hz or more",
     rivals={

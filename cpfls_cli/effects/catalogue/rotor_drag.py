@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, hub_wrench, stack
 from cpfls_cli.effects.signals import Signals
 
+IN_PLANE = np.array([1.0, 1.0, 0.0])
+"""What of a vector lies in the rotor plane, body axes."""
 
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    in_plane = signals.hub_velocity * [1.0, 1.0, 0.0]
-    return Columns(stack(hub_wrench(signals.hubs, -signals.speed[..., None] * in_plane)))
+
+def drag(signals: Signals, _shape: Mapping[str, float]) -> Columns:
+    """Compute the drag of all rotors for a unit of k_d, as a column."""
+    return Columns(stack(hub_wrench(signals.hubs, -signals.speed[..., None] * (signals.hub_velocity * IN_PLANE))))
 
 
 EFFECT = Effect(
@@ -34,5 +39,5 @@ EFFECT = Effect(
         "wind": "fly legs in opposite directions",
     },
     source="RotorPy multirotor.py; Martin and Salaun 2010; OS4 aero.m (induced and profile parts in one column)",
-    columns=_columns,
+    columns=drag,
 )

@@ -7,14 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, stack, wrench
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect, torque_column
 from cpfls_cli.effects.signals import Signals
 
 
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     spin = signals.speed @ signals.spins
     p, q, _ = signals.body_rate.T
-    return Columns(stack(wrench(np.column_stack([-spin * q, spin * p, np.zeros_like(spin)]))))
+    return torque_column(np.column_stack([-spin * q, spin * p, np.zeros_like(spin)]))
 
 
 EFFECT = Effect(
@@ -24,9 +24,7 @@ EFFECT = Effect(
     kind="wrench",
     formula="M = -omega x J_r S z = J_r S (-q, p, 0),  S = sum s_i w_i",
     sentence="With yaw effort the rotors are a gyroscope: rolling then pitches the vehicle, and pitching rolls it.",
-    coefficients=(
-        Coefficient("J_r", "kg m^2", 0.0, 0.01, "inertia of one rotor about its axis", scales.moment_of_inertia(0)),
-    ),
+    coefficients=(Coefficient("J_r", "kg m^2", 0.0, 0.01, "inertia of one rotor about its axis", scales.MOMENTS[0]),),
     needs=frozenset({"rotor_speed"}),
     excitation="roll and pitch rates during yaw effort to both sides",
     rivals={

@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect
-from cpfls_cli.effects.signals import Signals
-
-
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    return Columns(np.tile(np.eye(6)[:, :3], (len(signals), 1, 1)))
-
+from cpfls_cli.effects.effect import Columns, Effect, of_axes
 
 EFFECT = Effect(
     name="torque_bias",
@@ -22,9 +14,7 @@ EFFECT = Effect(
     kind="wrench",
     formula="M = (M_x, M_y, M_z)",
     sentence="Something turns the vehicle all the time to the same side, as a bent arm or a tilted motor does.",
-    coefficients=tuple(
-        Coefficient(f"M_{letter}", "N m", -0.15, 0.15, f"torque about {letter}", scales.arm_weight) for letter in "xyz"
-    ),
+    coefficients=of_axes("M_{}", "N m", -0.15, 0.15, "torque about {}", scales.arm_weight),
     needs=frozenset(),
     excitation="none: it is always there",
     rivals={
@@ -34,5 +24,5 @@ EFFECT = Effect(
         "euler_axis_torque": "tilt: the wrong convention vanishes in level flight",
     },
     source="SkyFlow (thrust axis misalignment)",
-    columns=_columns,
+    columns=lambda signals, _: Columns(np.tile(np.eye(6)[:, :3], (len(signals), 1, 1))),
 )

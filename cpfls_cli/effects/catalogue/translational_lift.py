@@ -2,16 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, stack, thrust_wrench
-from cpfls_cli.effects.signals import Signals
-
-
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    return Columns(stack(thrust_wrench(signals.hubs, (signals.hub_velocity[..., :2] ** 2).sum(axis=-1))))
-
+from cpfls_cli.effects.effect import Coefficient, Effect, thrust_column
 
 EFFECT = Effect(
     name="translational_lift",
@@ -32,5 +24,5 @@ EFFECT = Effect(
         "inflow": "fly level and fast, without climbing",
     },
     source="RotorPy multirotor.py (k_h)",
-    columns=_columns,
+    columns=lambda signals, _: thrust_column(signals, (signals.hub_velocity[..., :2] ** 2).sum(axis=-1)),
 )

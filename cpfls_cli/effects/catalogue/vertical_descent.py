@@ -8,11 +8,13 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, thrust_wrench
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, a_few_percent, thrust_wrench
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.vehicle.settings import VehicleSettings
 
+# kg/m^3, at sea level and 15 degrees.
 _AIR_DENSITY = 1.225
+# Ratios of descent: the end of the data, knots where their curves bend, where thrust shakes, and ends of the states.
 _LARGEST_RATIO = 2.5
 _KNOTS = (0.0, 0.5, 1.0, 1.25, 1.6, 2.0, 2.5)
 _SHAKING = (0.5, 1.7)
@@ -53,13 +55,7 @@ def descent_ratio(signals: Signals) -> Array:
 
 
 def descent_state(ratio: float) -> str:
-    """Name the state of a rotor in descent.
-
-    Parameters
-    ----------
-    ratio : float
-        Speed of descent over induced velocity.
-    """
+    """Name the state of a rotor in descent by the speed of descent over the induced velocity."""
     return next(state for limit, state in _STATES if ratio <= limit)
 
 
@@ -132,7 +128,7 @@ EFFECT = Effect(
     },
     source="Bauersfeld et al. 2021, NeuroBEM, eq. 19; Bangura and Mahony (0.5 < x < 2); the sources disagree in sign",
     columns=_columns,
-    accounts=lambda _number, _values: 0.05,
+    accounts=a_few_percent,
     shapes=(Shape("sideways", "1", (0.4, 0.7, 1.0, 1.5), "sideways speed over v_h that blows the effect away"),),
     scatter=_scatter,
     describe=_describe,

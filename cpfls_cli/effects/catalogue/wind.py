@@ -9,40 +9,41 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects import scales
+from cpfls_cli.effects.catalogue.rotor_drag import EFFECT as ROTOR_DRAG
+from cpfls_cli.effects.catalogue.rotor_drag import IN_PLANE, drag
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, hub_wrench, stack
+from cpfls_cli.effects.hooks import PhysicalNumbers, VehicleParts
 from cpfls_cli.effects.signals import Signals
 
-_IN_PLANE = np.array([1.0, 1.0, 0.0])
-
-
 _STRONGEST = 15.0
+"""Bound of either component in m/s, 7 Beaufort: nobody flies a multirotor to learn from in more."""
 
 
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
+def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
     still = signals if signals.wind is None else replace(signals, wind=None)
-    speed = signals.speed[..., None]
-    still_air = -speed * still.hub_velocity * _IN_PLANE
-    pushed = [speed * (signals.rotation[:, axis] * _IN_PLANE)[:, None] for axis in (0, 1)]
-    return Columns(stack(*(hub_wrench(signals.hubs, force) for force in (still_air, *pushed))))
+    pushed = [signals.speed[..., None] * (signals.rotation[:, axis] * IN_PLANE)[:, None] for axis in (0, 1)]
+    blown = stack(*(hub_wrench(signals.hubs, force) for force in pushed))
+    return Columns(np.concatenate([drag(still, shape).direct, blown], axis=2))
 
 
 def _physical(linear: Array) -> Array:
-    drag = linear[0]
-    return np.array([drag, *(linear[1:] / drag if drag > 0 else (np.nan, np.nan))])
+    per_speed = linear[0]
+    return np.array([per_speed, *(linear[1:] / per_speed if per_speed > 0 else (np.nan, np.nan))])
 
 
 def _linear(physical: Array) -> Array:
-    drag, x, y = physical
-    return np.array([drag, drag * x, drag * y])
+    per_speed, x, y = physical
+    return np.array([per_speed, per_speed * x, per_speed * y])
 
 
 def _blowing(signals: Signals, shape: Mapping[str, float]) -> Signals:
     return replace(signals, wind=np.array([shape["W_x"], shape["W_y"], 0.0]))
 
 
-def _drag(signals: Signals, shape: Mapping[str, float]) -> Columns:
-    in_plane = _blowing(signals, shape).hub_velocity * _IN_PLANE
-    return Columns(stack(hub_wrench(signals.hubs, -signals.speed[..., None] * in_plane)))
+def _in_vehicle(parts: VehicleParts, shape: Mapping[str, float], linear: Array) -> VehicleParts:
+    """Take the wind apart: found in still air, it is no part of the vehicle, and what it blows against is one."""
+    wind = shape["W_x"], shape["W_y"], 0.0
+    return parts._replace(wind=wind, effects=(*parts.effects, (ROTOR_DRAG.name, {}, linear)))
 
 
 _EFFECT = Effect(
@@ -69,9 +70,8 @@ _EFFECT = Effect(
     },
     source="RotorPy multirotor.py (wind state); PX4 sih.cpp (v_apparent)",
     columns=_columns,
-    physical=_physical,
-    linear=_linear,
-    holds=frozenset({"rotor_drag"}),
+    physical=PhysicalNumbers(_physical, _linear),
+    holds=frozenset({ROTOR_DRAG.name}),
 )
 
 _DRAG, *_WIND = _EFFECT.coefficients
@@ -79,10 +79,9 @@ _EXACT = replace(
     _EFFECT,
     coefficients=(_DRAG,),
     shapes=tuple(Shape(each.name, each.unit, (each.low, 0.0, each.high), each.meaning) for each in _WIND),
-    columns=_drag,
+    columns=lambda signals, shape: drag(_blowing(signals, shape), shape),
     physical=None,
-    linear=None,
     apply=_blowing,
-    still="rotor_drag",
+    in_vehicle=_in_vehicle,
 )
 EFFECT = replace(_EFFECT, exact=_EXACT)

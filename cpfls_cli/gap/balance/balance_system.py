@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.effects.effect import Columns
+from cpfls_cli.effects.effect import Columns, Shape
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.noise_floor import noise_floor
 from cpfls_cli.gap.balance.weak_flight import Candidate, CandidateKey, WeakFlight, actuated, columns_of, nuisance
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 NEGLIGIBLE = 0.003
 """Share of the torque or force below which nobody could use a correction; sampling alone leaves about as much."""
+_QUIET_AXIS = 0.3
+"""Torque of the most active axis that counts on every axis: what is negligible about one is so about the others."""
+_SCATTERING = 0.2
+"""Share of its largest variance from which on a window is one that scatters."""
 _LEAST_RATIO = 1.5
 """Mean square inside the scattering stretches over that outside from which scatter is believed."""
 
@@ -40,25 +45,32 @@ class System:
     cache: dict[CandidateKey, Array] = field(default_factory=dict, repr=False)
 
     def columns(self, candidate: Candidate) -> Array:
-        """Evaluate a candidate; a flight that lacks a signal it needs has zeros.
-
-        Returns
-        -------
-        array, shape (window, 6, coefficient)
-        """
+        """Evaluate a candidate, shape (window, 6, coefficient); zeros for a flight that lacks a signal it needs."""
         if candidate.key not in self.cache:
-            self.cache[candidate.key] = self._evaluate(candidate)
+            pairs = zip(self.flights, self.signals, strict=True)
+            rows = [None if candidate.effect.missing(signals) else f.rows(candidate, signals) for f, signals in pairs]
+            width = max((there.shape[2] for there in rows if there is not None), default=0)
+            known = (np.zeros((len(f), 6, width)) if r is None else r for f, r in zip(self.flights, rows, strict=True))
+            self.cache[candidate.key] = np.concatenate(list(known))
         return self.cache[candidate.key]
+
+    def by_flight(self, make: Callable[[WeakFlight, Signals], Array]) -> Array:
+        """Compute rows from each flight and its signals, shape (window, ...)."""
+        return np.concatenate(
+            [make(flight, signals) for flight, signals in zip(self.flights, self.signals, strict=True)]
+        )
 
     @cached_property
     def residual(self) -> Array:
         """What inertia and rotors leave, without the effects of unit coefficient; shape (window, 6)."""
-        pairs = zip(self.flights, self.signals, strict=True)
-        residual = np.concatenate([flight.averaged(flight.residual(signals)) for flight, signals in pairs])
-        for candidate in self.chosen:
-            if candidate.effect.kind == "wrench" and candidate.effect.unit_coefficient:
-                residual = residual - self.columns(candidate)[..., 0]
+        residual = self.by_flight(lambda flight, signals: flight.averaged(flight.residual(signals)))
+        for candidate in self.fixed:
+            residual = residual - self.columns(candidate)[..., 0]
         return residual
+
+    def left(self, linear: Array) -> Array:
+        """Compute what coefficients of `base` leave of the residual, shape (window, 6), N m and N."""
+        return np.asarray(self.residual - self.base @ linear)
 
     @cached_property
     def base(self) -> Array:
@@ -66,16 +78,22 @@ class System:
         return np.concatenate([self.columns(candidate) for candidate in self.free], axis=2)
 
     @cached_property
+    def places(self) -> tuple[tuple[Candidate, slice], ...]:
+        """Candidates with columns in `base`, each with the place of its own."""
+        widths = [self.columns(candidate).shape[2] for candidate in self.free]
+        ends = np.cumsum(widths).tolist()
+        return tuple((each, slice(end - width, end)) for each, width, end in zip(self.free, widths, ends, strict=True))
+
+    @cached_property
     def noise(self) -> Array:
         """Noise like that of `base`, and of `residual` in the last column; shape (window, 6, column + 1)."""
-        pairs = zip(self.flights, self.signals, strict=True)
-        return np.concatenate([self._noise(flight, signals) for flight, signals in pairs])
+        return self.by_flight(self._noise)
 
     def _noise(self, flight: WeakFlight, signals: Signals) -> Array:
         parts = []
-        for candidate in self.free:
+        for candidate, place in self.places:
             if candidate.effect.missing(signals):
-                parts.append(np.zeros((len(flight), 6, self.columns(candidate).shape[2])))
+                parts.append(np.zeros((len(flight), 6, place.stop - place.start)))
                 continue
             noise = flight.noise(columns_of(candidate, signals))
             parts.append(noise * flight.turns if candidate.effect.kind == "parameter" else noise)
@@ -84,8 +102,34 @@ class System:
     @cached_property
     def rotor_wrench(self) -> Array:
         """Torque and force of the rotors, averaged over the windows; shape (window, 6)."""
-        pairs = zip(self.flights, self.signals, strict=True)
-        return np.concatenate([flight.windows.average(signals.wrench) * flight.known for flight, signals in pairs])
+        return self.by_flight(lambda flight, signals: flight.windows.average(signals.wrench) * flight.known)
+
+    @property
+    def vehicle(self) -> VehicleSettings:
+        """The vehicle that flew."""
+        return self.flights[0].signals.vehicle
+
+    @property
+    def shapes(self) -> list[Shape]:
+        """Shapes of the chosen effects, in their order."""
+        return [shape for candidate in self.chosen for shape in candidate.effect.shapes]
+
+    @property
+    def shape_values(self) -> Array:
+        """Their values, shape (shape,)."""
+        return np.array([candidate.shape[s.name] for candidate in self.chosen for s in candidate.effect.shapes])
+
+    def with_shapes(self, values: Array) -> System:
+        """Move the shapes of all chosen effects."""
+        following = iter(values.tolist())
+        return system(
+            self.flights, [each.at({s.name: next(following) for s in each.effect.shapes}) for each in self.chosen]
+        )
+
+    @property
+    def fixed(self) -> tuple[Candidate, ...]:
+        """Chosen candidates that are a part of the residual."""
+        return tuple(each for each in self.chosen if each.effect.kind == "wrench" and each.effect.unit_coefficient)
 
     @property
     def free(self) -> tuple[Candidate, ...]:
@@ -101,24 +145,21 @@ class System:
         """Tell whether any flight has the signals that a candidate needs."""
         return any(not candidate.effect.missing(signals) for signals in self.signals)
 
-    def _evaluate(self, candidate: Candidate) -> Array:
-        rows = [
-            None if candidate.effect.missing(signals) else flight.rows(candidate, signals)
-            for flight, signals in zip(self.flights, self.signals, strict=True)
-        ]
-        width = max((there.shape[2] for there in rows if there is not None), default=0)
-        return np.concatenate(
-            [
-                np.zeros((len(flight), 6, width)) if there is None else there
-                for flight, there in zip(self.flights, rows, strict=True)
-            ]
-        )
-
 
 def system(flights: Sequence[WeakFlight], chosen: Sequence[Candidate] = ()) -> System:
     """Set up the balance of flights under a hypothesis."""
     signals = tuple(actuated(flight.signals, chosen) for flight in flights)
     return System(tuple(flights), tuple(chosen), signals)
+
+
+def has_force(flights: Sequence[WeakFlight]) -> bool:
+    """Tell whether any flight has the force balance."""
+    return any(flight.known[3:].any() for flight in flights)
+
+
+def channel_size(rows: Array) -> Array:
+    """Compute the root mean square of each channel, shape (6,); 1 for channels that no flight has."""
+    return np.where(rows.any(axis=0), np.sqrt(np.mean(rows**2, axis=0)), 1.0)
 
 
 def is_free(candidate: Candidate) -> bool:
@@ -166,34 +207,21 @@ def left_over(hypothesis: System, number: int, coefficients: Array) -> Columns:
     residual = flight.residual(signals)
     direct, momentum = residual.direct, residual.momentum
     assert momentum is not None
-    used = 0
-    for candidate in hypothesis.free:
-        width = hypothesis.columns(candidate).shape[2]
-        linear = coefficients[used : used + width]
-        used += width
-        direct, momentum = _less(direct, momentum, candidate, linear, signals)
-    for candidate in hypothesis.chosen:
-        if candidate.effect.kind == "wrench" and candidate.effect.unit_coefficient:
-            direct, momentum = _less(direct, momentum, candidate, np.ones(1), signals)
+    parts = [(candidate, coefficients[place]) for candidate, place in hypothesis.places]
+    for candidate, linear in [*parts, *((candidate, np.ones(1)) for candidate in hypothesis.fixed)]:
+        if not candidate.effect.missing(signals):
+            columns = columns_of(candidate, signals)
+            direct = direct - columns.direct @ linear
+            momentum = momentum if columns.momentum is None else momentum - columns.momentum @ linear
     return Columns(direct * flight.known, momentum * flight.known)
-
-
-def _less(direct: Array, momentum: Array, candidate: Candidate, linear: Array, signals: Signals) -> tuple[Array, Array]:
-    """Subtract what a candidate does with its coefficients."""
-    if candidate.effect.missing(signals):
-        return direct, momentum
-    columns = columns_of(candidate, signals)
-    if columns.momentum is not None:
-        momentum = momentum - columns.momentum @ linear
-    return direct - columns.direct @ linear, momentum
 
 
 def _activity(hypothesis: System) -> Array:
     """Compute the root mean square of the inertial torque and force of each channel about its mean."""
-    rows = np.concatenate([flight.averaged(flight.inertial) for flight in hypothesis.flights])
+    rows = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
     torque = np.sqrt(np.mean(rows[:, :3] ** 2, axis=0))
     weight = np.sqrt(np.mean(rows[:, 3:] ** 2))
-    return np.array([*np.maximum(torque, 0.3 * torque.max()), *[weight] * 3])
+    return np.array([*np.maximum(torque, _QUIET_AXIS * torque.max()), *[weight] * 3])
 
 
 def scatter_variance(hypothesis: System) -> Array:
@@ -204,14 +232,15 @@ def scatter_variance(hypothesis: System) -> Array:
     array, shape (window, 6)
         Zero where no effect scatters.
     """
-    parts = []
-    for flight, signals in zip(hypothesis.flights, hypothesis.signals, strict=True):
+
+    def of_flight(flight: WeakFlight, signals: Signals) -> Array:
         total = np.zeros((len(flight), 6))
-        for candidate in hypothesis.chosen:
-            if candidate.effect.scatter is not None and not candidate.effect.missing(signals):
-                total += flight.windows.average(candidate.effect.scatter(signals, candidate.shape))
-        parts.append(total * flight.known)
-    return np.concatenate(parts)
+        for effect, shape in hypothesis.chosen:
+            if effect.scatter is not None and not effect.missing(signals):
+                total += flight.windows.average(effect.scatter(signals, shape))
+        return total * flight.known
+
+    return hypothesis.by_flight(of_flight)
 
 
 def relative_scatter(hypothesis: System, linear: Array, floor: Array) -> float:
@@ -228,7 +257,7 @@ def relative_scatter(hypothesis: System, linear: Array, floor: Array) -> float:
     float
         Its mean square over a window.
     """
-    return scatter_size(scatter_variance(hypothesis), hypothesis.residual - hypothesis.base @ linear, floor)
+    return scatter_size(scatter_variance(hypothesis), hypothesis.left(linear), floor)
 
 
 def scatter_size(variance: Array, residual: Array, floor: Array) -> float:
@@ -250,7 +279,7 @@ def scatter_size(variance: Array, residual: Array, floor: Array) -> float:
     if not expected.any():
         return 0.0
     square = (residual / floor) ** 2
-    inside = expected > 0.2 * expected.max(axis=0, initial=0.0, keepdims=True) * np.sign(expected.max(axis=0))
+    inside = expected > _SCATTERING * expected.max(axis=0, initial=0.0, keepdims=True) * np.sign(expected.max(axis=0))
     inside &= expected > 0
     if not inside.any() or square[inside].mean() < _LEAST_RATIO * max(1.0, square[~inside].mean()):
         return 0.0

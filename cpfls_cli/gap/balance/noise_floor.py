@@ -92,7 +92,8 @@ def _below(residual: Columns, windows: Windows, cut_off: float) -> Array:
     length = len(windows.weight) * windows.period
     highest = min(_HIGHEST_OF_RATE / windows.period, _PASSED * cut_off)
     wanted = max(_LONGER * length, _BAND * _LOWEST_PER_WINDOW / highest)
-    longer = make_windows(windows.period, wanted, 0.5) if _fits(residual, wanted / windows.period) else windows
+    fits = len(residual.direct) >= 4 * wanted / windows.period
+    longer = make_windows(windows.period, wanted, 0.5) if fits else windows
     lowest = _LOWEST_PER_WINDOW / (len(longer.weight) * longer.period)
     frequencies = np.linspace(lowest, max(highest, _BAND * lowest), _FREQUENCIES)
     power = np.array([_power(residual, longer, frequency) for frequency in frequencies]) / _energy(longer)
@@ -114,10 +115,6 @@ def _terms(weights: bytes, period: float, centre: float) -> Array:
     colours = [1 / (1 + rho**2 - 2 * rho * np.cos(phase)) for rho in _CORRELATIONS]
     spectra = np.array([spectrum for colour in colours for spectrum in (colour, rising * colour)])
     return np.asarray(spectra @ share / share.sum())
-
-
-def _fits(residual: Columns, samples: float) -> bool:
-    return len(residual.direct) >= 4 * samples
 
 
 def _energy(windows: Windows) -> float:

@@ -13,8 +13,9 @@ from scipy.optimize import least_squares, lsq_linear, minimize_scalar
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.catalogue.parameter_error import Change, physical, too_light
 from cpfls_cli.effects.effect import Effect, Shape
-from cpfls_cli.gap.balance.balance_system import System, is_free, system
+from cpfls_cli.gap.balance.balance_system import System, has_force, is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.rounding import at_most, levelled, smallest
 
 # Of one shape between the neighbours of its grid point, to a thousandth of that; of all shapes from there.
 _EVALUATIONS = 14
@@ -53,14 +54,15 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     for shape in best[-1].effect.shapes if best else ():
         if shape.valley is not None:
             best[-1] = _in_deepest_valley(flights, best, shape, floor)
-    shapes = [(index, shape) for index, candidate in enumerate(best) for shape in candidate.effect.shapes]
     # What took the place of a linear effect stands between no points of a grid.
-    newest = [(index, shape) for index, shape in shapes if best[index].effect is chosen[-1].effect]
+    indices = [index for index, candidate in enumerate(best) if candidate.effect is chosen[-1].effect]
+    newest = [(index, shape) for index in indices for shape in best[index].effect.shapes]
     # A second round where there are several: the best length of a cable depends on its damping.
     rounds = 2 if len(newest) > 1 else 1
     for index, shape in rounds * newest:
         best[index] = _improved(flights, best, index, shape, floor, rotor_wrench)
-    return system(flights, _together(flights, best, shapes, floor, rotor_wrench) if len(shapes) > 1 else best)
+    hypothesis = system(flights, best)
+    return _together(hypothesis, floor, rotor_wrench) if len(hypothesis.shapes) > 1 else hypothesis
 
 
 @dataclass(frozen=True)
@@ -208,10 +210,9 @@ def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = F
 
 def _unseen(hypothesis: System, change: Change, length: Array) -> BoolArray:
     """Mark coefficients of effects that even on a bound would move all windows together by less than noise does."""
-    own = hypothesis.columns(hypothesis.free[0]).shape[2]
     most = np.maximum(np.abs(change.low), np.abs(change.high))
     unseen = np.where(np.isfinite(most), most, 1.0) * length < _SEEN
-    unseen[:own] = False
+    unseen[hypothesis.places[0][1]] = False
     return np.asarray(unseen & np.isfinite(most) & (length > 0))
 
 
@@ -242,34 +243,30 @@ def _change(hypothesis: System, shown: BoolArray, least: BoolArray | None) -> Ch
 
     The vehicle's own numbers are free where `least` is None.
     """
-    vehicle = hypothesis.flights[0].signals.vehicle
+    vehicle = hypothesis.vehicle
     pairs: list[tuple[float, float]] = []
-    for candidate in hypothesis.free:
-        width = hypothesis.columns(candidate).shape[2]
-        known = candidate.effect.coefficients
+    for candidate, place in hypothesis.places:
+        known, width = candidate.effect.coefficients, place.stop - place.start
         bounded = is_free(candidate) and candidate.effect.physical is None and len(known) == width
         pairs += [each.bounds(vehicle) for each in known] if bounded else [(-np.inf, np.inf)] * width
     low, high = np.array(pairs).T
     change = Change(np.zeros(len(low)), np.eye(len(low)), low, high)
     if least is not None:
-        own = physical(vehicle, shown[:3], least)
-        width = len(own.offset)
-        change.offset[:width], change.matrix[:width, :width] = own.offset, own.matrix
-        change.low[:width], change.high[:width] = own.low, own.high
+        own, place = physical(vehicle, shown[:3], least), hypothesis.places[0][1]
+        change.offset[place], change.matrix[place, place] = own.offset, own.matrix
+        change.low[place], change.high[place] = own.low, own.high
     return change
 
 
 def _without_lever(hypothesis: System, linear: Array) -> BoolArray | None:
     """Mark torques that are impossible beside the force of their effect; None if all are possible."""
-    out, first = np.zeros(len(linear), dtype=bool), 0
-    if not any(flight.known[3:].any() for flight in hypothesis.flights):
+    out = np.zeros(len(linear), dtype=bool)
+    if not has_force(hypothesis.flights):
         return None
-    for candidate in hypothesis.free:
-        own = linear[first : first + hypothesis.columns(candidate).shape[2]]
+    for candidate, place in hypothesis.places:
         if candidate.effect.lever is not None:
-            vehicle = hypothesis.flights[0].signals.vehicle
-            out[first : first + len(own)] = ~candidate.effect.lever(own, np.zeros(len(own)), vehicle) & (own != 0)
-        first += len(own)
+            own = linear[place]
+            out[place] = ~candidate.effect.lever(own, np.zeros(len(own)), hypothesis.vehicle) & (own != 0)
     return out if out.any() else None
 
 
@@ -287,7 +284,7 @@ def weighted_residual(hypothesis: System, floor: Array, rotor_wrench: Array) -> 
     array, shape (window, 6)
     """
     weight = compensation(rotor_wrench, hypothesis.rotor_wrench) / floor
-    return np.asarray((hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)) * weight)
+    return np.asarray(hypothesis.left(fit(hypothesis, floor)) * weight)
 
 
 def refitted(hypothesis: System, weight: Array) -> System:
@@ -302,16 +299,17 @@ def refitted(hypothesis: System, weight: Array) -> System:
         Standard deviation of each channel.
     """
     hypothesis = _exact(hypothesis, weight)
-    if not free_shapes(hypothesis):
+    if not hypothesis.shapes:
         return hypothesis
     rotor_wrench = system(hypothesis.flights).rotor_wrench
     error = _squares(hypothesis, weight, rotor_wrench)
+    low, high = np.array([shape.bounds(hypothesis.vehicle) for shape in hypothesis.shapes]).T
     for _ in range(_STEPS):
-        step = _newton_step(hypothesis, weight, rotor_wrench)
+        step = _newton_step(hypothesis, weight / compensation(rotor_wrench, hypothesis.rotor_wrench), rotor_wrench)
         for share in _SHARES:
-            ahead = _moved(hypothesis, share * step)
+            ahead = hypothesis.with_shapes(np.clip(hypothesis.shape_values + share * step, low, high))
             left = _squares(ahead, weight, rotor_wrench)
-            if left <= error:
+            if at_most(left, error):
                 break
         else:
             return hypothesis
@@ -323,19 +321,17 @@ def refitted(hypothesis: System, weight: Array) -> System:
 
 def _exact(hypothesis: System, weight: Array) -> System:
     """Exchange effects for what takes their place once they are chosen."""
-    linear, first, chosen = fit(hypothesis, weight), 0, {each.effect.name: each for each in hypothesis.chosen}
-    for candidate in hypothesis.free:
-        own = linear[first : first + hypothesis.columns(candidate).shape[2]]
-        first += len(own)
+    linear, chosen = fit(hypothesis, weight), {each.effect.name: each for each in hypothesis.chosen}
+    for candidate, place in hypothesis.places:
         if candidate.effect.exact is not None:
-            chosen[candidate.effect.name] = _in_place_of(candidate.effect, candidate.effect.exact, own)
+            chosen[candidate.effect.name] = _in_place_of(candidate.effect, candidate.effect.exact, linear[place])
     listed = tuple(chosen.values())
     return hypothesis if listed == hypothesis.chosen else system(hypothesis.flights, listed)
 
 
 def _in_place_of(effect: Effect, exact: Effect, linear: Array) -> Candidate:
     """Start the shapes at what the linear coefficients say."""
-    physical = linear if effect.physical is None else np.nan_to_num(effect.physical(linear))
+    physical = linear if effect.physical is None else np.nan_to_num(effect.physical.of(linear))
     values = {known.name: float(value) for known, value in zip(effect.coefficients, physical, strict=True)}
     shapes = {s.name: float(np.clip(values[s.name], s.grid[0], s.grid[-1])) for s in exact.shapes}
     return Candidate(exact, shapes)
@@ -343,29 +339,16 @@ def _in_place_of(effect: Effect, exact: Effect, linear: Array) -> Candidate:
 
 def _squares(hypothesis: System, weight: Array, rotor_wrench: Array) -> float:
     weight = weight / compensation(rotor_wrench, hypothesis.rotor_wrench)
-    left = hypothesis.residual - hypothesis.base @ fit_within_bounds(hypothesis, weight)[0]
+    left = hypothesis.left(fit_within_bounds(hypothesis, weight)[0])
     return float(((left / weight) ** 2).sum())
 
 
 def _newton_step(hypothesis: System, weight: Array, rotor_wrench: Array) -> Array:
     """Solve for the change of the shapes, with the coefficients that no bound holds beside them, shape (shape,)."""
-    weight = weight / compensation(rotor_wrench, hypothesis.rotor_wrench)
     linear, held = fit_within_bounds(hypothesis, weight)
     shapes = shape_columns(hypothesis, linear, rotor_wrench)
     rows = equations(hypothesis, weight).around(linear, ~held, shapes / weight[..., None])
     return np.asarray(rows.solve()[-shapes.shape[2] :])
-
-
-def _moved(hypothesis: System, step: Array) -> System:
-    """Change the shapes, as far as their ranges go."""
-    changes, chosen = iter(step.tolist()), []
-    for effect, shape in hypothesis.chosen:
-        moved = {
-            each.name: float(np.clip(shape[each.name] + next(changes), each.grid[0], each.grid[-1]))
-            for each in effect.shapes
-        }
-        chosen.append(Candidate(effect, moved))
-    return system(hypothesis.flights, chosen)
 
 
 def _improved(
@@ -378,18 +361,16 @@ def _improved(
 ) -> Candidate:
     candidate = chosen[index]
 
-    def moved(value: float) -> Candidate:
-        return Candidate(candidate.effect, {**candidate.shape, shape.name: float(value)})
-
     def error(value: float) -> float:
-        hypothesis = system(flights, [*chosen[:index], moved(value), *chosen[index + 1 :]])
+        hypothesis = system(flights, [*chosen[:index], candidate.at({shape.name: float(value)}), *chosen[index + 1 :]])
         return float((weighted_residual(hypothesis, floor, rotor_wrench) ** 2).sum())
 
-    bracket = _bracket(_steps(shape, candidate.shape[shape.name]), candidate.shape[shape.name])
+    value = candidate.shape[shape.name]
+    bracket = _bracket(_steps(shape, value), value)
     optimum = minimize_scalar(
         error, bounds=bracket, method="bounded", options={"maxiter": _EVALUATIONS, "xatol": 1e-3 * np.ptp(bracket)}
     )
-    return moved(optimum.x)
+    return candidate.at({shape.name: float(optimum.x)})
 
 
 def _in_deepest_valley(
@@ -404,11 +385,10 @@ def _in_deepest_valley(
 
     def error(tried: Candidate) -> float:
         hypothesis = system(flights, [*chosen[:-1], tried])
-        left = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
-        return float(((left / floor) ** 2).sum())
+        return float(((hypothesis.left(fit(hypothesis, floor)) / floor) ** 2).sum())
 
     tried = (Candidate(newest.effect, dict(zip(names, values, strict=True))) for values in product(*grids))
-    return min(tried, key=error)
+    return smallest(tried, error)
 
 
 def _steps(shape: Shape, value: float) -> list[float]:
@@ -421,50 +401,27 @@ def _steps(shape: Shape, value: float) -> list[float]:
 
 def _bracket(grid: Sequence[float], value: float) -> tuple[float, float]:
     """Find the neighbours of a value on its grid."""
-    nearest = int(np.argmin(np.abs(np.asarray(grid) - value)))
+    nearest = int(np.argmin(levelled(np.abs(np.asarray(grid) - value))))
     return float(grid[max(0, nearest - 1)]), float(grid[min(len(grid) - 1, nearest + 1)])
 
 
-def _together(
-    flights: Sequence[WeakFlight],
-    chosen: list[Candidate],
-    shapes: list[tuple[int, Shape]],
-    floor: Array,
-    rotor_wrench: Array,
-) -> list[Candidate]:
-    low = np.array([shape.grid[0] for _, shape in shapes])
-    high = np.array([shape.grid[-1] for _, shape in shapes])
-    start = np.array([chosen[index].shape[shape.name] for index, shape in shapes])
+def _together(hypothesis: System, floor: Array, rotor_wrench: Array) -> System:
+    """Move all shapes at once, within their bounds and for a few steps."""
+    low, high = np.array([shape.bounds(hypothesis.vehicle) for shape in hypothesis.shapes]).T
 
-    def moved(values: Array) -> list[Candidate]:
-        there = list(chosen)
-        for (index, shape), value in zip(shapes, low + values * (high - low), strict=True):
-            there[index] = Candidate(there[index].effect, {**there[index].shape, shape.name: float(value)})
-        return there
-
-    def error(values: Array) -> Array:
-        return weighted_residual(system(flights, moved(values)), floor, rotor_wrench).reshape(-1)
+    def error(shares: Array) -> Array:
+        return weighted_residual(hypothesis.with_shapes(low + shares * (high - low)), floor, rotor_wrench).reshape(-1)
 
     optimum = least_squares(
         error,
-        np.clip((start - low) / (high - low), 1e-6, 1 - 1e-6),
+        np.clip((hypothesis.shape_values - low) / (high - low), 1e-6, 1 - 1e-6),
         bounds=(0.0, 1.0),
         diff_step=[1e-3],
         max_nfev=_JOINT_EVALUATIONS,
         xtol=1e-4,
         ftol=1e-5,
     )
-    return moved(optimum.x)
-
-
-def free_shapes(hypothesis: System) -> list[tuple[Candidate, str]]:
-    """List the shapes of a hypothesis in the order of its effects.
-
-    Returns
-    -------
-    list of (Candidate, str)
-    """
-    return [(candidate, shape.name) for candidate in hypothesis.chosen for shape in candidate.effect.shapes]
+    return hypothesis.with_shapes(low + optimum.x * (high - low))
 
 
 def shape_columns(hypothesis: System, linear: Array, rotor_wrench: Array | None = None) -> Array:
@@ -481,28 +438,22 @@ def shape_columns(hypothesis: System, linear: Array, rotor_wrench: Array | None 
     -------
     array, shape (window, 6, shape)
     """
-    shapes = free_shapes(hypothesis)
-    columns = np.zeros((*hypothesis.residual.shape, len(shapes)))
-    for number, (candidate, name) in enumerate(shapes):
-        value = candidate.shape[name]
-        step = _STEP * (abs(value) or 1.0)
-        ahead, behind = (
-            _residual_at(hypothesis, linear, candidate, name, value + change, rotor_wrench) for change in (step, -step)
-        )
+    values = hypothesis.shape_values
+    columns = np.zeros((*hypothesis.residual.shape, len(values)))
+
+    def residual_at(shapes: Array) -> Array:
+        there = hypothesis.with_shapes(shapes)
+        left = there.left(linear)
+        if rotor_wrench is None:
+            return left
+        before, after = (compensation(rotor_wrench, each.rotor_wrench) for each in (hypothesis, there))
+        return left * after / before
+
+    for number, unit in enumerate(np.eye(len(values))):
+        step = _STEP * (abs(values[number]) or 1.0)
+        ahead, behind = (residual_at(values + change * unit) for change in (step, -step))
         columns[..., number] = (behind - ahead) / (2 * step)
     return columns
-
-
-def _residual_at(
-    hypothesis: System, linear: Array, moved: Candidate, name: str, value: float, rotor_wrench: Array | None
-) -> Array:
-    chosen = [Candidate(c.effect, {**c.shape, name: value}) if c is moved else c for c in hypothesis.chosen]
-    there = system(hypothesis.flights, chosen)
-    left = np.asarray(there.residual - there.base @ linear)
-    if rotor_wrench is None:
-        return left
-    before, after = (compensation(rotor_wrench, each.rotor_wrench) for each in (hypothesis, there))
-    return left * after / before
 
 
 def compensation(before: Array, after: Array) -> Array:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -43,6 +42,10 @@ class Candidate(NamedTuple):
         """What its columns depend on: formula and form of the effect, which one name may have several of, and shape."""
         effect = self.effect
         return effect.name, effect.columns, len(effect.coefficients), tuple(self.shape.values())
+
+    def at(self, values: Mapping[str, float]) -> Candidate:
+        """Give some shapes other values."""
+        return self._replace(shape={**self.shape, **values})
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,12 +144,7 @@ class WeakFlight:
         return replace(self, known=known, seen=seen)
 
     def averaged(self, columns: Columns) -> Array:
-        """Average columns, or a residual, over the windows.
-
-        Returns
-        -------
-        array, shape (window, 6, ...)
-        """
+        """Average columns, or a residual, over the windows, shape (window, 6, ...)."""
         rows = self.windows.average(columns.direct)
         if columns.momentum is not None:
             rows = rows + self.windows.derivative(columns.momentum)
@@ -173,7 +171,10 @@ def weak_flight(
     floor : array, shape (6,), N m and N, or None
         Noise of a flight that is planned; None: as its residual shows it.
     """
-    make = partial(_weak_flight, name, signals, windows, model, force, axes, floor)
+
+    def make() -> WeakFlight:
+        return _weak_flight(name, signals, windows, model, force and signals.has_force, axes, floor)
+
     # Each stage rebuilds its model, and a flight is planned once.
     shared = model is None and floor is None
     return signals.once((weak_flight, name, windows, force, tuple(axes)), make) if shared else make()
@@ -184,35 +185,24 @@ def _weak_flight(
     signals: Signals,
     windows: Windows,
     model: InertiaModel | None,
-    force: bool,
+    with_force: bool,
     axes: Sequence[str],
     floor: Array | None,
 ) -> WeakFlight:
-    with_force = force and signals.has_force
-    rotation = rotation_balance(signals, model)
     nothing = np.zeros((len(signals), 3))
-    translation = translation_balance(signals) if with_force else Balance(nothing, nothing)
-    inertial = Columns(
-        np.concatenate([rotation.direct, translation.direct], axis=1),
-        np.concatenate([rotation.momentum, translation.momentum], axis=1),
-    )
+    sides = rotation_balance(signals, model), translation_balance(signals) if with_force else Columns(nothing)
+    momenta = [nothing if side.momentum is None else side.momentum for side in sides]
+    inertial = Columns(np.concatenate([side.direct for side in sides], axis=1), np.concatenate(momenta, axis=1))
     known = np.array([signals.torque is not None and axis in axes for axis in _AXES] + [with_force] * 3)
     everything = np.ones(len(nuisance().effect.coefficients))
     cut_off = channel_cut_offs(signals, model is not None)
-    hardly = WeakFlight(name, signals, windows, inertial, known, everything, cut_off)
-    return replace(hardly, turns=_turns(hardly, floor))
-
-
-def _turns(flight: WeakFlight, known: Array | None) -> Array:
-    """Mark the vehicle's own numbers that the flight can show.
-
-    Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to be rid of the noise
-    of the gyroscope, which is not what anybody asked.
-    """
-    left = flight.residual(flight.signals)
-    floor = noise_floor(left, flight.windows, flight.cut_off) if known is None else known
-    moved = flight.averaged(flight.inertial)[:, :3].std(axis=0) > _TURNING * floor[:3]
-    return shown(moved)
+    flight = WeakFlight(name, signals, windows, inertial, known, everything, cut_off)
+    if floor is None:
+        floor = noise_floor(flight.residual(signals), windows, cut_off)
+    # Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to lose the noise
+    # of the gyroscope, which is not what anybody asked.
+    turning = flight.averaged(inertial)[:, :3].std(axis=0) > _TURNING * floor[:3]
+    return replace(flight, turns=shown(turning))
 
 
 def columns_of(candidate: Candidate, signals: Signals) -> Columns:
@@ -252,20 +242,7 @@ def actuated(signals: Signals, chosen: Iterable[Candidate]) -> Signals:
     return signals
 
 
-@dataclass(frozen=True)
-class Balance:
-    """One side of a balance, ``d/dt momentum + direct``.
-
-    Attributes
-    ----------
-    momentum, direct : array, shape (time, 3), body axes
-    """
-
-    momentum: Array
-    direct: Array
-
-
-def rotation_balance(signals: Signals, model: InertiaModel | None = None) -> Balance:
+def rotation_balance(signals: Signals, model: InertiaModel | None = None) -> Columns:
     """Compute the inertial body torque in momentum form.
 
     A rigid body: momentum ``I omega``, direct ``omega x I omega``. A model in Euler coordinates: ``W^-T (d/dt (J qd) -
@@ -278,28 +255,25 @@ def rotation_balance(signals: Signals, model: InertiaModel | None = None) -> Bal
 
     Returns
     -------
-    Balance
-        N m s and N m.
+    Columns
+        Of shape (time, 3), N m s and N m, body axes.
 
     Raises
     ------
     InputError
         If the model needs an attitude that the flight lacks.
     """
-    if model is not None:
-        return _euler_balance(signals, model)
-    momentum = signals.body_rate @ inertia_tensor(signals.vehicle)
-    return Balance(momentum, np.cross(signals.body_rate, momentum))
-
-
-def _euler_balance(signals: Signals, model: InertiaModel) -> Balance:
+    if model is None:
+        momentum = signals.body_rate @ inertia_tensor(signals.vehicle)
+        return Columns(np.cross(signals.body_rate, momentum), momentum)
     attitude = signals.attitude
     if attitude is None:
         raise InputError("the model needs the attitude, which the flight lacks")
-    return Balance(*momentum_form(attitude, signals.body_rate, model.inertia(attitude)))
+    momentum, direct = momentum_form(attitude, signals.body_rate, model.inertia(attitude))
+    return Columns(direct, momentum)
 
 
-def translation_balance(signals: Signals) -> Balance:
+def translation_balance(signals: Signals) -> Columns:
     """Compute mass times specific force in momentum form, body axes.
 
     From the accelerometer, else from the acceleration, else from the velocity: ``d/dt (m v_b) + m omega x v_b +
@@ -312,15 +286,15 @@ def translation_balance(signals: Signals) -> Balance:
 
     Returns
     -------
-    Balance
-        N s and N.
+    Columns
+        Of shape (time, 3), N s and N, body axes; without momentum unless from the velocity.
     """
     mass, gravity = signals.vehicle.mass_kg, signals.vehicle.gravity_m_s2
     if signals.specific_force is not None:
-        return Balance(np.zeros((len(signals), 3)), mass * signals.specific_force)
+        return Columns(mass * signals.specific_force)
     weight = mass * gravity * signals.rotation[:, 2]
     if signals.acceleration is not None:
         felt = np.einsum("tji,tj->ti", signals.rotation, signals.acceleration)
-        return Balance(np.zeros((len(signals), 3)), mass * felt + weight)
+        return Columns(mass * felt + weight)
     momentum = mass * signals.ground_velocity
-    return Balance(momentum, np.cross(signals.body_rate, momentum) + weight)
+    return Columns(np.cross(signals.body_rate, momentum) + weight, momentum)

@@ -13,13 +13,24 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.refine import compensation, refined, weighted_residual
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.ranking import NEAR, SearchStep, best_floor, block_index, least_gain, rows, surely_less
+from cpfls_cli.gap.naming.ranking import (
+    NEAR,
+    SearchStep,
+    best_floor,
+    block_index,
+    chance_of_ranks,
+    least_gain,
+    more_left,
+    rows,
+    surely_less,
+)
 from cpfls_cli.gap.naming.scoring import (
     Scored,
-    layout,
     normal_equations,
+    scoring_matrix,
 )
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.rounding import ascending, largest
 
 
 def late(chosen: Sequence[Candidate]) -> list[Candidate]:
@@ -43,7 +54,7 @@ def moved(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], step: Sear
     if best not in near or len(near) < 2:
         return step.ranking
     there = [(_rescored(refined(flights, [*chosen, s.candidate], step.floor), step), s.candidate) for s in near]
-    return sorted((replace(scored, candidate=own) for scored, own in there), key=lambda scored: -scored.gain)
+    return ascending((replace(scored, candidate=own) for scored, own in there), lambda scored: -scored.gain)
 
 
 def parted(refitted: System, step: SearchStep) -> System:
@@ -52,9 +63,10 @@ def parted(refitted: System, step: SearchStep) -> System:
     if not _stands_for_two(refitted.chosen, last):
         return refitted
     pairs = _pairs(refitted.flights, others, step)
-    best = max([refitted, *pairs], key=lambda each: _rescored(each, step).gain)
+    best = largest([refitted, *pairs], lambda each: _rescored(each, step).gain)
     for wider in _wider_pairs(refitted.flights, others, refitted.chosen[last], step):
-        if _is_needed(_rescored(wider, step), _rescored(best, step), step):
+        more, less = _rescored(wider, step), _rescored(best, step)
+        if more.gain - less.gain >= _enough(step, less) and surely_less(more, less):
             best = wider
     return best
 
@@ -111,16 +123,17 @@ def settled(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], index: i
         own = _rescored(system(flights, [*others, chosen[index]]), step)
         wider = _wider_pairs(flights, others, chosen[index], step)
         less = [pair for pair in wider if surely_less(_rescored(pair, step), own)]
-        return [own, *(_as_one(pair, step) for pair in (*pairs, *less)), *ranked[1:]]
+        # The last two effects of a pair together can do what one does.
+        as_one = (replace(_rescored(pair, step), beside=pair.chosen[-2].effect) for pair in (*pairs, *less))
+        return [own, *as_one, *ranked[1:]]
     if not beside_its_like(chosen, index):
         return ranked
     names = {each.effect.name for each in chosen}
-    tried = [scored.candidate for scored in step.ranking if np.isfinite(scored.gain)]
     return [
         _rescored(system(flights, [*others, chosen[index]]), step),
         *(
             _rescored(refined(flights, [*others, rival], step.floor), step)
-            for rival in late(tried)
+            for rival in _tried(step)
             if rival.effect.name not in names
         ),
         *(scored for scored in ranked if not late([scored.candidate])),
@@ -147,22 +160,19 @@ def chance_beside_its_like(
     effects : sequence of Effect
         That the search tried.
     """
-    # Slow to load, and needed only here and where two effects explain almost the same.
-    from scipy.stats import wilcoxon
-
     together = system(flights, chosen)
     floor = best_floor(together)
     without = refined(flights, [other for place, other in enumerate(chosen) if place != index], floor)
-    margin = _unseen(without, floor, settings) - _unseen(together, floor, settings)
+    margin = more_left(_unseen(without, floor, settings), _unseen(together, floor, settings))
     tried = sum(effect.actuation is not None for effect in effects)
-    return float(min(1.0, tried * wilcoxon(margin, alternative="greater").pvalue)) if len(margin) > 1 else 1.0
+    return min(1.0, tried * chance_of_ranks(margin)) if len(margin) > 1 else 1.0
 
 
 def _unseen(hypothesis: System, floor: Array, settings: GapSettings) -> Array:
     """Compute what a hypothesis leaves of each block that a fit of coefficients and shapes did not see."""
     plain = system(hypothesis.flights)
     weight = floor / compensation(plain.rotor_wrench, hypothesis.rotor_wrench)
-    arranged = layout(hypothesis, (), weight)
+    arranged = scoring_matrix(hypothesis, (), weight)
     normal = normal_equations(arranged, hypothesis.residual, weight, block_index(hypothesis, settings))
     return np.asarray(normal.solve(arranged.base)[1][:, 0])
 
@@ -173,10 +183,14 @@ def _stands_for_two(chosen: Sequence[Candidate], index: int) -> bool:
     return effect.actuation is not None and len(effect.shapes) > 1 and not beside_its_like(chosen, index)
 
 
+def _tried(step: SearchStep) -> list[Candidate]:
+    """List the effects between command and rotors that were not refused."""
+    return late([scored.candidate for scored in step.ranking if np.isfinite(scored.gain)])
+
+
 def _pairs(flights: Sequence[WeakFlight], others: Sequence[Candidate], step: SearchStep) -> list[System]:
     """Fit each two effects between command and rotors that have one shape."""
-    tried = [scored.candidate for scored in step.ranking if np.isfinite(scored.gain)]
-    single = [candidate for candidate in late(tried) if len(candidate.effect.shapes) == 1]
+    single = [candidate for candidate in _tried(step) if len(candidate.effect.shapes) == 1]
     return [refined(flights, [*others, *pair], step.floor) for pair in combinations(single, 2)]
 
 
@@ -184,25 +198,15 @@ def _wider_pairs(
     flights: Sequence[WeakFlight], others: Sequence[Candidate], own: Candidate, step: SearchStep
 ) -> list[System]:
     """Fit another effect between command and rotors that has two shapes with each one that has one shape."""
-    tried = late([scored.candidate for scored in step.ranking if np.isfinite(scored.gain)])
+    tried = _tried(step)
     double = [each for each in tried if len(each.effect.shapes) > 1 and each.effect.name != own.effect.name]
     single = [each for each in tried if len(each.effect.shapes) == 1]
     return [refined(flights, [*others, *pair], step.floor) for pair in product(double, single)]
 
 
-def _is_needed(more: Scored, less: Scored, step: SearchStep) -> bool:
-    """Tell whether a hypothesis with more numbers is worth them beside one with fewer."""
-    return more.gain - less.gain >= _enough(step, less) and surely_less(more, less)
-
-
 def _enough(step: SearchStep, beside: Scored) -> float:
     """Compute the least gain, in squared floors, of what is added to a hypothesis."""
     return least_gain(max(step.above_floor - beside.gain, 0.0), len(step.hypothesis.residual))
-
-
-def _as_one(pair: System, step: SearchStep) -> Scored:
-    """Score the last two effects of a hypothesis, which together can do what one does."""
-    return replace(_rescored(pair, step), beside=pair.chosen[-2].effect)
 
 
 def _rescored(refitted: System, step: SearchStep) -> Scored:

@@ -17,12 +17,12 @@ def bends_of(named: Sequence[Candidate], flights: Sequence[WeakFlight]) -> list[
 
     U is the root mean square of u over the flights. Bounded, because powers hang on the fastest seconds of a flight.
     """
-    usual = _usual_speed([flight.signals for flight in flights])
-    return [_bend(each.effect, usual) for each in named if _of_speed(each.effect)]
-
-
-def _of_speed(effect: Effect) -> bool:
-    return effect.kind == "wrench" and "velocity" in effect.needs and not (effect.shapes or effect.physical)
+    flown = [flight.signals for flight in flights if "velocity" in flight.signals.available]
+    squared = [(signals.air_velocity**2).sum(axis=1) for signals in flown]
+    usual = float(np.sqrt(np.mean(np.concatenate(squared)))) if squared else np.inf
+    effects = (each.effect for each in named)
+    of_speed = (each for each in effects if each.kind == "wrench" and "velocity" in each.needs)
+    return [_bend(effect, usual) for effect in of_speed if not (effect.shapes or effect.physical)]
 
 
 def _bend(effect: Effect, usual: float) -> Effect:
@@ -33,9 +33,3 @@ def _bend(effect: Effect, usual: float) -> Effect:
 
     either = tuple(replace(each, low=-each.high) for each in effect.coefficients)
     return replace(effect, name=f"a bend of {effect.name} over speed", columns=columns, coefficients=either)
-
-
-def _usual_speed(flights: Sequence[Signals]) -> float:
-    """Compute the root mean square of the speed through the air, m/s, over flights that have one."""
-    squared = [(flight.air_velocity**2).sum(axis=1) for flight in flights if "velocity" in flight.available]
-    return float(np.sqrt(np.mean(np.concatenate(squared)))) if squared else np.inf

@@ -23,10 +23,14 @@ from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect
 from cpfls_cli.gap.naming.scoring import Scored
 from cpfls_cli.gap.naming.search import alternatives
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.rounding import at_most
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _MATTERS = 0.02
 """Relative error of a moment of inertia or of the thrust from which on it is told."""
+
+_SURE = 1.5
+"""Half widths of its interval that an error exceeds: four numbers are asked."""
 
 _LEAST_SHARE = 0.2
 """Share of the gap of its own channel that a refitted number of the vehicle has to take off unseen flights."""
@@ -85,15 +89,11 @@ def judge_effect(
 
 def _frequency(chosen: Scored, ranking: Sequence[Scored]) -> float:
     """Compute the share of blocks whose omission leaves the effect the best candidate."""
-    if not _real(chosen):
+    if not np.isfinite(chosen.gain):
         return 0.0
-    others = [scored.block_error for scored in ranking if _real(scored)]
-    total = np.array([error.sum() - error for error in (chosen.block_error, *others)])
-    return float(np.mean(np.argmin(total, axis=0) == 0))
-
-
-def _real(scored: Scored) -> bool:
-    return bool(np.isfinite(scored.gain))
+    others = [scored.block_error for scored in ranking if np.isfinite(scored.gain)]
+    own, *total = (error.sum() - error for error in (chosen.block_error, *others))
+    return float(np.mean(np.all([at_most(own, other) for other in [own, *total]], axis=0)))
 
 
 def shares(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], estimates: Estimates, floor: Array) -> Array:
@@ -127,9 +127,8 @@ def _remaining(
 ) -> Array:
     """Compute the residual with some of the effects only, at the coefficients of all of them."""
     hypothesis = system(flights, [chosen[index] for index in kept])
-    parameters = estimates.linear[: len(estimates.linear) - sum(len(linear) for linear in estimates.of_effect)]
     linear = [estimates.of_effect[index] for index in kept if is_free(chosen[index])]
-    return np.asarray(hypothesis.residual - hypothesis.base @ np.concatenate([parameters, *linear]))
+    return hypothesis.left(np.concatenate([estimates.of_vehicle, *linear]))
 
 
 def wrong_numbers(
@@ -174,21 +173,16 @@ def impossible_ratios(numbers: Sequence[Estimate]) -> dict[str, float]:
 
 
 def _is_wrong(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
+    """Tell whether a number is surely wrong, by as much as matters and more than named effects account for."""
     if number.name not in NUMBERS:
         return False
     half = 0.5 * (number.high - number.low)
-    sure = abs(number.value) > 1.5 * half and abs(number.value) > _MATTERS
-    return sure and abs(number.value) > _accounted(number.name, effects)
-
-
-def _accounted(name: str, effects: Sequence[NamedEffect]) -> float:
-    """Sum the relative error of a number that named effects account for."""
     accounted = 0.0
     for effect in effects:
         accounts = CATALOGUE[effect.name].accounts
         if accounts is not None:
-            accounted += accounts(name, {c.name: c.value for c in effect.coefficients})
-    return accounted
+            accounted += accounts(number.name, {c.name: c.value for c in effect.coefficients})
+    return abs(number.value) > max(_SURE * half, _MATTERS) and abs(number.value) > accounted
 
 
 def sensor_fault(
@@ -203,7 +197,7 @@ def sensor_fault(
     """
     logged, repaired = system(as_logged), system(as_repaired)
     weight = np.sqrt(np.mean(repaired.residual**2, axis=0)) + 1e-12
-    before, after = ((s.residual - s.base @ fit(s, weight)) / weight for s in (logged, repaired))
+    before, after = (s.left(fit(s, weight)) / weight for s in (logged, repaired))
     share = float(np.clip(1 - (after**2).sum() / max((before**2).sum(), 1e-12), 0, 1))
     coefficients = _sensor_estimates(finding, as_repaired[0].signals.vehicle)
     return NamedEffect(finding.name, None, np.zeros(0), coefficients, finding.p_value, share, 1.0, finding.sentence)

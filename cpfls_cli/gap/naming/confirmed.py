@@ -13,12 +13,13 @@ from cpfls_cli.blocks import mean_error
 from cpfls_cli.gap.balance.balance_system import is_free, relative_scatter, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
-from cpfls_cli.gap.naming.earned import Fitted, Refusal, fitted, on_bound
+from cpfls_cli.gap.naming.earned import NamedFit, Refusal, fitted, on_bound
 from cpfls_cli.gap.naming.estimate import channel_weight, estimates
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out, share_removed
 from cpfls_cli.gap.naming.leftover import Leftover, leftover
 from cpfls_cli.gap.naming.ranking import SearchStep, block_index
 from cpfls_cli.gap.settings import CLEAR, ERRORS, VISIBLE, WORSE, GapSettings
+from cpfls_cli.rounding import ascending, largest, levelled, smallest
 
 _FILLS = 0.01
 """Share of what the largest effect takes off, in squares, below which another may fill what its formula is off by."""
@@ -30,7 +31,7 @@ _BESIDE = 0.7
 class Judgement(NamedTuple):
     """Effects with what they leave of the flights held out."""
 
-    found: Fitted
+    found: NamedFit
     held_out: HeldOut
 
 
@@ -53,16 +54,13 @@ class Judge:
     settings: GapSettings
     rng: np.random.Generator
 
-    def judge(self, found: Fitted) -> Judgement:
+    def judge(self, found: NamedFit) -> Judgement:
         """Evaluate effects on the held-out flights, beside the model with its own numbers refitted."""
         hypothesis, _, estimates = found
-        plain = system(hypothesis.flights)
-        weight = np.where(plain.residual.any(axis=0), np.sqrt(np.mean(plain.residual**2, axis=0)), 1.0)
         scatter = relative_scatter(hypothesis, estimates.linear, self.floor)
-        unseen = held_out(self.logged, self.repaired, hypothesis, estimates.linear, fit(plain, weight), scatter)
-        return Judgement(found, unseen)
+        return Judgement(found, held_out(self.logged, self.repaired, hypothesis, estimates.linear, scatter))
 
-    def remainder(self, found: Fitted) -> Leftover:
+    def remainder(self, found: NamedFit) -> Leftover:
         """Analyse what effects leave of the flights that they were found in."""
         hypothesis, block, estimates = found
         return leftover(hypothesis, estimates.linear, self.floor, block, self.settings, self.rng)
@@ -86,15 +84,20 @@ class Judge:
         if beyond is not None:
             return beyond[1]
         compared = {each.effect.name: self._without(judgement, each.effect.name) for each in chosen}
-        harmful = {name: one for name, one in compared.items() if one.worse(judgement.held_out).any()}
-        if harmful:
-            name = max(harmful, key=lambda each: harmful[each].ratio(judgement.held_out))
-            return Refusal(name, harmful[name].harm(judgement.held_out))
-        raised = {name: one.visibly for name, one in compared.items()}
-        least = min(raised, key=lambda each: raised[each], default=None)
-        if least is None:
+        if not compared:
             return None
-        if raised[least] < VISIBLE**2:
+        after = judgement.held_out.size(judgement.held_out.after).floors
+        harm = {name: one.worsened(after) for name, one in compared.items()}
+        worst = largest(harm, lambda name: float(harm[name].max()))
+        if harm[worst].any():
+            channel = int(np.argmax(harm[worst]))
+            return Refusal(
+                worst,
+                f"on the flights held out it makes the {CHANNELS[channel]} worse, "
+                f"{compared[worst].left[channel]:.2g} floors without it and {after[channel]:.2g} with it",
+            )
+        least = smallest(compared, lambda each: compared[each].visibly)
+        if compared[least].visibly < VISIBLE**2:
             return Refusal(least, "on the flights held out the gap is as small without it")
         return _elsewhere(judgement, compared) or _filling(judgement, compared)
 
@@ -103,7 +106,7 @@ class Judge:
         kept = [each for each in judgement.found.hypothesis.chosen if each.effect.name != name]
         without = fitted(self.training, kept, self.floor, self.settings)
         there = system(self.repaired, without.hypothesis.chosen)
-        residual, unseen = there.residual - there.base @ without.estimates.linear, judgement.held_out
+        residual, unseen = there.left(without.estimates.linear), judgement.held_out
         squares = [((each / unseen.noise) ** 2) * unseen.known for each in (residual, unseen.after)]
         count = np.maximum(unseen.known.sum(axis=0), 1)
         difference, block = squares[0] - squares[1], block_index(there, self.settings)
@@ -142,27 +145,13 @@ class Without(NamedTuple):
     @property
     def channel(self) -> int:
         """Channel in which it shows most."""
-        return int(np.argmax(self.seen))
+        return int(np.argmax(levelled(self.seen)))
 
-    def worse(self, unseen: HeldOut) -> Array:
-        """Mark the channels that the effect makes visibly and surely worse."""
-        after = unseen.size(unseen.after).floors
+    def worsened(self, after: Array) -> Array:
+        """Compute how much worse the effect makes channels that it leaves `after` floors in, as ratios; 0 if unsure."""
         surely = -self.raised > ERRORS * self.error
-        return np.asarray((after > CLEAR) & (after > WORSE * self.left) & surely)
-
-    def ratio(self, unseen: HeldOut) -> float:
-        """Give how much worse the worst channel gets."""
-        after = unseen.size(unseen.after).floors
-        return float(np.where(self.worse(unseen), after / np.maximum(self.left, 1e-9), 0.0).max())
-
-    def harm(self, unseen: HeldOut) -> str:
-        """Say which channel gets worse."""
-        after = unseen.size(unseen.after).floors
-        channel = int(np.argmax(np.where(self.worse(unseen), after / np.maximum(self.left, 1e-9), 0.0)))
-        return (
-            f"on the flights held out it makes the {CHANNELS[channel]} worse, {self.left[channel]:.2g} floors without "
-            f"it and {after[channel]:.2g} with it"
-        )
+        worse = (after > CLEAR) & (after > WORSE * self.left) & surely
+        return np.where(worse, after / np.maximum(self.left, 1e-9), 0.0)
 
 
 def _elsewhere(judgement: Judgement, compared: dict[str, Without]) -> Refusal | None:
@@ -177,11 +166,12 @@ def _elsewhere(judgement: Judgement, compared: dict[str, Without]) -> Refusal | 
         if len(ends) != 1 or not reaching or not is_free(candidate):
             continue
         channel = compared[candidate.effect.name].channel
-        largest = max(compared, key=lambda each: compared[each].seen[channel])
-        if largest != candidate.effect.name:
+        seen = {name: one.seen[channel] for name, one in compared.items()}
+        most = largest(seen, seen.__getitem__)
+        if most != candidate.effect.name:
             return Refusal(
                 candidate.effect.name,
-                f"its {reaching[0]} may be at the bound of what is possible, and what the formula of {largest} is"
+                f"its {reaching[0]} may be at the bound of what is possible, and what the formula of {most} is"
                 f" off by in the {CHANNELS[channel]} would then look no different",
             )
     return None
@@ -194,7 +184,7 @@ def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | No
     """
     floors = judgement.held_out.size(judgement.held_out.after).floors
     beyond = _FILLS * max((one.visibly for one in compared.values()), default=0.0)
-    for name in sorted(compared, key=lambda each: compared[each].visibly):
+    for name in ascending(compared, lambda each: compared[each].visibly):
         channel, off = compared[name].channel, compared[name].visibly
         left = float(floors[channel])
         beside = max(beyond, *(one.seen[channel] for one in compared.values()))
@@ -225,10 +215,12 @@ def differences(
     tuple of str
         Sentences; none where the flights agree, in a gap or in none.
     """
-    seen = _size(start.hypothesis.residual - start.hypothesis.base @ fit(start.hypothesis, start.floor), start.floor)
+    seen = _size(start.hypothesis.left(fit(start.hypothesis, start.floor)), start.floor)
     held = last.held_out
     # Numbers of the vehicle that took up what only one of the roles has are wrong for the other.
-    unseen = min((held.size(each).floors for each in (held.before, held.parameters)), key=np.nanmax)
+    unseen = smallest(
+        (held.size(each).floors for each in (held.before, held.parameters)), lambda each: float(np.nanmax(each))
+    )
     if last.found.hypothesis.chosen:
         return _other_numbers(first, judge, settings)
     there, here = _largest(seen), _largest(unseen)
@@ -258,9 +250,8 @@ def _other_numbers(first: Judgement, judge: Judge, settings: GapSettings) -> tup
     # Shapes are held: a load that swings from another start would ask for another cable, and is the same load.
     refit = system(judge.repaired, hypothesis.chosen)
     own = estimates(refit, channel_weight(refit, unseen.floor), block_index(refit, settings))
-    after = refit.residual - refit.base @ own.linear
-    before = unseen.parameters
-    if share_removed(before / unseen.noise, after / unseen.noise, unseen.known) < settings.named_share:
+    after = refit.left(own.linear)
+    if share_removed(unseen.parameters / unseen.noise, after / unseen.noise, unseen.known) < settings.named_share:
         return ()
     if _size(after * unseen.known, unseen.floor).max() > CLEAR:
         return ()

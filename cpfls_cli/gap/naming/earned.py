@@ -15,6 +15,7 @@ from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, free_est
 from cpfls_cli.gap.naming.ranking import block_index, rank_effects, surely_less
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.rounding import levelled, smallest
 
 _ON_BOUND = 1e-3
 """Share of its range that a number is from its bound at most to be on it."""
@@ -23,7 +24,7 @@ _CANCEL = 0.5
 """What two effects leave of each other, as a share of the smaller one, below which they are one."""
 
 
-class Fitted(NamedTuple):
+class NamedFit(NamedTuple):
     """Effects that have earned their name on the training flights.
 
     Attributes
@@ -55,17 +56,17 @@ class Refusal(NamedTuple):
         return f"{self.name} explains part of the gap, but is not named: {self.reason}"
 
 
-def fitted(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, settings: GapSettings) -> Fitted:
+def fitted(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, settings: GapSettings) -> NamedFit:
     """Fit effects together within their bounds, shapes and all."""
     start = system(flights, chosen)
     block = block_index(start, settings)
     hypothesis, estimates = weighted_estimates(start, floor, block)
-    return Fitted(hypothesis, block, estimates)
+    return NamedFit(hypothesis, block, estimates)
 
 
 def earned(
     flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, settings: GapSettings
-) -> tuple[Fitted, list[Refusal]]:
+) -> tuple[NamedFit, list[Refusal]]:
     """Fit chosen effects, and refit without those that have not earned a name on the flights that they were found in.
 
     These are effects whose size does not differ from zero, which are not told; effects that sit on a bound; of
@@ -86,7 +87,7 @@ def earned(
     return found, refusals
 
 
-def on_bound(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | None:
+def on_bound(found: NamedFit, floor: Array) -> tuple[list[Candidate], Refusal] | None:
     """Find an effect whose main number sits on a bound, or any number that is surely asked for beyond one.
 
     Zero is not such a bound: many coefficients cannot be less.
@@ -98,7 +99,12 @@ def on_bound(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | N
     chosen = found.hypothesis.chosen
     for candidate, estimates in zip(chosen, found.estimates.effects, strict=True):
         names = [shape.name for shape in candidate.effect.shapes]
-        if len(names) > 1 and all(_at_an_end(number) for number in estimates if number.name in names):
+        ends = (
+            any(bound and number.low <= bound <= number.high for bound in number.plausible)
+            for number in estimates
+            if number.name in names
+        )
+        if len(names) > 1 and all(ends):
             says = f"{' and '.join(names)} may all be at the bounds of what is possible"
             return [candidate], Refusal(candidate.effect.name, says, True)
     reached = {
@@ -123,11 +129,6 @@ def on_bound(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | N
     return None
 
 
-def _at_an_end(number: Estimate) -> bool:
-    """Tell whether a bound other than zero lies within the interval of a number."""
-    return any(bound and number.low <= bound <= number.high for bound in number.plausible)
-
-
 def _reached(numbers: Sequence[Estimate]) -> dict[str, str]:
     """Name the numbers that sit on a bound other than zero, and the bound."""
     found = {}
@@ -140,7 +141,7 @@ def _reached(numbers: Sequence[Estimate]) -> dict[str, str]:
     return found
 
 
-def _main(found: Fitted, index: int, numbers: Sequence[Estimate], floor: Array) -> Sequence[Estimate]:
+def _main(found: NamedFit, index: int, numbers: Sequence[Estimate], floor: Array) -> Sequence[Estimate]:
     """Keep the coefficient that explains most; all numbers where they are not coefficients of columns."""
     candidate = found.hypothesis.chosen[index]
     linear = found.estimates.of_effect[index]
@@ -148,11 +149,11 @@ def _main(found: Fitted, index: int, numbers: Sequence[Estimate], floor: Array) 
     if not names or candidate.effect.physical is not None or len(linear) != len(names):
         return numbers
     columns = found.hypothesis.columns(candidate) * linear / floor[:, None]
-    largest = names[int(np.argmax((columns**2).sum(axis=(0, 1))))]
+    largest = names[int(np.argmax(levelled((columns**2).sum(axis=(0, 1)))))]
     return [number for number in numbers if number.name == largest]
 
 
-def _cancelling(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | None:
+def _cancelling(found: NamedFit, floor: Array) -> tuple[list[Candidate], Refusal] | None:
     """Find two effects that leave less than half of the smaller one of each other."""
     chosen = found.hypothesis.chosen
     parts = [_explained(found, index) / floor for index in range(len(chosen))]
@@ -165,7 +166,7 @@ def _cancelling(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] 
     return None
 
 
-def _explained(found: Fitted, index: int) -> Array:
+def _explained(found: NamedFit, index: int) -> Array:
     """Compute what an effect explains, N m and N; an effect on the actuation by its own column."""
     candidate = found.hypothesis.chosen[index]
     columns = found.hypothesis.columns(candidate)
@@ -173,20 +174,20 @@ def _explained(found: Fitted, index: int) -> Array:
     return np.asarray(columns @ linear)
 
 
-def _lesser(found: Fitted, floor: Array, *pair: int) -> tuple[list[Candidate], Refusal]:
+def _lesser(found: NamedFit, floor: Array, *pair: int) -> tuple[list[Candidate], Refusal]:
     chosen = found.hypothesis.chosen
     left = {}
     for index in pair:
         others = [candidate for position, candidate in enumerate(chosen) if position != index]
         without, estimates = weighted_estimates(system(found.hypothesis.flights, others), floor, found.block)
-        left[index] = float((((without.residual - without.base @ estimates.linear) / floor) ** 2).sum())
-    out = min(left, key=lambda index: left[index])
+        left[index] = float(((without.left(estimates.linear) / floor) ** 2).sum())
+    out = smallest(left, lambda index: left[index])
     other = next(index for index in pair if index != out)
     names = chosen[out].effect.name, chosen[other].effect.name
     return [chosen[out]], Refusal(names[0], f"{names[0]} and {names[1]} nearly cancel, and one of them does as well")
 
 
-def _filling_a_bend(found: Fitted, settings: GapSettings) -> tuple[list[Candidate], Refusal] | None:
+def _filling_a_bend(found: NamedFit, settings: GapSettings) -> tuple[list[Candidate], Refusal] | None:
     """Find an effect, the latest first, that a bend of another one's formula surely explains more than."""
     chosen, flights = found.hypothesis.chosen, found.hypothesis.flights
     for own in reversed(chosen):

@@ -11,13 +11,12 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.gap.balance.balance_system import System, is_free, system, window_noise
+from cpfls_cli.gap.balance.balance_system import System, system, window_noise
 from cpfls_cli.gap.balance.refine import (
     Equations,
     equations,
     fit,
     fit_within_bounds,
-    free_shapes,
     refitted,
     shape_columns,
 )
@@ -52,6 +51,11 @@ class Estimates:
     parameters: tuple[Estimate, ...]
     of_effect: tuple[Array, ...]
 
+    @property
+    def of_vehicle(self) -> Array:
+        """The vehicle's own numbers in `linear`."""
+        return self.linear[: len(self.linear) - sum(len(linear) for linear in self.of_effect)]
+
 
 def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
     """Fit a hypothesis and compute confidence intervals of its numbers by the jackknife.
@@ -85,25 +89,25 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
 
 def _estimated(hypothesis: System, weight: Array, block: IntArray, linear: Array, held: BoolArray) -> Estimates:
     """Add confidence intervals to a fit."""
-    shapes = [candidate.shape[name] for candidate, name in free_shapes(hypothesis)]
+    shapes = hypothesis.shape_values
     values = np.concatenate([linear, shapes])
-    moving_shapes = shape_columns(hypothesis, linear, system(hypothesis.flights).rotor_wrench if shapes else None)
+    rotor_wrench = system(hypothesis.flights).rotor_wrench if len(shapes) else None
+    moving_shapes = shape_columns(hypothesis, linear, rotor_wrench)
     moving = np.concatenate([~held, np.ones(len(shapes), dtype=bool)])
     left_out = np.tile(values, (len(np.unique(block)), 1))
     left_out[:, moving] += _one_step(
         equations(hypothesis, weight).around(linear, ~held, moving_shapes / weight[..., None]), block
     )
-    by_effect, linear_by_effect, first = [], [], hypothesis.columns(hypothesis.free[0]).shape[2]
-    parameters = _of(hypothesis.free[0], hypothesis, values[:first], left_out[:, :first], np.zeros(0), left_out[:, :0])
-    column, shape_column = first, len(linear)
+    (vehicle, own), *_ = hypothesis.places
+    parameters = _of(vehicle, hypothesis, values[own], left_out[:, own], np.zeros(0), left_out[:, :0])
+    places = {candidate.key: place for candidate, place in hypothesis.places}
+    by_effect, linear_by_effect, first = [], [], len(linear)
     for candidate in hypothesis.chosen:
-        width = hypothesis.columns(candidate).shape[2] if is_free(candidate) else 0
-        depth = len(candidate.effect.shapes)
-        linear_at, shape_at = slice(column, column + width), slice(shape_column, shape_column + depth)
-        numbers = (values[linear_at], left_out[:, linear_at], values[shape_at], left_out[:, shape_at])
+        place, shape_at = places.get(candidate.key, slice(0)), slice(first, first + len(candidate.effect.shapes))
+        numbers = (values[place], left_out[:, place], values[shape_at], left_out[:, shape_at])
         by_effect.append(_of(candidate, hypothesis, *numbers))
-        linear_by_effect.append(linear[linear_at])
-        column, shape_column = column + width, shape_column + depth
+        linear_by_effect.append(linear[place])
+        first = shape_at.stop
     return Estimates(linear, tuple(by_effect), parameters, tuple(linear_by_effect))
 
 
@@ -152,10 +156,10 @@ def channel_weight(hypothesis: System, floor: Array) -> Array:
 
 def _left(hypothesis: System, floor: Array) -> tuple[Array, Array]:
     """Estimate the noise of each window, shape (window, 6), and the root mean square that a fit leaves in it, (6,)."""
-    residual = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
+    residual = hypothesis.left(fit(hypothesis, floor))
     noise = window_noise(hypothesis, residual, floor)
     if (noise > floor).any():
-        residual = hypothesis.residual - hypothesis.base @ fit(hypothesis, noise)
+        residual = hypothesis.left(fit(hypothesis, noise))
     return noise, np.sqrt(np.mean((residual / noise) ** 2, axis=0))
 
 
@@ -188,10 +192,10 @@ def _of(
     candidate: Candidate, hypothesis: System, linear: Array, linear_out: Array, shape: Array, shape_out: Array
 ) -> tuple[Estimate, ...]:
     effect = candidate.effect
-    vehicle = hypothesis.flights[0].signals.vehicle
+    vehicle = hypothesis.vehicle
     estimates = []
     if len(linear):
-        to_physical = effect.physical or (lambda values: values)
+        to_physical = effect.physical.of if effect.physical else lambda values: values
         value = to_physical(linear)
         scatter = _interval(value, np.array([to_physical(row) for row in linear_out]))
         estimates += [

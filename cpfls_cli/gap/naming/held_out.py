@@ -9,13 +9,12 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.balance.balance_system import System, floors, scatter_variance, system
+from cpfls_cli.gap.balance.balance_system import System, channel_size, floors, scatter_variance, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.naming.results import GapSize
-from cpfls_cli.gap.preparation import Preparation
 from cpfls_cli.gap.settings import CLEAR, COUNTS, NOISE, VISIBLE
-from cpfls_cli.weak_form.windows import Recording
+from cpfls_cli.rounding import largest
 
 
 @dataclass(frozen=True)
@@ -82,9 +81,9 @@ class HeldOut:
         clear = {
             name: share
             for (name, share), kind, size in zip(of_kind.items(), kinds, sizes, strict=True)
-            if size > COUNTS * sum(sizes) and _largest(before[:, kind]) > CLEAR
+            if size > COUNTS * sum(sizes) and np.sqrt(np.mean(before[:, kind] ** 2, axis=0)).max() > CLEAR
         }
-        better = max(of_kind, key=lambda name: of_kind[name])
+        better = largest(of_kind, lambda name: of_kind[name])
         return clear or {better: of_kind[better]}
 
     def removed_by_numbers(self) -> Array:
@@ -99,29 +98,6 @@ class HeldOut:
         gone = ((before**2 - after**2) * self.known).sum(axis=0) / rows
         each = [share_removed(before[:, [c]], after[:, [c]], self.known[:, [c]]) for c in range(before.shape[1])]
         return np.where(gone > VISIBLE**2, each, 0.0)
-
-
-def _largest(residual: Array) -> float:
-    return float(np.sqrt(np.mean(residual**2, axis=0)).max())
-
-
-def judged_unseen(
-    held: Sequence[Recording], prepared: Preparation, fitted: System, linear: Array, scatter: float
-) -> HeldOut:
-    """Evaluate a fitted hypothesis on held-out recordings, beside the model with its own numbers refitted.
-
-    Parameters
-    ----------
-    fitted : System
-        Of the training flights.
-    linear : array, shape (column,)
-    scatter : float
-        Mean square of the relative scatter of the effects.
-    """
-    plain = system(fitted.flights)
-    weight = np.where(plain.residual.any(axis=0), np.sqrt(np.mean(plain.residual**2, axis=0)), 1.0)
-    parameters = fit(plain, weight)
-    return held_out(prepared.logged(held), prepared.repaired(held), fitted, linear, parameters, scatter)
 
 
 def share_removed(before: Array, after: Array, known: Array) -> float:
@@ -152,10 +128,9 @@ def held_out(
     repaired: Sequence[WeakFlight],
     fitted: System,
     linear: Array,
-    parameters: Array,
     scatter: float,
 ) -> HeldOut:
-    """Apply a fitted hypothesis to held-out flights.
+    """Apply a fitted hypothesis to held-out flights, and the model with its own numbers refitted beside it.
 
     Parameters
     ----------
@@ -164,8 +139,6 @@ def held_out(
     fitted : System
         Of the training flights.
     linear : array, shape (column,)
-    parameters : array, shape (parameter,)
-        The vehicle's own numbers where nothing else is fitted.
     scatter : float
         Mean square of the relative scatter of the effects, from the training flights.
 
@@ -180,11 +153,11 @@ def held_out(
     beyond = {each.effect.name: _beyond(full.columns(each), fitted.columns(each)) for each in full.chosen}
     known = np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in repaired])
     known &= ~np.any(list(beyond.values()) or np.zeros((1, *known.shape), dtype=bool), axis=0)
-    floor = floors(full, linear)
+    floor, own = floors(full, linear), system(fitted.flights)
     return HeldOut(
         raw.residual,
-        plain.residual - plain.base @ parameters,
-        full.residual - full.base @ linear,
+        plain.left(fit(own, channel_size(own.residual))),
+        full.left(linear),
         floor,
         known,
         np.sqrt(floor**2 + scatter * scatter_variance(full)),

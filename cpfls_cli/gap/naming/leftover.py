@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,10 +11,10 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance.balance_system import System, left_over, scatter_size, scatter_variance
+from cpfls_cli.gap.balance.balance_system import System, left_over, window_noise
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
 from cpfls_cli.gap.naming.bends import bends_of
-from cpfls_cli.gap.naming.earned import Fitted, fitted
+from cpfls_cli.gap.naming.earned import NamedFit, fitted
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.ranking import SearchStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect, NotExcited, Unexplained
@@ -82,17 +81,15 @@ def leftover(
     floor : array, shape (6,)
     block : array of int, shape (window,)
     """
-    residual = hypothesis.residual - hypothesis.base @ linear
-    variance = scatter_variance(hypothesis)
-    scatter = scatter_size(variance, residual, floor)
-    in_floors = residual / np.sqrt(floor**2 + scatter * variance)
+    residual = hypothesis.left(linear)
+    in_floors = residual / window_noise(hypothesis, residual, floor)
     sizes = np.sqrt(np.mean(in_floors**2, axis=0))
     states = joined_states([state_signals(f, s) for f, s in zip(hypothesis.flights, hypothesis.signals, strict=True)])
     dependence = rank_dependence(
         in_floors, hypothesis.flight_index, block, without_actuation(states), settings.shifts, rng
     )
     band = _band(hypothesis, linear, settings, rng)
-    rates = np.concatenate([flight.windows.average(flight.signals.body_rate) for flight in hypothesis.flights])
+    rates = hypothesis.by_flight(lambda flight, _: flight.windows.average(flight.signals.body_rate))
     # A force turns nothing.
     directions = [*energy_directions(residual[:, :3], rates, block), *["neither"] * 3]
     unexplained = [
@@ -166,22 +163,9 @@ def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[
     return ["neither" if not s else "feeds" if m > 0 else "drains" for m, s in zip(mean, sure, strict=True)]
 
 
-class Beside(NamedTuple):
-    """Numbers of the named effects, and what is there beside them without a name.
-
-    Attributes
-    ----------
-    estimates : Estimates
-        Intervals hold what the numbers are with the unnamed effects and without them.
-    """
-
-    estimates: Estimates
-    unnamed: tuple[str, ...]
-
-
 def beside_the_unnamed(
-    found: Fitted, last: SearchStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
-) -> Beside:
+    found: NamedFit, last: SearchStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
+) -> tuple[Estimates, tuple[str, ...]]:
     """Widen the intervals of named effects by what is more than chance and too small for a name.
 
     A drag of the fuselage that shows in no channel on its own still takes its part from the drag of the rotors. And a
@@ -189,16 +173,22 @@ def beside_the_unnamed(
 
     Parameters
     ----------
-    found : Fitted
+    found : NamedFit
         The named effects.
     last : SearchStep
         Of the search, with nothing to add.
     effects : sequence of Effect
         To be tried.
+
+    Returns
+    -------
+    estimates : Estimates
+        Intervals hold what the numbers are with the unnamed effects and without them.
+    unnamed : tuple of str
     """
     named = found.hypothesis.chosen
     if not named:
-        return Beside(found.estimates, ())
+        return found.estimates, ()
     flights = found.hypothesis.flights
     step = last
     if {each.effect.name for each in named} != {each.effect.name for each in last.hypothesis.chosen}:
@@ -208,11 +198,11 @@ def beside_the_unnamed(
     if bends:
         chosen = _beyond_chance(rank_effects(flights, chosen, bends, settings, rng), bends, settings, rng)
     if len(chosen) == len(named):
-        return Beside(found.estimates, ())
+        return found.estimates, ()
     wider = fitted(flights, chosen, last.floor, settings).estimates
     pairs = zip(found.estimates.effects, wider.effects, strict=False)
     held = tuple(tuple(_both(number, there) for number in numbers) for numbers, there in pairs)
-    return Beside(replace(found.estimates, effects=held), tuple(each.effect.name for each in chosen[len(named) :]))
+    return replace(found.estimates, effects=held), tuple(each.effect.name for each in chosen[len(named) :])
 
 
 def _beyond_chance(
@@ -276,7 +266,7 @@ def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
     shape = {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes}
     columns = hypothesis.columns(Candidate(effect, shape)) / floor[:, None]
     new = _beyond_base(hypothesis.base / floor[:, None], columns) * usual_size(
-        effect, hypothesis.flights[0].signals.vehicle, columns.shape[2]
+        effect, hypothesis.vehicle, columns.shape[2]
     )
     # The best channel of the best coefficient decides.
     if np.sqrt((new**2).mean(axis=0)).max(initial=0.0) >= VISIBLE:
@@ -299,8 +289,8 @@ def usual_size(effect: Effect, vehicle: VehicleSettings, width: int) -> Array:
     bounds = [max(abs(bound) for bound in c.bounds(vehicle)) for c in effect.coefficients]
     if effect.unit_coefficient or not bounds:
         return np.ones(width)
-    if effect.linear is not None:
-        return np.abs(effect.linear(_USUAL_OF_BOUND * np.array(bounds)))
+    if effect.physical is not None:
+        return np.abs(effect.physical.linear(_USUAL_OF_BOUND * np.array(bounds)))
     return _USUAL_OF_BOUND * np.array(bounds)[:width]
 
 

@@ -10,17 +10,18 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.gap.balance.balance_system import System, floors, system
+from cpfls_cli.gap.balance.balance_system import System, channel_size, floors, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
 from cpfls_cli.gap.naming.scoring import (
     Scored,
     candidates_of,
-    layout,
     normal_equations,
     score,
+    scoring_matrix,
 )
 from cpfls_cli.gap.settings import ERRORS, VISIBLE, GapSettings
+from cpfls_cli.rounding import tied
 from cpfls_cli.weak_form.resampling import blocks_of, mirror_shifted
 
 NEAR = 0.6
@@ -102,17 +103,20 @@ def rank_effects(
     names = {candidate.effect.name for candidate in chosen}
     listed = [*candidates_of([effect for effect in effects if effect.name not in names]), *also]
     tried = [candidate for candidate in listed if hypothesis.can(candidate)]
-    arranged = layout(hypothesis, tried, floor)
+    arranged = scoring_matrix(hypothesis, tried, floor)
     block = block_index(hypothesis, settings)
     right = hypothesis.residual[..., None]
     if rng is not None:
-        unexplained = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
+        unexplained = hypothesis.left(fit(hypothesis, floor))
         shifted = mirror_shifted(unexplained, hypothesis.flight_index, settings.shifts, rng)
         right = np.concatenate([right, shifted], axis=2)
     beside = normal_equations(arranged, right, floor, block).beside(arranged.base)
     scored, chance = score(arranged, beside, hypothesis)
     above_floor = float(max(beside.before[:, 0].sum() - rows(hypothesis), 1e-9))
-    return SearchStep(hypothesis, floor, _each_once(scored), chance, above_floor, block)
+    once: dict[str, Scored] = {}
+    for each in scored:
+        once.setdefault(each.candidate.effect.name, each)
+    return SearchStep(hypothesis, floor, tuple(once.values()), chance, above_floor, block)
 
 
 def best_floor(hypothesis: System) -> Array:
@@ -124,34 +128,21 @@ def best_floor(hypothesis: System) -> Array:
     -------
     array, shape (6,)
     """
+
+    def settled() -> Array:
+        floor = channel_size(hypothesis.residual)
+        for _ in range(2):
+            floor = floors(hypothesis, fit(hypothesis, floor))
+        return floor
+
     key = (best_floor, hypothesis.flights, tuple(candidate.key for candidate in hypothesis.chosen))
-    return hypothesis.flights[0].signals.once(key, lambda: _best_floor(hypothesis))
-
-
-def _best_floor(hypothesis: System) -> Array:
-    rows = hypothesis.residual
-    floor = np.where(rows.any(axis=0), np.sqrt(np.mean(rows**2, axis=0)), 1.0)
-    for _ in range(2):
-        floor = floors(hypothesis, fit(hypothesis, floor))
-    return floor
+    return hypothesis.flights[0].signals.once(key, settled)
 
 
 def block_index(hypothesis: System, settings: GapSettings) -> IntArray:
-    """Assign each window to a block of the cross-validation.
-
-    Returns
-    -------
-    array of int, shape (window,)
-    """
+    """Assign each window to a block of the cross-validation, shape (window,)."""
     centres = np.concatenate([f.windows.centres(f.signals.time) for f in hypothesis.flights])
     return blocks_of(hypothesis.flight_index, centres, settings.block_s)
-
-
-def _each_once(ranking: Sequence[Scored]) -> tuple[Scored, ...]:
-    seen: dict[str, Scored] = {}
-    for scored in ranking:
-        seen.setdefault(scored.candidate.effect.name, scored)
-    return tuple(seen.values())
 
 
 def rows(hypothesis: System) -> int:
@@ -161,15 +152,26 @@ def rows(hypothesis: System) -> int:
 
 def surely_less(one: Scored, other: Scored) -> bool:
     """Tell whether one explanation leaves less than another, by more than the scatter over blocks."""
-    # Slow to load, and needed only where two explain almost the same.
-    from scipy.stats import wilcoxon
-
-    margin = other.block_error - one.block_error
+    margin = more_left(other.block_error, one.block_error)
     if len(margin) < 2 or margin.sum() <= 0:
         return False
     spread = len(margin) * float(mean_error(margin))
     # Effects act in some blocks and not in others: where sizes differ that much, ranks tell more than the mean.
-    return bool(margin.sum() > ERRORS * spread or wilcoxon(margin, alternative="greater").pvalue < _CHANCE)
+    return bool(margin.sum() > ERRORS * spread or chance_of_ranks(margin) < _CHANCE)
+
+
+def more_left(one: Array, other: Array) -> Array:
+    """Compute by how much more one explanation leaves of each block than another; 0 where that is rounding."""
+    return np.where(tied(one, other), 0.0, one - other)
+
+
+def chance_of_ranks(margin: Array) -> float:
+    """Compute how likely chance makes such margins over blocks, by the signed-rank test of Wilcoxon."""
+    # Slow to load, and needed only where two explain almost the same.
+    from scipy.stats import wilcoxon
+
+    differing = margin[margin != 0]
+    return float(wilcoxon(differing, alternative="greater").pvalue) if len(differing) else 1.0
 
 
 def least_gain(above_floor: float, windows: int) -> float:

@@ -259,13 +259,10 @@ def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> 
         How many were named.
     """
     filled = effects > 1 and bool((after > CLEAR).any())
-    return filled or any(_stays(before[kind], after[kind], named_share) for kind in (slice(0, 3), slice(3, 6)))
-
-
-def _stays(before: Array, after: Array, named_share: float) -> bool:
-    clear = (before > CLEAR) & (before**2 > COUNTS * np.nanmax(before, initial=0.0) ** 2)
+    largest = np.repeat([np.nanmax(before[kind], initial=0.0) for kind in (slice(0, 3), slice(3, 6))], 3)
+    clear = (before > CLEAR) & (before**2 > COUNTS * largest**2)
     large = (after > LARGE) & (after > _REST * before)
-    return bool((clear & (_is_left(after, before, named_share) | large)).any())
+    return filled or bool((clear & (_is_left(after, before, named_share) | large)).any())
 
 
 def _is_left(after: Array, before: Array, named_share: float) -> BoolArray:

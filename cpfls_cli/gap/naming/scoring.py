@@ -12,13 +12,15 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System
-from cpfls_cli.gap.balance.refine import compensation, fit, free_shapes, shape_columns
+from cpfls_cli.gap.balance.refine import compensation, fit, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.settings import ERRORS
+from cpfls_cli.rounding import ascending
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.resampling import Beside, Folds, folds
 
 REFUSED = -np.inf
+"""Gain of a candidate with a coefficient beyond its bounds: below that of any other."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,7 @@ class Scored:
     Attributes
     ----------
     columns : array of int
-        Of the layout; without those that a bound at 0 took out.
+        Of the matrix; without those that a bound at 0 took out.
     gain : float
         Sum of squares taken off the blocks that the fits did not see, in squared floors; minus infinity where refused.
     block_error : array, shape (block,)
@@ -48,7 +50,7 @@ class Scored:
 
 
 class PlacedCandidate(NamedTuple):
-    """Where a candidate stands in a layout.
+    """Where a candidate stands in the matrix.
 
     Attributes
     ----------
@@ -62,7 +64,7 @@ class PlacedCandidate(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Layout:
+class ScoringMatrix:
     """Base columns and candidates side by side.
 
     Attributes
@@ -88,7 +90,7 @@ def candidates_of(effects: Sequence[Effect]) -> list[Candidate]:
     ]
 
 
-def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) -> Layout:
+def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: Array) -> ScoringMatrix:
     """Arrange base and candidates, in floors.
 
     The shapes of the chosen effects stand in the base by their derivatives, so that a candidate is judged by what it
@@ -109,21 +111,14 @@ def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) ->
         indices = np.arange(first, first + columns.shape[2])
         placed.append(PlacedCandidate(candidate, indices, _weight(hypothesis, candidate)))
         first += columns.shape[2]
-    widths = [(each, hypothesis.columns(each).shape[2]) for each in hypothesis.free]
-    widths += [(one.candidate, len(one.columns)) for one in placed]
-    vehicle = hypothesis.flights[0].signals.vehicle
-    known = [information(each.effect, width, vehicle) for each, width in widths]
-    free, offered = known[: len(hypothesis.free)], known[len(hypothesis.free) :]
-    shapes = np.array([1.0 / np.ptp(_grid(each, name)) ** 2 for each, name in free_shapes(hypothesis)])
+    free = [information(each.effect, place.stop - place.start, hypothesis.vehicle) for each, place in hypothesis.places]
+    shapes = np.array([1.0 / np.ptp(shape.grid) ** 2 for shape in hypothesis.shapes])
+    offered = [information(one.candidate.effect, len(one.columns), hypothesis.vehicle) for one in placed]
     prior = np.concatenate([*free, shapes, *offered])
-    return Layout(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(placed), prior)
+    return ScoringMatrix(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(placed), prior)
 
 
-def _grid(candidate: Candidate, name: str) -> tuple[float, ...]:
-    return next(shape.grid for shape in candidate.effect.shapes if shape.name == name)
-
-
-def score(arranged: Layout, beside: Beside, hypothesis: System) -> tuple[list[Scored], Array]:
+def score(arranged: ScoringMatrix, beside: Beside, hypothesis: System) -> tuple[list[Scored], Array]:
     """Score every candidate, and the best of them on what is chance.
 
     Signs and bounds are not used on chance, so that it is given more than its due.
@@ -140,17 +135,17 @@ def score(arranged: Layout, beside: Beside, hypothesis: System) -> tuple[list[Sc
     chance : array, shape (shift,)
         Gain of the best candidate on each of the shifted residuals.
     """
-    vehicle, scored = hypothesis.flights[0].signals.vehicle, []
+    scored = []
     chance = np.full(beside.before.shape[1] - 1, -np.inf)
     for placed in arranged.candidates:
         error = _error(placed, placed.columns, beside)
         chance = np.maximum(chance, (beside.before - error)[:, 1:].sum(axis=0))
-        scored.append(_scored(placed, error[:, 0], beside, vehicle))
-    return sorted(scored, key=lambda candidate: -candidate.gain), chance
+        scored.append(_scored(placed, error[:, 0], beside, hypothesis.vehicle))
+    return ascending(scored, lambda candidate: -candidate.gain), chance
 
 
-def normal_equations(arranged: Layout, right: Array, floor: Array, block: IntArray) -> Folds:
-    """Build the normal equations of a layout.
+def normal_equations(arranged: ScoringMatrix, right: Array, floor: Array, block: IntArray) -> Folds:
+    """Build the normal equations of base and candidates.
 
     Parameters
     ----------
@@ -222,8 +217,8 @@ def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleS
     keep = np.ones(len(linear), dtype=bool)
     listed = effect.coefficients
     if effect.physical is not None:
-        ends = np.array([effect.physical(linear + way * ERRORS * error) for way in (-1, 1)])
-        physical = effect.physical(linear)
+        ends = np.array([effect.physical.of(linear + way * ERRORS * error) for way in (-1, 1)])
+        physical = effect.physical.of(linear)
         low, high = np.array([each.bounds(vehicle) for each in listed])[: len(physical)].T
         unsure = np.isnan(ends).any(axis=0) | np.isnan(physical)
         return keep, bool(np.all(unsure | ((ends.max(axis=0) >= low) & (ends.min(axis=0) <= high))))

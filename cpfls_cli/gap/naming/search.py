@@ -19,6 +19,7 @@ from cpfls_cli.gap.naming.ranking import (
     SearchStep,
     least_gain,
     least_margin,
+    more_left,
     rank_effects,
     rows,
     surely_less,
@@ -29,6 +30,7 @@ from cpfls_cli.gap.naming.scoring import (
     Scored,
 )
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.rounding import largest, less
 
 
 def forward_selection(
@@ -154,7 +156,8 @@ def _do_without(
         float((weighted_residual(there, floor, plain.rotor_wrench) ** 2).sum())
         for there in (without, system(flights, kept))
     )
-    return list(without.chosen) if left - before < LEAST_SHARE * max(left - rows(plain), 0.0) else None
+    needless = less(left - before, LEAST_SHARE * max(left - rows(plain), 0.0), left)
+    return list(without.chosen) if needless else None
 
 
 def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Scored]:
@@ -167,7 +170,7 @@ def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> l
         for other in ranking
         if other.candidate.effect.name != chosen.candidate.effect.name
         and other.gain > NEAR * chosen.gain
-        and not _beats(chosen, other, above_floor)
+        and not (_clearly_less(chosen, other, above_floor) and surely_less(chosen, other))
     ]
 
 
@@ -181,7 +184,8 @@ def simplest(ranking: Sequence[Scored], above_floor: float) -> Scored:
     """
     best = ranking[0]
     rivals = [other for other in unbeaten(best, ranking, above_floor) if other.gain > (1 - CLOSE) * best.gain]
-    return min([best, *rivals], key=lambda scored: (_numbers(scored), -scored.gain))
+    fewest = min(_numbers(each) for each in [best, *rivals])
+    return largest([each for each in [best, *rivals] if _numbers(each) == fewest], lambda scored: scored.gain)
 
 
 def alternatives(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Alternative]:
@@ -200,9 +204,10 @@ def alternatives(chosen: Scored, ranking: Sequence[Scored], above_floor: float) 
     ]
 
 
-def _beats(chosen: Scored, other: Scored, above_floor: float) -> bool:
-    margin = float((other.block_error - chosen.block_error).sum())
-    return margin > least_margin(above_floor, float(chosen.block_error.sum())) and surely_less(chosen, other)
+def _clearly_less(chosen: Scored, other: Scored, above_floor: float) -> bool:
+    """Tell whether one explanation leaves less than another by more than next to nothing."""
+    margin = float(more_left(other.block_error, chosen.block_error).sum())
+    return margin > least_margin(above_floor, float(chosen.block_error.sum()))
 
 
 def _numbers(scored: Scored) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -80,34 +80,37 @@ class Logging:
 
 def planned_signals(planned: Trajectory, room: Room, logging: Logging) -> Signals:
     """Compute what would be logged along a plan by a vehicle without any effect and without noise."""
+    speed = np.sqrt(np.maximum(squared_speeds(vars(planned), room.vehicle), 0.0))
+    voltage = 1 - _BATTERY_USE * planned.time / planned.duration
+    return _signals(planned.time, vars(planned), speed, voltage, room.vehicle, logging)
+
+
+def _signals(
+    time: Array,
+    motion: Mapping[str, Array],
+    rotor_speed: Array,
+    voltage: Array | None,
+    vehicle: VehicleSettings,
+    logging: Logging,
+) -> Signals:
+    """Make signals of what will be logged, with what an ideal accelerometer senses."""
     signals = Signals(
-        time=planned.time,
-        body_rate=planned.body_rate,
-        vehicle=room.vehicle,
-        attitude=planned.attitude,
-        position=planned.position,
-        velocity=planned.velocity,
-        acceleration=planned.acceleration,
-        rotor_speed=np.sqrt(np.maximum(squared_speeds(vars(planned), room.vehicle), 0.0)),
+        time=time,
+        body_rate=motion["body_rate"],
+        vehicle=vehicle,
+        attitude=motion["attitude"],
+        position=motion["position"],
+        velocity=motion["velocity"],
+        acceleration=motion["acceleration"],
+        rotor_speed=rotor_speed,
+        voltage=voltage,
         commanded=logging.commanded,
-        voltage=1 - _BATTERY_USE * planned.time / planned.duration,
         ground_height_m=logging.settings.ground_height_m,
     )
-    return as_logged(with_specific_force(signals), logging)
-
-
-def with_specific_force(signals: Signals) -> Signals:
-    """Add what an ideal accelerometer senses."""
-    assert signals.acceleration is not None, "a simulated flight has its acceleration"
-    upward = np.array([0.0, 0.0, signals.vehicle.gravity_m_s2])
-    felt = np.einsum("tji,tj->ti", signals.rotation, signals.acceleration + upward)
-    return replace(signals, specific_force=felt)
-
-
-def as_logged(signals: Signals, logging: Logging) -> Signals:
-    """Drop what will not be logged."""
+    upward = np.array([0.0, 0.0, vehicle.gravity_m_s2])
+    felt = np.einsum("tji,tj->ti", signals.rotation, motion["acceleration"] + upward)
     dropped = {name: None for name in _OPTIONAL if name not in logging.signals}
-    return replace(signals, commanded=logging.commanded, **dropped)  # type: ignore[arg-type]  # names of fields
+    return replace(signals, **{"specific_force": felt} | dropped)  # type: ignore[arg-type]  # names of fields
 
 
 def expected_floor(
@@ -169,16 +172,5 @@ def flown_signals(
     model = None if logging.base is None else VehicleModel(vehicle=vehicle, fuzzy=logging.base)
     flight = measure(planned.time, vars(planned), vehicle, loop, rng, model=model)
     logged = flight.signals
-    signals = Signals(
-        time=planned.time,
-        body_rate=logged["body_rate"],
-        vehicle=vehicle,
-        attitude=logged["attitude"],
-        position=logged["position"],
-        velocity=logged["velocity"],
-        acceleration=logged["acceleration"],
-        rotor_speed=logged["rotor_command"] if "rotor_speed" not in logged else logged["rotor_speed"],
-        voltage=logged.get("voltage"),
-        ground_height_m=logging.settings.ground_height_m,
-    )
-    return as_logged(with_specific_force(signals), logging)
+    speed = logged["rotor_command"] if "rotor_speed" not in logged else logged["rotor_speed"]
+    return _signals(planned.time, logged, speed, logged.get("voltage"), vehicle, logging)

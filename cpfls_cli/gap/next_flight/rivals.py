@@ -18,6 +18,7 @@ from cpfls_cli.gap.naming.leftover import usual_size
 from cpfls_cli.gap.naming.results import Alternative, NamedEffect
 from cpfls_cli.gap.naming.scoring import candidates_of, information
 from cpfls_cli.gap.next_flight.separation import SURE, Question, SizedEffect, gathered, judged, shared_noise
+from cpfls_cli.rounding import smallest
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -74,7 +75,9 @@ def _is_open(question: Question) -> bool:
 def usual(effect: Effect, vehicle: VehicleSettings) -> SizedEffect:
     """Give an effect a size that is large but not unheard of."""
     candidate = Candidate(effect, {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes})
-    return SizedEffect(candidate, usual_size(effect, vehicle, 1 if effect.unit_coefficient else _width(effect)))
+    numbers = np.ones(len(effect.coefficients) or 1)
+    width = len(numbers if effect.physical is None else effect.physical.linear(numbers))
+    return SizedEffect(candidate, usual_size(effect, vehicle, width))
 
 
 def questions_left(
@@ -94,7 +97,11 @@ def questions_left(
         Of the diagnosis, repaired.
     floor : array, shape (6,), N m and N
     """
-    sized = {each.name: _sized(each) for each in named if each.candidate is not None}
+    sized = {
+        each.name: SizedEffect(each.candidate, each.linear if len(each.linear) else np.ones(1))
+        for each in named
+        if each.candidate is not None
+    }
     questions, beside = [], []
     for rival in rivals:
         one = sized[rival.instead_of]
@@ -124,17 +131,6 @@ def _is_told(question: Question, flights: Sequence[WeakFlight], floor: Array) ->
     return answer.sure >= SURE
 
 
-def _sized(named: NamedEffect) -> SizedEffect:
-    assert named.candidate is not None, "an effect of the motion has its shapes"
-    return SizedEffect(named.candidate, named.linear if len(named.linear) else np.ones(1))
-
-
-def _width(effect: Effect) -> int:
-    if effect.linear is None:
-        return len(effect.coefficients)
-    return len(effect.linear(np.ones(len(effect.coefficients))))
-
-
 def fitted_effects(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> tuple[SizedEffect, ...]:
     """Fit effects together on flights; what the flights leave open stays small beside its bounds.
 
@@ -144,18 +140,17 @@ def fitted_effects(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], f
         Their shapes are kept.
     floor : array, shape (6,), N m and N
     """
-    balance, vehicle = system(flights, chosen), flights[0].signals.vehicle
-    widths = [balance.columns(each).shape[2] for each in balance.free]
-    matrix = (balance.base / floor[:, None]).reshape(-1, sum(widths))
-    pairs = zip(balance.free, widths, strict=True)
-    prior = np.concatenate([information(each.effect, width, vehicle) for each, width in pairs])
+    balance = system(flights, chosen)
+    matrix = (balance.base / floor[:, None]).reshape(-1, balance.base.shape[2])
+    widths = [(each, place.stop - place.start) for each, place in balance.places]
+    prior = np.concatenate([information(each.effect, width, balance.vehicle) for each, width in widths])
     # Rows of the prior beside those of the flights; lengths of columns differ by decades.
     matrix = np.concatenate([matrix, np.diag(np.sqrt(prior))])
     right = np.concatenate([(balance.residual / floor).reshape(-1), np.zeros(len(prior))])
     length = np.linalg.norm(matrix, axis=0)
     scale = 1.0 / np.where(length > 0, length, 1.0)
-    parts = np.split(np.linalg.lstsq(matrix * scale, right, rcond=1e-9)[0] * scale, np.cumsum(widths)[:-1])
-    by_name = {each.effect.name: part for each, part in zip(balance.free, parts, strict=True)}
+    linear = np.linalg.lstsq(matrix * scale, right, rcond=1e-9)[0] * scale
+    by_name = {each.effect.name: linear[place] for each, place in balance.places}
     return tuple(SizedEffect(each, by_name.get(each.effect.name, np.ones(1))) for each in chosen)
 
 
@@ -175,9 +170,9 @@ def fitted_rival(
 
     def error(candidate: Candidate) -> float:
         balance = system(flights, [*besides, candidate])
-        return float((((balance.residual - balance.base @ fit(balance, floor)) / floor) ** 2).sum())
+        return float(((balance.left(fit(balance, floor)) / floor) ** 2).sum())
 
-    best = min(candidates_of([rival]), key=error)
+    best = smallest(candidates_of([rival]), error)
     return fitted_effects(flights, refined(flights, [*besides, best], floor).chosen, floor)[-1]
 
 
@@ -186,6 +181,6 @@ def physical_values(sized: SizedEffect) -> dict[str, float]:
     effect, shape = sized.candidate
     if effect.unit_coefficient:
         return dict(shape)
-    physical = np.nan_to_num(sized.linear if effect.physical is None else effect.physical(sized.linear))
+    physical = np.nan_to_num(sized.linear if effect.physical is None else effect.physical.of(sized.linear))
     names = (coefficient.name for coefficient in effect.coefficients)
     return {**dict(zip(names, physical.tolist(), strict=False)), **shape}

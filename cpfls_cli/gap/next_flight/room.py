@@ -10,6 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.rigid_body import body_torque, inertia_tensor
 from cpfls_cli.errors import ComputationError, SettingError
+from cpfls_cli.rounding import at_most
 from cpfls_cli.simulation.inverse import collective_thrust
 from cpfls_cli.trajectory.harmonics import HarmonicPath, harmonic_trajectory, random_path
 from cpfls_cli.trajectory.planning import Trajectory
@@ -22,6 +23,7 @@ TILT_MAX = np.radians(35.0)
 
 _ROTOR_SHARE = 0.85
 """Of the largest speed of a rotor, and of the way down from hovering to rest, in squares: the rest is for control."""
+# Half of a turn to either side shows every heading.
 _MOST_YAW = np.pi
 # Of the fastest wave: between them a load is at most 1 % larger.
 _SAMPLES_PER_PERIOD = 20
@@ -54,11 +56,6 @@ class Room:
     vehicle: VehicleSettings
     period: float
 
-    @property
-    def _seen_at(self) -> float:
-        """Time between samples at which loads are looked at, s."""
-        return 1 / (_SAMPLES_PER_PERIOD * self.settings.next_flight.frequency_max_hz)
-
     def planned(self, path: HarmonicPath, period: float | None = None) -> Trajectory:
         """Sample a path, about the middle of the room."""
         there = replace(path, centre=path.centre + np.append(self.middle, 0.0))
@@ -90,7 +87,7 @@ class Room:
 
     def _share(self, path: HarmonicPath, halvings: int) -> float:
         """Find the largest share of a path that keeps the limits on motion and rotors, by bisection."""
-        if self.load(path) <= 1:
+        if at_most(self.load(path), 1.0):
             return 1.0
         low, high = 0.0, 1.0
         for _ in range(halvings):
@@ -101,7 +98,7 @@ class Room:
     def load(self, path: HarmonicPath) -> float:
         """Compute the largest share of any limit on motion, tilt and rotors that a path takes."""
         try:
-            planned = self.planned(path, self._seen_at)
+            planned = self.planned(path, 1 / (_SAMPLES_PER_PERIOD * self.settings.next_flight.frequency_max_hz))
         except ComputationError:
             return np.inf
         signals = vars(planned)

@@ -12,7 +12,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.next_flight.logged import Logging, planned_signals
 from cpfls_cli.gap.next_flight.room import Room
-from cpfls_cli.gap.next_flight.separation import Evidence, Judgement, Question, gathered, judged, shared_noise
+from cpfls_cli.gap.next_flight.separation import Answer, Evidence, Question, gathered, judged, shared_noise
 from cpfls_cli.rounding import ascending, less
 from cpfls_cli.trajectory.harmonics import HarmonicPath
 from cpfls_cli.weak_form.windows import windows
@@ -50,7 +50,7 @@ class Goal:
     logging: Logging
     noise: float
 
-    def judgements(self, signals: Signals | None, again: int = 1) -> tuple[Judgement, ...]:
+    def answers(self, signals: Signals | None, again: int = 1) -> tuple[Answer, ...]:
         """Judge what the known flights, each taken `again` times, say together with one along given signals."""
         flights = [] if signals is None else [self.logging.weak(signals)]
         answers = []
@@ -62,7 +62,7 @@ class Goal:
 
     def score(self, path: HarmonicPath) -> float:
         """Score a path: harmonic mean over the questions of what it tells, 1 for just enough; the worst counts most."""
-        answers = self.judgements(planned_signals(self.room.planned(path), self.room, self.logging))
+        answers = self.answers(planned_signals(self.room.planned(path), self.room, self.logging))
         return 1 / float(np.mean([1 / (answer.apart / answer.enough + _HOPELESS) for answer in answers]))
 
     def _empty(self) -> WeakFlight:

@@ -77,7 +77,7 @@ class Evidence:
 
 
 @dataclass(frozen=True)
-class Columns:
+class QuestionColumns:
     """Where the columns of a question stand.
 
     Attributes
@@ -93,7 +93,7 @@ class Columns:
     unit: bool
 
 
-def gathered(question: Question, flights: Sequence[WeakFlight], floor: Array) -> tuple[Evidence, Columns]:
+def gathered(question: Question, flights: Sequence[WeakFlight], floor: Array) -> tuple[Evidence, QuestionColumns]:
     """Gather what flights along known motions would say on a question.
 
     Parameters
@@ -114,10 +114,10 @@ def gathered(question: Question, flights: Sequence[WeakFlight], floor: Array) ->
     rivals = tuple(indices[1 + len(free) :]) or (np.zeros(0, dtype=int),)
     unit = bool(tried) and tried[0].effect.unit_coefficient
     evidence = Evidence(matrix.T @ matrix, sum(len(flight) for flight in flights), rows)
-    return evidence, Columns(np.concatenate(indices[1 : 1 + len(free)]), rivals, unit)
+    return evidence, QuestionColumns(np.concatenate(indices[1 : 1 + len(free)]), rivals, unit)
 
 
-def apart(evidence: Evidence, columns: Columns) -> float:
+def apart(evidence: Evidence, columns: QuestionColumns) -> float:
     """Compute the part of the true effect that the rival leaves over, at its best.
 
     Returns
@@ -128,12 +128,12 @@ def apart(evidence: Evidence, columns: Columns) -> float:
     return min(_left(evidence.gram, columns, rival) for rival in columns.rivals)
 
 
-def beyond_numbers(evidence: Evidence, columns: Columns) -> float:
+def beyond_numbers(evidence: Evidence, columns: QuestionColumns) -> float:
     """Compute the part of the true effect that the free columns beside the rival leave over, in squared floors."""
     return _left(evidence.gram, columns, np.zeros(0, dtype=int))
 
 
-def _left(gram: Array, columns: Columns, rival: IntArray) -> float:
+def _left(gram: Array, columns: QuestionColumns, rival: IntArray) -> float:
     weight = np.zeros(len(gram))
     weight[0] = 1.0
     free = columns.base
@@ -151,7 +151,7 @@ def _left(gram: Array, columns: Columns, rival: IntArray) -> float:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class Answer:
     """What flights would say on a question.
 
     Attributes
@@ -207,13 +207,13 @@ class Judgement:
         return float(np.sqrt(self.enough / max(self.apart, 1e-12)))
 
 
-def judged(evidence: Evidence, columns: Columns, noise: float) -> Judgement:
+def judged(evidence: Evidence, columns: QuestionColumns, noise: float) -> Answer:
     """Judge what flights would say on a question."""
     seen = beyond_numbers(evidence, columns)
     # An effect without a rival has to be worth a name.
     alone = not len(columns.rivals[0])
     least = least_gain(seen, evidence.windows) if alone else least_margin(seen, evidence.rows)
-    return Judgement(apart(evidence, columns), least, noise)
+    return Answer(apart(evidence, columns), least, noise)
 
 
 def shared_noise(windows: Windows) -> float:

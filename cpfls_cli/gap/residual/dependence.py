@@ -11,6 +11,7 @@ from numpy.polynomial import chebyshev
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
+from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.resampling import about_flight_mean, folds, mirror_shifted
 
 # Curves with two bends, and with six zeros around a circle: what formulas leave out is hardly more crooked.
@@ -91,12 +92,8 @@ def rank_dependence(
             curve = _curve(name, signal[rows])
             if curve.size and len(np.unique(block[rows])) >= _FEWEST_BLOCKS:
                 curve = about_flight_mean(curve, flight_index[rows])
-                share = _share(curve, draws[np.ix_(rows, channels)], block[rows])
+                share = _explained(curve, draws[np.ix_(rows, channels)], block[rows])
                 shares += [(int(channel), name, by_draw) for channel, by_draw in zip(channels, share, strict=True)]
-    return _ranked(shares, shifts)
-
-
-def _ranked(shares: list[tuple[int, str, Array]], shifts: int) -> tuple[Dependence, ...]:
     if not shares:
         return ()
     chance = np.max([share[1:] for _, _, share in shares], axis=0)
@@ -104,7 +101,7 @@ def _ranked(shares: list[tuple[int, str, Array]], shifts: int) -> tuple[Dependen
         Dependence(CHANNELS[channel], name, float(share[0]), float((1 + (chance >= share[0]).sum()) / (1 + shifts)))
         for channel, name, share in shares
     ]
-    return tuple(sorted(ranked, key=lambda one: -one.r2))
+    return tuple(ascending(ranked, lambda one: -one.r2))
 
 
 def _where_known(residual: Array, flight_index: IntArray, finite: BoolArray) -> Iterator[tuple[IntArray, IntArray]]:
@@ -130,7 +127,7 @@ def _curve(name: str, signal: Array) -> Array:
     return np.asarray(chebyshev.chebvander(scaled, _DEGREE)[:, 1:])
 
 
-def _share(curve: Array, draws: Array, block: IntArray) -> Array:
+def _explained(curve: Array, draws: Array, block: IntArray) -> Array:
     """Give the share explained of unseen blocks, shape (channel, draw)."""
     normal = folds(curve[:, None], draws.reshape(len(draws), 1, -1), block)
     _, error = normal.solve(np.arange(curve.shape[1]))
@@ -154,7 +151,7 @@ def state_signals(flight: WeakFlight, signals: Signals) -> dict[str, Array]:
     averaged = {"time": flight.windows.centres(signals.time) - signals.time[0]}
     for name, values in _instantaneous(signals):
         averaged[name] = flight.windows.average(values)
-    return averaged | {name: _within_half_turn(averaged[name]) for name in ANGLES if name in averaged}
+    return averaged | {name: (averaged[name] + np.pi) % (2 * np.pi) - np.pi for name in ANGLES if name in averaged}
 
 
 def joined_states(states: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
@@ -194,15 +191,11 @@ def without_actuation(state: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def _instantaneous(signals: Signals) -> Iterator[tuple[str, Array]]:
+    """Name the signals of motion and actuation, sample by sample."""
     yield from _axes("body rate", signals.body_rate)
     if signals.attitude is not None:
         # A turn through half a turn must not average to zero.
         yield from zip(("roll", "pitch", "yaw"), np.unwrap(signals.attitude, axis=0).T, strict=True)
-    yield from _translation(signals)
-    yield from _actuation(signals)
-
-
-def _translation(signals: Signals) -> Iterator[tuple[str, Array]]:
     if signals.velocity is not None:
         if signals.attitude is not None:
             yield from _axes("air velocity", signals.air_velocity)
@@ -211,9 +204,6 @@ def _translation(signals: Signals) -> Iterator[tuple[str, Array]]:
         yield "vertical speed", signals.velocity[:, 2]
     if signals.position is not None:
         yield "height", signals.position[:, 2] - signals.ground_height_m
-
-
-def _actuation(signals: Signals) -> Iterator[tuple[str, Array]]:
     if signals.rotor_speed is not None:
         for number, speed in enumerate(signals.rotor_speed.T, start=1):
             yield f"rotor speed {number}", speed
@@ -228,7 +218,3 @@ def _actuation(signals: Signals) -> Iterator[tuple[str, Array]]:
 def _axes(name: str, values: Array) -> Iterator[tuple[str, Array]]:
     for axis, column in zip("xyz", values.T, strict=True):
         yield f"{name} {axis}", column
-
-
-def _within_half_turn(angle: Array) -> Array:
-    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)

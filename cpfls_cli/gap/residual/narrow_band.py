@@ -118,12 +118,13 @@ def narrow_band(
         drawn += 1
     channel, frequency = int(channels[strongest]), _between_bins(power[strongest], peak, on)
     mean, error = _mean_power(channel, frequency, hop_s, flights, rates)
+    lobe = slice(max(0, peak - _LOBE_CYCLES * on.resolution), peak + _LOBE_CYCLES * on.resolution + 1)
     return NarrowBand(
         channel=CHANNELS[channel],
         frequency_hz=frequency,
-        share=_share(power[strongest], smooth[strongest], peak, on),
+        share=float(np.maximum(power[strongest] - smooth[strongest], 0)[lobe].sum() / power[strongest].sum()),
         p_value=(1 + reached) / (1 + drawn),
-        energy=_energy(mean, error),
+        energy="neither" if not abs(mean) > ERRORS * error else "feeds" if mean > 0 else "drains",
         power=mean,
         power_error=error,
     )
@@ -144,13 +145,6 @@ def _between_bins(power: Array, peak: int, on: Grid) -> float:
     bend = left - 2 * middle + right
     offset = 0.5 * (left - right) / bend if bend < 0 else 0.0
     return float(on.frequency[peak] + np.clip(offset, -1, 1) * on.frequency[1])
-
-
-def _share(power: Array, smooth: Array, peak: int, on: Grid) -> float:
-    reach = _LOBE_CYCLES * on.resolution
-    lobe = slice(max(0, peak - reach), peak + reach + 1)
-    above = np.maximum(power[lobe] - smooth[lobe], 0).sum()
-    return float(above / power.sum())
 
 
 def _mean_power(
@@ -176,12 +170,6 @@ def _products(residual: Array, rate: Array, length: int, cycles_per_row: float) 
     segments = np.stack([residual, rate])[:, : len(rate) // length * length].reshape(2, -1, length)
     first, second = (segments - segments.mean(axis=2, keepdims=True)) @ wave
     return np.asarray((first * second.conj()).real / 2)
-
-
-def _energy(mean: float, error: float) -> Energy:
-    if not abs(mean) > ERRORS * error:
-        return "neither"
-    return "feeds" if mean > 0 else "drains"
 
 
 @dataclass(frozen=True)
@@ -228,13 +216,12 @@ def pooled_power(series: Sequence[Array], on: Grid) -> Array:
     -------
     array, shape (..., frequency)
     """
-    return np.asarray(sum(_power(values, on) for values in series))
-
-
-def _power(values: Array, on: Grid) -> Array:
-    taper = np.hanning(values.shape[-1] + 2)[1:-1]
-    tapered = (values - values.mean(axis=-1, keepdims=True)) * taper
-    return np.asarray(np.abs(rfft(tapered, on.samples)) ** 2 / (taper**2).sum())
+    total: Array = np.zeros(())
+    for values in series:
+        taper = np.hanning(values.shape[-1] + 2)[1:-1]
+        tapered = (values - values.mean(axis=-1, keepdims=True)) * taper
+        total = total + np.abs(rfft(tapered, on.samples)) ** 2 / (taper**2).sum()
+    return np.asarray(total)
 
 
 def background(power: Array, on: Grid) -> Array:
@@ -269,13 +256,9 @@ def _running_median(power: Array, on: Grid) -> Array:
     padded = np.pad(used, [(0, 0)] * (used.ndim - 1) + [(half, half)], mode="reflect")
     # Neighbouring bins are alike, and so are neighbouring medians: a part of them is enough.
     step = 2 * on.resolution
-    views = sliding_window_view(padded, 2 * half + 1, axis=-1)[..., ::step, ::2]
-    return _between(np.median(views, axis=-1), (np.arange(power.shape[-1]) - on.lowest) / step)
-
-
-def _between(values: Array, position: Array) -> Array:
-    """Interpolate along the last axis at fractional places, constant beyond the ends."""
-    inside = np.clip(position, 0, values.shape[-1] - 1)
+    values = np.median(sliding_window_view(padded, 2 * half + 1, axis=-1)[..., ::step, ::2], axis=-1)
+    # In straight lines between them, constant beyond the ends.
+    inside = np.clip((np.arange(power.shape[-1]) - on.lowest) / step, 0, values.shape[-1] - 1)
     left = np.minimum(inside.astype(int), max(0, values.shape[-1] - 2))
     right = np.minimum(left + 1, values.shape[-1] - 1)
     share = inside - left

@@ -12,6 +12,7 @@ from scipy.special import chdtrc
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
+from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.resampling import about_flight_mean
 
 # A zero crossing of the residual makes no gap small.
@@ -25,7 +26,7 @@ _OUTER_PERCENT = 1.0
 _FEWEST_PER_LAG = 4
 
 
-class Stretch(NamedTuple):
+class GapStretch(NamedTuple):
     """A stretch of a flight with a large gap.
 
     Attributes
@@ -49,7 +50,7 @@ class Stretch(NamedTuple):
 
 def stretches(
     residual: Array, centres: Array, flight_index: IntArray, level: float = 2.0, most: int = 5
-) -> tuple[Stretch, ...]:
+) -> tuple[GapStretch, ...]:
     """Find the stretches of time in which the gap is largest.
 
     Windows whose root mean square over their neighbours is above the level and among the largest tenth of the channel;
@@ -68,25 +69,23 @@ def stretches(
 
     Returns
     -------
-    tuple of Stretch
+    tuple of GapStretch
         Largest first.
     """
     largest = []
     for channel in range(residual.shape[1]):
         of_channel = list(_of_channel(channel, residual[:, channel], centres, flight_index, level))
-        largest += sorted(of_channel, key=_size)[:most]
-    return tuple(sorted(largest, key=_size))
-
-
-def _size(stretch: Stretch) -> float:
-    return -stretch.rms_floors
+        largest += ascending(of_channel, lambda stretch: -stretch.rms_floors)[:most]
+    return tuple(ascending(largest, lambda stretch: -stretch.rms_floors))
 
 
 def _of_channel(
     channel: int, residual: Array, centres: Array, flight_index: IntArray, level: float
-) -> Iterator[Stretch]:
+) -> Iterator[GapStretch]:
     flights = [np.flatnonzero(flight_index == flight) for flight in np.unique(flight_index)]
-    size = [_local_rms(residual[rows]) for rows in flights]
+    # What is averaged over neighbours has no zero crossings; the filter's running sum can end below 0 by rounding.
+    square = [uniform_filter1d(residual[rows] ** 2, _AVERAGED_WINDOWS, mode="nearest") for rows in flights]
+    size = [np.sqrt(np.maximum(each, 0.0)) for each in square]
     least = max(level, float(np.quantile(np.concatenate(size), 1 - _OUTSTANDING_SHARE)))
     for rows, local in zip(flights, size, strict=True):
         hop = float(centres[rows[1]] - centres[rows[0]]) if len(rows) > 1 else 0.0
@@ -94,13 +93,7 @@ def _of_channel(
             inside = rows[run]
             rms = float(np.sqrt(np.mean(residual[inside] ** 2)))
             start, end = float(centres[inside[0]]) - hop / 2, float(centres[inside[-1]]) + hop / 2
-            yield Stretch(int(flight_index[rows[0]]), start, end, CHANNELS[channel], rms)
-
-
-def _local_rms(residual: Array) -> Array:
-    """Compute the root mean square over neighbouring windows, which a zero crossing does not make small."""
-    # The filter is a running sum, whose rounding can end below 0.
-    return np.asarray(np.sqrt(np.maximum(uniform_filter1d(residual**2, _AVERAGED_WINDOWS, mode="nearest"), 0.0)))
+            yield GapStretch(int(flight_index[rows[0]]), start, end, CHANNELS[channel], rms)
 
 
 def _runs(above: BoolArray, pause: int) -> list[slice]:
@@ -208,14 +201,10 @@ def whiteness(residual: Array, flight_index: IntArray, stride: int = 2, lags: in
     centred = [about_flight_mean(flight, np.zeros(len(flight), dtype=int)) for flight in flights]
     used = sum(len(flight) for flight in centred)
     square = np.sum([(flight**2).sum(axis=0) for flight in centred], axis=0)
-    products = np.array([_product(centred, lag) for lag in range(1, lags + 1)]).reshape(lags, residual.shape[1])
+    products = np.zeros((lags, residual.shape[1]))
+    for lag in range(1, lags + 1):
+        products[lag - 1] = np.sum([(f[lag:] * f[: max(0, len(f) - lag)]).sum(axis=0) for f in centred], axis=0)
     pairs = np.array([sum(max(0, len(flight) - lag) for flight in centred) for lag in range(1, lags + 1)])
     correlation = np.divide(products, square, out=np.zeros_like(products), where=square > 0)
     statistic = used * (used + 2) * (correlation**2 / pairs[:, None]).sum(axis=0)
     return Whiteness(correlation, statistic, chdtrc(lags, statistic) if lags else np.ones_like(statistic), used)
-
-
-def _product(rows: list[Array], lag: int) -> Array:
-    return np.asarray(
-        np.sum([(flight[lag:] * flight[: max(0, len(flight) - lag)]).sum(axis=0) for flight in rows], axis=0)
-    )

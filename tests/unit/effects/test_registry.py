@@ -130,8 +130,8 @@ def test_an_unknown_name_gives_the_nearest():
 def test_wind_and_drag_are_two_sides_of_one_number():
     entry = CATALOGUE["wind"]
     physical = np.array([1.3e-3, 3.0, -2.0])
-    np.testing.assert_allclose(entry.physical(entry.linear(physical)), physical)
-    assert np.isnan(entry.physical(np.array([0.0, 1e-3, 1e-3]))[1:]).all()
+    np.testing.assert_allclose(entry.physical.of(entry.physical.linear(physical)), physical)
+    assert np.isnan(entry.physical.of(np.array([0.0, 1e-3, 1e-3]))[1:]).all()
 
 
 def test_a_shape_with_a_first_value_is_tried_there_only():

@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.balance.weak_flight import Candidate, rotation_balance
 from cpfls_cli.gap.before_after import before_after
 from cpfls_cli.gap.compare import compare
-from cpfls_cli.gap.extended import ExtendedModel, extend, inertial_torque, plain
+from cpfls_cli.gap.extended import ExtendedModel, extend, plain
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.whole_vehicle import of_vehicle, whole_vehicle
@@ -136,7 +136,7 @@ def test_required_rotor_torque_is_that_of_the_motion_less_the_effect():
     model = with_effect("linear_damping", 0.12, 0.12, 0.12)
     exact = replace(recording.signals, body_rate=_exact_rate(4))
     inside = slice(10, -10)
-    required = inertial_torque(exact, None) - effect_wrench(model, exact)[:, :3]
+    required = rotation_balance(exact).along(exact.time) - effect_wrench(model, exact)[:, :3]
     assert required[inside] == pytest.approx(exact.stated_torque[inside], abs=2e-4)
 
 
@@ -145,7 +145,9 @@ def test_refitted_inertia_changes_the_inertial_torque_in_proportion():
     spun = replace(signals, body_rate=np.column_stack([0.4 * np.sin(2 * signals.time), *[0 * signals.time] * 2]))
     parameters = np.where(np.arange(len(plain(None).parameters)) == 0, 0.1, 0.0)
     model = whole_vehicle(ExtendedModel(None, parameters), VEHICLE)
-    heavier, stated = (inertial_torque(replace(spun, vehicle=each), None) for each in (model.vehicle, VEHICLE))
+    heavier, stated = (
+        rotation_balance(replace(spun, vehicle=each)).along(spun.time) for each in (model.vehicle, VEHICLE)
+    )
     assert heavier[:, 0] == pytest.approx(1.1 * stated[:, 0])
     assert model.body.inertia == pytest.approx(np.diag([0.66, 0.6, 1.2]))
 

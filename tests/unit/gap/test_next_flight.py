@@ -19,7 +19,7 @@ from cpfls_cli.gap.next_flight.rivals import (
 from cpfls_cli.gap.next_flight.room import room_of, squared_speeds
 from cpfls_cli.gap.next_flight.search import goal, next_flight
 from cpfls_cli.gap.next_flight.separation import (
-    Judgement,
+    Answer,
     Question,
     SizedEffect,
     apart,
@@ -136,10 +136,10 @@ def test_an_effect_without_a_rival_has_to_be_worth_a_name():
 
 @pytest.mark.parametrize("least", [0.0, 25.0, 400.0])
 def test_enough_is_what_makes_the_answer_sure(least):
-    enough = Judgement(1.0, least, 1.1).enough
-    assert Judgement(enough, least, 1.1).sure == pytest.approx(0.975)
-    assert Judgement(0.5 * enough, least, 1.1).sure < 0.9
-    assert Judgement(4 * enough, least, 1.1).least_size == pytest.approx(0.5)
+    enough = Answer(1.0, least, 1.1).enough
+    assert Answer(enough, least, 1.1).sure == pytest.approx(0.975)
+    assert Answer(0.5 * enough, least, 1.1).sure < 0.9
+    assert Answer(4 * enough, least, 1.1).least_size == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("strength", [0.35, 0.5, 0.8])
@@ -150,7 +150,7 @@ def test_the_share_of_right_answers_is_that_of_draws(strength):
     true, rival = rng.standard_normal((2, 200, 1))
     both = np.hstack([base, rival])
     rest = strength * (true - both @ np.linalg.lstsq(both, true, rcond=None)[0])
-    expected = Judgement(float((rest**2).sum()), 0.0, 1.0)
+    expected = Answer(float((rest**2).sum()), 0.0, 1.0)
     rows = strength * true + rng.standard_normal((200, 4000))
     left = [
         ((rows - own @ np.linalg.lstsq(own, rows, rcond=None)[0]) ** 2).sum(axis=0)
@@ -243,19 +243,19 @@ def test_a_search_improves_on_random_paths_and_is_the_same_by_seed(asked):
 def test_flights_that_are_there_count(asked):
     gentle = LOGGING.weak(along(path_of(2, 0.05)))
     known = goal(asked.questions, [gentle], room(), LOGGING)
-    alone = known.judgements(None)
+    alone = known.answers(None)
     assert alone[0].apart == pytest.approx(apart(*gathered(asked.questions[0], [gentle], FLOOR)))
-    assert known.judgements(None, again=2)[0].apart == pytest.approx(2 * alone[0].apart)
+    assert known.answers(None, again=2)[0].apart == pytest.approx(2 * alone[0].apart)
     more = along(path_of(2, 0.15))
-    assert known.judgements(more)[0].apart > asked.judgements(more)[0].apart
+    assert known.answers(more)[0].apart > asked.answers(more)[0].apart
 
 
 def test_flights_without_the_signal_of_a_rival_say_nothing():
     effects = [CATALOGUE[name] for name in ("torque_bias", "rotor_drag")]
     silent = weak(replace(fly(1), velocity=None, specific_force=None))
     known = goal(questions_between(effects, VEHICLE), [silent], room(), LOGGING)
-    assert [answer.apart for answer in known.judgements(None)] == [0.0, 0.0]
-    assert known.judgements(along(path_of(0, 1.0, 3)))[1].apart > 0
+    assert [answer.apart for answer in known.answers(None)] == [0.0, 0.0]
+    assert known.answers(along(path_of(0, 1.0, 3)))[1].apart > 0
 
 
 def test_a_special_case_is_not_told_from_what_holds_it():
@@ -298,7 +298,7 @@ def test_a_rival_that_could_not_be_tried_is_asked_for_at_a_usual_size():
     first, second, *_ = questions_left([effect], rivals, [], [silent], FLOOR)
     assert second.true.linear.tolist() == usual(CATALOGUE["rotor_drag"], VEHICLE).linear.tolist()
     known = goal([first, second], [silent], room(), LOGGING)
-    assert min(answer.apart for answer in known.judgements(along(path_of(0, 1.0, 3)))) > 0
+    assert min(answer.apart for answer in known.answers(along(path_of(0, 1.0, 3)))) > 0
 
 
 def test_a_rival_takes_the_size_that_imitates_the_named_effect():
@@ -344,8 +344,8 @@ def test_in_closed_loop_the_flight_tells_about_as_much(asked):
     planned = room().planned(path, 0.01)
     true = asked.questions[0].true
     flown = flown_signals(planned, [true], VEHICLE, LOGGING, ClosedLoopSettings(integration_rate_hz=200.0))
-    expected = asked.judgements(planned_signals(planned, room(), LOGGING))[0].apart
-    assert asked.judgements(flown)[0].apart == pytest.approx(expected, rel=0.4)
+    expected = asked.answers(planned_signals(planned, room(), LOGGING))[0].apart
+    assert asked.answers(flown)[0].apart == pytest.approx(expected, rel=0.4)
 
 
 def test_judged_on_hover_is_not_sure():

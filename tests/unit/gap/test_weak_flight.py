@@ -131,7 +131,8 @@ def test_momentum_is_never_differentiated(noise):
 
 
 def averaged(balance):
-    return AVERAGED.average(balance.direct) + AVERAGED.derivative(balance.momentum)
+    momentum = np.zeros_like(balance.direct) if balance.momentum is None else balance.momentum
+    return AVERAGED.average(balance.direct) + AVERAGED.derivative(momentum)
 
 
 def test_rigid_body_is_newton_and_euler():
