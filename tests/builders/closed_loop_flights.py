@@ -1,5 +1,8 @@
 """Flights in closed loop that a multirotor can fly exactly, for the tests of this package."""
 
+import pickle
+from copy import deepcopy
+
 import numpy as np
 
 from cpfls_cli.effects.signals import Signals
@@ -29,14 +32,21 @@ def planned(duration=3.0, also=0.0):
 
 
 def flown(duration=3.0, seed=1, vehicle=VEHICLE, noise=None, relative_noise=None, also=0.0, **closed_loop):
-    time, plan = planned(duration, also)
+    """Fly, or remember the flight: many tests begin with the same one."""
     settings = SimulationSettings(
         mode="closed-loop",
         noise=noise or {},
         relative_noise=relative_noise or {},
         closed_loop=ClosedLoopSettings(**closed_loop),
     )
-    return measure(time, plan, vehicle, settings, np.random.default_rng(seed))
+    known = pickle.dumps((duration, seed, vehicle, settings, also))
+    if known not in _FLOWN:
+        time, plan = planned(duration, also)
+        _FLOWN[known] = measure(time, plan, vehicle, settings, np.random.default_rng(seed))
+    return deepcopy(_FLOWN[known])
+
+
+_FLOWN = {}
 
 
 def signals_of(flight):

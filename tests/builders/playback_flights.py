@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.config.unknown import with_guesses
-from cpfls_cli.effects.polynomial import FACTORS, state_terms
+from cpfls_cli.effects.polynomial import FACTORS, STATE_TERMS, state_terms
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import MeasuredMotion
@@ -235,7 +235,9 @@ class _Fleet:
         self.ones = np.ones((self.flights, 1))
         # Among 1, air velocity and rate; what is no product of two of them is left to the package.
         pairs = np.vstack([[(0, 0)], [(axis, 0) for axis in range(1, 7)], FACTORS + 1])
-        self.factors = pairs[self.used].T if self.used.max() < len(pairs) else None
+        self.named = self.used[self.used < len(STATE_TERMS)]
+        self.learned = self.used[len(self.named) :] - len(STATE_TERMS)
+        self.factors = pairs[self.named].T if self.named.max() < len(pairs) else None
 
     def flown(self, samples):
         """Give states and logged rotor speeds at all samples, time first."""
@@ -270,7 +272,7 @@ class _Fleet:
         third = self.slopes(state + 0.5 * h * second, at + 0.5 * share)
         fourth = self.slopes(state + h * third, at + share - early)
         state = state + h / 6 * (first + 2 * second + 2 * third + fourth)
-        state[:, 6:10] /= np.linalg.norm(state[:, 6:10], axis=1, keepdims=True)
+        state[:, 6:10] /= np.sqrt((state[:, 6:10] ** 2).sum(axis=1, keepdims=True))
         return state
 
     def driven(self, at):
@@ -313,18 +315,23 @@ class _Fleet:
 
     def terms(self, air, rate):
         """Evaluate the terms of the motion that the model has."""
-        if self.factors is not None:
+        if self.factors is None:
+            terms = state_terms(air, rate)[:, self.named]
+        else:
             motion = np.concatenate([self.ones, air, rate], axis=1)
-            return motion[:, self.factors[0]] * motion[:, self.factors[1]]
-        terms = state_terms(air, rate)
-        if self.model.remainder is not None:
-            terms = np.hstack([terms, remainder_terms(self.model.remainder, air)])
-        return terms[:, self.used]
+            terms = motion[:, self.factors[0]] * motion[:, self.factors[1]]
+        if not len(self.learned):
+            return terms
+        return np.concatenate([terms, remainder_terms(self.model.remainder, air)[:, self.learned]], axis=1)
 
     def command(self, sample, state):
         """Ask for rotor speeds."""
         position, velocity, quaternion, rate = np.split(state, self.ends, axis=1)[:4]
         return self.autopilot.speeds(self.plan, sample, position, velocity, quaternion, rate)
+
+
+PULL = np.array([[-7.0, -7.0, 6.0], [7.0, 7.0, 14.0]])
+"""Least and largest acceleration that an autopilot asks of thrust, m/s^2, world frame."""
 
 
 class Autopilot:
@@ -341,11 +348,10 @@ class Autopilot:
         pull = 2.5 * (plan.velocity[sample] - velocity) + [0.0, 0.0, stated.gravity_m_s2]
         pull += 1.8 * plan.held[sample][:, None] * (plan.position[sample] - position)
         # Rotors have to be left for the torques: no steep tilts, no hard turns of the heading.
-        pull = np.clip(pull, [-7.0, -7.0, 6.0], [7.0, 7.0, 14.0])
+        pull = np.clip(pull, *PULL)
         rotation = _rotation(quaternion)
         turned = np.swapaxes(_upright(pull, plan.heading[sample]), 1, 2) @ rotation
-        skew = 0.5 * (turned - np.swapaxes(turned, 1, 2))
-        error = np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1)
+        error = 0.5 * (turned[:, [2, 0, 1], [1, 2, 0]] - turned[:, [1, 2, 0], [2, 0, 1]])
         wanted = 14.0 * (-5.0 * error * [1.0, 1.0, 0.5] - rate) * [1.0, 1.0, 0.5] + plan.kick[sample]
         wanted[:, 2] = np.clip(wanted[:, 2], -8.0, 8.0)
         thrust = stated.mass_kg * np.einsum("bi,bi->b", pull, rotation[:, :, 2])
@@ -399,10 +405,10 @@ def _rotation(quaternion):
 
 def _upright(pull, heading):
     """Orient bodies whose z axes point along a pull."""
-    up = pull / np.linalg.norm(pull, axis=1, keepdims=True)
-    forward = np.cross(np.stack([-np.sin(heading), np.cos(heading), 0 * heading], axis=1), up)
-    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
-    return np.stack([forward, np.cross(up, forward), up], axis=2)
+    up = pull / np.sqrt((pull * pull).sum(axis=1, keepdims=True))
+    forward = _cross(np.stack([-np.sin(heading), np.cos(heading), 0 * heading], axis=1), up)
+    forward /= np.sqrt((forward * forward).sum(axis=1, keepdims=True))
+    return np.stack([forward, _cross(up, forward), up], axis=2)
 
 
 def logged(name, states, speed, period, hold, noise, rng):

@@ -42,7 +42,8 @@ def _read(descriptor):
 
 @pytest.fixture
 def identify(pipeline, study, tmp_path):
-    search = ("--set", "identification.population=30", "--set", "identification.generations=3")
+    keys = ("population=30", "generations=3", "validation.enabled=false")
+    search = [word for key in keys for word in ("--set", f"identification.{key}")]
     return ("identify", study, pipeline.flight, "-o", tmp_path / "model.h5", "--json", *search)
 
 
