@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,13 +41,7 @@ def titles(names: Iterable[str]) -> list[str]:
 
 
 def unit_words(unit: str) -> str:
-    """Write a unit as people do.
-
-    Parameters
-    ----------
-    unit : str
-        With powers such as ``^2``; ``1`` for none.
-    """
+    """Write a unit as people do, with raised powers; ``1`` is none."""
     return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³")
 
 
@@ -83,15 +77,10 @@ def _coefficient(coefficient: Estimate) -> str:
     """Write a value with its interval and unit; a power of ten that is that of all three stands once."""
     unit = unit_words(coefficient.unit)
     words = with_interval(coefficient.value, coefficient.low, coefficient.high)
-    power = _common_power(words)
+    powers = {text.partition("e")[2] for text in words}
+    power = f"e{powers.pop()}" if len(powers) == 1 and "" not in powers else ""
     value, low, high = (printed(text.removesuffix(power)) for text in words)
     return f"{coefficient.name} = {value} [{low}, {high}]{printed(power)}{' ' if unit else ''}{unit}"
-
-
-def _common_power(numbers: Sequence[str]) -> str:
-    powers = {text.partition("e")[2] for text in numbers}
-    power = powers.pop() if len(powers) == 1 else ""
-    return f"e{power}" if power else ""
 
 
 def _relative(effect: str, number: Estimate) -> str:
@@ -162,7 +151,13 @@ def parameters_table(name: str, effects: NamedEffectsGroup) -> Table:
     """Show the vehicle's own numbers, refitted with the effects."""
     numbers = effects.parameter
     columns = (numbers.value.tolist(), numbers.low.tolist(), numbers.high.tolist())
-    rows = [list(_parameter(*row)) for row in zip(numbers.name, numbers.unit, *columns, strict=True)]
+    rows = []
+    for parameter, unit, *values in zip(numbers.name, numbers.unit, *columns, strict=True):
+        kind, _, axis = parameter.rpartition("_")
+        words = f"{_NUMBERS[kind]} {axis}" if kind in _NUMBERS else parameter.replace("_", " ")
+        is_relative = unit == "1"
+        value, low, high = (100.0 * each if is_relative else each for each in values)
+        rows.append([words, *measured(value, low, high), "%" if is_relative else unit_words(unit)])
     caption = (
         "The vehicle's own numbers, refitted with the effects; relative ones are changes against the vehicle file. "
         "Only ratios to the torque of the rotors can be seen."
@@ -171,25 +166,13 @@ def parameters_table(name: str, effects: NamedEffectsGroup) -> Table:
 
 
 def measured(value: float, low: float, high: float) -> list[str]:
-    """Write a value and its interval with the digits that the width of the interval leaves.
-
-    Returns
-    -------
-    list of str
-        Value, interval; the interval is ``—`` where it is not known.
-    """
+    """Write a value, and its interval or ``—``, with the digits that the width of the interval leaves."""
     first, *ends = (printed(text) for text in with_interval(value, low, high))
     return [first, " … ".join(ends) if np.isfinite([low, high]).any() else UNKNOWN]
 
 
 def interval(low: float, high: float, digits: int = 4) -> str:
-    """Write an interval.
-
-    Returns
-    -------
-    str
-        ``—`` where it is not known.
-    """
+    """Write an interval; ``—`` where it is not known."""
     return f"{number(low, digits)} … {number(high, digits)}" if np.isfinite([low, high]).any() else UNKNOWN
 
 
@@ -201,22 +184,8 @@ def _meaning(effect: str, coefficient: str) -> str:
     return f"{coefficient}: {meaning}" if meaning else coefficient
 
 
-def _parameter(name: str, unit: str, value: float, low: float, high: float) -> Iterator[str]:
-    kind, _, axis = name.rpartition("_")
-    yield f"{_NUMBERS[kind]} {axis}" if kind in _NUMBERS else name.replace("_", " ")
-    scale = 100.0 if unit == "1" else 1.0
-    yield from measured(scale * value, scale * low, scale * high)
-    yield "%" if unit == "1" else unit_words(unit)
-
-
 def intervals_figure(name: str, effects: NamedEffectsGroup) -> Plot | None:
-    """Draw where each coefficient lies between the least and the largest possible value.
-
-    Returns
-    -------
-    Plot or None
-        None where no range is known.
-    """
+    """Draw where each coefficient lies between the least and the largest possible value, where a range is known."""
     coefficients = effects.coefficient
     low, high = coefficients.plausible_low, coefficients.plausible_high
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -235,7 +204,12 @@ def intervals_figure(name: str, effects: NamedEffectsGroup) -> Plot | None:
         for row, index in enumerate(shown):
             _draw_row(axes, row, placed[index])
         axes.set_yticks(range(len(shown)), names)
-        _right_labels(axes, ranges)
+        right = axes.twinx()
+        axes.set_ylim(-0.6, len(shown) - 0.4)
+        right.set_ylim(axes.get_ylim())
+        right.set_yticks(range(len(shown)), ranges)
+        right.tick_params(length=0)
+        right.grid(visible=False)
         axes.set_xlim(-0.03, 1.03)
         axes.set_xticks([0.0, 1.0], ["least possible", "largest possible"])
         axes.grid(visible=False)
@@ -250,12 +224,3 @@ def _draw_row(axes: Axes, row: int, placed: Array) -> None:
     if np.isfinite(low) and np.isfinite(high):
         axes.hlines(row, np.clip(low, 0, 1), np.clip(high, 0, 1), color="black", linewidth=2.4, zorder=1)
     axes.plot([np.clip(value, 0.0, 1.0)], [row], "o", color=AFTER["color"], markersize=6, zorder=2)
-
-
-def _right_labels(axes: Axes, labels: list[str]) -> None:
-    right = axes.twinx()
-    axes.set_ylim(-0.6, len(labels) - 0.4)
-    right.set_ylim(axes.get_ylim())
-    right.set_yticks(range(len(labels)), labels)
-    right.tick_params(length=0)
-    right.grid(visible=False)
