@@ -85,9 +85,9 @@ def _forces_decide(record: DiagnosisRecord) -> Iterator[Text]:
         alone, share = record.torque_alone.name[0], share_words(float(record.torque_alone.share[0]))
         yield Text(
             f"From the torques alone it would be {effect_title(alone)}, which explains {share} of their gap: about the "
-            f"body axes the two look alike. What pulls at the hubs or the fuselage also pushes the vehicle, and with "
-            f"the forces the flights say {joined(titles(record.effects_of_motion))}. Without an accelerometer or a "
-            "velocity, only the first name could be given.",
+            "body axes the two look alike. A force at the hubs or the fuselage also accelerates the vehicle, and "
+            f"together with the forces the flights point to {joined(titles(record.effects_of_motion))}. Without an "
+            "accelerometer or a velocity, only the first name could be given.",
             "note",
         )
 
@@ -174,10 +174,10 @@ def free_runs_figure(name: str, run: RunGroup, after: str, *, repaired: bool) ->
         for axis, about in zip(AXES, rates, strict=True)
         if leaves_view((about["measured"], about["after"]), about["before"])
     ]
-    leaves = f" About {' and '.join(astray)} the model as given leaves the picture." if astray else ""
+    leaves = f" About {' and '.join(astray)} the model as given leaves the figure." if astray else ""
     faults = " Measured are the rates without the faults of the sensors; before starts from the log as it is."
     caption = (
-        f"{run.flight}, where the model as given went astray most (about {AXES[run.axis]}). At each dotted line the "
+        f"{run.flight}, where the model as given was farthest off (about {AXES[run.axis]}). At each dotted line the "
         "simulation starts from the measured rates and then runs freely on the rotor speeds of the flight. Before: the "
         f"model as given; after: {after}.{faults if repaired else ''}{leaves}"
     )

@@ -80,7 +80,7 @@ def verdict_box(disagreement: Source[DisagreementRecord]) -> Box:
     if gap.largest is None:
         return Box("GAP", f"{disagreement.label}: no gap could be measured.", [], "warning")
     if not gap.above_noise.any():
-        return Box("GAP", "Model and flights agree to the noise.", [], "good")
+        return Box("GAP", "Model and flights agree within the noise.", [], "good")
     channel, floors = gap.channel[gap.largest], float(gap.floors[gap.largest])
     title = f"The gap is largest in the {channel_words(channel)}: {number(floors, 3)} noise floors."
     signals = [signal for signal, _ in record.dependence.followed(channel)][:_NAMED_SIGNALS]
@@ -114,7 +114,7 @@ def disagreement_blocks(disagreement: Source[DisagreementRecord], index: int) ->
         yield Text("No channel has a gap above noise, so there is nothing to follow.")
     drawn = None if record.playback is None else playback_figure(f"replay-{index}", record.playback)
     if drawn is not None:
-        yield Heading("What a simulation makes of it")
+        yield Heading("Measured and simulated")
         yield from _playback_text(record)
         yield drawn
 
@@ -276,7 +276,7 @@ def heat_map_figure(name: str, heat_map: HeatMapGroup) -> Plot:
 
     caption = (
         f"Mean gap of the {channel_words(channel)}, the channel with the largest one in floors, over the two signals "
-        "that explain it best. Hatched cells are negative; the flights never were where nothing is drawn."
+        "that explain it best. Hatched cells are negative; cells that the flights never visited are left empty."
     )
     return plot(name, caption, f"Mean gap over {signals[0]} and {signals[1]}", 3.9, draw)
 

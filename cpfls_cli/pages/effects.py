@@ -62,7 +62,9 @@ def capitalised(words: str) -> str:
 
 def closest_sentence(effect: NamedEffect) -> str:
     """Say which effect came closest to a gap that it does not explain."""
-    return f"The closest was {effect_title(effect.name)}, and that is not it: {effect.name}, {_size(effect)}."
+    return (
+        f"The closest was {effect_title(effect.name)}, which does not explain the gap: {effect.name}, {_size(effect)}."
+    )
 
 
 def _size(effect: NamedEffect) -> str:

@@ -89,8 +89,8 @@ def _period(record: IdentifiedRecord, period: PeriodGroup, index: int) -> Table:
             for axis, name in enumerate(AXES)
         ]
     caption = (
-        "The same attitudes, told one turn away in roll and in pitch: no vehicle notices, and a periodic model must "
-        "not either. Root mean square and largest error, N m."
+        "The same attitudes, written one full turn further in roll and in pitch: the vehicle is the same, so a "
+        "periodic model must predict the same. Root mean square and largest error, N m."
     )
     header = ("Part", "Axis", "RMSE here", "RMSE one period away", "Largest here", "Largest one period away")
     return Table(f"period-{index}", caption, header, rows, frozenset({0, 1}))
@@ -105,8 +105,8 @@ def _physics(physics: PhysicsGroup) -> Facts:
     return Facts(
         [
             ("D(q) positive definite", f"{definite} of {physics.cells} cells of roll and pitch that training visited"),
-            ("Its smallest eigenvalue", f"{smallest} kg m², at {where}"),
-            ("Energy that C(q, qd) makes", f"{number(physics.energy, 2)} of its own terms{rounding}"),
+            ("Smallest eigenvalue of D(q)", f"{smallest} kg m², at {where}"),
+            ("Energy that C(q, qd) produces", f"{number(physics.energy, 2)} of its own terms{rounding}"),
         ]
     )
 
@@ -120,11 +120,11 @@ def ridge_sentence(ridge: RidgeGroup) -> str:
     gain = 1.0 - least / off[0] if off[0] > 0 else 0.0
     if np.isinf(ridge.weight[best]) or gain <= 0:
         return (
-            "No fuzzy part does better on blocks that were left out than none: this flight holds no evidence for an "
-            "inertia that depends on attitude in another way than a rigid body's does."
+            "On blocks that were left out no fuzzy part does better than the rigid body alone: this flight holds no "
+            "evidence for an inertia that depends on attitude in another way than a rigid body's does."
         )
     reduction = (
-        f"On blocks that were left out, the best fuzzy part takes {percent(gain)} off the error of the rigid body"
+        f"On blocks that were left out, the best fuzzy part reduces the error of the rigid body by {percent(gain)}"
     )
     if alone - least <= deviation:
         return (
@@ -219,8 +219,8 @@ def _steps_figure(name: str, label: str, steps: StepsGroup) -> Plot:
 
     caption = (
         f"Root mean square error after so many seconds, with the measured torques of {steps.part} replayed through "
-        f"{label} from {steps.windows} starts. Nothing moves: attitude and body rate stay what they were; a model "
-        "above that line predicts nothing. Both axes are logarithmic."
+        f"{label} from {steps.windows} starts. Nothing moves: the prediction that attitude and body rate stay what "
+        "they were; a model above that line is worse than it. Both axes are logarithmic."
     )
     return plot(name, caption, "Error of predicted attitude and body rate over the horizon, by axis", 4.4, draw)
 

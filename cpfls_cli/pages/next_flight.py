@@ -100,17 +100,17 @@ def _outcomes(asked: QuestionGroup) -> Iterator[str]:
         true, rival, least = row["true"], row["rival"], str(row["smallest"])
         if not least and row["size"]:
             least = f"{number(row['least'], 2)} of that"
-        taken = f"Taken for it: {row['size']}. " if row["size"] else ""
+        taken = f"Assumed size: {row['size']}. " if row["size"] else ""
         if not rival:
             absent = f"smaller than {least}" if least else "not there"
             yield f"If the diagnosis then names {true}, it is there; if not, it is {absent}. {taken}".rstrip()
             continue
         chance = max(other["wrong"] for other in rows if {other["true"], other["rival"]} == {true, rival})
-        surely = f"Surely told from {least} on. " if least else ""
+        surely = f"Surely told apart from {least} on. " if least else ""
         error = f"less than {100 * _RARE:g} %" if chance < _RARE else f"{100 * chance:.2g} %"
         yield (
             f"If the diagnosis then names {true} alone, it is {true} and not {rival} (by chance the wrong one of the "
-            f"two is named in {error} of flights). {taken}{surely}By hand: {row['advice']}."
+            f"two is named in {error} of flights). {taken}{surely}To fly it by hand: {row['advice']}."
         )
     if any(asked.rival):
         yield (

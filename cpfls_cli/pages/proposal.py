@@ -65,7 +65,7 @@ def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
             yield Text(f"{name}: the data cannot rule out {rival.text}: {rival.reason}", "warning")
     for one in proposal.logs:
         prefix = f"{one.name}: " if len(proposal.logs) > 1 else ""
-        reasons = one.recognition.flown.reasons or ("all of it is flown, nothing is cut",)
+        reasons = one.recognition.flown.reasons or ("all of it is flight, nothing is cut",)
         yield from (Text(f"{prefix}{reason}") for reason in reasons)
         yield from (Text(f"{prefix}not mapped: {words}", "note") for words in one.recognition.left_out)
     yield Text(_rotors_in_words(proposal))
@@ -94,11 +94,13 @@ def _rotors_in_words(proposal: Proposal) -> str:
         return "the log states a torque and no rotors"
     if not proposal.rotors:
         return (
-            "no column is recognised as a rotor's, so nothing here drives a model of the vehicle; if some are, name"
+            "no column is recognised as a rotor's, and a model of the vehicle needs rotors; if some are, name"
             " them in import.signals (rotor_speed or rotor_command)"
         )
     if proposal.airframe is None:
-        unknown = "neither parameters nor the motion say where they are; a livelier log beside this one may"
+        unknown = (
+            "neither parameters nor the motion say where they are; a log with more motion, given beside this one, may"
+        )
         return f"{proposal.rotors} rotors; {unknown}"
     places = ", ".join(
         f"{index} {rotor.name or 'at its place'} {_SPINS[rotor.spin]}".replace("  ", " ")

@@ -54,7 +54,7 @@ def _whiteness(label: str, residuals: ResidualsGroup, index: int) -> Table:
         "(Ljung and Box). Filtered signals are never quite white. The mean is a constant torque that the model lacks, "
         "with the chance that errors without one have a mean as large."
     )
-    header = ("Axis", "At one sample", "Lags outside the band", "p", "Mean, N m", "p of the mean", "So it is")
+    header = ("Axis", "At one sample", "Lags outside the band", "p", "Mean, N m", "p of the mean", "Conclusion")
     rows = [[name, *_whiteness_about(residuals, axis)] for axis, name in enumerate(AXES)]
     return Table(f"whiteness-of-errors-{index}", caption, header, rows, frozenset({0, len(header) - 1}))
 
@@ -122,8 +122,8 @@ def autocorrelation_figure(name: str, label: str, residuals: ResidualsGroup) -> 
 
     caption = (
         f"Correlation of the torque error of {label} with itself some time later, on {residuals.part}. Errors that "
-        "noise alone makes stay within the grey band at 95 % of the lags; what stays outside is motion that the model "
-        "does not explain."
+        "noise alone makes stay within the grey band at 95 % of the lags; errors outside it follow motion that the "
+        "model does not explain."
     )
     return plot(name, caption, "Autocorrelation of the torque error by axis, with the band of white noise", 2.5, draw)
 

@@ -60,7 +60,8 @@ def answer(sweep: Source[SweepRecord]) -> Iterator[Block]:
     yield Table("settings", "", header, rows)
     if record.without_model:
         yield Text(
-            f"{record.without_model} of {len(record.run)} runs found no finite model; they count for no mean", "warning"
+            f"{record.without_model} of {len(record.run)} runs found no finite model; all means leave them out",
+            "warning",
         )
 
 
@@ -105,7 +106,7 @@ def _sweep(sweep: Source[SweepRecord], index: int) -> Iterator[Block]:
     yield from _held_out(sweep, index)
     yield Text(
         f"Every setting was searched with the same seeds, from {sweep.record.origin.seed} on. "
-        "cpfls reduce and cpfls identify with the overrides of a setting and --seed find each model again."
+        "cpfls reduce and cpfls identify with the overrides of a setting and --seed make each model again."
     )
 
 

@@ -108,10 +108,10 @@ def _setting(flight: Source[FlightRecord], settings: dict[str, Any]) -> str:
     plant = "the exact vehicle" if settings["plant"] == "vehicle" else "the identified model itself"
     frequencies = ", ".join(plain(value) for value in settings["natural_frequency_hz"])
     return (
-        f"The attitude of {path} is followed by {plant} under τ = D(q) v + C(q, q̇) q̇ with v = q̈ planned + Kd ė + Kp e: "
-        f"natural frequency {frequencies} Hz in roll, pitch and yaw, damping {plain(settings['damping'])}. D and C are "
-        f"those of {model}, of the rigid body fitted to the same samples, and of the exact vehicle; PD alone has the "
-        "same gains times a constant inertia and knows nothing else."
+        f"The attitude of {path} is followed by {plant} under τ = D(q) v + C(q, q̇) q̇ with v = q̈ planned + Kd ė + Kp "
+        f"e: natural frequency {frequencies} Hz in roll, pitch and yaw, damping {plain(settings['damping'])}. D and C "
+        f"are those of {model}, of the rigid body fitted to the same samples, and of the exact vehicle; PD alone has "
+        "the same gains times a constant inertia and no model."
     )
 
 

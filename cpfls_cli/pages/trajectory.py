@@ -178,7 +178,7 @@ def derivatives_figure(name: str, trajectory: Source[TrajectoryRecord]) -> Plot:
         for axes, derivative, unit in zip(panels, DERIVATIVES, _UNITS, strict=True):
             curve = leg.curves[derivative]
             line(axes, leg.time, curve, **style_of(0))
-            jumps = "" if np.any(curve) else ": not limited, infinite where the one below jumps"
+            jumps = "" if np.any(curve) else ": not limited, infinite where the derivative below jumps"
             axes.set_title(f"{derivative}{jumps}")
             axes.set_ylabel(unit)
             axes.axhline(0.0, color="#999999", linewidth=0.6)
