@@ -140,7 +140,7 @@ def coefficients_table(name: str, effects: NamedEffectsGroup) -> Table:
             _meaning(effect, numbers.name[index]),
             *measured(*(float(values[index]) for values in (numbers.value, numbers.low, numbers.high))),
             unit_words(numbers.unit[index]),
-            interval(float(low[index]), float(high[index]), 3),
+            _range(float(low[index]), float(high[index])),
         ]
         for index, effect in enumerate(numbers.effect)
     ]
@@ -173,9 +173,8 @@ def measured(value: float, low: float, high: float) -> list[str]:
     return [first, " … ".join(ends) if np.isfinite([low, high]).any() else UNKNOWN]
 
 
-def interval(low: float, high: float, digits: int = 4) -> str:
-    """Write an interval; ``—`` where it is not known."""
-    return f"{number(low, digits)} … {number(high, digits)}" if np.isfinite([low, high]).any() else UNKNOWN
+def _range(low: float, high: float) -> str:
+    return f"{number(low, 3)} … {number(high, 3)}" if np.isfinite([low, high]).any() else UNKNOWN
 
 
 def _meaning(effect: str, coefficient: str) -> str:
@@ -199,7 +198,7 @@ def intervals_figure(name: str, effects: NamedEffectsGroup) -> Plot | None:
     if not len(shown):
         return None
     names = [f"{coefficients.effect[index]}  {coefficients.name[index]}" for index in shown]
-    ranges = [f"{interval(low[index], high[index], 3)} {unit_words(coefficients.unit[index])}" for index in shown]
+    ranges = [f"{_range(low[index], high[index])} {unit_words(coefficients.unit[index])}" for index in shown]
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()

@@ -85,13 +85,17 @@ _POWER = re.compile(r"\$\\mathdefault\{(-?)(?:([\d.]+)\\times)?10\^\{(-?\d+)\}\}
 """How Matplotlib asks for a power of ten to be typeset."""
 _REFERENCE = re.compile(r"url\(#([^)]+)\)")
 
+# Two for each pixel that a curve is wide on a usual screen.
 _LARGEST = 1500
-# Of an inch of an SVG.
-_POINTS = 72
-# Of a layout: ticks follow the size of a plot, and its margins follow its ticks.
-_ROUNDS = 2
-# Of the range of an axis: a tick at its end is one.
-_ROUNDING = 1e-9
+_DOTS_PER_INCH = 72
+"""Of an SVG."""
+
+_LAYOUT_ROUNDS = 2
+"""Ticks follow the size of a plot, and its margins follow its ticks: two rounds settle that."""
+
+_AT_THE_END = 1e-9
+"""Share of an axis by which rounding may put a tick beyond the end of it."""
+
 _ROWS = 25
 """Of a table of the data of a figure, at most."""
 
@@ -238,9 +242,9 @@ def kept_samples(values: Array, largest: int = _LARGEST) -> IntArray:
     return np.unique(np.concatenate([order[starts], order[ends - 1], [0, samples - 1]]))
 
 
-def evenly_spread(samples: int, rows: int = _ROWS) -> IntArray:
-    """Choose the samples of a curve that a table shows: both ends and some between, no more than its rows."""
-    return np.unique(np.linspace(0, max(samples - 1, 0), min(samples, rows)).round().astype(int))
+def evenly_spread(samples: int) -> IntArray:
+    """Choose the samples of a curve that a table shows: both ends and some between."""
+    return np.unique(np.linspace(0, max(samples - 1, 0), min(samples, _ROWS)).round().astype(int))
 
 
 def runs(marked: Array | BoolArray) -> list[tuple[int, int]]:
@@ -283,7 +287,7 @@ def _inline_svg(figure: Figure, name: str, description: str) -> str:
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     stream, canvas = io.StringIO(), FigureCanvasSVG(figure)
-    figure.set_dpi(_POINTS)
+    figure.set_dpi(_DOTS_PER_INCH)
     with warnings.catch_warnings():
         # A browser finds other fonts for what the one that measures the text lacks.
         warnings.filterwarnings("ignore", message="Glyph .* missing")
@@ -312,7 +316,7 @@ def _lay_out(figure: Figure) -> None:
     engine = figure.get_layout_engine()
     free = list(_free_ticks(figure))
     ticks = [_ticks(axis, locator, formatter) for axis, _, locator, formatter in free]
-    for _ in range(_ROUNDS):
+    for _ in range(_LAYOUT_ROUNDS):
         before = ticks
         for (_, ticker, _, _), each in zip(free, before, strict=True):
             _fix(ticker, each.few())
@@ -359,7 +363,7 @@ class _Ticks(NamedTuple):
 def _ticks(axis: Axis, locator: Locator, formatter: Formatter) -> _Ticks:
     """Find the ticks of an axis as large as it is."""
     low, high = sorted(axis.get_view_interval())
-    rounding = _ROUNDING * (high - low)
+    rounding = _AT_THE_END * (high - low)
     places = [float(place) for place in locator() if low - rounding <= place <= high + rounding]
     words = [_POWER.sub(_without_mathematics, word) for word in formatter.format_ticks(places)]
     return _Ticks(places, words, formatter.get_offset())
