@@ -87,25 +87,22 @@ def _coefficient(coefficient: Estimate) -> str:
 
 def _relative(effect: str, number: Estimate) -> str:
     """Write an error of a number of the vehicle as people do, `Izz +24 % [+20, +28]`."""
-    value, low, high = relative_words(number.value, number.low, number.high)
-    return f"{vehicle_number(effect, number.name)} {value} % [{low}, {high}]"
+    name, value, low, high = _error_words(effect, number)
+    return f"{name} {value} % [{low}, {high}]"
 
 
 def wrong_numbers(effects: NamedEffectsGroup) -> list[str]:
     """List the numbers of the vehicle that a verdict calls wrong, each with its error, `Izz +24 %`."""
-    numbers = [(e.name, number) for e in effects.named if e.name == VEHICLE_NUMBERS.name for number in e.coefficients]
-    return [f"{vehicle_number(name, n.name)} {relative_words(n.value, n.low, n.high)[0]} %" for name, n in numbers]
+    named = [effect for effect in effects.named if effect.name == VEHICLE_NUMBERS.name]
+    errors = [_error_words(effect.name, number) for effect in named for number in effect.coefficients]
+    return [f"{name} {value} %" for name, value, *_ in errors]
 
 
-def vehicle_number(effect: str, name: str) -> str:
-    """Name a number of the vehicle as people do."""
-    return _SHORT.get(name, effect.removesuffix(_RELATIVE).replace("_", " "))
-
-
-def relative_words(value: float, low: float, high: float) -> list[str]:
-    """Write a relative error and the ends of its interval in per cent, with their signs."""
-    numbers = with_interval(*(100.0 * each for each in (value, low, high)))
-    return [printed(text if text.startswith("-") or not float(text) else f"+{text}") for text in numbers]
+def _error_words(effect: str, number: Estimate) -> list[str]:
+    """Name a number of the vehicle as people do, and write its error and the interval in per cent, with signs."""
+    name = _SHORT.get(number.name, effect.removesuffix(_RELATIVE).replace("_", " "))
+    numbers = with_interval(*(100.0 * each for each in (number.value, number.low, number.high)))
+    return [name, *(printed(text if text.startswith("-") or not float(text) else f"+{text}") for text in numbers)]
 
 
 def effects_table(name: str, effects: NamedEffectsGroup) -> Table:
