@@ -188,7 +188,7 @@ def residual_figure(name: str, record: DisagreementRecord) -> Plot:
         figure.supylabel("gap, noise floors", fontsize=9.5)
         panels[-1].set_xlabel("time, s; flights one after another")
 
-    more = " Dashed lines part the flights, in the order given." if len(offset) > 1 else ""
+    more = " Dashed lines separate the flights, in the order given." if len(offset) > 1 else ""
     caption = (
         "Gap over time, in noise floors; the grey band is one floor up and down. Shaded and numbered: the "
         f"{_STRETCHES} stretches in which it is largest, as in the table below.{more}"

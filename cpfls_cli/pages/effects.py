@@ -119,9 +119,9 @@ def effects_table(name: str, effects: NamedEffectsGroup) -> Table:
         for effect, named in zip(effects.listed, effects.effect.named, strict=True)
     ]
     caption = (
-        "Effects. Share: part of the gap above the floor that comes back without it. p: how often chance explains as "
-        "much with any effect of the catalogue. Chosen again: share of the stretches of flight without which it would "
-        "still be the first choice."
+        "Effects. Share: part of the gap above the floor that returns when the effect is left out. p: how often chance "
+        "explains as much with any effect of the catalogue. Chosen again: share of the stretches of flight without "
+        "which it would still be the first choice."
     )
     header = ("Effect", "Identifier", "Share", "p", "Chosen again", "What it is")
     return Table(name, caption, header, rows, frozenset({0, 1, 5}), frozenset({0, 5}))
@@ -159,7 +159,7 @@ def parameters_table(name: str, effects: NamedEffectsGroup) -> Table:
         rows.append([words, *measured(value, low, high), "%" if is_relative else unit_words(unit)])
     caption = (
         "The vehicle's own numbers, refitted with the effects; relative ones are changes against the vehicle file. "
-        "Only ratios to the torque of the rotors can be seen."
+        "Only ratios to the torque of the rotors can be determined."
     )
     return Table(name, caption, ("Number", "Change", "95 % interval", "Unit"), rows, frozenset({0, 3}))
 

@@ -69,7 +69,9 @@ _SECTIONS: Sequence[Callable[[Sources], Section | None]] = (
     reduction_section,
     identification_section,
     _of_each("validation", "How far to trust it", IdentifiedRecord, validation_blocks),
-    _of_each("residuals", "What the model leaves over", IdentifiedRecord, residual_blocks, lambda one: one.residuals),
+    _of_each(
+        "residuals", "What the model leaves unexplained", IdentifiedRecord, residual_blocks, lambda one: one.residuals
+    ),
     _of_each(
         "uncertainty",
         "How sure the inertia is",

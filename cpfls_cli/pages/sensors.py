@@ -99,7 +99,9 @@ def unseen_section(sources: Sources) -> Section | None:
     blocks: list[Block] = []
     for index, source in enumerate(_distinct(given, lambda record: _rows(record.not_excited)), start=1):
         unseen = source.record.not_excited
-        why = f"Effects that could be there without {source.label} knowing, and why: what the logs lack, or how to fly."
+        why = (
+            f"Effects that {source.label} could not show, and why: what the logs lack, or which flight would show them."
+        )
         nothing = Text(f"{source.label}: every effect of the catalogue would have shown.")
         blocks.append(_unseen_table(f"unseen-{index}", unseen, why) if unseen.name else nothing)
     return Section("unseen", _UNSEEN, blocks) if blocks else None

@@ -122,7 +122,7 @@ def _peaks(name: str, trajectory: Source[TrajectoryRecord]) -> Table:
         # Above a snap that jumps there is nothing at the samples, and no bound between them.
         is_unbounded = derivative in ("crackle", "pop") and not peaks[derivative] and peaks["snap"]
         rows.append([derivative, unit, "no bound" if is_unbounded else number(peaks[derivative])])
-    caption = f"Largest length of each derivative at the samples of {trajectory.label}, along the path."
+    caption = f"Largest magnitude of each derivative at the samples of {trajectory.label}, along the path."
     return Table(name, caption, ("Derivative", "Unit", "Largest"), rows, frozenset({0, 1}))
 
 

@@ -179,9 +179,9 @@ def compared_curves_figure(name: str, models: Sequence[tuple[str, CurvesGroup]],
         figure.legend(*zip(*curves, strict=True), loc="outside upper left", ncols=3)
 
     caption = (
-        f"D(q) of {', '.join(label for label, _ in models)} {word}, each with its 95 % band, along the attitudes "
-        "that its own training visited; grey: the rigid body that fits best to the first. Where two bands part, the "
-        f"flights tell the models apart. {OUTSIDE_WORDS} {MISFIT_WORDS}"
+        f"D(q) of {', '.join(label for label, _ in models)} {word}, each with its 95 % band, along the attitudes that "
+        "its own training visited; grey: the rigid body that fits best to the first. Where two bands do not overlap, "
+        f"the flights tell the models apart. {OUTSIDE_WORDS} {MISFIT_WORDS}"
     )
     return plot(name, caption, f"Six entries of the inertia matrices of several models {word}", 4.6, draw)
 
