@@ -59,14 +59,14 @@ def messages_for_errors() -> Iterator[None]:
 
 def tell(outcome: Outcome, common: Common) -> None:
     """Print what a command has to say, and end with its exit code."""
-    from cpfls_cli.report.outcome import plain
+    from cpfls_cli.report.outcome import as_json
     from cpfls_cli.report.terminal import warnings_of
 
     if isinstance(sys.stdout, io.TextIOWrapper):
         # An encoding without a degree sign must not end a command that has done its work.
         sys.stdout.reconfigure(errors="replace")
     if common.as_json:
-        print(json.dumps(plain(outcome.summary), allow_nan=False), flush=True)
+        print(json.dumps(as_json(outcome.summary), allow_nan=False), flush=True)
     elif not common.quiet:
         print("\n".join(_lines(outcome)), flush=True)
     if not common.quiet:

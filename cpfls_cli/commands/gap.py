@@ -27,7 +27,7 @@ from cpfls_cli.pages.extended import model_with, warnings
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Block, Text
-from cpfls_cli.report.outcome import Outcome, plain
+from cpfls_cli.report.outcome import Outcome, as_json
 
 FILES = ("disagreement.h5", "diagnosis.h5", "extended.h5", "report.html", "gap.json")
 """What a folder holds in the end; no extended.h5 where the extension was refused."""
@@ -83,7 +83,7 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path
     summary["extended"] = {"written": answers.extended is not None, "reason": answers.refused}
     with filled_folder(job.output, FILES) as folder:
         answers, written = _written(job, given, answers, folder)
-        text = json.dumps(plain(summary), indent=1, allow_nan=False)
+        text = json.dumps(as_json(summary), indent=1, allow_nan=False)
         write_text(folder / "gap.json", text + "\n")
         job.progress(0.97, 1, "report")
         report.run(replace(job, output=folder / "report.html", progress=_quiet), written)

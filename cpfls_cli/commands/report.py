@@ -72,7 +72,7 @@ def source_of_record(record: Record, path: object, label: str, sha256: str) -> S
     """
     study = validate(parse_yaml(record.origin.config, f"{path}: /config"), f"{path}: /config")
     parameters = model_structure(study.identification).parameters
-    return Source.of(label, sha256, record, resolved(study), study.vehicle, parameters)
+    return Source(label, sha256, record, resolved(study), study.vehicle, parameters)
 
 
 def _printable(name: str) -> str:

@@ -20,7 +20,7 @@ from cpfls_cli.identification.settings import PRESETS
 from cpfls_cli.inertia import symmetric
 
 _GONE = {("report", "paper"), ("report", "evaluation_times")}
-"""Sections and keys that configs of before hold, also those inside artifacts; they say nothing any more."""
+"""Sections and keys that configs of before hold; inside artifacts they are left out, in a file they are refused."""
 
 _PRESET_SECTION = "identification"
 _UNKNOWN = {"extra_forbidden", "unexpected_keyword_argument"}
@@ -76,6 +76,14 @@ def _known(section: str, values: Any) -> Any:
     if not isinstance(values, dict):
         return values
     return {key: value for key, value in values.items() if (section, key) not in _GONE}
+
+
+def gone_lines(data: dict[str, Any], source: str) -> list[str]:
+    """Say of the keys of a file that are gone what to do."""
+    sections = {section: values for section, values in data.items() if isinstance(values, dict)}
+    held = [f"{section}.{key}" for section, key in sorted(_GONE) if key in sections.get(section, ())]
+    why = "is no key any more: remove it; `make reproduce` writes the page that compares a study with the paper"
+    return [f"{source}: {key}: {why}" for key in held]
 
 
 def _no_body(study: Study) -> Iterator[str]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from cpfls_cli.config.check import check_data
+from cpfls_cli.config.check import check_data, gone_lines
 from cpfls_cli.config.overrides import apply_override, setting_errors
 from cpfls_cli.config.study import Study
 from cpfls_cli.config.yaml_text import parse_yaml
@@ -39,7 +39,7 @@ def load_study(path: Path, overrides: Sequence[str] = (), seed: int | None = Non
     data = read_overridden(path, overrides, seed)
     # Nobody's file is of the vehicle that a study begins with: without the section its keys are missing.
     data.setdefault("vehicle", {})
-    return validate(data, str(path), sweep=sweep)
+    return validate(data, str(path), sweep=sweep, wrong=gone_lines(data, str(path)))
 
 
 def read_overridden(path: Path, overrides: Sequence[str] = (), seed: int | None = None) -> dict[str, Any]:
@@ -101,7 +101,7 @@ def parse_config(text: str, source: str) -> dict[str, Any]:
     return data
 
 
-def validate(data: dict[str, Any], source: str, *, sweep: bool = False) -> Study:
+def validate(data: dict[str, Any], source: str, *, sweep: bool = False, wrong: Sequence[str] = ()) -> Study:
     """Validate plain data as a study.
 
     Parameters
@@ -110,6 +110,8 @@ def validate(data: dict[str, Any], source: str, *, sweep: bool = False) -> Study
         Name of the file, for messages.
     sweep : bool
         Check the settings of the sweep too; only what sweeps needs them to fit the other keys.
+    wrong : sequence of str
+        What is known to be wrong already.
 
     Raises
     ------
@@ -117,7 +119,8 @@ def validate(data: dict[str, Any], source: str, *, sweep: bool = False) -> Study
         Listing every wrong key with its value, what is wrong, and the nearest valid key.
     """
     _refuse_asked(data, source)
-    study, errors = check_data(data, source)
+    study, found = check_data(data, source)
+    errors = [*wrong, *found]
     if sweep:
         errors += setting_errors(data, source, errors)
     if study is None or errors:

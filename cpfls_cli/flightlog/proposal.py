@@ -28,7 +28,7 @@ _WAY: Final = {1: "counter-clockwise", -1: "clockwise", 0: "?"}
 _LEAST_GAP_S, _SLOWEST_VOLTAGE_S = 0.1, 0.5
 _ROOM = 1.2
 _PROPELLERS = (0.003, 0.2)
-DECIDES_ROTORS: Final = "a livelier log beside this one, or a look at the vehicle, decides"
+DECIDES_ROTORS: Final = "a log with more motion beside this one, or a look at the vehicle, decides"
 _MULTIROTORS: Final = (2, 13, 14, 15, 29)
 """MAV_TYPE: quadrotor, hexarotor, octorotor, tricopter, dodecarotor."""
 

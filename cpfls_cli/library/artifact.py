@@ -93,9 +93,9 @@ class Artifact(Mapping[str, Any]):
     @property
     def summary(self) -> dict[str, Any]:
         """What its command prints with ``--json``, as far as the artifact holds it."""
-        from cpfls_cli.report.outcome import plain
+        from cpfls_cli.report.outcome import as_json
 
-        summary: dict[str, Any] = plain(getattr(self._record, "summary", {}))
+        summary: dict[str, Any] = as_json(getattr(self._record, "summary", {}))
         return summary
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import product
+from math import ceil
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,9 +39,9 @@ from cpfls_cli.pages.gap import (
 )
 from cpfls_cli.pages.replay import beside_rivals, playback_figure
 from cpfls_cli.pages.sensors import sensor_warnings, sensors_answer, unseen_answer
-from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.report.canvas import GREY, legend_over, plain_ticks, plot, stacked
-from cpfls_cli.report.content import Block, Heading, Plot, Section, Text
+from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.report.canvas import GREY, in_columns, legend_over, plain_ticks, plot, stacked
+from cpfls_cli.report.content import Block, Heading, Plot, Text
 from cpfls_cli.report.numbers import joined, sentence
 
 if TYPE_CHECKING:
@@ -84,35 +85,17 @@ def _forces_decide(record: DiagnosisRecord) -> Iterator[Text]:
         alone, share = record.torque_alone.name[0], share_words(float(record.torque_alone.share[0]))
         yield Text(
             f"From the torques alone it would be {effect_title(alone)}, which explains {share} of their gap: about the "
-            f"body axes the two look alike. What pulls at the hubs or the fuselage also pushes the vehicle, and with "
-            f"the forces the flights say {joined(titles(record.effects_of_motion))}. Without an accelerometer or a "
-            "velocity, only the first name could be given.",
+            "body axes the two look alike. A force at the hubs or the fuselage also accelerates the vehicle, and "
+            f"together with the forces the flights point to {joined(titles(record.effects_of_motion))}. Without an "
+            "accelerometer or a velocity, only the first name could be given.",
             "note",
         )
 
 
-def diagnosis_section(sources: Sources) -> Section | None:
-    """Show the diagnoses; their verdicts stand in the summary.
-
-    Returns
-    -------
-    Section or None
-        None where no diagnosis was given.
-    """
-    return section_of_each("diagnosis", "Before and after", sources.diagnoses, _section)
-
-
-def _section(diagnosis: Source[DiagnosisRecord], index: int) -> Iterator[Block]:
+def diagnosis_blocks(diagnosis: Source[DiagnosisRecord], index: int) -> Iterator[Block]:
+    """Show what a diagnosis rests on; its verdict stands in the summary."""
     record = diagnosis.record
     yield Heading(f"Measured and simulated, {diagnosis.label}")
-    yield from _pictures(record, index)
-    yield Heading("The gap on held-out flights")
-    yield from _sizes(record, index)
-    yield Heading("Effects and their numbers")
-    yield from _effects(record, index)
-
-
-def _pictures(record: DiagnosisRecord, index: int) -> Iterator[Block]:
     after, run = model_words(record), record.run
     if run is None:
         yield Text("The held-out flights are too short to simulate a stretch of them.", "note")
@@ -122,6 +105,10 @@ def _pictures(record: DiagnosisRecord, index: int) -> Iterator[Block]:
         yield free_runs_figure(f"free-runs-{index}", run, after, repaired=bool(record.audit.faults))
     if record.picture is not None:
         yield gap_picture_figure(f"gap-picture-{index}", record.picture, after)
+    yield Heading("The gap on held-out flights")
+    yield from _sizes(record, index)
+    yield Heading("Effects and their numbers")
+    yield from _effects(record, index)
 
 
 def _sizes(record: DiagnosisRecord, index: int) -> Iterator[Block]:
@@ -187,10 +174,10 @@ def free_runs_figure(name: str, run: RunGroup, after: str, *, repaired: bool) ->
         for axis, about in zip(AXES, rates, strict=True)
         if leaves_view((about["measured"], about["after"]), about["before"])
     ]
-    leaves = f" About {' and '.join(astray)} the model as given leaves the picture." if astray else ""
+    leaves = f" About {' and '.join(astray)} the model as given leaves the figure." if astray else ""
     faults = " Measured are the rates without the faults of the sensors; before starts from the log as it is."
     caption = (
-        f"{run.flight}, where the model as given went astray most (about {AXES[run.axis]}). At each dotted line the "
+        f"{run.flight}, where the model as given was farthest off (about {AXES[run.axis]}). At each dotted line the "
         "simulation starts from the measured rates and then runs freely on the rotor speeds of the flight. Before: the "
         f"model as given; after: {after}.{faults if repaired else ''}{leaves}"
     )
@@ -210,13 +197,7 @@ def _draw_runs(axes: Axes, time: Array, curves: dict[str, Array], runs: Sequence
 
 
 def gap_picture_figure(name: str, picture: PictureGroup, after: str) -> Plot:
-    """Draw the channel with the largest gap over the stretch in which it is largest.
-
-    Parameters
-    ----------
-    after : str
-        What the second model is, for the caption.
-    """
+    """Draw the channel with the largest gap over the stretch in which it is largest."""
     channel = channel_words(picture.channel)
 
     def draw(figure: Figure) -> None:
@@ -238,21 +219,21 @@ def gap_picture_figure(name: str, picture: PictureGroup, after: str) -> Plot:
 
 
 def whiteness_figure(name: str, record: DiagnosisRecord) -> Plot:
-    """Draw the autocorrelation of the gap by channel, with the band of white noise.
-
-    Parameters
-    ----------
-    record : DiagnosisRecord
-        With whiteness.
-    """
+    """Draw the autocorrelation of the gap by channel, torques above forces, with the band of white noise."""
     white, gap = record.whiteness, record.gap
-    assert white is not None, "the record has whiteness"
-    band = _BAND / np.sqrt(max(_independent(record.residual.time, float(white.lag[0])), 1.0))
-    rows = -(-len(gap.known) // len(AXES))
+    assert white is not None, "asked for by the caller"
+    steps = np.diff(record.residual.time)
+    hop = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    # Windows a lag apart share no sample.
+    independent = len(record.residual.time) * hop / float(white.lag[0])
+    band = _BAND / np.sqrt(max(independent, 1.0))
+    rows = ceil(len(gap.known) / len(AXES))
 
     def draw(figure: Figure) -> None:
-        panels = _by_channel(figure, [gap.channel[index] for index in gap.known])
+        panels = in_columns(figure, len(gap.known), len(AXES), share_y=True).ravel()[: len(gap.known)]
         for axes, index in zip(panels, gap.known, strict=True):
+            axes.set_title(gap.channel[index])
+            plain_ticks(axes.yaxis)
             axes.axhspan(-band, band, color="#e6e6e6", label="white noise", zorder=0)
             axes.axhline(0.0, color="#999999", linewidth=0.7)
             axes.plot(white.lag, white.before[:, index], label="before", **BEFORE)
@@ -268,22 +249,3 @@ def whiteness_figure(name: str, record: DiagnosisRecord) -> Plot:
         "a gap that keeps its sign for seconds has a cause."
     )
     return plot(name, caption, "Autocorrelation of the gap before and after, by channel", 0.9 + 1.6 * rows, draw)
-
-
-def _by_channel(figure: Figure, channels: Sequence[str]) -> list[Axes]:
-    """Make a small plot for each channel, torques above forces, named."""
-    rows = -(-len(channels) // len(AXES))
-    grid = figure.subplots(rows, len(AXES), sharex=True, sharey=True, squeeze=False)
-    for axes in grid.flat[len(channels) :]:
-        axes.set_axis_off()
-    for axes, channel in zip(grid.flat, channels, strict=False):
-        axes.set_title(channel)
-        plain_ticks(axes.yaxis)
-    return list(grid.flat[: len(channels)])
-
-
-def _independent(time: Array, lag: float) -> float:
-    """Count the windows that share no sample."""
-    steps = np.diff(time)
-    hop = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
-    return len(time) * hop / lag

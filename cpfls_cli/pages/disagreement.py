@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from math import ceil
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,9 +14,9 @@ from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.pages.gap import channel_unit, channel_words
 from cpfls_cli.pages.replay import beside_rivals, playback_figure
 from cpfls_cli.pages.sensors import contradicted, sensors_answer, settled_channels, unseen_answer
-from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.report.canvas import line, plain_ticks, plot, stacked
-from cpfls_cli.report.content import Block, Box, Cell, Heading, Plot, Section, Table, Text
+from cpfls_cli.pages.source import Source
+from cpfls_cli.report.canvas import in_columns, line, plain_ticks, plot, stacked
+from cpfls_cli.report.content import Block, Box, Cell, Heading, Plot, Table, Text
 from cpfls_cli.report.numbers import joined, number, plain, sentence, whole_percent
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def answer(disagreement: Source[DisagreementRecord]) -> Iterator[Block]:
     yield from _playback_text(record)
     yield from unseen_answer(record.not_excited)
     yield from sensors_answer(record.audit)
-    yield from flight_warnings(record)
+    yield from (Text(warning, "warning") for warning in record.warning)
 
 
 def where(disagreement: Source[DisagreementRecord]) -> Iterator[Block]:
@@ -79,7 +80,7 @@ def verdict_box(disagreement: Source[DisagreementRecord]) -> Box:
     if gap.largest is None:
         return Box("GAP", f"{disagreement.label}: no gap could be measured.", [], "warning")
     if not gap.above_noise.any():
-        return Box("GAP", "Model and flights agree to the noise.", [], "good")
+        return Box("GAP", "Model and flights agree within the noise.", [], "good")
     channel, floors = gap.channel[gap.largest], float(gap.floors[gap.largest])
     title = f"The gap is largest in the {channel_words(channel)}: {number(floors, 3)} noise floors."
     signals = [signal for signal, _ in record.dependence.followed(channel)][:_NAMED_SIGNALS]
@@ -92,23 +93,8 @@ def verdict_box(disagreement: Source[DisagreementRecord]) -> Box:
     return Box("GAP", title, [*follows, on])
 
 
-def flight_warnings(record: DisagreementRecord) -> Iterator[Text]:
-    """Warn of what is wrong with the flights."""
-    return (Text(warning, "warning") for warning in record.warning)
-
-
-def disagreement_section(sources: Sources) -> Section | None:
-    """Show where models and flights disagree.
-
-    Returns
-    -------
-    Section or None
-        None where no disagreement was given.
-    """
-    return section_of_each("disagreement", _TITLE, sources.disagreements, _section)
-
-
-def _section(disagreement: Source[DisagreementRecord], index: int) -> Iterator[Block]:
+def disagreement_blocks(disagreement: Source[DisagreementRecord], index: int) -> Iterator[Block]:
+    """Show where a model and flights disagree, with its figures."""
     record = disagreement.record
     yield Heading(disagreement.label)
     yield _axes_table(record, index)
@@ -119,10 +105,16 @@ def _section(disagreement: Source[DisagreementRecord], index: int) -> Iterator[B
     yield from _stretches(record, index)
     yield Heading("What it follows")
     yield from _follows(record)
-    yield from _signals(record, index)
+    channels = _followed_channels(record)
+    if channels:
+        yield dependence_figure(f"dependence-{index}", record.dependence, channels)
+        if record.heat_map is not None:
+            yield heat_map_figure(f"heat-map-{index}", record.heat_map)
+    else:
+        yield Text("No channel has a gap above noise, so there is nothing to follow.")
     drawn = None if record.playback is None else playback_figure(f"replay-{index}", record.playback)
     if drawn is not None:
-        yield Heading("What a simulation makes of it")
+        yield Heading("Measured and simulated")
         yield from _playback_text(record)
         yield drawn
 
@@ -170,16 +162,6 @@ def _followed_channels(record: DisagreementRecord) -> list[str]:
     return [channel for channel in above if channel in record.dependence.channel]
 
 
-def _signals(record: DisagreementRecord, index: int) -> Iterator[Block]:
-    channels = _followed_channels(record)
-    if not channels:
-        yield Text("No channel has a gap above noise, so there is nothing to follow.")
-        return
-    yield dependence_figure(f"dependence-{index}", record.dependence, channels)
-    if record.heat_map is not None:
-        yield heat_map_figure(f"heat-map-{index}", record.heat_map)
-
-
 def _playback_text(record: DisagreementRecord) -> Iterator[Text]:
     if record.playback is not None:
         yield from (Text(each) for each in beside_rivals(record.playback))
@@ -189,8 +171,7 @@ def residual_figure(name: str, record: DisagreementRecord) -> Plot:
     """Draw the gap of each channel over all flights, one after another."""
     gap, residual = record.gap, record.residual
     offset = flight_offsets(residual.flight, residual.time)
-    time = residual.time + offset[residual.flight]
-    value = residual.value / gap.floor
+    time, value = residual.time + offset[residual.flight], residual.value / gap.floor
     parts = [residual.flight == index for index in np.unique(residual.flight)]
 
     def draw(figure: Figure) -> None:
@@ -207,7 +188,7 @@ def residual_figure(name: str, record: DisagreementRecord) -> Plot:
         figure.supylabel("gap, noise floors", fontsize=9.5)
         panels[-1].set_xlabel("time, s; flights one after another")
 
-    more = " Dashed lines part the flights, in the order given." if len(offset) > 1 else ""
+    more = " Dashed lines separate the flights, in the order given." if len(offset) > 1 else ""
     caption = (
         "Gap over time, in noise floors; the grey band is one floor up and down. Shaded and numbered: the "
         f"{_STRETCHES} stretches in which it is largest, as in the table below.{more}"
@@ -216,18 +197,7 @@ def residual_figure(name: str, record: DisagreementRecord) -> Plot:
 
 
 def flight_offsets(flight: IntArray, clock: Array) -> Array:
-    """Put the clocks of flights one after another.
-
-    Parameters
-    ----------
-    flight : array of int, shape (window,)
-    clock : array, shape (window,), s
-
-    Returns
-    -------
-    array, shape (flight,), s
-        To be added to the clock of each flight.
-    """
+    """Put the clocks of flights one after another: give for each flight what is to be added to its clock, s."""
     offset, end = np.zeros(int(flight.max(initial=-1)) + 1), 0.0
     for index in range(len(offset)):
         times = clock[flight == index]
@@ -248,23 +218,15 @@ def _mark_stretches(axes: Axes, record: DisagreementRecord, channel: str, offset
 
 
 def dependence_figure(name: str, dependence: DependenceGroup, channels: Sequence[str]) -> Plot:
-    """Draw the share of each channel's gap that its best signals explain, each alone.
-
-    Parameters
-    ----------
-    channels : sequence of str
-        At least one.
-    """
-    rows = -(-len(channels) // _COLUMNS)
+    """Draw the share of each channel's gap that its best signals explain, each alone."""
+    rows = ceil(len(channels) / _COLUMNS)
 
     def draw(figure: Figure) -> None:
-        grid = figure.subplots(rows, _COLUMNS, sharex=True, squeeze=False)
-        for axes, channel in zip(grid.flat, channels, strict=False):
+        panels = in_columns(figure, len(channels), _COLUMNS)
+        for axes, channel in zip(panels.flat, channels, strict=False):
             _draw_channel(axes, dependence, channel)
-        for axes in grid.flat[len(channels) :]:
-            axes.set_axis_off()
         for column in range(min(_COLUMNS, len(channels))):
-            last = grid[(len(channels) - 1 - column) // _COLUMNS, column]
+            last = panels[(len(channels) - 1 - column) // _COLUMNS, column]
             last.set_xlabel("share of variance explained")
             last.tick_params(labelbottom=True)
 
@@ -314,7 +276,7 @@ def heat_map_figure(name: str, heat_map: HeatMapGroup) -> Plot:
 
     caption = (
         f"Mean gap of the {channel_words(channel)}, the channel with the largest one in floors, over the two signals "
-        "that explain it best. Hatched cells are negative; the flights never were where nothing is drawn."
+        "that explain it best. Hatched cells are negative; cells that the flights never visited are left empty."
     )
     return plot(name, caption, f"Mean gap over {signals[0]} and {signals[1]}", 3.9, draw)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,13 +41,7 @@ def titles(names: Iterable[str]) -> list[str]:
 
 
 def unit_words(unit: str) -> str:
-    """Write a unit as people do.
-
-    Parameters
-    ----------
-    unit : str
-        With powers such as ``^2``; ``1`` for none.
-    """
+    """Write a unit as people do, with raised powers; ``1`` is none."""
     return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³")
 
 
@@ -68,7 +62,9 @@ def capitalised(words: str) -> str:
 
 def closest_sentence(effect: NamedEffect) -> str:
     """Say which effect came closest to a gap that it does not explain."""
-    return f"The closest was {effect_title(effect.name)}, and that is not it: {effect.name}, {_size(effect)}."
+    return (
+        f"The closest was {effect_title(effect.name)}, which does not explain the gap: {effect.name}, {_size(effect)}."
+    )
 
 
 def _size(effect: NamedEffect) -> str:
@@ -83,38 +79,30 @@ def _coefficient(coefficient: Estimate) -> str:
     """Write a value with its interval and unit; a power of ten that is that of all three stands once."""
     unit = unit_words(coefficient.unit)
     words = with_interval(coefficient.value, coefficient.low, coefficient.high)
-    power = _common_power(words)
+    powers = {text.partition("e")[2] for text in words}
+    power = f"e{powers.pop()}" if len(powers) == 1 and "" not in powers else ""
     value, low, high = (printed(text.removesuffix(power)) for text in words)
     return f"{coefficient.name} = {value} [{low}, {high}]{printed(power)}{' ' if unit else ''}{unit}"
 
 
-def _common_power(numbers: Sequence[str]) -> str:
-    powers = {text.partition("e")[2] for text in numbers}
-    power = powers.pop() if len(powers) == 1 else ""
-    return f"e{power}" if power else ""
-
-
 def _relative(effect: str, number: Estimate) -> str:
     """Write an error of a number of the vehicle as people do, `Izz +24 % [+20, +28]`."""
-    value, low, high = relative_words(number.value, number.low, number.high)
-    return f"{vehicle_number(effect, number.name)} {value} % [{low}, {high}]"
+    name, value, low, high = _error_words(effect, number)
+    return f"{name} {value} % [{low}, {high}]"
 
 
 def wrong_numbers(effects: NamedEffectsGroup) -> list[str]:
     """List the numbers of the vehicle that a verdict calls wrong, each with its error, `Izz +24 %`."""
-    numbers = [(e.name, number) for e in effects.named if e.name == VEHICLE_NUMBERS.name for number in e.coefficients]
-    return [f"{vehicle_number(name, n.name)} {relative_words(n.value, n.low, n.high)[0]} %" for name, n in numbers]
+    named = [effect for effect in effects.named if effect.name == VEHICLE_NUMBERS.name]
+    errors = [_error_words(effect.name, number) for effect in named for number in effect.coefficients]
+    return [f"{name} {value} %" for name, value, *_ in errors]
 
 
-def vehicle_number(effect: str, name: str) -> str:
-    """Name a number of the vehicle as people do."""
-    return _SHORT.get(name, effect.removesuffix(_RELATIVE).replace("_", " "))
-
-
-def relative_words(value: float, low: float, high: float) -> list[str]:
-    """Write a relative error and the ends of its interval in per cent, with their signs."""
-    numbers = with_interval(*(100.0 * each for each in (value, low, high)))
-    return [printed(text if text.startswith("-") or not float(text) else f"+{text}") for text in numbers]
+def _error_words(effect: str, number: Estimate) -> list[str]:
+    """Name a number of the vehicle as people do, and write its error and the interval in per cent, with signs."""
+    name = _SHORT.get(number.name, effect.removesuffix(_RELATIVE).replace("_", " "))
+    numbers = with_interval(*(100.0 * each for each in (number.value, number.low, number.high)))
+    return [name, *(printed(text if text.startswith("-") or not float(text) else f"+{text}") for text in numbers)]
 
 
 def effects_table(name: str, effects: NamedEffectsGroup) -> Table:
@@ -131,9 +119,9 @@ def effects_table(name: str, effects: NamedEffectsGroup) -> Table:
         for effect, named in zip(effects.listed, effects.effect.named, strict=True)
     ]
     caption = (
-        "Effects. Share: part of the gap above the floor that comes back without it. p: how often chance explains as "
-        "much with any effect of the catalogue. Chosen again: share of the stretches of flight without which it would "
-        "still be the first choice."
+        "Effects. Share: part of the gap above the floor that returns when the effect is left out. p: how often chance "
+        "explains as much with any effect of the catalogue. Chosen again: share of the stretches of flight without "
+        "which it would still be the first choice."
     )
     header = ("Effect", "Identifier", "Share", "p", "Chosen again", "What it is")
     return Table(name, caption, header, rows, frozenset({0, 1, 5}), frozenset({0, 5}))
@@ -149,7 +137,7 @@ def coefficients_table(name: str, effects: NamedEffectsGroup) -> Table:
             _meaning(effect, numbers.name[index]),
             *measured(*(float(values[index]) for values in (numbers.value, numbers.low, numbers.high))),
             unit_words(numbers.unit[index]),
-            interval(float(low[index]), float(high[index]), 3),
+            _range(float(low[index]), float(high[index])),
         ]
         for index, effect in enumerate(numbers.effect)
     ]
@@ -162,35 +150,28 @@ def parameters_table(name: str, effects: NamedEffectsGroup) -> Table:
     """Show the vehicle's own numbers, refitted with the effects."""
     numbers = effects.parameter
     columns = (numbers.value.tolist(), numbers.low.tolist(), numbers.high.tolist())
-    rows = [list(_parameter(*row)) for row in zip(numbers.name, numbers.unit, *columns, strict=True)]
+    rows = []
+    for parameter, unit, *values in zip(numbers.name, numbers.unit, *columns, strict=True):
+        kind, _, axis = parameter.rpartition("_")
+        words = f"{_NUMBERS[kind]} {axis}" if kind in _NUMBERS else parameter.replace("_", " ")
+        is_relative = unit == "1"
+        value, low, high = (100.0 * each if is_relative else each for each in values)
+        rows.append([words, *measured(value, low, high), "%" if is_relative else unit_words(unit)])
     caption = (
         "The vehicle's own numbers, refitted with the effects; relative ones are changes against the vehicle file. "
-        "Only ratios to the torque of the rotors can be seen."
+        "Only ratios to the torque of the rotors can be determined."
     )
     return Table(name, caption, ("Number", "Change", "95 % interval", "Unit"), rows, frozenset({0, 3}))
 
 
 def measured(value: float, low: float, high: float) -> list[str]:
-    """Write a value and its interval with the digits that the width of the interval leaves.
-
-    Returns
-    -------
-    list of str
-        Value, interval; the interval is ``—`` where it is not known.
-    """
+    """Write a value, and its interval or ``—``, with the digits that the width of the interval leaves."""
     first, *ends = (printed(text) for text in with_interval(value, low, high))
     return [first, " … ".join(ends) if np.isfinite([low, high]).any() else UNKNOWN]
 
 
-def interval(low: float, high: float, digits: int = 4) -> str:
-    """Write an interval.
-
-    Returns
-    -------
-    str
-        ``—`` where it is not known.
-    """
-    return f"{number(low, digits)} … {number(high, digits)}" if np.isfinite([low, high]).any() else UNKNOWN
+def _range(low: float, high: float) -> str:
+    return f"{number(low, 3)} … {number(high, 3)}" if np.isfinite([low, high]).any() else UNKNOWN
 
 
 def _meaning(effect: str, coefficient: str) -> str:
@@ -201,22 +182,8 @@ def _meaning(effect: str, coefficient: str) -> str:
     return f"{coefficient}: {meaning}" if meaning else coefficient
 
 
-def _parameter(name: str, unit: str, value: float, low: float, high: float) -> Iterator[str]:
-    kind, _, axis = name.rpartition("_")
-    yield f"{_NUMBERS[kind]} {axis}" if kind in _NUMBERS else name.replace("_", " ")
-    scale = 100.0 if unit == "1" else 1.0
-    yield from measured(scale * value, scale * low, scale * high)
-    yield "%" if unit == "1" else unit_words(unit)
-
-
 def intervals_figure(name: str, effects: NamedEffectsGroup) -> Plot | None:
-    """Draw where each coefficient lies between the least and the largest possible value.
-
-    Returns
-    -------
-    Plot or None
-        None where no range is known.
-    """
+    """Draw where each coefficient lies between the least and the largest possible value, where a range is known."""
     coefficients = effects.coefficient
     low, high = coefficients.plausible_low, coefficients.plausible_high
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -228,14 +195,19 @@ def intervals_figure(name: str, effects: NamedEffectsGroup) -> Plot | None:
     if not len(shown):
         return None
     names = [f"{coefficients.effect[index]}  {coefficients.name[index]}" for index in shown]
-    ranges = [f"{interval(low[index], high[index], 3)} {unit_words(coefficients.unit[index])}" for index in shown]
+    ranges = [f"{_range(low[index], high[index])} {unit_words(coefficients.unit[index])}" for index in shown]
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
         for row, index in enumerate(shown):
             _draw_row(axes, row, placed[index])
         axes.set_yticks(range(len(shown)), names)
-        _right_labels(axes, ranges)
+        right = axes.twinx()
+        axes.set_ylim(-0.6, len(shown) - 0.4)
+        right.set_ylim(axes.get_ylim())
+        right.set_yticks(range(len(shown)), ranges)
+        right.tick_params(length=0)
+        right.grid(visible=False)
         axes.set_xlim(-0.03, 1.03)
         axes.set_xticks([0.0, 1.0], ["least possible", "largest possible"])
         axes.grid(visible=False)
@@ -250,12 +222,3 @@ def _draw_row(axes: Axes, row: int, placed: Array) -> None:
     if np.isfinite(low) and np.isfinite(high):
         axes.hlines(row, np.clip(low, 0, 1), np.clip(high, 0, 1), color="black", linewidth=2.4, zorder=1)
     axes.plot([np.clip(value, 0.0, 1.0)], [row], "o", color=AFTER["color"], markersize=6, zorder=2)
-
-
-def _right_labels(axes: Axes, labels: list[str]) -> None:
-    right = axes.twinx()
-    axes.set_ylim(-0.6, len(labels) - 0.4)
-    right.set_ylim(axes.get_ylim())
-    right.set_yticks(range(len(labels)), labels)
-    right.tick_params(length=0)
-    right.grid(visible=False)

@@ -12,18 +12,17 @@ from cpfls_cli.artifacts.evidence import PeriodGroup, PhysicsGroup, StepsGroup, 
 from cpfls_cli.artifacts.identified import IdentifiedRecord, RidgeGroup
 from cpfls_cli.artifacts.scores import AXES, MODEL
 from cpfls_cli.pages.model import TORQUE, verdict
-from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, HELD, legend_above, legend_over, plain_ticks, plot, style_of
-from cpfls_cli.report.content import Block, Cell, Facts, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.content import Block, Cell, Facts, Heading, Plot, Table, Text
 from cpfls_cli.report.numbers import count, number, percent, plain, r_squared
+from cpfls_cli.rounding import at_most
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _ROUNDING = 1e-9
-# Of equal candidates rounding must not choose one.
-_TIE = 1.0 + 1e-6
 _DECADE = 10.0
 _SCORES = (f"RMSE, {TORQUE}", "NRMSE", "R²", "VAF", f"Largest, {TORQUE}", "Relative")
 _PREDICTORS = {"rigid-body": "rigid body", "nothing-moves": "nothing moves"}
@@ -36,30 +35,8 @@ _STEP_STYLES: dict[str, dict[str, Any]] = {
 }
 
 
-def validation_section(sources: Sources) -> Section | None:
-    """Show the verdicts on the models and what they rest on.
-
-    Returns
-    -------
-    Section or None
-        None where no model was given.
-    """
-    return section_of_each("validation", "How far to trust it", sources.models, _validation)
-
-
-def steps_section(sources: Sources) -> Section | None:
-    """Show how well the models predict motion, where that was tried.
-
-    Returns
-    -------
-    Section or None
-        None where no model holds it.
-    """
-    models = [model for model in sources.models if model.record.steps is not None]
-    return section_of_each("steps", "Prediction by horizon", models, _steps)
-
-
-def _validation(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+def validation_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+    """Show the verdict on a model and what it rests on."""
     record = model.record
     yield Heading(model.label)
     yield from verdict(model)
@@ -112,8 +89,8 @@ def _period(record: IdentifiedRecord, period: PeriodGroup, index: int) -> Table:
             for axis, name in enumerate(AXES)
         ]
     caption = (
-        "The same attitudes, told one turn away in roll and in pitch: no vehicle notices, and a periodic model must "
-        "not either. Root mean square and largest error, N m."
+        "The same attitudes, written one full turn further in roll and in pitch: the vehicle is the same, so a "
+        "periodic model must predict the same. Root mean square and largest error, N m."
     )
     header = ("Part", "Axis", "RMSE here", "RMSE one period away", "Largest here", "Largest one period away")
     return Table(f"period-{index}", caption, header, rows, frozenset({0, 1}))
@@ -123,18 +100,13 @@ def _physics(physics: PhysicsGroup) -> Facts:
     roll, pitch = np.degrees(physics.worst_attitude)
     smallest = number(physics.smallest_eigenvalue, 3)
     definite = "in all" if physics.indefinite == 0 else f"not in {physics.indefinite}"
+    where = f"roll {plain(round(roll))}°, pitch {plain(round(pitch))}°"
     rounding = " (rounding)" if physics.energy < _ROUNDING else ""
     return Facts(
         [
-            (
-                "D(q) positive definite",
-                f"{definite} of {physics.cells} cells of roll and pitch that training visited",
-            ),
-            (
-                "Its smallest eigenvalue",
-                f"{smallest} kg m², at roll {plain(round(roll))}°, pitch {plain(round(pitch))}°",
-            ),
-            ("Energy that C(q, qd) makes", f"{number(physics.energy, 2)} of its own terms{rounding}"),
+            ("D(q) positive definite", f"{definite} of {physics.cells} cells of roll and pitch that training visited"),
+            ("Smallest eigenvalue of D(q)", f"{smallest} kg m², at {where}"),
+            ("Energy that C(q, qd) produces", f"{number(physics.energy, 2)} of its own terms{rounding}"),
         ]
     )
 
@@ -148,11 +120,11 @@ def ridge_sentence(ridge: RidgeGroup) -> str:
     gain = 1.0 - least / off[0] if off[0] > 0 else 0.0
     if np.isinf(ridge.weight[best]) or gain <= 0:
         return (
-            "No fuzzy part does better on blocks that were left out than none: this flight holds no evidence for an "
-            "inertia that depends on attitude in another way than a rigid body's does."
+            "On blocks that were left out no fuzzy part does better than the rigid body alone: this flight holds no "
+            "evidence for an inertia that depends on attitude in another way than a rigid body's does."
         )
     reduction = (
-        f"On blocks that were left out, the best fuzzy part takes {percent(gain)} off the error of the rigid body"
+        f"On blocks that were left out, the best fuzzy part reduces the error of the rigid body by {percent(gain)}"
     )
     if alone - least <= deviation:
         return (
@@ -163,14 +135,10 @@ def ridge_sentence(ridge: RidgeGroup) -> str:
 
 
 def _ridge_figure(name: str, model: Source[IdentifiedRecord], ridge: RidgeGroup) -> Plot:
-    """Draw the cross-validated error with its standard error; the last point has no fuzzy part at all.
-
-    References
-    ----------
-    method.md section 8.
-    """
-    weight, error = ridge.weight, ridge.error
-    chosen = _chosen(weight, model.record.model.ridge_weight)
+    """Draw the cross-validated error (method.md section 8) over the ridge weight; the last point has no fuzzy part."""
+    weight, error, taken = ridge.weight, ridge.error, model.record.model.ridge_weight
+    finite = np.where(np.isfinite(weight), weight, np.finfo(float).max)
+    chosen = len(weight) - 1 if np.isinf(taken) else int(np.argmin(np.abs(finite - taken)))
     # The point without a fuzzy part stands a decade beyond the largest weight.
     position = np.where(np.isfinite(weight), weight, 10.0 * weight[np.isfinite(weight)].max(initial=1e-9))
     mark: dict[str, Any] = {"markersize": 10, "markerfacecolor": "none", "markeredgewidth": 2}
@@ -181,7 +149,10 @@ def _ridge_figure(name: str, model: Source[IdentifiedRecord], ridge: RidgeGroup)
         axes.errorbar(position, error, ridge.standard_error, fmt="o-", label="error ± one standard error", **style)
         axes.plot([position[chosen]], [error[chosen]], "D", color=style_of(1)["color"], label="chosen", **mark)
         axes.set_xscale("log")
-        _scale(axes, error)
+        if error.min() > 0 and error.max() > _DECADE * error.min():
+            axes.set_yscale("log", nonpositive="clip")
+        else:
+            plain_ticks(axes.yaxis)
         last = len(weight) - 1
         shown = [*range(0, last - 1, max(last // 6, 1)), last]
         axes.set_xticks(position[shown], [_weight_words(weight[index], 1) for index in shown])
@@ -198,31 +169,15 @@ def _ridge_figure(name: str, model: Source[IdentifiedRecord], ridge: RidgeGroup)
     return plot(name, caption, "Cross-validated error over the ridge weight, the chosen weight marked", 3.0, draw)
 
 
-def _chosen(weight: Array, value: float) -> int:
-    if np.isinf(value):
-        return len(weight) - 1
-    finite = np.where(np.isfinite(weight), weight, np.finfo(float).max)
-    return int(np.argmin(np.abs(finite - value)))
-
-
-def _scale(axes: Axes, error: Array) -> None:
-    """Take a logarithmic scale where errors differ by more than a decade."""
-    if error.min() > 0 and error.max() > _DECADE * error.min():
-        axes.set_yscale("log", nonpositive="clip")
-    else:
-        plain_ticks(axes.yaxis)
-
-
 def _weight_words(weight: float, digits: int) -> str:
     return "fuzzy part off" if np.isinf(weight) else number(weight, digits)
 
 
 def _structures(structures: StructuresGroup, index: int) -> Table:
-    least = _TIE * float(np.min(structures.error))
     rows: list[list[str | Cell]] = []
     for candidate, name in enumerate(structures.name):
         error, deviation = float(structures.error[candidate]), float(structures.standard_error[candidate])
-        best = error <= least
+        best = at_most(error, float(np.min(structures.error)))
         shown = f"{number(error, 4)} ± {number(deviation, 2)}{' ◂ least' if best else ''}"
         rows.append(
             [
@@ -240,7 +195,8 @@ def _structures(structures: StructuresGroup, index: int) -> Table:
     return Table(f"structures-{index}", caption, header, rows, frozenset({0}), frozenset({0}))
 
 
-def _steps(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+def steps_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+    """Show how well a model predicts motion, where that was tried."""
     steps = model.record.steps
     assert steps is not None, "only models that hold them are shown"
     yield Heading(model.label)
@@ -262,9 +218,9 @@ def _steps_figure(name: str, label: str, steps: StepsGroup) -> Plot:
         legend_over(figure, grid[0][0])
 
     caption = (
-        f"Root mean square error after so many seconds, with the measured torques of {steps.part} "
-        f"replayed through {label} from {steps.windows} starts. Nothing moves: attitude and body rate stay what they "
-        "were; a model above that line predicts nothing. Both axes are logarithmic."
+        f"Root mean square error after so many seconds, with the measured torques of {steps.part} replayed through "
+        f"{label} from {steps.windows} starts. Nothing moves: the prediction that attitude and body rate stay what "
+        "they were; a model above that line is worse than it. Both axes are logarithmic."
     )
     return plot(name, caption, "Error of predicted attitude and body rate over the horizon, by axis", 4.4, draw)
 
@@ -286,24 +242,23 @@ def _draw_steps(panels: list[Axes], steps: StepsGroup, errors: Array) -> None:
 
 
 def _steps_table(steps: StepsGroup, index: int) -> Table:
-    count_of_steps = len(steps.horizon)
+    last = len(steps.horizon) - 1
     sizes = [scale * np.sqrt(np.sum(getattr(steps, quantity) ** 2, axis=2)) for quantity, _, scale in _STEP_ROWS]
     rows: list[list[str | Cell]] = []
-    for step in sorted({0, count_of_steps // 5, count_of_steps // 2, count_of_steps - 1}):
+    for step in sorted({0, (last + 1) // 5, (last + 1) // 2, last}):
         for row, predictor in enumerate(steps.model):
             cells = [_error_cell(size[:, step], row) for size in sizes]
-            reach = f"{number(float(steps.horizon[step]), 3)} s" if row == 0 else ""
-            samples = count(steps.samples[step]) if row == 0 else ""
-            rows.append([reach, samples, _PREDICTORS.get(predictor, predictor), *cells])
+            first = [f"{number(float(steps.horizon[step]), 3)} s", count(steps.samples[step])] if row == 0 else ["", ""]
+            rows.append([*first, _PREDICTORS.get(predictor, predictor), *cells])
     caption = (
-        f"Root mean square error after so much time on {steps.part}, all axes together. Marked: the "
-        "least. — where a predictor could not be simulated over every window."
+        f"Root mean square error after so much time on {steps.part}, all axes together. Marked: the least. — where a "
+        "predictor could not be simulated over every window."
     )
     header = ("Horizon", "Samples", "Predictor", "Attitude, °", "Body rate, rad/s")
     return Table(f"steps-table-{index}", caption, header, rows, frozenset({0, 2}))
 
 
 def _error_cell(errors: Array, row: int) -> Cell:
-    least = np.isfinite(errors[row]) and errors[row] <= _TIE * np.nanmin(errors)
     text = number(float(errors[row]), 3)
-    return Cell(f"{text} ◂", "good") if least else Cell(text)
+    is_least = np.isfinite(errors[row]) and at_most(errors[row], np.nanmin(errors))
+    return Cell(f"{text} ◂", "good") if is_least else Cell(text)

@@ -30,15 +30,7 @@ _SIGNALS = (
 def export_answer(
     told: Sequence[str], warnings: Sequence[str], sizes: Mapping[str, int], dry_run: bool
 ) -> Iterator[Text]:
-    """Say which files a model was exported to, what stands in them, and what speaks against flying with it.
-
-    Parameters
-    ----------
-    told : sequence of str
-        What the model is and what it is worth.
-    sizes : mapping of str to int
-        Bytes of each file.
-    """
+    """Say which files a model was exported to and their bytes, what it is worth, and what speaks against it."""
     verb = "would be written" if dry_run else "written"
     for file, size in sizes.items():
         yield Text(f"{file}: {verb} ({size} bytes)")
@@ -104,13 +96,7 @@ def identified_warnings(model: IdentifiedRecord, path: object) -> Iterator[str]:
 
 
 def verification_answer(form: str, told: Sequence[str], flight: LoggedFlight, found: Verification) -> Iterator[Block]:
-    """Say how far the flown export is from its model, and what makes the difference.
-
-    Parameters
-    ----------
-    told : sequence of str
-        What the target does not hold.
-    """
+    """Say how far the flown export is from its model, what makes the difference, and what the target does not hold."""
     title, step = TARGETS[form].title, TARGETS[form]
     runs = f"{found.windows} runs of {found.horizon_s:.3g} s along {flight.name}"
     verdict = "flies what was exported" if found.agrees else "DOES NOT FLY what was exported"
@@ -129,18 +115,15 @@ def verification_answer(form: str, told: Sequence[str], flight: LoggedFlight, fo
     ]
     header = ("", *(f"{name}, {unit}" for name, unit, _ in _SIGNALS))
     scale = np.array([factor for _, _, factor in _SIGNALS])
-    yield Table("verification", "", header, [[name, *map(_short, values * scale)] for name, values in rows])
+    shown = [[name, *(number(value, 3) for value in values * scale)] for name, values in rows]
+    yield Table("verification", "", header, shown)
     yield from map(Text, told)
     yield from (Text(warning, "warning") for warning in flight.warnings)
 
 
-def _short(value: float) -> str:
-    return number(value, 3)
-
-
 def verification_summary(form: str, missing: Sequence[Missing], found: Verification) -> dict[str, Any]:
     """Say the same for machines, SI."""
-    names = ("position", "velocity", "attitude", "body_rate")
+    names = [name.replace(" ", "_") for name, _, _ in _SIGNALS]
 
     def by_signal(values: Any) -> dict[str, float]:
         return dict(zip(names, values.tolist(), strict=True))

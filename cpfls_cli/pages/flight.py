@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.flight import DelayGroup, FlightRecord
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.pages.trajectory import attitude_figure, rotation_figure
 from cpfls_cli.report.canvas import line, plot, stacked, style_of
-from cpfls_cli.report.content import Block, Facts, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.content import HASH_SHOWN, Block, Facts, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, count, joined, number, plain
 from cpfls_cli.units import SPEED_UNITS
-from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,15 +40,9 @@ _ORIGINS = {"trajectory": "simulated along", "log": "imported from", "model": "w
 
 
 def answer(flight: Source[FlightRecord], index: int = 1) -> Iterator[Block]:
-    """Say where a flight comes from, how large it is, what was done to it and what it lacks.
-
-    Parameters
-    ----------
-    index : int
-        Number of the flight on its page.
-    """
+    """Say where a flight comes from, how large it is, what was done to it and what it lacks."""
     record = flight.record
-    yield Facts(_facts(flight))
+    yield Facts(list(_facts(flight)))
     findings = {} if record.quality is None else record.quality.findings
     if findings:
         rows = [[reason, count(times)] for reason, times in findings.items()]
@@ -83,30 +77,23 @@ def autopilot_text(position_rms_m: float, position_max_m: float, attitude_rms_ra
     return Text(f"off the path by {away}; attitude by {degrees} deg rms (roll pitch yaw)")
 
 
-def _facts(flight: Source[FlightRecord]) -> list[tuple[str, str]]:
+def _facts(flight: Source[FlightRecord]) -> Iterator[tuple[str, str]]:
     record = flight.record
+    inputs = flight.header.inputs.items()
+    origins = (f"{_ORIGINS.get(role, role)} {file.name} (sha256 {file.sha256[:HASH_SHOWN]})" for role, file in inputs)
+    yield "Source", ", ".join(origins)
     duration = float(record.time[-1] - record.time[0]) if len(record.time) else 0.0
     rate = (len(record.time) - 1) / duration if duration > 0 else float("nan")
-    size = f"{len(record.time)} over {duration:.2f} s, {number(rate)} per second"
-    rows = [("Source", _origin(flight)), ("Samples", size)]
+    yield "Samples", f"{len(record.time)} over {duration:.2f} s, {number(rate)} per second"
     if record.torque is not None:
-        shown = ", ".join(f"{number(value)} {axis}" for value, axis in zip(record.largest_torque, AXES, strict=True))
-        rows.append(("Largest torque, N m", shown))
+        shown = (f"{number(value)} {axis}" for value, axis in zip(record.largest_torque, AXES, strict=True))
+        yield "Largest torque, N m", ", ".join(shown)
     if record.delay is not None:
-        rows.append(("Delay taken out", _delay(record.delay)))
-    return [*rows, ("Noise added", _noise(flight))]
-
-
-def _origin(flight: Source[FlightRecord]) -> str:
-    inputs = flight.header.inputs.items()
-    return ", ".join(f"{_ORIGINS.get(role, role)} {file.name} (sha256 {file.sha256[:12]})" for role, file in inputs)
-
-
-def _delay(delay: DelayGroup) -> str:
-    taken = f"{1e3 * delay.value:.1f} ms of motion behind command"
-    if delay.best_r2 is None:
-        return f"{taken}, as the config states"
-    return f"{taken}, estimated from this flight (pooled R² of the rigid body there {delay.best_r2:.3f})"
+        r2, told = record.delay.best_r2, "as the config states"
+        if r2 is not None:
+            told = f"estimated from this flight (pooled R² of the rigid body there {r2:.3f})"
+        yield "Delay taken out", f"{1e3 * record.delay.value:.1f} ms of motion behind command, {told}"
+    yield "Noise added", _noise(flight)
 
 
 def _noise(flight: Source[FlightRecord]) -> str:
@@ -140,43 +127,26 @@ def _effects(flight: Source[FlightRecord]) -> Iterator[Text]:
 
 
 def flight_section(sources: Sources) -> Section | None:
-    """Show the flights.
+    """Show the flights, if any."""
 
-    Returns
-    -------
-    Section or None
-        None where no flight was given.
-    """
-    return section_of_each("flights", "Flights", sources.flights, lambda flight, index: _flight(flight, index, sources))
+    def blocks(flight: Source[FlightRecord], index: int) -> Iterator[Block]:
+        record, label, name = flight.record, flight.label, f"figure-3-flight-{index}"
+        yield Heading(label)
+        yield from answer(flight, index)
+        if record.attitude is not None and sources.by_hash(flight.made_from("trajectory")) is None:
+            # On the circle where angles go round it: they would run off any other figure.
+            if record.turns and record.attitude_rate is not None:
+                yield rotation_figure(name, label, record.time, record.attitude, record.attitude_rate)
+            else:
+                yield attitude_figure(name, label, record.time, record.attitude)
+        if record.torque is not None:
+            yield torque_figure(f"figure-4-torque-{index}", label, record.time, record.torque)
 
-
-def _flight(flight: Source[FlightRecord], index: int, sources: Sources) -> Iterator[Block]:
-    record = flight.record
-    yield Heading(flight.label)
-    yield from answer(flight, index)
-    if record.attitude is not None and sources.by_hash(flight.made_from("trajectory")) is None:
-        yield _attitude_figure(f"figure-3-flight-{index}", flight.label, record)
-    if record.torque is not None:
-        yield torque_figure(f"figure-4-torque-{index}", flight)
+    return section_of_each("flights", "Flights", sources.flights, blocks)
 
 
-def _attitude_figure(name: str, label: str, record: FlightRecord) -> Plot:
-    """Draw angles on the circle where they go round it, since they would run off any other figure."""
-    assert record.attitude is not None, "asked for by the caller"
-    if record.turns and record.attitude_rate is not None:
-        return rotation_figure(name, label, record.time, record.attitude, record.attitude_rate)
-    return attitude_figure(name, label, record.time, record.attitude)
-
-
-def torque_figure(name: str, flight: Source[FlightRecord]) -> Plot:
-    """Draw the generalised torque of a flight, one panel per axis.
-
-    References
-    ----------
-    Figure 4 of the paper.
-    """
-    time, torque = flight.record.time, flight.record.torque
-    assert torque is not None, "the flight holds no torque"
+def torque_figure(name: str, label: str, time: Array, torque: Array) -> Plot:
+    """Draw the generalised torque of a flight, one panel per axis: Figure 4 of the paper."""
 
     def draw(figure: Figure) -> None:
         panels = stacked(figure, 3)
@@ -186,22 +156,17 @@ def torque_figure(name: str, flight: Source[FlightRecord]) -> Plot:
             axes.set_ylabel("N m")
         panels[-1].set_xlabel("time, s")
 
-    caption = f"Figure 4. Generalised torque on the Euler angles along {flight.label}."
+    caption = f"Figure 4. Generalised torque on the Euler angles along {label}."
     return plot(name, caption, "Generalised torque on roll, pitch and yaw over time", 4.6, draw)
 
 
 def vehicle_section(sources: Sources) -> Section:
-    """Show the vehicle of the study.
-
-    References
-    ----------
-    Table 3 of the paper.
-    """
+    """Show the vehicle of the study: Table 3 of the paper."""
     caption = (
         "Table 3. The vehicle of the study config. A range means that the rotors differ; the arm is the distance of a "
         "rotor from the z axis."
     )
-    blocks: list[Block] = [Table("table-3-vehicle", caption, ("Quantity", "Study"), _vehicle_rows(sources))]
+    blocks: list[Block] = [Table("table-3-vehicle", caption, ("Quantity", "Study"), list(_vehicle_rows(sources)))]
     unknown = sources.vehicle.unknown
     if unknown:
         names = joined(name.replace("_", " ") for name in unknown)
@@ -212,31 +177,22 @@ def vehicle_section(sources: Sources) -> Section:
     return Section("vehicle", "Vehicle", blocks)
 
 
-def _vehicle_rows(sources: Sources) -> list[tuple[str, str]]:
+def _vehicle_rows(sources: Sources) -> Iterator[tuple[str, str]]:
     vehicle = sources.vehicle
-    values = [plain(vehicle.gravity_m_s2), plain(vehicle.mass_kg), *_rotors(vehicle)]
-    values += [plain(moment) for moment in vehicle.inertia_kg_m2]
-    names = ["gravity g, m/s²", "mass m, kg", "rotors", "arm l, m", "thrust factor k, N s²", "drag factor b, N m s²"]
-    names += [f"{name}, kg m²" for name in INERTIA_PARAMETERS[: len(vehicle.inertia_kg_m2)]]
-    rows = list(zip(names, values, strict=True))
-    return rows if sources.only_gap else [*rows, ("flight time T, s", _durations(sources))]
-
-
-def _rotors(vehicle: VehicleSettings) -> list[str]:
-    arms = [float(np.hypot(rotor.position_m[0], rotor.position_m[1])) for rotor in vehicle.rotors]
-    return [
-        str(len(vehicle.rotors)),
-        _range(arms),
-        _range([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors]),
-        _range([rotor.drag_factor_n_m_s2 for rotor in vehicle.rotors]),
-    ]
+    yield "gravity g, m/s²", plain(vehicle.gravity_m_s2)
+    yield "mass m, kg", plain(vehicle.mass_kg)
+    yield "rotors", str(len(vehicle.rotors))
+    yield "arm l, m", _range([float(np.hypot(*rotor.position_m[:2])) for rotor in vehicle.rotors])
+    yield "thrust factor k, N s²", _range([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors])
+    yield "drag factor b, N m s²", _range([rotor.drag_factor_n_m_s2 for rotor in vehicle.rotors])
+    for name, moment in zip(INERTIA_PARAMETERS, vehicle.inertia_kg_m2, strict=False):
+        yield f"{name}, kg m²", plain(moment)
+    if not sources.only_gap:
+        times = [source.record.time for source in sources.flights or sources.trajectories]
+        durations = [float(time[-1] - time[0]) for time in times if len(time)]
+        yield "flight time T, s", _range(durations) if times else UNKNOWN
 
 
 def _range(values: Sequence[float]) -> str:
     low, high = (plain(float(f"{value:.4g}")) for value in (min(values), max(values)))
     return low if low == high else f"{low} … {high}"
-
-
-def _durations(sources: Sources) -> str:
-    times = [source.record.time for source in sources.flights or sources.trajectories]
-    return _range([float(time[-1] - time[0]) for time in times if len(time)]) if times else UNKNOWN

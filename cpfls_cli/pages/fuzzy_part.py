@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import ceil
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -12,9 +13,9 @@ from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.model import InertiaFunctionsGroup
 from cpfls_cli.fuzzy.membership import join_ends, memberships
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.report.canvas import plot, style_of
-from cpfls_cli.report.content import Block, Facts, Folded, Heading, Plot, Section, Table, Text
+from cpfls_cli.pages.source import Source
+from cpfls_cli.report.canvas import in_columns, plot, style_of
+from cpfls_cli.report.content import Block, Facts, Folded, Heading, Plot, Table, Text
 from cpfls_cli.report.numbers import count, number, percent
 
 if TYPE_CHECKING:
@@ -26,33 +27,8 @@ _COLUMNS = 2
 _CLOSE = 0.05
 
 
-def partitions_section(sources: Sources) -> Section | None:
-    """Show the partitions of the models and their parameters.
-
-    Returns
-    -------
-    Section or None
-        None where no model was given.
-
-    References
-    ----------
-    Figure 6 and section 10 of the paper.
-    """
-    return section_of_each("partitions", "Partitions and parameters", sources.models, _partitions)
-
-
-def rules_section(sources: Sources) -> Section | None:
-    """Show what of the models the data determine.
-
-    Returns
-    -------
-    Section or None
-        None where no model was given.
-    """
-    return section_of_each("rules", "Excitation of the rules", sources.models, _rules)
-
-
-def _partitions(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+def partitions_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+    """Show the partitions of a model (Figure 6 of the paper) and its parameters."""
     record = model.record
     if record.fuzzy_part_off:
         yield Text(f"The fuzzy part of {model.label} is off: no membership function takes part in it.", "note")
@@ -60,8 +36,7 @@ def _partitions(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
         yield partitions_figure(f"figure-6-partitions-{index}", model)
     else:
         yield Text(f"{model.label} has one rule per input: its one membership function is 1 everywhere.", "note")
-    tables = [_chromosome_table(record, index), _inertia_table(record, index), _coefficients_table(record, index)]
-    yield Folded(f"Chromosome, breakpoints, inertia and coefficients of {model.label}", tables)
+    yield Folded(f"Chromosome, breakpoints, inertia and coefficients of {model.label}", list(_tables(record, index)))
 
 
 def _breakpoints(model: InertiaFunctionsGroup) -> dict[str, Array]:
@@ -70,17 +45,14 @@ def _breakpoints(model: InertiaFunctionsGroup) -> dict[str, Array]:
     return {name: model.breakpoints[names == name] for name in dict.fromkeys(model.partition)}
 
 
-def _chromosome_table(record: IdentifiedRecord, index: int) -> Table:
+def _tables(record: IdentifiedRecord, index: int) -> Iterator[Table]:
     weights = [count(weight) for weight in record.model.weights]
     rows = []
     for name, peaks in _breakpoints(record.functions).items():
         genes, weights = weights[: len(peaks) - 1], weights[len(peaks) - 1 :]
         rows.append([name, " ".join(genes), " ".join(number(float(peak), 5) for peak in peaks)])
-    header = ("Partition", "Weights (16 bit)", "Breakpoints")
-    return Table(f"chromosome-{index}", "Chromosome and the partitions that it encodes.", header, rows)
-
-
-def _inertia_table(record: IdentifiedRecord, index: int) -> Table:
+    header: tuple[str, ...] = ("Partition", "Weights (16 bit)", "Breakpoints")
+    yield Table(f"chromosome-{index}", "Chromosome and the partitions that it encodes.", header, rows)
     rows = [
         [name, number(float(under)) if record.on_rigid_body else "none", number(float(alone))]
         for name, under, alone in zip(
@@ -88,18 +60,15 @@ def _inertia_table(record: IdentifiedRecord, index: int) -> Table:
         )
     ]
     header = ("kg m²", "Under the fuzzy part", "Rigid body alone")
-    return Table(f"inertia-{index}", "Inertia found by least squares.", header, rows)
+    yield Table(f"inertia-{index}", "Inertia found by least squares.", header, rows)
+    coefficients = zip(record.functions.parameter, record.functions.coefficients, strict=True)
+    rows = [[name, number(float(value), 5)] for name, value in coefficients]
+    caption = "Coefficients of the rule consequents, kg m²."
+    yield Table(f"coefficients-{index}", caption, ("Coefficient", "Value"), rows)
 
 
-def _coefficients_table(record: IdentifiedRecord, index: int) -> Table:
-    pairs = zip(record.functions.parameter, record.functions.coefficients, strict=True)
-    rows = [[name, number(float(value), 5)] for name, value in pairs]
-    return Table(
-        f"coefficients-{index}", "Coefficients of the rule consequents, kg m².", ("Coefficient", "Value"), rows
-    )
-
-
-def _rules(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+def rules_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+    """Show what of a model the data determine."""
     rules, solve = model.record.rules, model.record.solve
     yield Heading(model.label)
     yield Facts(
@@ -126,23 +95,16 @@ def _rules(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
 
 
 def partitions_figure(name: str, model: Source[IdentifiedRecord]) -> Plot:
-    """Draw the membership functions of all partitions, side by side.
-
-    References
-    ----------
-    Figure 6 of the paper; equation (8).
-    """
+    """Draw the membership functions (equation 8) of all partitions: Figure 6 of the paper."""
     partitions = _breakpoints(model.record.functions)
     joined = model.config["identification"]["structure"] == "cpfls"
-    rows = -(-len(partitions) // _COLUMNS)
+    rows = ceil(len(partitions) / _COLUMNS)
 
     def draw(figure: Figure) -> None:
-        panels = figure.subplots(rows, _COLUMNS, sharex=True, sharey=True, squeeze=False)
+        panels = in_columns(figure, len(partitions), _COLUMNS, share_y=True)
         for axes, (title, peaks) in zip(panels.flat, partitions.items(), strict=False):
             _draw_partition(axes, peaks, joined)
             axes.set_title(title)
-        for axes in panels.flat[len(partitions) :]:
-            axes.set_axis_off()
         for axes in panels[:, 0]:
             axes.set_ylabel("membership")
         for axes in panels[-1]:

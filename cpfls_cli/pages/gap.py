@@ -38,13 +38,8 @@ AFTER: dict[str, Any] = {"color": style_of(1)["color"], "linestyle": "-", "linew
 _MARKS = 12
 _ROOM = 3.0
 _LEAST = 0.1
-_GIVEN: dict[str, Any] = {
-    "color": GREY,
-    "marker": "s",
-    "markerfacecolor": "white",
-    "markersize": 7,
-    "linestyle": "none",
-}
+_SQUARE: dict[str, Any] = {"marker": "s", "markerfacecolor": "white", "markersize": 7, "linestyle": "none"}
+_GIVEN: dict[str, Any] = {"color": GREY, **_SQUARE}
 _SHRUNK: dict[str, Any] = {"color": AFTER["color"], "marker": "o", "markersize": 7, "linestyle": "none"}
 
 
@@ -72,33 +67,19 @@ def gap_table(name: str, gap: GapChangeGroup, caption: str) -> Table:
 
 
 def marked(points: int) -> dict[str, Any]:
-    """Put circles on the curve after, so that it is told from the others without colour.
-
-    Parameters
-    ----------
-    points : int
-        Of the curve.
-    """
+    """Put circles on the curve after, of so many points, so that it is told from the others without colour."""
     every = max(1, points // _MARKS)
     return {**AFTER, "marker": "o", "markersize": 3.6, "markerfacecolor": "white", "markevery": every}
 
 
 def keep_in_view(axes: Axes, shown: Sequence[Array], astray: Array) -> None:
-    """Stop a curve that runs away from flattening the others; parameters as those of `leaves_view`."""
+    """Let a curve that runs away leave the picture: it would flatten those that must be seen in full."""
     if leaves_view(shown, astray):
         axes.set_ylim(*_view(shown))
 
 
 def leaves_view(shown: Sequence[Array], astray: Array) -> bool:
-    """Tell whether a curve runs away from the others.
-
-    Parameters
-    ----------
-    shown : sequence of array
-        Curves that must be seen in full.
-    astray : array
-        The curve that may leave the picture.
-    """
+    """Tell whether a curve runs away from those that must be seen in full."""
     low, high = _view(shown)
     return bool(astray.min() < low or astray.max() > high)
 
@@ -125,7 +106,15 @@ def gap_sizes_figure(name: str, gap: GapChangeGroup) -> Plot:
         axes.axvspan(0.8 * _LEAST, CLEAR, color="#eeeeee", label="within noise", zorder=0)
         axes.axvline(1.0, color="black", linewidth=1.1, linestyle=(0, (4, 2)), label="noise floor", zorder=1)
         axes.set_yticks(rows, channels)
-        _scale(axes, float(np.nanmax([*before, *after, 1.0])))
+        axes.set_ylim(-0.6, len(channels) - 0.4)
+        axes.grid(visible=False, axis="y")
+        largest = float(np.nanmax([*before, *after, 1.0]))
+        axes.set_xscale("log")
+        axes.set_xlim(0.8 * _LEAST, 1.6 * max(largest, 3.0))
+        ticks = [0.1, 1.0, *(10.0**power for power in range(1, 9) if 10.0**power < 1.6 * largest)]
+        axes.set_xticks(ticks, [plain(tick) for tick in ticks])
+        axes.set_xticks([], minor=True)
+        axes.set_xlabel("gap, noise floors")
         legend_over(figure, axes)
 
     note = f" Marks at {plain(_LEAST)} stand for {plain(_LEAST)} or less." if hidden else ""
@@ -133,17 +122,5 @@ def gap_sizes_figure(name: str, gap: GapChangeGroup) -> Plot:
         f"Gap on held-out flights, in noise floors (logarithmic). A gap at the dashed line is as large as what noise "
         f"alone leaves; within the grey band, up to {CLEAR:g} floors, it is none.{note}"
     )
-    return plot(
-        name, caption, "Gap of each channel before and after, in noise floors", 1.0 + 0.34 * len(channels), draw
-    )
-
-
-def _scale(axes: Axes, largest: float) -> None:
-    axes.set_xscale("log")
-    axes.set_xlim(0.8 * _LEAST, 1.6 * max(largest, 3.0))
-    axes.set_ylim(-0.6, len(axes.get_yticks()) - 0.4)
-    ticks = [0.1, 1.0, *(10.0**power for power in range(1, 9) if 10.0**power < 1.6 * largest)]
-    axes.set_xticks(ticks, [plain(tick) for tick in ticks])
-    axes.set_xticks([], minor=True)
-    axes.grid(visible=False, axis="y")
-    axes.set_xlabel("gap, noise floors")
+    description = "Gap of each channel before and after, in noise floors"
+    return plot(name, caption, description, 1.0 + 0.34 * len(channels), draw)

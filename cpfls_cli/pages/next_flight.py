@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -41,19 +40,15 @@ def question_blocks(name: str, asked: QuestionGroup) -> Iterator[Block]:
     """Say what a flight will tell and how sure, beside other flights, and what to do with it."""
     worst = float(np.nanmin(np.minimum(asked.sure, np.where(np.isnan(asked.flown), 1.0, asked.flown))))
     told = _told(asked)
+    right = f"{_percent(worst)} of such flights"
     if worst >= _SETTLED:
-        yield Text(
-            f"This flight tells {told}: each outcome is right in {_percent(worst)} of such flights or more.", "good"
-        )
+        yield Text(f"This flight tells {told}: each outcome is right in {right} or more.", "good")
     elif worst >= _EVEN:
-        yield Text(
-            f"This flight probably tells {told}: right in {_percent(worst)} of such flights where it is hardest.",
-            "note",
-        )
+        yield Text(f"This flight probably tells {told}: right in {right} where it is hardest.", "note")
     else:
         yield Text(
-            f"Within this room no flight was found that surely tells {told}: where it is hardest, {_percent(worst)} of "
-            "such flights do. Give it a larger --box, a longer --duration, or higher trajectory.limits.",
+            f"Within this room no flight was found that surely tells {told}: where it is hardest, {right} do. Give it "
+            "a larger --box, a longer --duration, or higher trajectory.limits.",
             "warning",
         )
     yield _table(name, asked)
@@ -98,29 +93,24 @@ def _table(name: str, asked: QuestionGroup) -> Table:
     return Table(name, caption, header, rows, frozenset({0, 1}))
 
 
-def _least(row: Mapping[str, Any]) -> str:
-    """Say from which size on an effect is told; nothing of one that is as it is."""
-    if row["smallest"] or not row["size"]:
-        return str(row["smallest"])
-    return f"{number(row['least'], 2)} of that"
-
-
 def _outcomes(asked: QuestionGroup) -> Iterator[str]:
     """Say what each outcome will mean."""
     rows = rows_of(asked)
     for row in rows:
-        true, rival, least = row["true"], row["rival"], _least(row)
-        taken = f"Taken for it: {row['size']}. " if row["size"] else ""
+        true, rival, least = row["true"], row["rival"], str(row["smallest"])
+        if not least and row["size"]:
+            least = f"{number(row['least'], 2)} of that"
+        taken = f"Assumed size: {row['size']}. " if row["size"] else ""
         if not rival:
             absent = f"smaller than {least}" if least else "not there"
             yield f"If the diagnosis then names {true}, it is there; if not, it is {absent}. {taken}".rstrip()
             continue
         chance = max(other["wrong"] for other in rows if {other["true"], other["rival"]} == {true, rival})
-        surely = f"Surely told from {least} on. " if least else ""
+        surely = f"Surely told apart from {least} on. " if least else ""
         error = f"less than {100 * _RARE:g} %" if chance < _RARE else f"{100 * chance:.2g} %"
         yield (
             f"If the diagnosis then names {true} alone, it is {true} and not {rival} (by chance the wrong one of the "
-            f"two is named in {error} of flights). {taken}{surely}By hand: {row['advice']}."
+            f"two is named in {error} of flights). {taken}{surely}To fly it by hand: {row['advice']}."
         )
     if any(asked.rival):
         yield (

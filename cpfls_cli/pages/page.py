@@ -2,80 +2,100 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
+from cpfls_cli.artifacts.disagreement import DisagreementRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.pages.comparison import comparison_section
-from cpfls_cli.pages.diagnosis import diagnosis_section
-from cpfls_cli.pages.disagreement import disagreement_section
-from cpfls_cli.pages.evidence import steps_section, validation_section
+from cpfls_cli.pages.diagnosis import diagnosis_blocks
+from cpfls_cli.pages.disagreement import disagreement_blocks
+from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
 from cpfls_cli.pages.extended import extension_section
 from cpfls_cli.pages.flight import flight_section, vehicle_section
-from cpfls_cli.pages.fuzzy_part import partitions_section, rules_section
+from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
 from cpfls_cli.pages.identification import identification_section, search_section
 from cpfls_cli.pages.prediction import prediction_section
 from cpfls_cli.pages.provenance import missing, provenance_section
 from cpfls_cli.pages.replay import replay_section
-from cpfls_cli.pages.residuals import residuals_section
+from cpfls_cli.pages.residuals import residual_blocks
 from cpfls_cli.pages.selection import reduction_section
 from cpfls_cli.pages.sensors import sensors_section, unseen_section
-from cpfls_cli.pages.source import Sources
+from cpfls_cli.pages.source import R, Source, Sources, section_of_each
 from cpfls_cli.pages.summary import models_section, summary_section
 from cpfls_cli.pages.sweep import replicates_section
 from cpfls_cli.pages.tracking import tracking_section
-from cpfls_cli.pages.trajectory import path_section
-from cpfls_cli.pages.uncertainty import uncertainty_section
+from cpfls_cli.pages.trajectory import path_blocks
+from cpfls_cli.pages.uncertainty import uncertainty_blocks
 from cpfls_cli.pages.vehicle_model import found_vehicle_section
-from cpfls_cli.report.content import Document, Section
+from cpfls_cli.report.content import Block, Document, Section
 from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import html_page
 from cpfls_cli.report.json_page import json_page
 from cpfls_cli.report.markdown import markdown_page
 
-_SECTIONS = (
+
+def _of_each(
+    name: str,
+    title: str,
+    kind: type[R],
+    blocks: Callable[[Source[R], int], Iterable[Block]],
+    holds: Callable[[R], object] = lambda _: True,
+) -> Callable[[Sources], Section | None]:
+    """Make a section of all artifacts of one kind, or of those that hold what it shows."""
+
+    def section(sources: Sources) -> Section | None:
+        shown = [source for source in sources.of_kind(kind) if holds(source.record)]
+        return section_of_each(name, title, shown, blocks)
+
+    return section
+
+
+_SECTIONS: Sequence[Callable[[Sources], Section | None]] = (
     summary_section,
     comparison_section,
     models_section,
-    diagnosis_section,
+    _of_each("diagnosis", "Before and after", DiagnosisRecord, diagnosis_blocks),
     extension_section,
     found_vehicle_section,
-    disagreement_section,
+    _of_each("disagreement", "Where they disagree", DisagreementRecord, disagreement_blocks),
     sensors_section,
     unseen_section,
     vehicle_section,
-    path_section,
+    _of_each("path", "Training path", TrajectoryRecord, path_blocks),
     flight_section,
     reduction_section,
     identification_section,
-    validation_section,
-    residuals_section,
-    uncertainty_section,
-    steps_section,
+    _of_each("validation", "How far to trust it", IdentifiedRecord, validation_blocks),
+    _of_each(
+        "residuals", "What the model leaves unexplained", IdentifiedRecord, residual_blocks, lambda one: one.residuals
+    ),
+    _of_each(
+        "uncertainty",
+        "How sure the inertia is",
+        IdentifiedRecord,
+        uncertainty_blocks,
+        lambda one: one.uncertainty or one.curves,
+    ),
+    _of_each("steps", "Prediction by horizon", IdentifiedRecord, steps_blocks, lambda one: one.steps),
     replicates_section,
     search_section,
-    partitions_section,
+    _of_each("partitions", "Partitions and parameters", IdentifiedRecord, partitions_blocks),
     prediction_section,
     replay_section,
     tracking_section,
-    rules_section,
+    _of_each("rules", "Excitation of the rules", IdentifiedRecord, rules_blocks),
     provenance_section,
 )
-
 
 _WRITE = {Form.HTML: html_page, Form.MARKDOWN: markdown_page, Form.JSON: json_page}
 
 
 @dataclass(frozen=True)
 class Page:
-    """A finished report.
-
-    Attributes
-    ----------
-    sections, figures, tables : tuple of str
-        Names of what it shows, in order.
-    missing : tuple of str
-        Formats of which no artifact was given.
-    """
+    """A finished report: its text, the names of what it shows in order, and the formats that were not given."""
 
     text: str
     sections: tuple[str, ...]
@@ -90,18 +110,7 @@ def sections_of(sources: Sources) -> list[Section]:
 
 
 def report_page(sources: Sources, version: str, form: Form = Form.HTML) -> Page:
-    """Write a report about artifacts.
-
-    Parameters
-    ----------
-    version : str
-        Of the program.
-
-    Returns
-    -------
-    Page
-        Equal text for equal artifacts and settings.
-    """
+    """Write a report about artifacts, with the version of the program; equal text for equal artifacts and settings."""
     return page_of(sources, sections_of(sources), version, form)
 
 

@@ -22,19 +22,14 @@ _SURE: Final = {"data": "the data", "named": "its name", "guess": "a guess"}
 NOT_KNOWN: Final = {"inertia": "null", "thrust": "null", "drag": "null"}
 """What stands for numbers that the identification of the vehicle finds."""
 
+_SPINS: Final = {1: "counter-clockwise", -1: "clockwise", 0: "turning an unknown way"}
 _ORDER: Final = ("body_frame", "world_frame", "quaternion_order", "acceleration_frame", "rotor_command_is")
 _FASTEST_HZ, _RATE_HZ, _LOWPASS_HZ = 500.0, 250.0, 60.0
 
 
 @dataclass(frozen=True)
 class Stated:
-    """What the person who asks knows.
-
-    Attributes
-    ----------
-    mass_kg, arm_m : float or None
-        None where it is not said.
-    """
+    """What the person who asks knows of the vehicle."""
 
     mass_kg: float | None = None
     arm_m: float | None = None
@@ -59,31 +54,32 @@ def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
     names = ", ".join(one.name for one in proposal.logs)
     yield Text("; ".join([names, *proposal.facts]))
     rows = [
-        _row(guess.signal, _columns(guess.columns.columns), _unit(guess.columns), guess) for guess in proposal.signals
+        _row(guess.signal, ", ".join(guess.columns.columns), _unit(guess.columns), guess) for guess in proposal.signals
     ]
     rows += [_row(choice.key, choice.value, "", choice) for choice in proposal.choices]
     header = ("Signal or key", "Columns or value", "Unit", "Told by", "Why")
-    yield Table(
-        "signals", "What the log is taken for.", header, rows, words=frozenset(range(4)), sentences=frozenset({4})
-    )
-    for entry, rival in _rivals(proposal):
-        yield Text(f"{entry}: the data cannot rule out {rival.text}: {rival.reason}", "warning")
+    yield Table("signals", "What the log is taken for.", header, rows, frozenset(range(4)), frozenset({4}))
+    named = [(guess.signal, guess.rivals) for guess in proposal.signals]
+    for name, rivals in [*named, *((choice.key, choice.rivals) for choice in proposal.choices)]:
+        for rival in rivals:
+            yield Text(f"{name}: the data cannot rule out {rival.text}: {rival.reason}", "warning")
     for one in proposal.logs:
         prefix = f"{one.name}: " if len(proposal.logs) > 1 else ""
-        reasons = one.recognition.flown.reasons or ("all of it is flown, nothing is cut",)
+        reasons = one.recognition.flown.reasons or ("all of it is flight, nothing is cut",)
         yield from (Text(f"{prefix}{reason}") for reason in reasons)
         yield from (Text(f"{prefix}not mapped: {words}", "note") for words in one.recognition.left_out)
     yield Text(_rotors_in_words(proposal))
     yield from (Text(warning, "warning") for warning in proposal.warnings)
-    yield from _what_next(proposal, stated, output)
+    asked = asked_keys(proposal, stated)
+    if asked:
+        yield Text(f"to be filled in by hand, marked {ASK} in {output}: {', '.join(asked)}", "warning")
+    yield Text(f"next: cpfls import {output} {proposal.logs[0].name} -o flight.h5")
+    if proposal.rotors:
+        yield Text(f"then: cpfls vehicle {output} flight.h5 -o vehicle.h5")
 
 
 def _row(name: str, value: str, unit: str, entry: Guess | Choice) -> list[str | Cell]:
     return [name, value, unit, Cell(_SURE[entry.sure], "warning" if entry.sure == "guess" else "plain"), entry.reason]
-
-
-def _columns(columns: Sequence[str]) -> str:
-    return ", ".join(columns)
 
 
 def _unit(columns: ColumnMap) -> str:
@@ -93,43 +89,24 @@ def _unit(columns: ColumnMap) -> str:
     return f"{columns.unit}{scale}{offset}{sign}"
 
 
-def _rivals(proposal: Proposal) -> Iterator[tuple[str, Rival]]:
-    for guess in proposal.signals:
-        yield from ((guess.signal, rival) for rival in guess.rivals)
-    for choice in proposal.choices:
-        yield from ((choice.key, rival) for rival in choice.rivals)
-
-
 def _rotors_in_words(proposal: Proposal) -> str:
     if proposal.states_torque:
         return "the log states a torque and no rotors"
     if not proposal.rotors:
         return (
-            "no column is recognised as a rotor's, so nothing here drives a model of the vehicle; if some are, name"
+            "no column is recognised as a rotor's, and a model of the vehicle needs rotors; if some are, name"
             " them in import.signals (rotor_speed or rotor_command)"
         )
     if proposal.airframe is None:
-        unknown = "neither parameters nor the motion say where they are; a livelier log beside this one may"
+        unknown = (
+            "neither parameters nor the motion say where they are; a log with more motion, given beside this one, may"
+        )
         return f"{proposal.rotors} rotors; {unknown}"
     places = ", ".join(
-        f"{index} {rotor.name or 'at its place'} {_turning(rotor)}".replace("  ", " ")
+        f"{index} {rotor.name or 'at its place'} {_SPINS[rotor.spin]}".replace("  ", " ")
         for index, rotor in enumerate(proposal.airframe.rotors, start=1)
     )
     return f"rotors{', a guess' if proposal.airframe.is_guess else ''}: {places} ({proposal.airframe.reason})"
-
-
-def _turning(rotor: RotorPlace) -> str:
-    return {1: "counter-clockwise", -1: "clockwise", 0: "turning an unknown way"}[rotor.spin]
-
-
-def _what_next(proposal: Proposal, stated: Stated, output: str) -> Iterator[Text]:
-    asked = asked_keys(proposal, stated)
-    if asked:
-        yield Text(f"to be filled in by hand, marked {ASK} in {output}: {', '.join(asked)}", "warning")
-    log = proposal.logs[0].name
-    yield Text(f"next: cpfls import {output} {log} -o flight.h5")
-    if proposal.rotors:
-        yield Text(f"then: cpfls vehicle {output} flight.h5 -o vehicle.h5")
 
 
 def summary(proposal: Proposal, stated: Stated, output: str) -> dict[str, Any]:
@@ -140,7 +117,7 @@ def summary(proposal: Proposal, stated: Stated, output: str) -> dict[str, Any]:
         "systems": [one.system for one in proposal.logs],
         "time_column": proposal.time_column,
         "time_unit": proposal.time_unit,
-        "signals": {guess.signal: {**_map(guess.columns), **_grounds(guess)} for guess in proposal.signals},
+        "signals": {guess.signal: {**_columns(guess.columns), **_grounds(guess)} for guess in proposal.signals},
         "choices": {choice.key: {"value": choice.value, **_grounds(choice)} for choice in proposal.choices},
         "crop_s": proposal.crop_s,
         "crops_s": dict(proposal.crops),
@@ -160,7 +137,7 @@ def _grounds(entry: Guess | Choice) -> dict[str, Any]:
     return {"told_by": entry.sure, "reason": entry.reason, "rivals": rivals}
 
 
-def _map(columns: ColumnMap) -> dict[str, Any]:
+def _columns(columns: ColumnMap) -> dict[str, Any]:
     return {
         "columns": list(columns.columns),
         "unit": columns.unit,
@@ -293,7 +270,15 @@ def _import(proposal: Proposal) -> Iterator[str]:
             2,
         )
         yield "  torque_source: null"
-    yield from _crop(proposal)
+    alone = len(proposal.logs) == 1
+    for one in proposal.logs:
+        for reason in one.recognition.flown.reasons:
+            yield from _comment(reason if alone else f"{one.name}: {reason}", 2)
+    if proposal.crop_s is None and any(proposal.crops.values()):
+        yield from _comment("No one stretch suits all logs; each takes its own:", 2)
+        for name, crop in proposal.crops.items():
+            yield f"  # {name}: {'null' if crop is None else f'--set import.crop_s=[{crop[0]:g},{crop[1]:g}]'}"
+    yield f"  crop_s: {'null' if proposal.crop_s is None else _flow(list(proposal.crop_s))}"
     yield f"  gap_s: {_flow(proposal.gap_s)}"
     yield "  gap_rule: longest-part"
     if first.rate_hz > _FASTEST_HZ:
@@ -323,20 +308,15 @@ def _signal(guess: Guess) -> Iterator[str]:
         return
     yield f"    {guess.signal}:"
     for key, value in entries.items():
-        yield from _long(f"      {key}: ", value)
+        line = f"      {key}: {_flow(value)}"
+        if len(line) <= _WIDTH or not isinstance(value, list):
+            yield line
+        else:
+            yield f"      {key}:"
+            yield from (f"        - {_flow(item)}" for item in value)
     if columns.otherwise:
         yield "      otherwise:"
         yield from (f"        - {_flow(_entries(other))}" for other in columns.otherwise)
-
-
-def _long(start: str, value: Any) -> Iterator[str]:
-    line = start + _flow(value)
-    if len(line) <= _WIDTH or not isinstance(value, list):
-        yield line
-        return
-    yield start.rstrip()
-    indent = " " * (len(start) - len(start.lstrip()) + 2)
-    yield from (f"{indent}- {_flow(item)}" for item in value)
 
 
 def _entries(columns: ColumnMap) -> dict[str, Any]:
@@ -346,18 +326,6 @@ def _entries(columns: ColumnMap) -> dict[str, Any]:
     entries |= {"scale": columns.scale} if columns.scale != 1.0 else {}
     entries |= {"offset": columns.offset} if columns.offset != 0.0 else {}
     return entries
-
-
-def _crop(proposal: Proposal) -> Iterator[str]:
-    alone = len(proposal.logs) == 1
-    for one in proposal.logs:
-        for reason in one.recognition.flown.reasons:
-            yield from _comment(reason if alone else f"{one.name}: {reason}", 2)
-    if proposal.crop_s is None and any(proposal.crops.values()):
-        yield from _comment("No one stretch suits all logs; each takes its own:", 2)
-        for name, crop in proposal.crops.items():
-            yield f"  # {name}: {'null' if crop is None else f'--set import.crop_s=[{crop[0]:g},{crop[1]:g}]'}"
-    yield f"  crop_s: {'null' if proposal.crop_s is None else _flow(list(proposal.crop_s))}"
 
 
 def _comment(text: str, indent: int) -> Iterator[str]:
@@ -377,9 +345,8 @@ def _flow(value: Any) -> str:
         case list():
             return "[" + ", ".join(_flow(item) for item in value) + "]"
         case str():
-            plain = (
-                _PLAIN.fullmatch(value) and value.strip() == value and value.lower() not in ("true", "false", "null")
-            )
-            return value if plain else json.dumps(value, ensure_ascii=False)
+            is_word = _PLAIN.fullmatch(value) and value == value.strip()
+            needs_quotes = not is_word or value.lower() in ("true", "false", "null")
+            return json.dumps(value, ensure_ascii=False) if needs_quotes else value
         case _:
             return json.dumps(value)

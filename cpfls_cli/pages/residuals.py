@@ -11,9 +11,9 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.evidence import ResidualsGroup
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES
-from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, plain_ticks, plot, stacked, style_of
-from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.content import Block, Cell, Heading, Plot, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, number, percent, probability
 
 if TYPE_CHECKING:
@@ -30,19 +30,8 @@ _FILL: dict[str, Any] = {"color": "#9db8d6", "edgecolor": "#1b4f8a", "linewidth"
 _NORMAL: dict[str, Any] = {**BASELINE, "color": "black"}
 
 
-def residuals_section(sources: Sources) -> Section | None:
-    """Show the residuals of the models that hold them.
-
-    Returns
-    -------
-    Section or None
-        None where no model holds any.
-    """
-    models = [model for model in sources.models if model.record.residuals is not None]
-    return section_of_each("residuals", "What the model leaves over", models, _residuals)
-
-
-def _residuals(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+def residual_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+    """Show what a model leaves of the torque, where it holds that."""
     residuals = model.record.residuals
     assert residuals is not None, "only models that hold them are shown"
     yield Heading(model.label)
@@ -57,22 +46,17 @@ def _residuals(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
 
 
 def _whiteness(label: str, residuals: ResidualsGroup, index: int) -> Table:
+    samples, available = residuals.samples, residuals.available
+    examined = f"{samples}" if available in (None, samples) else f"the first {samples} of its {available}"
     caption = (
-        f"Whether the torque error of {label} is white noise about 0 on {residuals.part}, "
-        f"{_examined(residuals)}. Of white noise 5 % of the lags lie outside the band; p is the chance that white "
-        "noise has autocorrelations as large (Ljung and Box). Filtered signals are never quite white. The mean is a "
-        "constant torque that the model lacks, with the chance that errors without one have a mean as large."
+        f"Whether the torque error of {label} is white noise about 0 on {residuals.part}, {examined} samples. Of white "
+        "noise 5 % of the lags lie outside the band; p is the chance that white noise has autocorrelations as large "
+        "(Ljung and Box). Filtered signals are never quite white. The mean is a constant torque that the model lacks, "
+        "with the chance that errors without one have a mean as large."
     )
-    header = ("Axis", "At one sample", "Lags outside the band", "p", "Mean, N m", "p of the mean", "So it is")
+    header = ("Axis", "At one sample", "Lags outside the band", "p", "Mean, N m", "p of the mean", "Conclusion")
     rows = [[name, *_whiteness_about(residuals, axis)] for axis, name in enumerate(AXES)]
     return Table(f"whiteness-of-errors-{index}", caption, header, rows, frozenset({0, len(header) - 1}))
-
-
-def _examined(residuals: ResidualsGroup) -> str:
-    samples, available = residuals.samples, residuals.available
-    if available is None or samples == available:
-        return f"{samples} samples"
-    return f"the first {samples} of its {available} samples"
 
 
 def _whiteness_about(residuals: ResidualsGroup, axis: int) -> list[str | Cell]:
@@ -137,9 +121,9 @@ def autocorrelation_figure(name: str, label: str, residuals: ResidualsGroup) -> 
         legend_over(figure, panels[0])
 
     caption = (
-        f"Correlation of the torque error of {label} with itself some time later, on "
-        f"{residuals.part}. Errors that noise alone makes stay within the grey band at 95 % of the "
-        "lags; what stays outside is motion that the model does not explain."
+        f"Correlation of the torque error of {label} with itself some time later, on {residuals.part}. Errors that "
+        "noise alone makes stay within the grey band at 95 % of the lags; errors outside it follow motion that the "
+        "model does not explain."
     )
     return plot(name, caption, "Autocorrelation of the torque error by axis, with the band of white noise", 2.5, draw)
 
@@ -168,9 +152,8 @@ def cross_correlation_figure(name: str, label: str, residuals: ResidualsGroup) -
         panels[-1].set_xlabel("lag, s (positive: the error follows the input)")
 
     caption = (
-        f"Correlation of the torque error of {label} with the signals that go into the model and the "
-        f"torque that comes out of it, on {residuals.part}; the three strongest of each axis are "
-        "named, the others are grey lines. "
+        f"Correlation of the torque error of {label} with the signals that go into the model and the torque that "
+        f"comes out of it, on {residuals.part}; the three strongest of each axis are named, the others are grey lines. "
         "Far outside the grey band the error follows a signal, so that a better model could explain it; slow signals "
         "leave the band by chance too."
     )
@@ -197,10 +180,14 @@ def distribution_figure(name: str, label: str, residuals: ResidualsGroup) -> Plo
     def draw(figure: Figure) -> None:
         upper, lower = _by_axis(figure, rows=2)
         for index, quantiles in enumerate(residuals.quantile.T):
-            middle, deviation = _robust(normal, quantiles)
+            # Median and quartiles give a normal distribution that outliers do not move.
+            low, middle, high = np.interp([-_QUARTILE, 0.0, _QUARTILE], normal, quantiles)
+            deviation = (high - low) / (2 * _QUARTILE)
             edges, counts = residuals.histogram_edge[:, index], residuals.histogram_count[:, index]
             _histogram(upper[index], edges, counts, middle, deviation)
-            _quantiles(lower[index], normal, quantiles, middle, deviation)
+            lower[index].plot(normal, quantiles, "o", markersize=2.4, color=style_of(0)["color"])
+            ends = normal[[0, -1]]
+            lower[index].plot(ends, middle + deviation * ends, **_NORMAL)
         upper[0].set_ylabel("errors in a bin")
         upper[1].set_xlabel("error, N m")
         lower[0].set_ylabel("quantile of the error, N m")
@@ -208,17 +195,11 @@ def distribution_figure(name: str, label: str, residuals: ResidualsGroup) -> Plo
         legend_over(figure, upper[0])
 
     caption = (
-        f"Distribution of the torque error of {label} on {residuals.part}: histogram, and its "
-        "quantiles over those of the normal distribution (dashed: the normal distribution through the quartiles). "
-        "Points that leave the dashed line at the ends are errors larger than noise makes them."
+        f"Distribution of the torque error of {label} on {residuals.part}: histogram, and its quantiles over those of "
+        "the normal distribution (dashed: the normal distribution through the quartiles). Points that leave the dashed "
+        "line at the ends are errors larger than noise makes them."
     )
     return plot(name, caption, "Histogram and quantile plot of the torque error by axis", 4.6, draw)
-
-
-def _robust(normal: Array, quantiles: Array) -> tuple[float, float]:
-    """Fit a normal distribution to median and quartiles, which outliers do not move."""
-    low, middle, high = np.interp([-_QUARTILE, 0.0, _QUARTILE], normal, quantiles)
-    return float(middle), float(high - low) / (2 * _QUARTILE)
 
 
 def _histogram(axes: Axes, edges: Array, counts: IntArray, middle: float, deviation: float) -> None:
@@ -233,9 +214,3 @@ def _histogram(axes: Axes, edges: Array, counts: IntArray, middle: float, deviat
     axes.grid(visible=False, axis="x")
     axes.xaxis.set_major_locator(MaxNLocator(3, symmetric=True))
     plain_ticks(axes.xaxis)
-
-
-def _quantiles(axes: Axes, normal: Array, quantiles: Array, middle: float, deviation: float) -> None:
-    axes.plot(normal, quantiles, "o", markersize=2.4, color=style_of(0)["color"])
-    ends = np.array([normal[0], normal[-1]])
-    axes.plot(ends, middle + deviation * ends, **_NORMAL)

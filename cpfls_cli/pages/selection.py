@@ -19,15 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_HEADER = (
-    "Set",
-    "Samples",
-    "Share",
-    "Rank",
-    "Condition number",
-    "Change",
-    "Random choice of equal size",
-)
+_HEADER = ("Set", "Samples", "Share", "Rank", "Condition number", "Change", "Random choice of equal size")
 _Row = list[str | Cell]
 
 
@@ -52,18 +44,14 @@ def _warnings(selection: Source[SelectionRecord]) -> Iterator[str]:
             f"{selection.label} is rank deficient: rank {record.rank}, where all samples reach {record.rank_full}; do "
             "not train on it, use another reduction.criterion or more samples"
         )
-    elif _is_a_choice(record) and at_most(record.random_median, record.condition_number):
+    # All samples are the only choice of their size.
+    elif len(record.indices) < record.candidates and at_most(record.random_median, record.condition_number):
         yield f"{selection.label} is no better than a random choice of equal size"
     if target is not None and less(target, record.condition_number):
         yield (
             f"the target reduction.condition_number = {target:g} is not reached, the selection has "
             f"{number(record.condition_number, 5)}: {_limit(record)}"
         )
-
-
-def _is_a_choice(record: SelectionRecord) -> bool:
-    """Tell whether others could have been selected: all samples are the only choice of their size."""
-    return len(record.indices) < record.candidates
 
 
 def _limit(record: SelectionRecord) -> str:
@@ -75,43 +63,35 @@ def _limit(record: SelectionRecord) -> str:
 
 
 def reduction_section(sources: Sources) -> Section | None:
-    """Show the reduced training sets.
-
-    Returns
-    -------
-    Section or None
-        None where no selection was given.
-
-    References
-    ----------
-    Table 4 and Figure 5 of the paper.
-    """
-    if not sources.selections:
+    """Show the reduced training sets, if any: Table 4 and Figure 5 of the paper."""
+    selections = sources.selections
+    if not selections:
         return None
     blocks: list[Block] = []
-    for selection in sources.selections:
-        blocks += [Heading(selection.label)] if len(sources.selections) > 1 else []
-        blocks += [*answer(selection), *_undetermined(selection)]
-    blocks += [_table(sources), *_better_than_all(sources)]
-    flights = list(dict.fromkeys(selection.made_from("flight") for selection in sources.selections))
+    for selection in selections:
+        blocks += [Heading(selection.label)] if len(selections) > 1 else []
+        blocks += answer(selection)
+        full, parameters = selection.record.rank_full, selection.parameters
+        if full < parameters:
+            undetermined = (
+                f"The flight behind {selection.label} determines only {full} of {parameters} parameters, however many "
+                "samples are kept: condition numbers cover the determined directions only."
+            )
+            blocks.append(Text(undetermined, "warning"))
+    blocks.append(_table(selections))
+    for selection in selections:
+        record = selection.record
+        if not record.deficient and less(record.condition_number, record.condition_number_full):
+            blocks.append(Text(f"{selection.label} is better conditioned than the full set."))
+    flights = list(dict.fromkeys(selection.made_from("flight") for selection in selections))
     for index, flight in enumerate(flights, start=1):
-        group = [selection for selection in sources.selections if selection.made_from("flight") == flight]
+        group = [selection for selection in selections if selection.made_from("flight") == flight]
         blocks.append(reduction_figure(f"figure-5-reduction-{index}", group))
     return Section("reduction", "Reduced training set", blocks)
 
 
-def _undetermined(selection: Source[SelectionRecord]) -> Iterator[Text]:
-    full = selection.record.rank_full
-    if full < selection.parameters:
-        yield Text(
-            f"The flight behind {selection.label} determines only {full} of {selection.parameters} parameters, however "
-            "many samples are kept: condition numbers cover the determined directions only.",
-            "warning",
-        )
-
-
-def _table(sources: Sources) -> Table:
-    rows = [row for selection in sources.selections for row in _rows(selection)]
+def _table(selections: Sequence[Source[SelectionRecord]]) -> Table:
+    rows = [row for selection in selections for row in _rows(selection)]
     # Selections from one flight share its full set, which then stands once.
     rows = [row for index, row in enumerate(rows) if row not in rows[:index]]
     caption = (
@@ -137,25 +117,8 @@ def _rows(selection: Source[SelectionRecord]) -> Iterator[_Row]:
     ]
 
 
-def _better_than_all(sources: Sources) -> Iterator[Text]:
-    for selection in sources.selections:
-        record = selection.record
-        if not record.deficient and less(record.condition_number, record.condition_number_full):
-            yield Text(f"{selection.label} is better conditioned than the full set.")
-
-
 def reduction_figure(name: str, selections: Sequence[Source[SelectionRecord]]) -> Plot:
-    """Draw condition number and extreme singular values after each selected sample.
-
-    Parameters
-    ----------
-    selections : sequence of Source
-        Selections from one flight.
-
-    References
-    ----------
-    Figure 5 of the paper.
-    """
+    """Draw condition number and extreme singular values after each sample selected from one flight: Figure 5."""
 
     def draw(figure: Figure) -> None:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
@@ -183,7 +146,7 @@ def _draw_condition(axes: Axes, selection: Source[SelectionRecord], index: int) 
     record, trace = selection.record, selection.record.trace.condition_number
     label = f"{record.criterion}, {len(trace)} samples{', rank deficient' if record.deficient else ''}"
     known = np.where(np.isfinite(trace), trace, np.nan)
-    axes.plot(_numbers(trace), known, label=label, **style_of(index))
+    axes.plot(_sizes(trace), known, label=label, **style_of(index))
     random = record.random_median
     if np.isfinite(random):
         word = "random choice" if index == 0 else None
@@ -197,8 +160,9 @@ def _draw_singular_values(axes: Axes, selection: Source[SelectionRecord], index:
     for values, word, dashes in curves:
         shown = np.where(values > 0, values, np.nan)
         label = word if index == 0 else None
-        axes.plot(_numbers(values), shown, color=colour, linestyle=dashes, label=label)
+        axes.plot(_sizes(values), shown, color=colour, linestyle=dashes, label=label)
 
 
-def _numbers(trace: Array) -> Array:
+def _sizes(trace: Array) -> Array:
+    """Count the samples that are selected at each point of a curve."""
     return np.arange(1, len(trace) + 1, dtype=float)

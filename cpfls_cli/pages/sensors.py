@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from typing import Any
 
 from cpfls_cli.artifacts.gap_flights import AuditGroup, NotExcitedGroup
 from cpfls_cli.pages.effects import effect_title, measured, titles, unit_words
@@ -29,11 +30,6 @@ def contradicted(first: str) -> str:
     return f"The log contradicts itself: {sentence(first)}"
 
 
-def contradictions_told(audit: AuditGroup) -> Iterator[Text]:
-    """Say what no verdict can stand beside."""
-    return (Text(contradicted(each), "warning") for each in audit.contradiction or ())
-
-
 def _faults(audit: AuditGroup) -> Iterator[Block]:
     for fault in audit.faults:
         yield Box("SENSOR FAULT", f"{fault} The diagnosis repairs it before it looks at the model.", [], "warning")
@@ -50,21 +46,23 @@ def sensor_warnings(audit: AuditGroup) -> Iterator[Text]:
 
 
 def sensors_section(sources: Sources) -> Section | None:
-    """Show the audit of the sensors, each once.
-
-    Returns
-    -------
-    Section or None
-        None where nothing of the gap workflow was given.
-    """
-    distinct = {_words(source.record.audit): source for source in reversed(sources.gap)}
+    """Show the audits of the sensors, equal ones once, where anything of the gap workflow was given."""
+    shown = _distinct(sources.gap, lambda record: _words(record.audit))
     blocks: list[Block] = []
-    for index, source in enumerate(reversed(distinct.values()), start=1):
+    for index, source in enumerate(shown, start=1):
         audit = source.record.audit
-        blocks += [Heading(source.label)] if len(distinct) > 1 else []
-        blocks += [*contradictions_told(audit), *settled_channels(audit), *_faults(audit), *sensor_warnings(audit)]
+        blocks += [Heading(source.label)] if len(shown) > 1 else []
+        # No verdict can stand beside a log that contradicts itself.
+        blocks += [Text(contradicted(each), "warning") for each in audit.contradiction or ()]
+        blocks += [*settled_channels(audit), *_faults(audit), *sensor_warnings(audit)]
         blocks += [_numbers(audit, f"sensor-numbers-{index}")] if audit.coefficient.name else []
     return Section("sensors", _SENSORS, blocks) if blocks else None
+
+
+def _distinct(sources: Sequence[Source[Any]], told: Callable[[Any], Hashable]) -> list[Source[Any]]:
+    """List artifacts without those that tell the same as one before."""
+    distinct = {told(source.record): source for source in reversed(sources)}
+    return list(reversed(distinct.values()))
 
 
 def _words(audit: AuditGroup) -> tuple[str, ...]:
@@ -96,27 +94,17 @@ def unseen_answer(unseen: NotExcitedGroup) -> Iterator[Block]:
 
 
 def unseen_section(sources: Sources) -> Section | None:
-    """List the effects that could be there unseen, with the reason or the flight that would show them.
-
-    Returns
-    -------
-    Section or None
-        None where neither a disagreement nor a diagnosis was given.
-    """
-    given: list[Source] = [*sources.diagnoses, *sources.disagreements]
-    if not given:
-        return None
-    distinct = {_rows(source.record.not_excited): source for source in reversed(given)}
-    blocks = [_of_source(source, index) for index, source in enumerate(reversed(distinct.values()), start=1)]
-    return Section("unseen", _UNSEEN, blocks)
-
-
-def _of_source(source: Source, index: int) -> Block:
-    unseen: NotExcitedGroup = source.record.not_excited
-    if not unseen.name:
-        return Text(f"{source.label}: every effect of the catalogue would have shown.")
-    caption = f"Effects that could be there without {source.label} knowing, and why: what the logs lack, or how to fly."
-    return _unseen_table(f"unseen-{index}", unseen, caption)
+    """List the effects that could be there unseen, where a disagreement or a diagnosis was given."""
+    given: list[Source[Any]] = [*sources.diagnoses, *sources.disagreements]
+    blocks: list[Block] = []
+    for index, source in enumerate(_distinct(given, lambda record: _rows(record.not_excited)), start=1):
+        unseen = source.record.not_excited
+        why = (
+            f"Effects that {source.label} could not show, and why: what the logs lack, or which flight would show them."
+        )
+        nothing = Text(f"{source.label}: every effect of the catalogue would have shown.")
+        blocks.append(_unseen_table(f"unseen-{index}", unseen, why) if unseen.name else nothing)
+    return Section("unseen", _UNSEEN, blocks) if blocks else None
 
 
 def _unseen_table(name: str, unseen: NotExcitedGroup, caption: str) -> Table:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Self
+from typing import Any, Generic
 
 from typing_extensions import TypeVar
 
@@ -28,11 +28,6 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 R = TypeVar("R", bound=Record, default=Any)
 
-GAP_TITLE = "Where simulation and flight disagree"
-VEHICLE_TITLE = "A vehicle found in flights"
-REPLAY_TITLE = "What a model predicts of flights"
-"""Heading of a page about nothing else, unless the config gives one."""
-
 
 @dataclass(frozen=True)
 class Source(Origin, Generic[R]):
@@ -40,27 +35,16 @@ class Source(Origin, Generic[R]):
 
     Attributes
     ----------
-    record : Record
-        The artifact.
     config : mapping
-        The resolved study that made it, by section and key.
-    vehicle : VehicleSettings
-        Of that study.
+        The resolved study, by section and key.
     parameters : int
-        Linear parameters of the fuzzy part that that study asks for.
+        Linear parameters of the fuzzy part that the study asks for.
     """
 
     record: R
     config: Mapping[str, Any]
     vehicle: VehicleSettings
     parameters: int
-
-    @classmethod
-    def of(
-        cls, label: str, sha256: str, record: R, config: Mapping[str, Any], vehicle: VehicleSettings, parameters: int
-    ) -> Self:
-        """Name an artifact for a document."""
-        return cls(label, sha256, record.FORMAT.name, record.origin, record, config, vehicle, parameters)
 
     def made_from(self, role: str) -> str | None:
         """Hash of an input by its role; None where it had none."""
@@ -71,76 +55,35 @@ class Source(Origin, Generic[R]):
         return self.record.input_name(role)
 
 
+class _OfKind(Generic[R]):
+    """The artifacts of one kind, as an attribute."""
+
+    def __init__(self, kind: type[R]) -> None:
+        self.kind = kind
+
+    def __get__(self, sources: Sources, _: type[Sources]) -> list[Source[R]]:
+        return sources.of_kind(self.kind)
+
+
 @dataclass(frozen=True)
 class Sources:
-    """Everything that a report is about.
-
-    Attributes
-    ----------
-    all : sequence of Source
-        In the order given.
-    vehicle : VehicleSettings
-        Of the study that the report is made with.
-    """
+    """Everything that a report is about, with vehicle and settings of the study that it is made with."""
 
     all: Sequence[Source[Any]]
     vehicle: VehicleSettings
     settings: ReportSettings
 
-    @property
-    def trajectories(self) -> list[Source[TrajectoryRecord]]:
-        """Planned paths."""
-        return self._of(TrajectoryRecord)
-
-    @property
-    def flights(self) -> list[Source[FlightRecord]]:
-        """Flights, simulated or imported."""
-        return self._of(FlightRecord)
-
-    @property
-    def selections(self) -> list[Source[SelectionRecord]]:
-        """Reduced training sets."""
-        return self._of(SelectionRecord)
-
-    @property
-    def models(self) -> list[Source[IdentifiedRecord]]:
-        """Identified models."""
-        return self._of(IdentifiedRecord)
-
-    @property
-    def sweeps(self) -> list[Source[SweepRecord]]:
-        """Replicates of searches."""
-        return self._of(SweepRecord)
-
-    @property
-    def predictions(self) -> list[Source[PredictionRecord]]:
-        """Predictions of models along flights."""
-        return self._of(PredictionRecord)
-
-    @property
-    def replays(self) -> list[Source[ReplayRecord]]:
-        """Models played back along flights."""
-        return self._of(ReplayRecord)
-
-    @property
-    def disagreements(self) -> list[Source[DisagreementRecord]]:
-        """Where models and flights disagree."""
-        return self._of(DisagreementRecord)
-
-    @property
-    def diagnoses(self) -> list[Source[DiagnosisRecord]]:
-        """What models miss."""
-        return self._of(DiagnosisRecord)
-
-    @property
-    def vehicles(self) -> list[Source[VehicleRecord]]:
-        """Vehicles found in flights."""
-        return self._of(VehicleRecord)
-
-    @property
-    def extensions(self) -> list[Source[ExtendedRecord]]:
-        """Models with the effects that they missed."""
-        return self._of(ExtendedRecord)
+    trajectories = _OfKind(TrajectoryRecord)
+    flights = _OfKind(FlightRecord)
+    selections = _OfKind(SelectionRecord)
+    models = _OfKind(IdentifiedRecord)
+    sweeps = _OfKind(SweepRecord)
+    predictions = _OfKind(PredictionRecord)
+    replays = _OfKind(ReplayRecord)
+    disagreements = _OfKind(DisagreementRecord)
+    diagnoses = _OfKind(DiagnosisRecord)
+    vehicles = _OfKind(VehicleRecord)
+    extensions = _OfKind(ExtendedRecord)
 
     @property
     def gap(self) -> list[Source[Any]]:
@@ -154,30 +97,24 @@ class Sources:
 
     @property
     def title(self) -> str:
-        """Heading of the page."""
-        usual = self.settings.title == ReportSettings().title
-        if not usual or not self.only_gap:
+        """Heading of the page: that of the config, or what suits artifacts of the gap workflow alone."""
+        if self.settings.title != ReportSettings().title or not self.only_gap:
             return self.settings.title
         if self.vehicles:
-            return VEHICLE_TITLE
-        return GAP_TITLE if self.gap else REPLAY_TITLE
+            return "A vehicle found in flights"
+        return "Where simulation and flight disagree" if self.gap else "What a model predicts of flights"
+
+    def of_kind(self, kind: type[R]) -> list[Source[R]]:
+        """List the artifacts of one kind, in the order given."""
+        return [source for source in self.all if isinstance(source.record, kind)]
 
     def by_hash(self, sha256: str | None) -> Source[Any] | None:
         """Look up an artifact by its hash."""
         return next((source for source in self.all if source.sha256 == sha256), None)
 
-    def _of(self, kind: type[R]) -> list[Source[R]]:
-        return [source for source in self.all if isinstance(source.record, kind)]
-
 
 def unique_labels(names: Sequence[str], hashes: Sequence[str]) -> list[str]:
-    """Name files apart: a name that stands more than once gets the first digits of its hash.
-
-    Parameters
-    ----------
-    names : sequence of str
-        File names without folders.
-    """
+    """Name files apart: a name that stands more than once gets the first digits of its hash."""
     count = Counter(names)
     return [
         name if count[name] == 1 else f"{name} ({sha256[:HASH_SHOWN]})"
@@ -187,26 +124,13 @@ def unique_labels(names: Sequence[str], hashes: Sequence[str]) -> list[str]:
 
 def source_of(job: Job, record: R) -> Source[R]:
     """Name the artifact that a job has just written, so that its page can speak of it."""
-    return Source.of(job.output.name, "", record, resolved(job.study), job.study.vehicle, 0)
+    return Source(job.output.name, "", record, resolved(job.study), job.study.vehicle, 0)
 
 
 def section_of_each(
     name: str, title: str, sources: Sequence[Source[R]], blocks: Callable[[Source[R], int], Iterable[Block]]
 ) -> Section | None:
-    """Join what is shown of each source to one section.
-
-    Parameters
-    ----------
-    name : str
-        Identifier of the section.
-    blocks : callable
-        What is shown of one source; takes it and its number, from 1.
-
-    Returns
-    -------
-    Section or None
-        None where there is no source.
-    """
+    """Join to one section what is shown of each source, which is numbered from 1; None where there is no source."""
     if not sources:
         return None
     shown = [block for number, source in enumerate(sources, start=1) for block in blocks(source, number)]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -47,10 +47,21 @@ def answer(sweep: Source[SweepRecord]) -> Iterator[Block]:
     """Say how many runs are finished, mean and spread of each setting, and what to distrust."""
     record = sweep.record
     yield Text(f"{_finished(sweep)}, {len(record.settings)} settings; mean and standard deviation of the training part")
-    yield _overview(sweep)
+    rows = [
+        [
+            setting.name,
+            *(str(value) for value in (setting.samples, *setting.size, setting.runs)),
+            *(_both(values) for values in (setting.mse[:, 0], setting.max_error[:, 0], setting.condition_number)),
+        ]
+        for setting in record.settings
+    ]
+    sizes = ("Setting", "Samples", "Population", "Generations", "Runs")
+    header = (*sizes, f"MSE, {SQUARED_TORQUE}", f"Largest error, {TORQUE}", "Condition number")
+    yield Table("settings", "", header, rows)
     if record.without_model:
         yield Text(
-            f"{record.without_model} of {len(record.run)} runs found no finite model; they count for no mean", "warning"
+            f"{record.without_model} of {len(record.run)} runs found no finite model; all means leave them out",
+            "warning",
         )
 
 
@@ -59,44 +70,13 @@ def _finished(sweep: Source[SweepRecord]) -> str:
     return f"{len(sweep.record.run)} of {planned} runs"
 
 
-def _overview(sweep: Source[SweepRecord]) -> Table:
-    """Line up one row for each setting."""
-    rows = [
-        [
-            setting.name,
-            *(str(value) for value in (setting.samples, *setting.size, setting.runs)),
-            *(_both(values) for values in (setting.mse[:, 0], setting.max_error[:, 0], setting.condition_number)),
-        ]
-        for setting in sweep.record.settings
-    ]
-    sizes = ("Setting", "Samples", "Population", "Generations", "Runs")
-    header = (*sizes, f"MSE, {SQUARED_TORQUE}", f"Largest error, {TORQUE}", "Condition number")
-    return Table("settings", "", header, rows)
-
-
 def replicates_section(sources: Sources) -> Section | None:
-    """Show the settings of sweeps beside each other.
-
-    Returns
-    -------
-    Section or None
-        None where no sweep was given.
-
-    References
-    ----------
-    Table 5 of the paper.
-    """
+    """Show the settings of sweeps beside each other, if any: Table 5 of the paper."""
     return section_of_each("replicates", "Replicates of the search", joined_sweeps(sources.sweeps), _sweep)
 
 
 def joined_sweeps(sweeps: Sequence[Source[SweepRecord]]) -> list[Source[SweepRecord]]:
-    """Take sweeps of equal settings and inputs as one, unless a seed stands in both.
-
-    Returns
-    -------
-    list of Source
-        In the order of the first of each.
-    """
+    """Take sweeps of equal settings and inputs as one, in the order of the first of each, unless they share a seed."""
     joined: list[Source[SweepRecord]] = []
     for sweep in sweeps:
         index = next((index for index, other in enumerate(joined) if other.record.joins(sweep.record)), None)
@@ -108,15 +88,10 @@ def joined_sweeps(sweeps: Sequence[Source[SweepRecord]]) -> list[Source[SweepRec
 
 
 def _joined(first: Source[SweepRecord], second: Source[SweepRecord]) -> Source[SweepRecord]:
+    seeds = sum(int(sweep.config["sweep"]["seeds"]) for sweep in (first, second))
+    config = {**first.config, "sweep": {**first.config["sweep"], "seeds": seeds}}
     record = first.record.joined(second.record)
-    label, config = f"{first.label} and {second.label}", _with_seeds_of(first.config, second.config)
-    return replace(first, label=label, header=record.origin, record=record, config=config)
-
-
-def _with_seeds_of(config: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-    """Plan as many seeds as two studies do together."""
-    seeds = int(config["sweep"]["seeds"]) + int(other["sweep"]["seeds"])
-    return {**config, "sweep": {**config["sweep"], "seeds": seeds}}
+    return replace(first, label=f"{first.label} and {second.label}", record=record, config=config)
 
 
 def _sweep(sweep: Source[SweepRecord], index: int) -> Iterator[Block]:
@@ -131,7 +106,7 @@ def _sweep(sweep: Source[SweepRecord], index: int) -> Iterator[Block]:
     yield from _held_out(sweep, index)
     yield Text(
         f"Every setting was searched with the same seeds, from {sweep.record.origin.seed} on. "
-        "cpfls reduce and cpfls identify with the overrides of a setting and --seed find each model again."
+        "cpfls reduce and cpfls identify with the overrides of a setting and --seed make each model again."
     )
 
 
@@ -139,9 +114,9 @@ def _table(sweep: Source[SweepRecord], index: int) -> Table:
     settings = sweep.record.settings
     rows = [[title, *(shown(setting) for setting in settings)] for title, shown in _ROWS]
     caption = (
-        f"Results of {sweep.label} on the whole training part. The best run of a setting is that of the "
-        "smallest mean squared error; mean and standard deviation are over its seeds; the "
-        "variance is the square of the standard deviation shown."
+        f"Results of {sweep.label} on the whole training part. The best run of a setting is that of the smallest mean "
+        "squared error; mean and standard deviation are over its seeds; the variance is the square of the standard "
+        "deviation shown."
     )
     return Table(f"table-5-replicates-{index}", caption, ["Quantity", *(setting.name for setting in settings)], rows)
 

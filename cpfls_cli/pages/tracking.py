@@ -20,12 +20,7 @@ from cpfls_cli.report.numbers import number, percent, plain
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_CONTROLLERS = {
-    "model": "identified model",
-    "rigid-body": "rigid body",
-    "pd": "PD alone",
-    "vehicle": "exact vehicle",
-}
+_CONTROLLERS = {"model": "identified model", "rigid-body": "rigid body", "pd": "PD alone", "vehicle": "exact vehicle"}
 _HEADER = (
     "Controller",
     *(f"RMS {axis}, °" for axis in AXES),
@@ -40,17 +35,7 @@ _SHOWN = 1e-6
 
 
 def answer(flight: Source[FlightRecord], model: Record | None = None, index: int = 1) -> Iterator[Block]:
-    """Say how closely each controller followed the plan, how the model does beside the others, and what to distrust.
-
-    Parameters
-    ----------
-    flight : Source
-        With a comparison of controllers.
-    model : Record or None
-        That controls; None where it is not at hand.
-    index : int
-        Number of the flight on its page.
-    """
+    """Say how closely each controller followed the plan, how the model does beside the others, and what to distrust."""
     record, tracking = flight.record, _comparison(flight)
     samples = len(record.time)
     yield Text(
@@ -96,13 +81,7 @@ def _row(tracking: TrackingGroup, name: str) -> list[str | Cell]:
 
 
 def _beside(tracking: TrackingGroup, other: str, words: str, tone: Tone) -> Iterator[Text]:
-    """Compare the error of the model with that of another controller.
-
-    Parameters
-    ----------
-    tone : {"note", "warning"}
-        Where the model is the worse one about some axis.
-    """
+    """Compare the error of the model with that of another controller; the tone is for where the model is worse."""
     ratio = tracking.ratio(other)
     if ratio is not None:
         shares = ", ".join(number(value, 3) for value in ratio)
@@ -111,25 +90,17 @@ def _beside(tracking: TrackingGroup, other: str, words: str, tone: Tone) -> Iter
 
 
 def tracking_section(sources: Sources) -> Section | None:
-    """Show how closely controllers followed a plan.
+    """Show how closely controllers followed a plan, where a flight was controlled with a model."""
 
-    Returns
-    -------
-    Section or None
-        None where no flight was controlled with a model.
-    """
+    def blocks(flight: Source[FlightRecord], index: int) -> Iterator[Block]:
+        model = sources.by_hash(flight.made_from("model"))
+        yield Heading(flight.label)
+        yield Text(_setting(flight, flight.config["simulation"]["computed_torque"]))
+        yield from answer(flight, None if model is None else model.record, index)
+        yield tracking_figure(f"tracking-error-{index}", flight)
+
     tracked = [flight for flight in sources.flights if flight.record.tracking is not None]
-    return section_of_each(
-        "tracking", "Control with the model", tracked, lambda flight, index: _tracking(flight, index, sources)
-    )
-
-
-def _tracking(flight: Source[FlightRecord], index: int, sources: Sources) -> Iterator[Block]:
-    model = sources.by_hash(flight.made_from("model"))
-    yield Heading(flight.label)
-    yield Text(_setting(flight, flight.config["simulation"]["computed_torque"]))
-    yield from answer(flight, None if model is None else model.record, index)
-    yield tracking_figure(f"tracking-error-{index}", flight)
+    return section_of_each("tracking", "Control with the model", tracked, blocks)
 
 
 def _setting(flight: Source[FlightRecord], settings: dict[str, Any]) -> str:
@@ -137,21 +108,15 @@ def _setting(flight: Source[FlightRecord], settings: dict[str, Any]) -> str:
     plant = "the exact vehicle" if settings["plant"] == "vehicle" else "the identified model itself"
     frequencies = ", ".join(plain(value) for value in settings["natural_frequency_hz"])
     return (
-        f"The attitude of {path} is followed by {plant} under τ = D(q) v + C(q, q̇) q̇ with v = q̈ planned + Kd ė + Kp e: "
-        f"natural frequency {frequencies} Hz in roll, pitch and yaw, damping {plain(settings['damping'])}. D and C are "
-        f"those of {model}, of the rigid body fitted to the same samples, and of the exact vehicle; PD alone has the "
-        "same gains times a constant inertia and knows nothing else."
+        f"The attitude of {path} is followed by {plant} under τ = D(q) v + C(q, q̇) q̇ with v = q̈ planned + Kd ė + Kp "
+        f"e: natural frequency {frequencies} Hz in roll, pitch and yaw, damping {plain(settings['damping'])}. D and C "
+        f"are those of {model}, of the rigid body fitted to the same samples, and of the exact vehicle; PD alone has "
+        "the same gains times a constant inertia and no model."
     )
 
 
 def tracking_figure(name: str, flight: Source[FlightRecord]) -> Plot:
-    """Draw the size of the attitude error, averaged over a second, by axis and controller.
-
-    Parameters
-    ----------
-    flight : Source
-        With a comparison of controllers.
-    """
+    """Draw the size of the attitude error, averaged over a second, by axis and controller."""
     tracking = _comparison(flight)
     time, error = tracking.time, np.degrees(tracking.error)
     window = max(int(np.sum(time - time[0] < _WINDOW_S)), 1)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,16 +11,15 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.artifacts.trajectory import DERIVATIVES, LegGroup, TrajectoryRecord
 from cpfls_cli.pages.next_flight import question_blocks
-from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, legend_above, line, plot, stacked, style_of
-from cpfls_cli.report.content import Block, Plot, Section, Table, Text
+from cpfls_cli.report.content import Block, Plot, Table, Text
 from cpfls_cli.report.numbers import number, plain
 from cpfls_cli.trajectory.legs import Leg
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory
 from cpfls_cli.vehicle.rotors import RotorViolation
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from cpfls_cli.excitation import Excitation
@@ -32,13 +31,7 @@ _TURN = 360.0
 
 
 def answer(trajectory: Source[TrajectoryRecord], index: int = 1) -> Iterator[Block]:
-    """Say what a path asks for: its peaks and its moves, or how a held vehicle turns.
-
-    Parameters
-    ----------
-    index : int
-        Number of the path on its page.
-    """
+    """Say what a path asks for: its peaks and its moves, or how a held vehicle turns."""
     record = trajectory.record
     if record.held:
         yield Text("the vehicle is held at its centre of mass and only turns")
@@ -52,15 +45,7 @@ def answer(trajectory: Source[TrajectoryRecord], index: int = 1) -> Iterator[Blo
 
 
 def plan_blocks(planned: PlannedRotation, demand: Flyability, excitation: Excitation | None) -> Iterator[Block]:
-    """Say of a plan what its samples do not hold: how long it is, and what it asks of the vehicle between them.
-
-    Parameters
-    ----------
-    demand : Flyability
-        Of the plan on the vehicle.
-    excitation : Excitation or None
-        Of an optimised path.
-    """
+    """Say of a plan what its samples do not hold: how long it is, and what it asks of the vehicle between them."""
     yield Text(f"{len(planned.time)} samples over {planned.duration:g} s")
     if isinstance(planned, Trajectory):
         tilt, thrust = np.degrees(demand.tilt.max()), demand.thrust.max()
@@ -90,12 +75,7 @@ def demand_sentences(demand: Flyability, planned: PlannedRotation) -> tuple[str,
 
 
 def violation_sentence(violation: RotorViolation, time: Array) -> str:
-    """Say what a rotor was asked for that it cannot do.
-
-    Parameters
-    ----------
-    time : array, shape (time,), s
-    """
+    """Say what a rotor was asked for that it cannot do."""
     start, end = time[violation.first], time[violation.last]
     return (
         f"rotor {violation.rotor + 1}: {violation.kind} asked for at {_samples(violation.count)} from {start:.2f} s to "
@@ -124,18 +104,8 @@ def _written(values: Array) -> str:
     return " ".join(f"{value:.2f}" for value in values)
 
 
-def path_section(sources: Sources) -> Section | None:
-    """Show the planned paths.
-
-    Returns
-    -------
-    Section or None
-        None where no trajectory was given.
-    """
-    return section_of_each("path", "Training path", sources.trajectories, _path)
-
-
-def _path(trajectory: Source[TrajectoryRecord], index: int) -> Iterator[Block]:
+def path_blocks(trajectory: Source[TrajectoryRecord], index: int) -> Iterator[Block]:
+    """Show a planned path with its figures."""
     record, label = trajectory.record, trajectory.label
     yield from answer(trajectory, index)
     if record.held:
@@ -147,29 +117,26 @@ def _path(trajectory: Source[TrajectoryRecord], index: int) -> Iterator[Block]:
 
 def _peaks(name: str, trajectory: Source[TrajectoryRecord]) -> Table:
     peaks = trajectory.record.peaks()
-    rows = [[derivative, unit, _peak(derivative, peaks)] for derivative, unit in zip(DERIVATIVES, _UNITS, strict=True)]
-    caption = f"Largest length of each derivative at the samples of {trajectory.label}, along the path."
+    rows = []
+    for derivative, unit in zip(DERIVATIVES, _UNITS, strict=True):
+        # Above a snap that jumps there is nothing at the samples, and no bound between them.
+        is_unbounded = derivative in ("crackle", "pop") and not peaks[derivative] and peaks["snap"]
+        rows.append([derivative, unit, "no bound" if is_unbounded else number(peaks[derivative])])
+    caption = f"Largest magnitude of each derivative at the samples of {trajectory.label}, along the path."
     return Table(name, caption, ("Derivative", "Unit", "Largest"), rows, frozenset({0, 1}))
 
 
-def _peak(name: str, peaks: Mapping[str, float]) -> str:
-    """Write a peak; above a snap that jumps there is nothing at the samples, and no bound between them."""
-    return "no bound" if name in ("crackle", "pop") and not peaks[name] and peaks["snap"] else number(peaks[name])
-
-
 def _moves(name: str, label: str, moves: LegGroup) -> Table:
-    rows = [_move(moves, index) for index in range(min(len(moves.begin), _MOVES_SHOWN))]
+    rows = []
+    for index in range(min(len(moves.begin), _MOVES_SHOWN)):
+        begin, length = moves.begin[index], float(np.linalg.norm(moves.displacement[index]))
+        numbers = (begin, moves.end[index] - begin, length)
+        rows.append([str(index + 1), *map(plain, numbers), moves.limited_by[index].replace(" ", ", ")])
     header = ("Move", "Begins, s", "Takes, s", "Length, m", "Limited by")
     caption = f"Moves of {label} under limits, and the derivatives that reach theirs."
     if len(moves.begin) > _MOVES_SHOWN:
         caption += f" The first {_MOVES_SHOWN} of {len(moves.begin)}."
     return Table(name, caption, header, rows, frozenset({0, 4}))
-
-
-def _move(moves: LegGroup, index: int) -> list[str]:
-    begin, length = moves.begin[index], float(np.linalg.norm(moves.displacement[index]))
-    numbers = (begin, moves.end[index] - begin, length)
-    return [str(index + 1), *(plain(value) for value in numbers), moves.limited_by[index].replace(" ", ", ")]
 
 
 def _turns(name: str, trajectory: Source[TrajectoryRecord]) -> Table:
@@ -203,12 +170,7 @@ def figure_names(*, held: bool) -> tuple[str, ...]:
 
 
 def derivatives_figure(name: str, trajectory: Source[TrajectoryRecord]) -> Plot:
-    """Draw pop to displacement over the first leg.
-
-    References
-    ----------
-    Figure 2 of the paper.
-    """
+    """Draw pop to displacement over the first leg: Figure 2 of the paper."""
     leg, limits = trajectory.record.first_leg(), _limits(trajectory)
 
     def draw(figure: Figure) -> None:
@@ -216,9 +178,8 @@ def derivatives_figure(name: str, trajectory: Source[TrajectoryRecord]) -> Plot:
         for axes, derivative, unit in zip(panels, DERIVATIVES, _UNITS, strict=True):
             curve = leg.curves[derivative]
             line(axes, leg.time, curve, **style_of(0))
-            axes.set_title(
-                derivative if np.any(curve) else f"{derivative}: not limited, infinite where the one below jumps"
-            )
+            jumps = "" if np.any(curve) else ": not limited, infinite where the derivative below jumps"
+            axes.set_title(f"{derivative}{jumps}")
             axes.set_ylabel(unit)
             axes.axhline(0.0, color="#999999", linewidth=0.6)
             for limit in limits.get(derivative, ()):
@@ -244,17 +205,7 @@ def _limits(trajectory: Source[TrajectoryRecord]) -> dict[str, tuple[float, floa
 
 
 def attitude_figure(name: str, label: str, time: Array, attitude: Array) -> Plot:
-    """Draw roll and pitch of a path or a flight.
-
-    Parameters
-    ----------
-    time : array, shape (samples,), s
-    attitude : array, shape (samples, 3), rad
-
-    References
-    ----------
-    Figure 3 of the paper.
-    """
+    """Draw roll and pitch of a path or a flight: Figure 3 of the paper."""
     degrees = np.degrees(attitude)
 
     def draw(figure: Figure) -> None:
@@ -271,20 +222,18 @@ def attitude_figure(name: str, label: str, time: Array, attitude: Array) -> Plot
 
 
 def rotation_figure(name: str, label: str, time: Array, attitude: Array, rate: Array) -> Plot:
-    """Draw attitude and Euler rates of full rotations, angles on the circle.
-
-    Parameters
-    ----------
-    time : array, shape (samples,), s
-    attitude, rate : array, shape (samples, 3), rad and rad/s
-    """
+    """Draw attitude and Euler rates of full rotations, angles on the circle."""
     degrees = np.degrees(attitude)
 
     def draw(figure: Figure) -> None:
         angles, rates = stacked(figure, 2)
         for index, axis in enumerate(AXES):
             style = style_of(index)
-            _on_circle(angles, time, degrees[:, index], axis, style)
+            wrapped = np.mod(degrees[:, index], _TURN)
+            # Without the strokes where an angle goes round.
+            seams = np.flatnonzero(np.abs(np.diff(wrapped)) > _TURN / 2) + 1
+            for part_number, part in enumerate(np.split(np.arange(len(time)), seams)):
+                line(angles, time[part], wrapped[part], label=axis if part_number == 0 else None, **style)
             line(rates, time, rate[:, index], **style)
         angles.set_yticks([0, 90, 180, 270, 360])
         angles.set_ylabel("angle on the circle, °")
@@ -295,11 +244,3 @@ def rotation_figure(name: str, label: str, time: Array, attitude: Array, rate: A
     turns = ", ".join(f"{axis} {np.ptp(degrees[:, index]) / _TURN:.1f}" for index, axis in enumerate(AXES))
     caption = f"Attitude and Euler rates of {label}; range in turns: {turns}."
     return plot(name, caption, "Roll, pitch and yaw on the circle, and their rates, over time", 4.6, draw)
-
-
-def _on_circle(axes: Axes, time: Array, degrees: Array, label: str, style: dict[str, Any]) -> None:
-    """Draw an angle modulo a turn, without the strokes where it goes round."""
-    wrapped = np.mod(degrees, _TURN)
-    seams = np.flatnonzero(np.abs(np.diff(wrapped)) > _TURN / 2) + 1
-    for part_number, part in enumerate(np.split(np.arange(len(time)), seams)):
-        line(axes, time[part], wrapped[part], label=label if part_number == 0 else None, **style)

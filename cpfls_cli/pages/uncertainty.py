@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.evidence import CurvesGroup, RoundTripGroup, UncertaintyGroup
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, band, legend_over, named, plain_ticks, plot, runs, style_of
-from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.content import Block, Cell, Heading, Plot, Table, Text
 from cpfls_cli.report.numbers import number, percent, printed, with_interval
 from cpfls_cli.validation.bands import band as interval
 
@@ -37,19 +37,8 @@ _SAME = 1e-9
 _BAND = "95 % band of"
 
 
-def uncertainty_section(sources: Sources) -> Section | None:
-    """Show the bands of the models that hold them.
-
-    Returns
-    -------
-    Section or None
-        None where no model holds any.
-    """
-    models = [model for model in sources.models if model.record.uncertainty or model.record.curves]
-    return section_of_each("uncertainty", "How sure the inertia is", models, _uncertainty)
-
-
-def _uncertainty(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+def uncertainty_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+    """Show the bands of a model, where it holds any."""
     record = model.record
     yield Heading(model.label)
     if record.uncertainty is not None:
@@ -71,30 +60,24 @@ def _parameters(model: Source[IdentifiedRecord], draws: UncertaintyGroup, index:
     stated = [*model.vehicle.inertia_kg_m2, *[0.0] * 6][:6]
     rows: list[list[str | Cell]] = []
     for parameter, name in enumerate(INERTIA_PARAMETERS):
-        cells = [_with_interval(*(float(side[parameter]) for side in column)) for column in columns]
+        cells = []
+        for column in columns:
+            middle, *ends = map(printed, with_interval(*(float(side[parameter]) for side in column)))
+            cells.append(f"{middle} ({' … '.join(ends)})")
         low, high = float(columns[0][1][parameter]), float(columns[0][2][parameter])
         inside = low <= stated[parameter] <= high
         conclusion = Cell("inside" if inside else "outside ◂", "plain" if inside else "warning")
         rows.append([name, number(stated[parameter]), *cells, conclusion])
-    header = [
-        "kg m²",
-        "Stated in the config",
-        "Rigid body that fits best",
-        *(["Under the fuzzy part"] if record.on_rigid_body else []),
-    ]
+    under = ["Under the fuzzy part"] if record.on_rigid_body else []
+    header = ["kg m²", "Stated in the config", "Rigid body that fits best", *under, "Stated value"]
     caption = (
         f"Inertia parameters of {model.label} with 95 % intervals, from a bootstrap of {draws.blocks} contiguous "
-        f"blocks of {number(draws.block_duration, 2)} s. The last column says whether the stated value "
-        "lies in the interval of the rigid body that fits best."
+        f"blocks of {number(draws.block_duration, 2)} s. The last column says whether the stated value lies in the "
+        "interval of the rigid body that fits best."
     )
-    last = len(header)
+    last = len(header) - 1
     words, sentences = frozenset({0, last}), frozenset(range(2, last))
-    return Table(f"inertia-bands-{index}", caption, [*header, "Stated value"], rows, words, sentences)
-
-
-def _with_interval(value: float, low: float, high: float) -> str:
-    middle, *ends = map(printed, with_interval(value, low, high))
-    return f"{middle} ({ends[0]} … {ends[1]})"
+    return Table(f"inertia-bands-{index}", caption, header, rows, words, sentences)
 
 
 def _round_trip_sentence(round_trip: RoundTripGroup) -> str:
@@ -102,9 +85,9 @@ def _round_trip_sentence(round_trip: RoundTripGroup) -> str:
     shown = ", ".join(f"{entry} {percent(share)}" for entry, share in shares if np.isfinite(share))
     return (
         "Round trip: the model was simulated along its training motion, with errors as large as its own, and "
-        f"identified again (dashed). Share of the visited points where that lies within the band: "
-        f"{shown or 'none was visited'}. About 95 % is what a band of 95 % promises; much less says that "
-        "the band is too narrow."
+        "identified again (dashed). Share of the visited points where that lies within the band: "
+        f"{shown or 'none was visited'}. About 95 % is what a band of 95 % promises; much less says that the band is "
+        "too narrow."
     )
 
 
@@ -116,19 +99,31 @@ def inertia_curves_figure(
     again = None if round_trip is None else round_trip.inertia[curve]
 
     def draw(figure: Figure) -> None:
-        grid = figure.subplots(len(_ENTRIES) // _COLUMNS, _COLUMNS, sharex=True)
-        for axes, entry in zip(grid.flat, _ENTRIES, strict=True):
+        panels = _panels(figure, word)
+        for axes, entry in zip(panels, _ENTRIES, strict=True):
             _draw_entry(axes, curves, curve, entry, again)
-        grid[-1, 1].set_xlabel(f"{word.removeprefix('over ')}, °")
-        figure.supylabel("kg m²", fontsize=9.5)
-        legend_over(figure, grid[0, 0])
+        legend_over(figure, panels[0])
 
+    values, rigid = curves.inertia[curve], curves.rigid_body[curve]
+    is_same = np.allclose(values, rigid, rtol=0.0, atol=_SAME * float(np.abs(rigid).max(initial=0.0)), equal_nan=True)
+    same = " This model is that rigid body, so the grey line lies under its own." if is_same else ""
     dashed = " Dashed: identified again from a simulation of the model itself." if again is not None else ""
     caption = (
         f"D(q) of {label} {word}, with 95 % bands; grey: the rigid body that fits best. Shaded green: where "
-        f"training was. {OUTSIDE_WORDS} {MISFIT_WORDS}{_same_words(curves, curve)}{dashed}"
+        f"training was. {OUTSIDE_WORDS} {MISFIT_WORDS}{same}{dashed}"
     )
     return plot(name, caption, f"Six entries of the inertia matrix {word}, with bands", 4.5, draw)
+
+
+def _panels(figure: Figure, word: str) -> list[Axes]:
+    """Make a plot for each entry of D(q)."""
+    panels = figure.subplots(len(_ENTRIES) // _COLUMNS, _COLUMNS, sharex=True)
+    for axes, entry in zip(panels.flat, _ENTRIES, strict=True):
+        axes.set_title(entry)
+        plain_ticks(axes.yaxis)
+    panels[-1, 1].set_xlabel(f"{word.removeprefix('over ')}, °")
+    figure.supylabel("kg m²", fontsize=9.5)
+    return list(panels.flat)
 
 
 def _entry_of(values: Array, entry: str) -> Array:
@@ -137,15 +132,8 @@ def _entry_of(values: Array, entry: str) -> Array:
 
 
 def _keep_scale(axes: Axes, shown: Sequence[Array], curves: Sequence[CurvesGroup]) -> None:
-    """Keep the scale of what training saw: a band that opens where it was not would flatten everything.
-
-    Parameters
-    ----------
-    shown : sequence of array
-        What must be seen in full.
-    curves : sequence of CurvesGroup
-        The whole matrices, so that rounding of an entry that is zero is not drawn large.
-    """
+    """Show some values in full and no more: a band that opens where training was not would flatten everything."""
+    # Of the whole matrices, so that rounding of an entry that is zero is not drawn large.
     largest = max(float(np.abs(each.inertia).max(initial=1e-12)) for each in curves)
     known = np.concatenate([curve[np.isfinite(curve)] for curve in shown])
     if known.size:
@@ -154,24 +142,19 @@ def _keep_scale(axes: Axes, shown: Sequence[Array], curves: Sequence[CurvesGroup
         axes.set_ylim(low - room, high + room)
 
 
-def _same_words(curves: CurvesGroup, curve: int) -> str:
-    values, rigid = curves.inertia[curve], curves.rigid_body[curve]
-    same = np.allclose(values, rigid, rtol=0.0, atol=_SAME * float(np.abs(rigid).max(initial=0.0)), equal_nan=True)
-    return " This model is that rigid body, so the grey line lies under its own." if same else ""
-
-
-def _angle(curves: CurvesGroup, curve: int) -> Array:
-    """Give the angle that changes along a curve, in degrees."""
+def _along(curves: CurvesGroup, curve: int, entry: str) -> tuple[Array, BoolArray, Array, Array, Array, Array]:
+    """Give along a curve its angle in degrees, where training was, an entry of D(q), its band and the rigid body's."""
     attitude = np.degrees(curves.attitude[curve])
-    return np.asarray(attitude[:, int(np.argmax(np.ptp(attitude, axis=0)))])
+    angle = attitude[:, int(np.argmax(np.ptp(attitude, axis=0)))]
+    matrices = (curves.inertia, curves.low, curves.high, curves.rigid_body)
+    values, low, high, rigid = (_entry_of(matrix[curve], entry) for matrix in matrices)
+    return angle, ~curves.outside[curve], values, low, high, rigid
 
 
 def _draw_entry(axes: Axes, curves: CurvesGroup, curve: int, entry: str, again: Array | None) -> None:
     from matplotlib.ticker import MaxNLocator
 
-    matrices = (curves.inertia, curves.low, curves.high, curves.rigid_body)
-    values, low, high, rigid = (_entry_of(matrix[curve], entry) for matrix in matrices)
-    angle, visited = _angle(curves, curve), ~curves.outside[curve]
+    angle, visited, values, low, high, rigid = _along(curves, curve, entry)
     for first, last in runs(visited):
         axes.axvspan(angle[first], angle[last], color=_VISITED, label="training was here", zorder=0)
     band(axes, angle, low, high, color="#9db8d6", alpha=0.7, label="95 % band")
@@ -179,40 +162,26 @@ def _draw_entry(axes: Axes, curves: CurvesGroup, curve: int, entry: str, again: 
     axes.plot(angle, values, label="model", **{**style_of(0), "linewidth": 1.6})
     if again is not None:
         axes.plot(angle, _entry_of(again, entry), label="identified again", **_AGAIN)
-    axes.set_title(entry)
     axes.set_xlim(angle[0], angle[-1])
     axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 1.5, 2, 3, 4.5, 5, 6, 9, 10]))
-    plain_ticks(axes.yaxis)
     _keep_scale(axes, [rigid, values, low[visited], high[visited]], [curves])
 
 
 def compared_curves_figure(name: str, models: Sequence[tuple[str, CurvesGroup]], word: str) -> Plot:
-    """Draw the six entries of D(q) of several models along their curves of one name.
-
-    Parameters
-    ----------
-    models : sequence of (str, CurvesGroup)
-        Labels of models, and their curves, one of them of that name.
-    word : str
-        "over roll" or "over pitch".
-    """
+    """Draw the six entries of D(q) of several models along their curves "over roll" or "over pitch"."""
 
     def draw(figure: Figure) -> None:
-        grid = figure.subplots(len(_ENTRIES) // _COLUMNS, _COLUMNS, sharex=True)
-        for axes, entry in zip(grid.flat, _ENTRIES, strict=True):
+        panels = _panels(figure, word)
+        for axes, entry in zip(panels, _ENTRIES, strict=True):
             shown = [_draw_model(axes, *model, index, entry, word) for index, model in enumerate(models)]
             _keep_scale(axes, shown, [curves for _, curves in models])
-            axes.set_title(entry)
-            plain_ticks(axes.yaxis)
-        grid[-1, 1].set_xlabel(f"{word.removeprefix('over ')}, °")
-        figure.supylabel("kg m²", fontsize=9.5)
-        curves = [(handle, label) for handle, label in zip(*named(grid[0, 0]), strict=True) if _BAND not in label]
+        curves = [(handle, label) for handle, label in zip(*named(panels[0]), strict=True) if _BAND not in label]
         figure.legend(*zip(*curves, strict=True), loc="outside upper left", ncols=3)
 
     caption = (
-        f"D(q) of {', '.join(label for label, _ in models)} {word}, each with its 95 % band, along the attitudes "
-        "that its own training visited; grey: the rigid body that fits best to the first. Where two bands part, the "
-        f"flights tell the models apart. {OUTSIDE_WORDS} {MISFIT_WORDS}"
+        f"D(q) of {', '.join(label for label, _ in models)} {word}, each with its 95 % band, along the attitudes that "
+        "its own training visited; grey: the rigid body that fits best to the first. Where two bands do not overlap, "
+        f"the flights tell the models apart. {OUTSIDE_WORDS} {MISFIT_WORDS}"
     )
     return plot(name, caption, f"Six entries of the inertia matrices of several models {word}", 4.6, draw)
 
@@ -220,9 +189,8 @@ def compared_curves_figure(name: str, models: Sequence[tuple[str, CurvesGroup]],
 def _draw_model(axes: Axes, label: str, curves: CurvesGroup, index: int, entry: str, word: str) -> Array:
     """Draw one model; give the values that must be seen in full."""
     curve = curves.name.index(word)
-    matrices = (curves.inertia, curves.low, curves.high, curves.rigid_body)
-    values, low, high, rigid = (_entry_of(matrix[curve], entry) for matrix in matrices)
-    angle, visited, style = _angle(curves, curve), ~curves.outside[curve], style_of(index)
+    angle, visited, values, low, high, rigid = _along(curves, curve, entry)
+    style = style_of(index)
     band(axes, angle, low, high, color=style["color"], alpha=0.16, label=f"{_BAND} {label}")
     axes.plot(angle, values, label=label, **{**style, "linewidth": 1.6})
     if index == 0:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from math import ceil
 from typing import TYPE_CHECKING, Any, NamedTuple
 from unicodedata import category
 from xml.etree import ElementTree
@@ -84,26 +85,26 @@ _POWER = re.compile(r"\$\\mathdefault\{(-?)(?:([\d.]+)\\times)?10\^\{(-?\d+)\}\}
 """How Matplotlib asks for a power of ten to be typeset."""
 _REFERENCE = re.compile(r"url\(#([^)]+)\)")
 
+# Two for each pixel that a curve is wide on a usual screen.
 _LARGEST = 1500
-# Of an inch of an SVG.
-_POINTS = 72
-# Of a layout: ticks follow the size of a plot, and its margins follow its ticks.
-_ROUNDS = 2
-# Of the range of an axis: a tick at its end is one.
-_ROUNDING = 1e-9
+_DOTS_PER_INCH = 72
+"""Of an SVG."""
+
+_LAYOUT_ROUNDS = 2
+"""Ticks follow the size of a plot, and its margins follow its ticks: two rounds settle that."""
+
+_AT_THE_END = 1e-9
+"""Share of an axis by which rounding may put a tick beyond the end of it."""
+
 _ROWS = 25
 """Of a table of the data of a figure, at most."""
 
 
 def plot(name: str, caption: str, description: str, height: float, draw: Callable[[Figure], None]) -> Plot:
-    """Describe a figure; it is drawn when it is asked for.
+    """Describe a figure, which is drawn when it is asked for.
 
     Parameters
     ----------
-    name : str
-        Unique on the page.
-    description : str
-        What the figure shows, for those who do not see it.
     height : float
         Inches, at a width of 7.6.
     draw : callable
@@ -125,25 +126,19 @@ class _Drawing:
     def svg(self) -> str:
         with self._drawn() as figure:
             # A page that shows a figure tells its numbers as well: it is drawn once for both.
-            vars(self)["panels"] = self._panels_of(figure)
+            vars(self)["panels"] = _panels_of(figure)
             return _inline_svg(figure, self.name, self.description)
 
     @cached_property
     def panels(self) -> list[Panel]:
         with self._drawn() as figure:
-            return self._panels_of(figure)
+            return _panels_of(figure)
 
     def figure(self) -> Figure:
         with self._drawn() as figure:
             # Ticks take their style when they are first laid out.
             figure.draw_without_rendering()
             return figure
-
-    @staticmethod
-    def _panels_of(figure: Figure) -> list[Panel]:
-        from cpfls_cli.report.collect import panels_of
-
-        return panels_of(figure)
 
     @contextmanager
     def _drawn(self) -> Iterator[Figure]:
@@ -161,15 +156,14 @@ class _Drawing:
             yield figure
 
 
-def line(axes: Axes, x: Array, y: Array, **style: Any) -> None:
-    """Draw a curve, thinned out so that no peak is lost.
+def _panels_of(figure: Figure) -> list[Panel]:
+    from cpfls_cli.report.collect import panels_of
 
-    Parameters
-    ----------
-    x, y : array, shape (samples,)
-    **style
-        As `Axes.plot` takes it.
-    """
+    return panels_of(figure)
+
+
+def line(axes: Axes, x: Array, y: Array, **style: Any) -> None:
+    """Draw a curve in a style of `Axes.plot`, thinned out so that no peak is lost."""
     from cpfls_cli.report.collect import SPREAD
 
     kept, shown = kept_samples(y), evenly_spread(len(y))
@@ -180,14 +174,7 @@ def line(axes: Axes, x: Array, y: Array, **style: Any) -> None:
 
 
 def band(axes: Axes, x: Array, low: Array, high: Array, **style: Any) -> None:
-    """Shade the range of a curve, thinned out so that no peak is lost.
-
-    Parameters
-    ----------
-    x, low, high : array, shape (samples,)
-    **style
-        As `Axes.fill_between` takes it.
-    """
+    """Shade the range of a curve in a style of `Axes.fill_between`, thinned out so that no peak is lost."""
     kept = np.union1d(kept_samples(low, _BAND_POINTS), kept_samples(high, _BAND_POINTS))
     axes.fill_between(x[kept], low[kept], high[kept], **{"linewidth": 0.0, "zorder": 1.0, **style})
 
@@ -197,19 +184,21 @@ def stacked(figure: Figure, rows: int) -> list[Axes]:
     return list(figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0])
 
 
+def in_columns(figure: Figure, plots: int, columns: int, *, share_y: bool = False) -> np.ndarray[Any, Any]:
+    """Make plots in columns with one x axis; what is left over of the last row stays empty."""
+    panels = figure.subplots(ceil(plots / columns), columns, sharex=True, sharey=share_y, squeeze=False)
+    for axes in panels.flat[plots:]:
+        axes.set_axis_off()
+    return panels
+
+
 def legend_above(axes: Axes, columns: int = 4) -> None:
     """Put a legend above a plot, where it hides no curve."""
     axes.legend(*named(axes), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.1)
 
 
 def legend_over(figure: Figure, axes: Axes) -> None:
-    """Put one legend above a whole figure.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        With the curves.
-    """
+    """Put one legend above a whole figure, of the curves of one of its plots."""
     figure.legend(*named(axes), loc="outside upper left", ncols=4)
 
 
@@ -224,13 +213,7 @@ def named(axes: Axes) -> tuple[list[Artist], list[str]]:
 
 
 def plain_ticks(axis: Axis) -> None:
-    """Write every tick in full: a factor in the corner of a plot is easily overlooked.
-
-    Parameters
-    ----------
-    axis : matplotlib.axis.Axis
-        With a linear scale.
-    """
+    """Write every tick of a linear scale in full: a factor in the corner of a plot is easily overlooked."""
     from matplotlib.ticker import FuncFormatter
 
     axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, smallest=1e-4)))
@@ -246,14 +229,8 @@ def kept_samples(values: Array, largest: int = _LARGEST) -> IntArray:
 
     Parameters
     ----------
-    values : array, shape (samples,)
     largest : int
         About how many samples to keep; a shorter curve is kept whole.
-
-    Returns
-    -------
-    array of int
-        Ascending indices.
     """
     samples = len(values)
     if samples <= largest:
@@ -265,51 +242,28 @@ def kept_samples(values: Array, largest: int = _LARGEST) -> IntArray:
     return np.unique(np.concatenate([order[starts], order[ends - 1], [0, samples - 1]]))
 
 
-def evenly_spread(samples: int, rows: int = _ROWS) -> IntArray:
-    """Choose the samples of a curve that a table shows: both ends and some between.
-
-    Parameters
-    ----------
-    rows : int
-        At most so many.
-
-    Returns
-    -------
-    array of int
-        Ascending indices.
-    """
-    return np.unique(np.linspace(0, max(samples - 1, 0), min(samples, rows)).round().astype(int))
+def evenly_spread(samples: int) -> IntArray:
+    """Choose the samples of a curve that a table shows: both ends and some between."""
+    return np.unique(np.linspace(0, max(samples - 1, 0), min(samples, _ROWS)).round().astype(int))
 
 
 def runs(marked: Array | BoolArray) -> list[tuple[int, int]]:
-    """Find stretches of marked samples.
-
-    Parameters
-    ----------
-    marked : array, shape (samples,)
-        Other than zero where marked.
-
-    Returns
-    -------
-    list of (int, int)
-        First and last index of each.
-    """
+    """Find stretches of marked samples, each by its first and its last index."""
     edges = np.diff(np.concatenate([[0], (np.asarray(marked) != 0).astype(int), [0]]))
     return list(zip(np.flatnonzero(edges == 1).tolist(), (np.flatnonzero(edges == -1) - 1).tolist(), strict=True))
 
 
 def _show_as_written(figure: Figure) -> None:
-    """Show every text as it is: a dollar sign in the name of a setting is no mathematics, and SVG has no bells."""
+    """Show every text as it is: a dollar sign in a name is no mathematics, and SVG has no control characters."""
     for text in _texts(figure):
         if written := text.get_text():
-            # Invisible, but no font has to know of it.
             own = written.replace(NOT_FIRST, "")
             text.set_text("".join(each if _is_shown(each) else "\N{REPLACEMENT CHARACTER}" for each in own))
             text.set_parse_math(False)
 
 
 def _is_shown(character: str) -> bool:
-    """Tell whether a character can be drawn; to Python no space is, but the one that all use."""
+    # To Python no space is printable but the usual one.
     return character.isprintable() or character == "\n" or category(character) == "Zs"
 
 
@@ -329,37 +283,29 @@ def _texts(artist: Artist) -> Iterator[Text]:
 
 
 def _inline_svg(figure: Figure, name: str, description: str) -> str:
-    """Write a figure as an ``svg`` element for an HTML page.
+    """Write a figure as an ``svg`` element for an HTML page; ids inside it start with the name of the figure."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
 
-    Parameters
-    ----------
-    name : str
-        Unique on the page; ids inside the figure start with it.
-    description : str
-        What the figure shows, for those who do not see it.
-    """
+    stream, canvas = io.StringIO(), FigureCanvasSVG(figure)
+    figure.set_dpi(_DOTS_PER_INCH)
     with warnings.catch_warnings():
         # A browser finds other fonts for what the one that measures the text lacks.
         warnings.filterwarnings("ignore", message="Glyph .* missing")
-        root = ElementTree.fromstring(_svg(figure))
+        # Laid out here and drawn once: `savefig` draws twice, of which the first is for a layout.
+        _lay_out(figure)
+        canvas.print_svg(stream, metadata={"Date": None})  # type: ignore[no-untyped-call]  # matplotlib leaves it untyped
+    root = ElementTree.fromstring(stream.getvalue())
     _strip(root)
     _rename_ids(root, name)
-    _shorten(root)
+    for element in root.iter():
+        # Two decimals of coordinates are a fiftieth of a pixel on a screen: else most of a page would be digits.
+        for key in _COORDINATES & set(element.attrib):
+            words = " ".join(element.attrib[key].split())
+            element.set(key, _LONG_NUMBER.sub(lambda digits: f"{float(digits[0]):.2f}", words))
     for attribute in ("width", "height", "version"):
         root.attrib.pop(attribute, None)
     root.attrib |= {"xmlns": _NAMESPACE, "role": "img", "aria-label": description}
     return ElementTree.tostring(root, encoding="unicode")
-
-
-def _svg(figure: Figure) -> str:
-    """Lay out a figure, and draw it once: `savefig` draws it twice, of which the first is for a layout."""
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-
-    stream, canvas = io.StringIO(), FigureCanvasSVG(figure)
-    figure.set_dpi(_POINTS)
-    _lay_out(figure)
-    canvas.print_svg(stream, metadata={"Date": None})  # type: ignore[no-untyped-call]  # matplotlib leaves it untyped
-    return stream.getvalue()
 
 
 def _lay_out(figure: Figure) -> None:
@@ -370,7 +316,7 @@ def _lay_out(figure: Figure) -> None:
     engine = figure.get_layout_engine()
     free = list(_free_ticks(figure))
     ticks = [_ticks(axis, locator, formatter) for axis, _, locator, formatter in free]
-    for _ in range(_ROUNDS):
+    for _ in range(_LAYOUT_ROUNDS):
         before = ticks
         for (_, ticker, _, _), each in zip(free, before, strict=True):
             _fix(ticker, each.few())
@@ -417,7 +363,7 @@ class _Ticks(NamedTuple):
 def _ticks(axis: Axis, locator: Locator, formatter: Formatter) -> _Ticks:
     """Find the ticks of an axis as large as it is."""
     low, high = sorted(axis.get_view_interval())
-    rounding = _ROUNDING * (high - low)
+    rounding = _AT_THE_END * (high - low)
     places = [float(place) for place in locator() if low - rounding <= place <= high + rounding]
     words = [_POWER.sub(_without_mathematics, word) for word in formatter.format_ticks(places)]
     return _Ticks(places, words, formatter.get_offset())
@@ -461,14 +407,6 @@ def _rename_ids(root: ElementTree.Element, name: str) -> None:
                 element.set(key, f"#{name}-{value[1:]}")
             elif "url(#" in value:
                 element.set(key, _REFERENCE.sub(rf"url(#{name}-\1)", value))
-
-
-def _shorten(root: ElementTree.Element) -> None:
-    """Write coordinates with two decimals, a fiftieth of a pixel on a screen: most of a page would be digits else."""
-    for element in root.iter():
-        for key in _COORDINATES & set(element.attrib):
-            words = " ".join(element.attrib[key].split())
-            element.set(key, _LONG_NUMBER.sub(lambda digits: f"{float(digits[0]):.2f}", words))
 
 
 def _references(element: ElementTree.Element) -> list[str]:

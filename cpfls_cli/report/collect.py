@@ -19,7 +19,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.report.canvas import NOT_FIRST
-from cpfls_cli.report.content import Panel, Series
+from cpfls_cli.report.content import Drawn, Panel, Series
 
 SPREAD = "_evenly_spread"
 """Attribute of a thinned curve: samples of the whole one for tables."""
@@ -28,31 +28,21 @@ _COLORBAR = "<colorbar>"
 
 
 def panels_of(figure: Figure) -> list[Panel]:
-    """Collect the panels of a figure with all that is drawn in them.
-
-    Returns
-    -------
-    list of Panel
-        Without panels that hold no data.
-    """
+    """Collect the panels of a figure that hold data, with all that is drawn in them."""
     shown = [axes for axes in figure.axes if axes.get_label() != _COLORBAR]
     return [panel for axes in shown if (panel := _panel(axes, figure)).series]
 
 
 def _panel(axes: Axes, figure: Figure) -> Panel:
+    sides: Sequence[Literal["left", "center", "right"]] = ("left", "center", "right")
     return Panel(
-        title=next(iter(_titles(axes)), ""),
+        title=next(filter(None, (axes.get_title(side) for side in sides)), ""),
         x_label=_axis_label(axes, "x") or figure.get_supxlabel(),
         y_label=_axis_label(axes, "y") or figure.get_supylabel(),
         series=_drawn_in(axes),
         x_names=_names(axes.xaxis),
         y_names=_names(axes.yaxis),
     )
-
-
-def _titles(axes: Axes) -> Iterator[str]:
-    sides: Sequence[Literal["left", "center", "right"]] = ("left", "center", "right")
-    yield from filter(None, (axes.get_title(side) for side in sides))
 
 
 def _axis_label(axes: Axes, which: Literal["x", "y"]) -> str:
@@ -75,37 +65,26 @@ def _names(axis: Axis) -> dict[float, str]:
 
 
 def _drawn_in(axes: Axes) -> list[Series]:
-    """Collect everything that stands for data in a set of axes.
-
-    Returns
-    -------
-    list of Series
-        Bars and error bars first, then curves, points, bands and maps, then marks.
-    """
-    grouped, used = _containers(axes)
+    """Collect what stands for data in a set of axes: bars and error bars, then curves, points and areas, then marks."""
+    grouped, used = [], set()
+    for container in axes.containers:
+        for part in container:
+            used |= {id(artist) for artist in (part if isinstance(part, tuple | list) else (part,))}
+        if isinstance(container, BarContainer):
+            grouped.append(_bars(container))
+        elif isinstance(container, ErrorbarContainer):
+            grouped.append(_error_bars(container))
     curves = [line for line in axes.lines if id(line) not in used]
     data = [line for line in curves if line.get_transform() == axes.transData]
-    marks = [_level(axes, line) for line in curves if line.get_transform() != axes.transData]
+    levels = [
+        _mark(axes, line.get_transform(), _label(line), *(_numbers(ends) for ends in line.get_data()))
+        for line in curves
+        if line.get_transform() != axes.transData
+    ]
     areas = [series for item in axes.collections if id(item) not in used for series in _collection(axes, item)]
     spans = [_span(axes, patch) for patch in axes.patches if id(patch) not in used and isinstance(patch, Rectangle)]
-    everything = [*grouped, *_joined(data), *areas, *marks, *spans]
+    everything = [*grouped, *_joined(data), *areas, *levels, *spans]
     return sorted((series for series in everything if series.x.size), key=lambda series: series.form == "mark")
-
-
-def _containers(axes: Axes) -> tuple[list[Series], set[int]]:
-    series, used = [], set()
-    for container in axes.containers:
-        used |= {id(part) for part in _parts(container)}
-        if isinstance(container, BarContainer):
-            series.append(_bars(container))
-        elif isinstance(container, ErrorbarContainer):
-            series.append(_error_bars(container))
-    return series, used
-
-
-def _parts(container: Any) -> Iterator[Any]:
-    for part in container:
-        yield from part if isinstance(part, tuple | list) else (part,)
 
 
 def _bars(bars: BarContainer) -> Series:
@@ -118,7 +97,7 @@ def _bars(bars: BarContainer) -> Series:
 
 def _error_bars(container: ErrorbarContainer) -> Series:
     line, _, bars = container
-    x, y = _numbers(line.get_xdata()), _numbers(line.get_ydata())
+    x, y = (_numbers(values) for values in line.get_data())
     ends = np.array(bars[0].get_segments())[..., 1] if bars else np.stack([y, y], axis=1)
     return Series(_label(container), "points", x, y, ends.min(axis=1), ends.max(axis=1))
 
@@ -128,7 +107,9 @@ def _joined(lines: list[Line2D]) -> list[Series]:
     curves: list[tuple[object, Series]] = []
     for line in lines:
         look = (line.get_color(), str(line.get_linestyle()), line.get_marker(), line.get_linewidth())
-        series = _line(line)
+        form: Drawn = "points" if line.get_linestyle() in ("None", "none", "", " ") else "line"
+        x, y = (_numbers(values) for values in line.get_data())
+        series = Series(_label(line), form, x, y, spread=getattr(line, SPREAD, None))
         continued = (i for i, (other, curve) in enumerate(curves) if other == look and _continues(curve, series))
         index = next(continued, None)
         if index is None:
@@ -136,12 +117,6 @@ def _joined(lines: list[Line2D]) -> list[Series]:
         else:
             curves[index] = (look, _longer(curves[index][1], series))
     return [series for _, series in curves]
-
-
-def _line(line: Line2D) -> Series:
-    form = "points" if line.get_linestyle() in ("None", "none", "", " ") else "line"
-    x, y = _numbers(line.get_xdata()), _numbers(line.get_ydata())
-    return Series(_label(line), form, x, y, spread=getattr(line, SPREAD, None))  # type: ignore[arg-type]
 
 
 def _continues(first: Series, second: Series) -> bool:
@@ -153,10 +128,6 @@ def _longer(first: Series, second: Series) -> Series:
     if first.spread is not None and second.spread is not None:
         spread = (np.append(first.spread[0], second.spread[0]), np.append(first.spread[1], second.spread[1]))
     return replace(first, x=np.append(first.x, second.x), y=np.append(first.y, second.y), spread=spread)
-
-
-def _level(axes: Axes, line: Line2D) -> Series:
-    return _mark(axes, line.get_transform(), _label(line), _numbers(line.get_xdata()), _numbers(line.get_ydata()))
 
 
 def _span(axes: Axes, patch: Rectangle) -> Series:
@@ -174,7 +145,11 @@ def _mark(axes: Axes, transform: Any, label: str, x: Array, y: Array) -> Series:
 
 def _collection(axes: Axes, item: Any) -> Iterator[Series]:
     if isinstance(item, QuadMesh):
-        yield _map(item)
+        corners = np.asarray(item.get_coordinates())
+        centres = ((corners[1:, 1:] + corners[:-1, :-1]) / 2).reshape(-1, 2)
+        value = _numbers(item.get_array()).ravel()
+        known = np.isfinite(value)
+        yield Series(_label(item), "map", centres[known, 0], centres[known, 1], value=value[known])
     elif isinstance(item, PathCollection):
         offsets = _numbers(item.get_offsets())
         yield Series(_label(item), "points", offsets[:, 0], offsets[:, 1])
@@ -197,15 +172,6 @@ def _band(label: str, vertices: Array) -> Series:
     there, back = vertices[1 : points + 1], vertices[points + 2 : 2 * points + 2][::-1]
     low, high = np.fmin(there[:, 1], back[:, 1]), np.fmax(there[:, 1], back[:, 1])
     return Series(label, "band", there[:, 0], (low + high) / 2, low, high)
-
-
-def _map(mesh: QuadMesh) -> Series:
-    corners = np.asarray(mesh.get_coordinates())
-    middle = (corners[1:, 1:] + corners[:-1, :-1]) / 2
-    value = _numbers(mesh.get_array()).ravel()
-    known = np.isfinite(value)
-    centres = middle.reshape(-1, 2)[known]
-    return Series(_label(mesh), "map", centres[:, 0], centres[:, 1], value=value[known])
 
 
 def _numbers(values: Any) -> Array:

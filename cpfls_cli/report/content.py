@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.files import text_sha256
 
 if TYPE_CHECKING:
@@ -16,18 +16,14 @@ if TYPE_CHECKING:
 HASH_SHOWN = 12
 
 Tone = Literal["plain", "note", "good", "warning"]
+"""How much something stands out."""
+
 Drawn = Literal["line", "points", "bars", "band", "map", "mark"]
 
 
 @dataclass(frozen=True)
 class Text:
-    """A paragraph.
-
-    Attributes
-    ----------
-    tone : {"plain", "note", "good", "warning"}
-        How much it stands out.
-    """
+    """A paragraph."""
 
     text: str
     tone: Tone = "plain"
@@ -36,12 +32,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Facts:
-    """Terms with their values.
-
-    Attributes
-    ----------
-    rows : sequence of (str, str)
-    """
+    """Terms with their values."""
 
     rows: Sequence[tuple[str, str]]
     kind: ClassVar[str] = "facts"
@@ -49,12 +40,7 @@ class Facts:
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of a table that stands out.
-
-    Attributes
-    ----------
-    tone : {"plain", "note", "good", "warning"}
-    """
+    """A cell of a table that stands out."""
 
     text: str
     tone: Tone = "plain"
@@ -62,17 +48,14 @@ class Cell:
 
 @dataclass(frozen=True)
 class Table:
-    """A table; its first column names the rows.
+    """A table, with a name that is unique on the page; its first column names the rows.
 
     Attributes
     ----------
-    name : str
-        Unique on the page.
-    rows : sequence of sequence of (str or Cell)
     words : frozenset of int
-        Columns that hold words and are aligned left; all others hold numbers.
+        Columns that are aligned left; all others hold numbers.
     sentences : frozenset of int
-        Columns of words that are long and broken into lines.
+        Columns of long text, which is broken into lines.
     """
 
     name: str
@@ -97,9 +80,8 @@ class Series:
     ----------
     label : str
         As in the legend; empty where it has none.
-    form : {"line", "points", "bars", "band", "map", "mark"}
-        A mark is a level or a span: ends of x and of y, infinite where it goes from edge to edge.
     x, y : array, shape (points,)
+        Of a mark, which is a level or a span, the ends; infinite where it goes from edge to edge.
     low, high : array, shape (points,), or None
         Ends of a band or of error bars.
     value : array, shape (points,), or None
@@ -120,15 +102,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Panel:
-    """One set of axes of a figure.
-
-    Attributes
-    ----------
-    title, x_label, y_label : str
-        Labels with units.
-    x_names, y_names : mapping of float to str
-        Words that stand at positions of an axis in place of numbers.
-    """
+    """One set of axes of a figure, with the words that stand at positions of its axes in place of numbers."""
 
     title: str
     x_label: str
@@ -158,14 +132,10 @@ class Picture(Protocol):
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure.
+    """A figure, with a name that is unique on the page, and a description for those who do not see it.
 
     Attributes
     ----------
-    name : str
-        Unique on the page.
-    description : str
-        What the figure shows, for those who do not see it.
     see : tuple of (str, str), or None
         Where on the page more is said of it: an anchor, and the words that lead there.
     """
@@ -180,13 +150,7 @@ class Plot:
 
 @dataclass(frozen=True)
 class Listing:
-    """Verbatim text that can be folded away.
-
-    Attributes
-    ----------
-    shown : bool
-        Whether it is folded out from the start.
-    """
+    """Verbatim text that can be folded away, or is folded out from the start."""
 
     summary: str
     text: str
@@ -213,14 +177,7 @@ class Heading:
 
 @dataclass(frozen=True)
 class Box:
-    """What a reader must see first.
-
-    Attributes
-    ----------
-    label : str
-        One word, such as the name of a verdict.
-    tone : {"plain", "note", "good", "warning"}
-    """
+    """What a reader must see first; its label is one word, such as the name of a verdict."""
 
     label: str
     title: str
@@ -234,13 +191,7 @@ Block = Box | Text | Facts | Table | Plot | Listing | Folded | Heading
 
 @dataclass(frozen=True)
 class Section:
-    """One section of the page.
-
-    Attributes
-    ----------
-    name : str
-        Unique on the page; its anchor.
-    """
+    """One section of the page; its name is the anchor."""
 
     name: str
     title: str
@@ -260,24 +211,21 @@ class Section:
 
 @dataclass(frozen=True)
 class Origin:
-    """An artifact that a document is about.
-
-    Attributes
-    ----------
-    label : str
-        Its name, unique in the document.
-    sha256 : str
-        Hash of the file.
-    format : str
-        Its format.
-    header : Header
-        Where it comes from.
-    """
+    """An artifact that a document is about, with a label that is unique there and the hash of the file."""
 
     label: str
     sha256: str
-    format: str
-    header: Header
+    record: Record
+
+    @property
+    def format(self) -> str:
+        """Name of its format."""
+        return self.record.FORMAT.name
+
+    @property
+    def header(self) -> Header:
+        """Where it comes from."""
+        return self.record.origin
 
     @property
     def short_hash(self) -> str:
@@ -292,19 +240,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class Document:
-    """A report in any form: sections, and the artifacts that it is about.
-
-    Attributes
-    ----------
-    title : str
-        Heading of the page.
-    version : str
-        Version of the program.
-    sections : sequence of Section
-        In the order in which they are read.
-    origins : sequence of Origin
-        The artifacts.
-    """
+    """A report in any form: its sections, the artifacts that it is about, and the version of the program."""
 
     title: str
     version: str

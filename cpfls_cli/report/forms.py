@@ -18,11 +18,5 @@ _SUFFIXES = {".md": Form.MARKDOWN, ".markdown": Form.MARKDOWN, ".json": Form.JSO
 
 
 def form_of(path: Path) -> Form:
-    """Choose a form by the suffix of a file.
-
-    Returns
-    -------
-    Form
-        HTML where the suffix says nothing.
-    """
+    """Choose a form by the suffix of a file; HTML where that says nothing."""
     return _SUFFIXES.get(path.suffix.lower(), Form.HTML)

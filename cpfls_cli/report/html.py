@@ -52,21 +52,20 @@ class _Side:
 
 
 def figure_tables(panels: Sequence[Panel]) -> list[Table]:
-    """Write the data of a figure as tables of at most 25 rows, curves over the same x side by side.
-
-    Returns
-    -------
-    list of Table
-        Their captions say how many points are drawn.
-    """
+    """Write the data of a figure as tables of at most 25 rows, curves over the same x side by side."""
     sides: list[_Side] = []
     for panel in panels:
         data = [series for series in panel.series if series.form != "mark"]
         for index, series in enumerate(data):
             name = series.label or (f"curve {index + 1}" if len(data) > 1 else "")
             _place(sides, panel, series, name)
+    tables = [_table(side) for side in sides]
     marks = [row for panel in panels for row in _marks(panel)]
-    return [_table(side) for side in sides] + ([_levels(marks)] if marks else [])
+    if marks:
+        shown = [marks[index] for index in evenly_spread(len(marks))]
+        more = f": {len(shown)} of {len(marks)}" if len(shown) < len(marks) else ""
+        tables.append(Table("", f"Levels and spans{more}.", ("Panel", "What", "x", "y"), shown))
+    return tables
 
 
 def _place(sides: list[_Side], panel: Panel, series: Series, name: str) -> None:
@@ -116,12 +115,6 @@ def _marks(panel: Panel) -> Iterator[list[str]]:
         if mark.form == "mark" and (mark.label or np.any(mark.y[np.isfinite(mark.y)]) or np.isfinite(mark.x).all()):
             x, y = (_range(ends, names) for ends, names in ((mark.x, panel.x_names), (mark.y, panel.y_names)))
             yield [panel.title or panel.y_label, mark.label, x, y]
-
-
-def _levels(marks: Sequence[list[str]]) -> Table:
-    shown = [marks[index] for index in evenly_spread(len(marks))]
-    more = f": {len(shown)} of {len(marks)}" if len(shown) < len(marks) else ""
-    return Table("", f"Levels and spans{more}.", ("Panel", "What", "x", "y"), shown)
 
 
 def _range(ends: Array, names: Mapping[float, str]) -> str:

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
 from cpfls_cli.report.content import Block, Document, Facts, Folded, Origin, Panel, Plot, Series, Table
 
 _DIGITS = 6
@@ -44,9 +43,8 @@ def _block(block: Block) -> dict[str, Any]:
         case Facts():
             return {"kind": block.kind, "rows": [list(row) for row in block.rows]}
         case Plot():
-            panels = [_panel(panel) for panel in block.picture.panels]
             words = {"name": block.name, "caption": block.caption, "description": block.description}
-            return {"kind": "figure", **words, "panels": panels}
+            return {"kind": "figure", **words, "panels": [_panel(panel) for panel in block.picture.panels]}
         case _:
             return {"kind": block.kind, **asdict(block)}
 
@@ -81,12 +79,8 @@ def _panel(panel: Panel) -> dict[str, Any]:
 
 def _series(series: Series) -> dict[str, Any]:
     columns = {key: getattr(series, key) for key in ("x", "y", "low", "high", "value")}
-    numbers = {key: _numbers(values) for key, values in columns.items() if values is not None}
+    numbers = {key: [_rounded(value) for value in values] for key, values in columns.items() if values is not None}
     return {"label": series.label, "form": series.form, **numbers}
-
-
-def _numbers(values: Array) -> list[float | None]:
-    return [_rounded(value) for value in values]
 
 
 def _rounded(value: float) -> float | None:

@@ -13,13 +13,7 @@ _TONES: dict[Tone, str] = {"note": "Note", "good": "Good", "warning": "Warning"}
 
 
 def markdown_page(document: Document) -> str:
-    """Write a document as GitHub-flavoured Markdown.
-
-    Returns
-    -------
-    str
-        Without anything that a reader of Markdown would take for markup of its own.
-    """
+    """Write a document as GitHub-flavoured Markdown; nothing in its texts is taken for markup."""
     files = ", ".join(f"{_plain(source.label)} `{source.short_hash}`" for source in document.origins)
     contents = "\n".join(f"- [{_plain(section.title)}](#{section.name})" for section in document.sections)
     parts = [f"# {_plain(document.title)}", f"Made by cpfls {_plain(document.version)} from {files}.", contents]
@@ -50,7 +44,9 @@ def _block(block: Block) -> Iterator[str]:
             seen = f"Figure `{block.name}`: {_plain(block.description)}."
             yield f"> {seen} It is drawn in the HTML form of this report; the JSON form holds its data."
         case Listing():
-            yield from _listing(block)
+            fence = "`" * max(3, 1 + max((len(run) for run in re.findall("`+", block.text)), default=0))
+            yield f"**{_plain(block.summary)}**"
+            yield f"{fence}text\n{block.text.rstrip()}\n{fence}"
 
 
 def _table(table: Table) -> Iterator[str]:
@@ -62,12 +58,6 @@ def _table(table: Table) -> Iterator[str]:
 
 def _marked(text: str, tone: Tone) -> str:
     return f"**{_plain(text)}**" if tone != "plain" and text.strip() else _plain(text)
-
-
-def _listing(listing: Listing) -> Iterator[str]:
-    fence = "`" * max(3, 1 + max((len(run) for run in re.findall("`+", listing.text)), default=0))
-    yield f"**{_plain(listing.summary)}**"
-    yield f"{fence}text\n{listing.text.rstrip()}\n{fence}"
 
 
 def _plain(text: str) -> str:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 UNKNOWN = "—"
 ROUNDING = 1e-12
 _LARGE = 1e6
 _LEAST_P = 1e-6
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_DIGITS = 4
 _SMALLEST, _LARGEST = -4, 6
 """Powers of ten between which no power is written."""
 
@@ -19,12 +18,12 @@ _FEWEST, _MOST = 2, 15
 
 
 def number(value: float, digits: int = 4) -> str:
-    """Write a number with so many significant digits.
+    """Write a number with so many significant digits, a small or large one with a power of ten.
 
     Returns
     -------
     str
-        ``—`` where the number is not known, ``∞`` where it has no bound; powers of ten outside 1e-3 .. 1e6.
+        ``—`` where the number is not known, ``∞`` where it has no bound.
     """
     if math.isnan(value):
         return UNKNOWN
@@ -32,7 +31,7 @@ def number(value: float, digits: int = 4) -> str:
         return "∞" if value > 0 else "−∞"
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     power = int(exponent)
-    if value == 0 or -4 <= power < 6:
+    if value == 0 or _SMALLEST <= power < _LARGEST:
         decimals = max(digits - 1 - power, 0) if value else 0
         text = f"{value:.{decimals}f}"
     else:
@@ -41,13 +40,7 @@ def number(value: float, digits: int = 4) -> str:
 
 
 def plain(value: float, smallest: float = 1e-3) -> str:
-    """Write a setting or the tick of an axis: no trailing zeros, small and large ones by powers of a thousand.
-
-    Parameters
-    ----------
-    smallest : float
-        What is smaller than this gets a power of ten.
-    """
+    """Write a setting or the tick of an axis: no trailing zeros, small and large ones by powers of a thousand."""
     if value == 0 or not math.isfinite(value) or smallest <= abs(value) < _LARGE:
         return (f"{value:.6g}" if math.isfinite(value) else number(value)).replace("-", "−")
     power = 3 * math.floor(math.log10(abs(value)) / 3)
@@ -117,64 +110,42 @@ def with_interval(value: float, low: float, high: float) -> tuple[str, str, str]
     width = high - low
     if not (math.isfinite(width) and math.isfinite(value) and width > 0):
         return _alone(value), _alone(low), _alone(high)
-    first, second, third = _alike((value, low, high), 0.5 * width)
-    return first, second, third
-
-
-def printed(text: str) -> str:
-    """Write a number of `with_interval` as in print.
-
-    Returns
-    -------
-    str
-        With a minus sign, and ``× 10`` with a raised power.
-    """
-    mantissa, _, power = text.partition("e")
-    raised = f" × {power_of_ten(int(power))}" if power else ""
-    return mantissa.replace("-", "−") + raised
-
-
-def _alike(values: Sequence[float], error: float) -> list[str]:
-    largest = math.floor(math.log10(max(map(abs, values))))
-    last = math.floor(math.log10(error)) - 1
+    largest = math.floor(math.log10(max(abs(value), abs(low), abs(high))))
+    last = math.floor(math.log10(0.5 * width)) - 1
     digits = min(max(largest - last + 1, _FEWEST), _MOST)
     power = 0 if _SMALLEST <= largest < _LARGEST else largest
     decimals = max(digits - 1 - (largest - power), 0)
-    tail = f"e{power}" if power else ""
-    return [f"{_signed(each / 10.0**power, decimals)}{tail}" for each in values]
 
+    def written(one: float) -> str:
+        text = f"{one / 10.0**power:.{decimals}f}"
+        # Rounded to zero, a number has no sign.
+        text = text.removeprefix("-") if float(text) == 0 else text
+        return f"{text}e{power}" if power else text
 
-def _signed(value: float, decimals: int) -> str:
-    text = f"{value:.{decimals}f}"
-    return text.removeprefix("-") if float(text) == 0 else text
+    return written(value), written(low), written(high)
 
 
 def _alone(value: float) -> str:
     if not math.isfinite(value):
         return number(value).replace("−", "-")
-    return f"{value:.{_DIGITS}g}" if value else "0"
+    return f"{value:.4g}" if value else "0"
+
+
+def printed(text: str) -> str:
+    """Write a number of `with_interval` as in print: with a minus sign, and ``× 10`` with a raised power."""
+    mantissa, _, power = text.partition("e")
+    raised = f" × {power_of_ten(int(power))}" if power else ""
+    return mantissa.replace("-", "−") + raised
 
 
 def joined(words: Iterable[str], last: str = "and") -> str:
-    """Join words to a phrase, without repeating one.
-
-    Parameters
-    ----------
-    last : str
-        Before the last word.
-    """
+    """Join words to a phrase, without repeating one."""
     *others, final = dict.fromkeys(words)
     return f"{', '.join(others)} {last} {final}" if others else final
 
 
 def sentence(text: str) -> str:
-    """Write words as a sentence.
-
-    Returns
-    -------
-    str
-        With a capital letter, unless a file name comes first, and a full stop.
-    """
+    """Write words as a sentence: with a capital letter, unless a file name comes first, and a full stop."""
     first = text.split(" ", 1)[0]
     start = text if "." in first or "_" in first else f"{text[:1].upper()}{text[1:]}"
     return start if start.endswith((".", "?", "!")) else f"{start}."

@@ -24,7 +24,7 @@ class Outcome:
     blocks : tuple of Block
         For people, on standard output; texts of tone ``warning`` go to standard error.
     exit_code : int
-        Of the program; not 0 where the work was stopped.
+        Not 0 where the work was stopped.
     """
 
     summary: Mapping[str, Any]
@@ -38,18 +38,12 @@ def nothing_written(job: Job) -> Outcome:
     return Outcome({"dry_run": True, "output": str(job.output)}, (line,))
 
 
-def plain(value: Any) -> Any:
-    """Replace what JSON has no word for: numbers that are not finite become null.
-
-    Parameters
-    ----------
-    value : object
-        Nested mappings, lists and tuples of numbers and text.
-    """
+def as_json(value: Any) -> Any:
+    """Write nested mappings, lists, numbers and text as JSON knows them: a number that is not finite becomes null."""
     if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): as_json(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
+        return [as_json(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
-    return plain(value.item()) if hasattr(value, "item") else value
+    return as_json(value.item()) if hasattr(value, "item") else value

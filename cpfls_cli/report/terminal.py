@@ -23,8 +23,6 @@ def terminal_lines(blocks: Iterable[Block], width: int | None = None, *, colour:
     ----------
     width : int or None
         Columns of the terminal; None where there is none and lines are as long as they are.
-    colour : bool
-        Whether tones show as colours too.
     """
     for block in blocks:
         match block:
@@ -36,7 +34,12 @@ def terminal_lines(blocks: Iterable[Block], width: int | None = None, *, colour:
                 yield f"{block.label}: {block.title}"
                 yield from (f"  {sentence}" for sentence in block.sentences)
             case Facts():
-                yield from _facts(block, width, colour)
+                drawn = _grid(colour, header=False)
+                drawn.add_column(no_wrap=True)
+                drawn.add_column(no_wrap=width is None)
+                for term, value in block.rows:
+                    drawn.add_row(RichText(term), RichText(value))
+                yield from _printed(drawn, width, colour)
             case Table():
                 yield from _table(block, width, colour)
             case Listing():
@@ -48,15 +51,6 @@ def terminal_lines(blocks: Iterable[Block], width: int | None = None, *, colour:
 def warnings_of(blocks: Iterable[Block]) -> tuple[str, ...]:
     """List the texts that warn."""
     return tuple(block.text for block in blocks if isinstance(block, Text) and block.tone == "warning")
-
-
-def _facts(facts: Facts, width: int | None, colour: bool) -> Iterator[str]:
-    drawn = _grid(colour, header=False)
-    drawn.add_column(no_wrap=True)
-    drawn.add_column(no_wrap=width is None)
-    for term, value in facts.rows:
-        drawn.add_row(RichText(term), RichText(value))
-    yield from _printed(drawn, width, colour)
 
 
 def _table(table: Table, width: int | None, colour: bool) -> Iterator[str]:
@@ -76,12 +70,8 @@ def _table(table: Table, width: int | None, colour: bool) -> Iterator[str]:
         drawn.add_row(*(RichText(cell.text, _STYLES[cell.tone] if colour else "") for cell in row))
     lines = _printed(drawn, width, colour)
     # No word is broken; what that takes beyond the width, other columns have to give.
-    excess = max(map(_columns, lines), default=0) - (width or _UNLIMITED)
+    excess = max((RichText.from_ansi(line).cell_len for line in lines), default=0) - (width or _UNLIMITED)
     yield from _printed(drawn, width - excess, colour) if width and excess > 0 else lines
-
-
-def _columns(line: str) -> int:
-    return RichText.from_ansi(line).cell_len
 
 
 def _grid(colour: bool, *, header: bool) -> RichTable:

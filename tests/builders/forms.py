@@ -21,7 +21,7 @@ from cpfls_cli.report.terminal import terminal_lines, warnings_of
 
 def source_of_record(record, label="record.h5"):
     study = Study()
-    return Source.of(label, "f" * 64, record, resolved(study), study.vehicle, 0)
+    return Source(label, "f" * 64, record, resolved(study), study.vehicle, 0)
 
 
 def phrases(block):

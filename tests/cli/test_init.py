@@ -210,7 +210,7 @@ def test_a_log_without_rotors_is_imported_and_drives_nothing(cpfls, proposed, tm
     path = write_csv(tmp_path / "log.csv", flat_log(own, speed=None))
     result, text, data = proposed(path, "--mass", MASS)
     said = " ".join(result.stdout.split())
-    assert "no column is recognised as a rotor's, so nothing here drives a model of the vehicle; if some are" in said
+    assert "no column is recognised as a rotor's, and a model of the vehicle needs rotors; if some are" in said
     assert "name them in import.signals (rotor_speed or rotor_command)" in said
     assert "then: cpfls vehicle" not in result.stdout
     assert data["vehicle"]["rotors"] == "ASK"

@@ -13,7 +13,7 @@ import pytest
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import read_config
-from cpfls_cli.report.outcome import plain
+from cpfls_cli.report.outcome import as_json
 from tests.builders.artifacts import edited
 from tests.builders.command_line import undrawn
 from tests.builders.vehicle_search import CONFIG, TRIED, left_out
@@ -87,7 +87,7 @@ def test_json_tells_verdict_structures_and_what_was_held_out(found):
 
 def test_the_file_keeps_to_its_format_and_says_the_same(cpfls, found):
     assert cpfls("check", found.output).exit_code == 0
-    assert plain(found.record.summary) == found.told
+    assert as_json(found.record.summary) == found.told
     assert "a vehicle found in flights" in cpfls("info", found.output).stdout
 
 

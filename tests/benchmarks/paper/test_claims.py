@@ -52,7 +52,7 @@ def setting(mse, structure="cpfls", samples=5487, size=(40, 10), seeds=None):
 
 def sources(*records, times=()):
     """A report about records."""
-    given = [Source.of("s.h5", "", record.with_header(Header("1", 0, "")), {}, None, 0) for record in records]
+    given = [Source("s.h5", "", record.with_header(Header("1", 0, "")), {}, None, 0) for record in records]
     return PaperSources(given, VehicleSettings(), ReportSettings(), times)
 
 

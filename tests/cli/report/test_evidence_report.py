@@ -131,7 +131,7 @@ def test_structures_are_compared_and_the_least_error_is_marked_in_words(page):
 @pytest.mark.parametrize(
     ("error", "told"),
     [
-        ((0.9, 0.5, 1.0), "takes 50.0 % off the error of the rigid body, 5.0 standard errors"),
+        ((0.9, 0.5, 1.0), "reduces the error of the rigid body by 50.0 %, 5.0 standard errors"),
         ((0.99, 0.95, 1.0), "within one standard error: the flight holds hardly any evidence"),
         ((1.2, 1.1, 1.0), "this flight holds no evidence"),
     ],

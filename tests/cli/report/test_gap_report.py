@@ -88,7 +88,7 @@ def test_two_levels_with_two_names_are_explained(full):
 
 
 def test_the_model_that_runs_away_does_not_flatten_the_picture(full):
-    assert "the model as given leaves the picture" in full.text
+    assert "the model as given leaves the figure" in full.text
 
 
 def test_equal_artifacts_give_equal_pages(tmp_path):
@@ -120,7 +120,7 @@ def test_a_disagreement_alone_says_where_and_how_to_go_on(tmp_path):
 def test_a_disagreement_below_noise_has_nothing_to_follow(tmp_path):
     quiet = made.disagreement(**{"gap/floors": np.array([0.4, 0.5, 0.6, 0.7, 0.8, 0.9])})
     page = shown(tmp_path, quiet)
-    assert "Model and flights agree to the noise." in page.text
+    assert "Model and flights agree within the noise." in page.text
     assert "dependence-1" not in page.summary["figures"]
 
 

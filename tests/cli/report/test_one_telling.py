@@ -14,7 +14,7 @@ from cpfls_cli.pages import diagnosis, disagreement, extended, vehicle_model
 from cpfls_cli.pages.source import Source
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.report.content import Table, Text
-from cpfls_cli.report.outcome import plain
+from cpfls_cli.report.outcome import as_json
 from tests.builders import gap_artifacts, vehicle_models
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
 
@@ -53,7 +53,7 @@ def told(cpfls, study, tmp_path_factory):
 def source_of(record, label, sha256="f" * 64):
     study = validate(parse_config(record.origin.config, "/config"), "/config")
     parameters = model_structure(study.identification).parameters
-    return Source.of(label, sha256, record, resolved(study), study.vehicle, parameters)
+    return Source(label, sha256, record, resolved(study), study.vehicle, parameters)
 
 
 @pytest.fixture
@@ -100,7 +100,7 @@ def test_the_report_says_what_the_command_says(answered, name):
 @pytest.mark.parametrize("name", FROM_COMMANDS)
 def test_what_json_prints_is_the_summary_of_the_record(told, name):
     """A command adds what is no fact of the record, such as how long it took."""
-    printed, summary = plain(told[name].outcome.summary), plain(told[name].source.record.summary)
+    printed, summary = as_json(told[name].outcome.summary), as_json(told[name].source.record.summary)
     known = {key: value for key, value in summary.items() if value is not None}
     assert known == {key: printed.get(key) for key in known}
 

@@ -127,7 +127,7 @@ def test_run_that_finds_nothing_is_told_and_counts_for_no_mean(cpfls, words, tmp
     monkeypatch.setattr(sweep_runs, "identify", sometimes)
     result = cpfls(*words, "-o", tmp_path / "sweep.h5", "--json")
     assert result.exit_code == 0
-    assert result.stderr == "cpfls: note: 1 of 6 runs found no finite model; they count for no mean\n"
+    assert result.stderr == "cpfls: note: 1 of 6 runs found no finite model; all means leave them out\n"
     first = json.loads(result.stdout)["settings"][0]
     assert first["runs"] == 2
     assert first["mse"]["mean"] == first["mse"]["smallest"]

@@ -2,11 +2,15 @@
 
 from typing import get_args
 
+import pytest
+
 from cpfls_cli.config.keys import commented_default, keys_of, known_keys
-from cpfls_cli.config.load import parse_config, validate
+from cpfls_cli.config.load import load_study, parse_config, validate
 from cpfls_cli.config.study import SECTIONS, Study, resolved
+from cpfls_cli.errors import ConfigError
 from cpfls_cli.flightlog.settings import SignalName
 from cpfls_cli.units import KNOWN_UNITS
+from tests.builders.studies import VEHICLE
 
 
 def all_keys(settings, prefix=""):
@@ -84,7 +88,16 @@ def test_signals_come_with_their_names_units_and_an_example_that_is_a_study():
     assert signals["body_torque"].sign == (1, -1, -1)
 
 
-def test_keys_that_say_nothing_any_more_are_left_out():
-    """Configs of before hold them, and so do artifacts."""
+def test_a_config_file_with_keys_that_are_gone_is_refused_with_what_to_do(tmp_path):
+    path = tmp_path / "study.yaml"
+    path.write_text("report: {paper: true, evaluation_times: []}\n" + VEHICLE)
+    with pytest.raises(ConfigError) as refused:
+        load_study(path)
+    lines = str(refused.value).splitlines()
+    assert [line.split(": ")[1] for line in lines] == ["report.evaluation_times", "report.paper"]
+    assert all("remove it; `make reproduce`" in line for line in lines)
+
+
+def test_keys_that_are_gone_are_left_out_of_the_configs_of_artifacts():
     study = validate({"report": {"title": "A study", "paper": True, "evaluation_times": []}}, "study.yaml")
     assert resolved(study)["report"] == {"title": "A study", "notes": []}

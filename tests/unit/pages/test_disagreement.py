@@ -36,7 +36,7 @@ def test_every_form_calls_the_same_channels_above_noise(floors, above):
             line.split() for line in text.splitlines() if line.startswith(("torque", "force")) and line.endswith("%")
         ]
         assert "".join(row[-3][0] for row in rows) == above, form
-        assert ("Model and flights agree to the noise." in text) is ("y" not in above), form
+        assert ("Model and flights agree within the noise." in text) is ("y" not in above), form
         assert ("The gap is largest in the" in text) is ("y" in above), form
         assert ("follows thrust (90 %)" in text) is ("y" in above), form
 

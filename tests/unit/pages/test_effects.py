@@ -35,7 +35,9 @@ def test_ends_of_an_interval_can_be_told_apart_and_rounding_makes_no_certainty()
     )
     assert "less than 1 % of" in effect_sentence(replace(OFFSET, share=-0.001))
     assert "(p = 0.012, " in effect_sentence(replace(OFFSET, p_value=0.0123))
-    assert closest_sentence(OFFSET).startswith("The closest was offset of the centre of mass, and that is not it: ")
+    assert closest_sentence(OFFSET).startswith(
+        "The closest was offset of the centre of mass, which does not explain the gap: "
+    )
 
 
 def test_a_power_of_ten_that_all_three_have_stands_once():

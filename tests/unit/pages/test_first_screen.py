@@ -225,7 +225,9 @@ def test_what_is_left_has_an_axis_a_cause_and_a_way_of_energy(left, said):
 
 def test_the_closest_effects_are_not_the_answer_and_say_how_little_they_do():
     box, facts, _, table, below = screen(diagnosis("UNEXPLAINED", named=({"named": 0},), share=0.31))
-    assert box.sentences[0].startswith("The closest was offset of the centre of mass, and that is not it: com_offset, ")
+    assert box.sentences[0].startswith(
+        "The closest was offset of the centre of mass, which does not explain the gap: com_offset, "
+    )
     assert facts["How sure"] == "With the closest effects, of the held-out gap above the noise, 31 % is gone."
     assert "After: with the closest effects, offset of the centre of mass, which are not the answer." in table.caption
     assert "What it is" in dict(below)

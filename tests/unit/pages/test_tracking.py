@@ -21,7 +21,7 @@ def page(flight, settings=SETTINGS):
     inputs = {role: InputFile(f"{role}.h5", "0" * 64, "cpfls/x") for role in ("model", "trajectory")}
     config = {"simulation": {"computed_torque": settings}}
     record = flight.with_header(Header("0", 1, "", inputs))
-    source = Source.of("tracked.h5", "1" * 64, record, config, VehicleSettings(), 0)
+    source = Source("tracked.h5", "1" * 64, record, config, VehicleSettings(), 0)
     return tracking_section(Sources([source], VehicleSettings(), ReportSettings()))
 
 
