@@ -99,10 +99,10 @@ def test_channels_that_agree_are_not_warned_about(turning):
     found = audit([moved(turning)], WINDOWS)
     assert (found.warnings, found.contradictions) == ((), ())
     checks = sensors_of([moved(turning)], WINDOWS).motion.checks
-    matches = [match for check in checks if check.pair.exact for match in check.matches]
-    assert {match.channels for match in matches} == {"position and velocity", "velocity and acceleration"}
-    np.testing.assert_allclose([match.scale for match in matches], 1.0, atol=1e-3)
-    np.testing.assert_allclose([match.delay_s for match in matches], 0.0, atol=1e-3)
+    exact = [check for check in checks if check.pair.exact]
+    assert {check.pair.words for check in exact} == {"position and velocity", "velocity and acceleration"}
+    np.testing.assert_allclose([check.scale for check in exact], 1.0, atol=1e-3)
+    np.testing.assert_allclose([check.delay.value for check in exact], 0.0, atol=1e-3)
 
 
 @pytest.mark.parametrize(
