@@ -1,7 +1,5 @@
 """Reader of blackbox logs, as Betaflight, INAV and their kin write them: a header in text, then packed frames."""
 
-from __future__ import annotations
-
 import re
 import struct
 from collections.abc import Collection, Mapping
@@ -14,29 +12,16 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import InputError
 from cpfls_cli.logs.blackbox_frames import ENCODINGS, KINDS, MAIN, ROLLOVER, Fields, decode
 from cpfls_cli.logs.formats import BLACKBOX_MAGIC, LogContents
+from cpfls_cli.logs.records import bytes_of
 
 _LARGEST_SHORT = 0x7FFF
 _DEGREES = 180 / pi
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
-    """Read the main fields of the longest flight in a file, on one clock, ``time``.
-
-    Parameters
-    ----------
-    wanted : collection of str, optional
-        Not needed: frames are read as a whole.
-
-    Raises
-    ------
-    InputError
-        If the file is no such log, or holds no frames that can be read.
-    """
+    """Read the main fields of the longest flight in a file, on one clock, ``time``; frames are read as a whole."""
     del wanted
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
+    content = bytes_of(path)
     begins = [found.start() for found in re.finditer(re.escape(BLACKBOX_MAGIC), content)]
     if not begins:
         raise InputError(f"{path}: not a blackbox log: it does not begin as one")
@@ -66,13 +51,13 @@ def _flight(content: bytes) -> tuple[dict[str, str], IntArray, int]:
         begin = end + 1
     if header.get("Data version") != "2":
         raise ValueError(f"Data version {header.get('Data version', 'missing')}, not 2")
-    fields = _fields(header)
+    fields, names = _fields(header), header["Field I name"].split(",")
     constants = np.array(
         [
             _numbers(header, "minthrottle", "1150")[0],
             _numbers(header, "motorOutput", header.get("minthrottle", "1150"))[0],
             _numbers(header, "vbatref", "4095")[0],
-            _names(header).index("motor[0]") if "motor[0]" in _names(header) else -1,
+            names.index("motor[0]") if "motor[0]" in names else -1,
         ]
     )
     data = np.frombuffer(content, dtype=np.uint8)
@@ -83,17 +68,13 @@ def _flight(content: bytes) -> tuple[dict[str, str], IntArray, int]:
     return header, rows, broken
 
 
-def _names(header: Mapping[str, str]) -> list[str]:
-    return header["Field I name"].split(",")
-
-
 def _numbers(header: Mapping[str, str], key: str, otherwise: str = "") -> list[int]:
     return [int(word) for word in header.get(key, otherwise).split(",")]
 
 
 def _fields(header: Mapping[str, str]) -> Fields:
     """Read how the fields of each kind of frame are written; frames of kind P have the fields of those of kind I."""
-    if _names(header)[1:2] != ["time"]:
+    if header["Field I name"].split(",")[1:2] != ["time"]:
         raise ValueError("the second field is not time")
     width = max(len(header.get(f"Field {kind} name", "").split(",")) for kind in KINDS)
     fields = Fields(np.zeros(len(KINDS), dtype=np.int64), *np.zeros((3, len(KINDS), width), dtype=np.int64))
@@ -113,7 +94,7 @@ def _fields(header: Mapping[str, str]) -> Fields:
 
 def _columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str, Array], dict[str, str]]:
     """Name the columns, and give those whose unit the header tells in that unit."""
-    names = _names(header)
+    names = header["Field I name"].split(",")
     stamps = rows[:, 1] + ROLLOVER * np.cumsum(np.diff(rows[:, 1], prepend=rows[:1, 1]) < 0)
     # The number of a frame follows from which frames are left out, which nothing here needs.
     columns = {name: rows[:, place].astype(float) for place, name in enumerate(names) if name != "loopIteration"}

@@ -5,8 +5,6 @@ frame of kind I stands by itself, one of kind P builds on the two before it. Fra
 stepped over.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

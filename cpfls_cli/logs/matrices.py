@@ -1,7 +1,5 @@
 """Reader of HDF5 and of MATLAB's .mat: arrays of numbers by their path, the columns of a matrix one by one."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Collection, Iterable, Iterator

@@ -1,7 +1,5 @@
 """Reader of ROS 2 bags, SQLite or MCAP: topics of messages, flattened to their numbers."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import fields, is_dataclass
