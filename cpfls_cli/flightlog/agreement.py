@@ -1,7 +1,5 @@
 """Signals of a log held against each other: which axes, signs, units and frames let them agree."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import permutations, product
@@ -13,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.repair import align_quaternion_signs
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
+from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
 
 _FILTER_ORDER = 2
@@ -99,7 +98,8 @@ def fit_axes(reference: Array, measured: Array) -> AxisFit:
     }
     explained = {axes: max(value, 0.0) ** 2 / (power * total) for axes, value in together.items()}
     named = ((0, 1, 2), (1.0, 1.0, 1.0))
-    best = max(explained, key=lambda axes: explained[axes])
+    # An axis that does not move fits as well with either sign.
+    best = largest(explained, lambda axes: explained[axes])
     runner_up = max(value for axes, value in explained.items() if axes != best)
     # Other axes than the names say have to be clearly better.
     clearly = explained[best] > _CLEARLY and 1 - explained[best] < (1 - explained[named]) / _TIMES_BETTER

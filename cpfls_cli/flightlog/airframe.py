@@ -1,7 +1,5 @@
 """Where the rotors of a vehicle are and how they turn: from the parameters in a log, or from its motion."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import permutations
@@ -14,6 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
 from cpfls_cli.lag import delayed, lagged
+from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
 
 Parameters = Mapping[str, float | str]
@@ -89,7 +88,7 @@ class Airframe:
         """Whether other places, or other ways to turn, are not ruled out."""
         return self.sure == "guess"
 
-    def with_arm(self, arm_m: float) -> Airframe:
+    def with_arm(self, arm_m: float) -> "Airframe":
         """Give the same rotors at a distance from the middle; the mean distance where they differ."""
         mean = float(np.mean([hypot(*rotor.direction) for rotor in self.rotors]))
         factor = arm_m / mean
@@ -283,7 +282,7 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     moved = [lagged(squared, rate_hz * lag).start for lag in (_LAGS_S if is_command else _LAGS_S[:3])]
     moved += [] if is_command else [delayed(squared, rate_hz * seconds) for seconds in _SHIFTS_S]
     tried = [_shares(acceleration, rate, low_pass(own, rate_hz, cutoff, 2)) for own in moved]
-    shares, weights = max(tried, key=lambda found: max(sum(share) for _, share in found[0]))
+    shares, weights = largest(tried, lambda found: max(sum(share) for _, share in found[0]))
     layout, explained, by_axes = _chosen(shares, ("X", "plus"))
     if not by_axes:
         layout, explained, by_axes = _chosen(shares, ("X",))
@@ -301,7 +300,7 @@ def _chosen(
 ) -> tuple[_Layout, tuple[float, float, float], bool]:
     """Choose the layout that explains most, and tell whether another numbering comes near."""
     own = [found for found in shares if found[0].form in forms]
-    layout, explained = max(own, key=lambda found: sum(found[1]) * (_PREFER_X if found[0].form == "X" else 1.0))
+    layout, explained = largest(own, lambda found: sum(found[1]) * (_PREFER_X if found[0].form == "X" else 1.0))
     places = [rotor.name for rotor in layout.rotors]
     others = max(sum(share[:2]) for other, share in own if [rotor.name for rotor in other.rotors] != places)
     clear = sum(explained[:2]) > max(_LEAST_OF_BOTH, _LEAST_TIMES * others) and explained[2] > _LEAST_EXPLAINED

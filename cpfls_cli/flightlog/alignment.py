@@ -1,7 +1,5 @@
 """Commands aligned with the motion: the lag of the rotors, and the delay between torque command and motion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How fast a signal of a log really is: updates that come slower than the clock, and a filter before the log."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """The clock of a log: time stamps that increase, restarts, and the longest stretch without a long gap."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Conversion of a log's columns: selected by name, in SI, in body FLU and world ENU."""
 
-from __future__ import annotations
-
 from collections.abc import Container, Mapping
 from dataclasses import fields, replace
 from difflib import get_close_matches
@@ -14,13 +12,12 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.repair import unwrap_angles
-from cpfls_cli.flightlog.settings import ColumnMap, ImportSettings, SignalMap
+from cpfls_cli.flightlog.settings import ROTORS, ColumnMap, ImportSettings, SignalMap
 from cpfls_cli.units import STANDARD_GRAVITY, to_si
 
 _SUFFICIENT_SIGNALS = ("attitude", "quaternion", "body_rate", "rotor_speed", "rotor_command")
 _WORLD_SIGNALS = ("position", "velocity", "acceleration")
 _BODY_SIGNALS = ("body_rate", "body_torque")
-_ROTOR_SIGNALS = ("rotor_speed", "rotor_command")
 _SCALAR_SIGNALS = ("thrust", "voltage")
 _MOST_NEAREST, _MOST_LISTED = 3, 20
 _ALIKE, _ALIKE_SHORT, _SHORT_NAME = 0.5, 0.7, 2
@@ -206,7 +203,7 @@ def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) ->
         Names among those of `LogSignals`.
     """
     in_body = _as_body_vectors(signals, settings)
-    converted = {name: signals[name] for name in _ROTOR_SIGNALS if name in signals}
+    converted: dict[str, Array] = {name: signals[name] for name in ROTORS if name in signals}
     if "rotor_command" in signals and settings.rotor_command_is == "thrust":
         # Thrust goes with the square of the speed; a share below 0 gives none.
         converted["rotor_command"] = np.sqrt(np.maximum(signals["rotor_command"], 0.0))

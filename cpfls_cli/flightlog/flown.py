@@ -1,7 +1,5 @@
 """The part of a log in which the vehicle flies: not on the ground, not idling, not disarmed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

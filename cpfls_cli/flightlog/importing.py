@@ -1,7 +1,5 @@
 """The import of a flight: read, align, filter, derive."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from math import pi

@@ -1,7 +1,5 @@
 """Columns of a log of any kind by name, each on its own clock and all on one, and the column that is its clock."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -14,7 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.nameless import nameless_clock
 from cpfls_cli.flightlog.names import Named
-from cpfls_cli.flightlog.settings import UNITS_OF_SIGNAL, SignalName
+from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics
 from cpfls_cli.units import KNOWN_UNITS, UnitName
 
@@ -33,7 +31,6 @@ _TIME_NAMES = (
     "t_s",
 )
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-ROTORS: Final[tuple[SignalName, ...]] = ("rotor_speed", "rotor_command")
 _STEPS_S = (2e-4, 0.5)
 _SEVERAL = 3.0
 _SLOWEST_HZ = 0.5

@@ -1,7 +1,5 @@
 """Columns of a matrix that bear numbers and no names, recognised by how they move together."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 

@@ -1,7 +1,5 @@
 """One proposal for several logs of one vehicle: the same signals for all, what differs, and the vehicle itself."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from math import ceil, floor, log10

@@ -7,8 +7,6 @@ than it is named. A column that disagrees with all others is then the odd one, a
 takes less than twice as much, the log does not tell.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
@@ -130,7 +128,7 @@ class Reading:
         rates = AS_NAMED if self.rates is None else (self.rates.order, self.rates.sign)
         return {"attitude": (own.order, own.sign), "body_rate": rates, "position": (self.place_order, self.place_sign)}
 
-    def differs(self, other: Reading) -> bool:
+    def differs(self, other: "Reading") -> bool:
         """Tell whether another reading makes something else of the log."""
         return (self.maps, self.body, self.attitude.scalar_last) != (other.maps, other.body, other.attitude.scalar_last)
 

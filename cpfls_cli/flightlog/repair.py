@@ -1,7 +1,5 @@
 """Rows of a log on their way to a uniform clock: cropped, made continuous, spikes removed, absent values filled."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi
@@ -48,7 +46,7 @@ class SignalTable:
     time: Array
     signals: dict[str, Array]
 
-    def rows(self, kept: slice | IntArray | BoolArray) -> SignalTable:
+    def rows(self, kept: slice | IntArray | BoolArray) -> "SignalTable":
         """Select rows."""
         return SignalTable(self.time[kept], {name: values[kept] for name, values in self.signals.items()})
 

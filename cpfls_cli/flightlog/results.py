@@ -1,7 +1,5 @@
 """Results of an import: the signals on one clock, the flight derived from them, and the report."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Zero-phase low-pass filter and time derivative of uniformly sampled signals, and body rates from an attitude."""
 
-from __future__ import annotations
-
 from math import ceil
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Parts of a log that measure no flight: bad values, rotors at rest or below zero, columns dead, clipped or still."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, floor, pi
@@ -12,10 +10,9 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.repair import SignalTable, count_saturated
-from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
+from cpfls_cli.flightlog.settings import ROTORS, ImportSettings, SignalMap
 from cpfls_cli.units import KNOWN_UNITS
 
-_ROTORS = ("rotor_speed", "rotor_command")
 _SHORTEST_REST_S = 0.5
 # A speed that is measured, or a command that was filtered, may undershoot zero a little.
 _UNDERSHOOT = 0.01
@@ -57,7 +54,7 @@ def rotors_at_rest(table: SignalTable, settings: ImportSettings) -> dict[str, Bo
     """
     return {
         name: _at_rest(table.time, table.signals[name], settings.saturation_samples)
-        for name in _ROTORS
+        for name in ROTORS
         if name in table.signals
     }
 
@@ -154,7 +151,7 @@ def warn_of_dead(table: SignalTable, known: Sequence[str], settings: ImportSetti
                 count = int((by_column[column] == limit).sum())
                 yield f"column {column} is clipped at {_shown(limit, signal)}, for {count} samples: the rest is lost"
         if name in _MEASURED and len(constant) < len(by_column):
-            known_rest = name in _ROTORS and _at_rest(table.time, values, settings.saturation_samples)
+            known_rest = name in ROTORS and _at_rest(table.time, values, settings.saturation_samples)
             moves = np.broadcast_to(np.logical_not(known_rest), len(values))
             yield from _warn_of_pause(name, table.time[moves], values[moves])
 
@@ -175,7 +172,7 @@ def _limit(name: str, values: Array) -> float | None:
     """Find the limit at which a channel is clipped; a rotor's command has no lower one."""
     if name not in _LOWEST_LIMIT:
         return None
-    signs = (1.0,) if name in _ROTORS else (1.0, -1.0)
+    signs = (1.0,) if name in ROTORS else (1.0, -1.0)
     return next(
         (sign * np.nanmax(sign * values) for sign in signs if clipped(sign * values, _LOWEST_LIMIT[name])), None
     )
@@ -215,7 +212,7 @@ def _warn_of_pause(name: str, time: Array, values: Array) -> Iterator[str]:
         marked = np.zeros(len(time), dtype=bool)
         for first, last in pauses:
             marked[first : last + 1] = True
-        each = "rotor" if name in _ROTORS else "axis"
+        each = "rotor" if name in ROTORS else "axis"
         yield (
             f"{name} does not change on any {each} {_when(time, marked)}: its source was silent there, and the last"
             " value was repeated; cut it off with import.crop_s"

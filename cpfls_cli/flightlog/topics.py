@@ -1,7 +1,5 @@
 """Topics of a log, each with a clock of its own, resampled to the clock of one of them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Resampling of windows: blocks left out by cross-validation as normal equations, and residuals shifted in time."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -138,7 +136,7 @@ class Folds:
         )
         return np.asarray(self.square - explained)
 
-    def beside(self, base: IntArray) -> Beside:
+    def beside(self, base: IntArray) -> "Beside":
         """Fit a base, so that a fit of it with a few columns more costs no more than those columns.
 
         Parameters

@@ -1,7 +1,5 @@
 """Weak form: averages over smooth windows, with derivatives moved onto the window by integration by parts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -87,7 +85,7 @@ class Windows:
         """
         return -self._apply(values, self.slope)
 
-    def alternating(self) -> Windows:
+    def alternating(self) -> "Windows":
         """Turn the sign of every other sample: white noise stays as large as it was, and what is smooth vanishes."""
         sign = 1.0 - 2.0 * (np.arange(len(self.weight)) % 2)
         return Windows(sign * self.weight, sign * self.slope, self.hop, self.period)
