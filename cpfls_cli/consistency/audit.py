@@ -105,7 +105,6 @@ def audit(flights: Sequence[Signals], windows: Windows) -> Audit:
     ----------
     flights : sequence of Signals
         At least one, with the sampling period of the windows.
-    windows : Windows
 
     References
     ----------

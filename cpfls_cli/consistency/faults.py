@@ -46,12 +46,10 @@ class AuditFinding:
     ----------
     name : str
         Of the effect.
-    coefficients : tuple of FaultNumber
     p_value : float
         Probability that chance takes the most significant coefficient past half of the size that matters, after Holm.
     named : bool
         Whether any coefficient is named.
-    sentence : str
     """
 
     name: str
@@ -92,7 +90,6 @@ def findings(faults: Sequence[CheckedFault], period: float) -> tuple[AuditFindin
 
     Parameters
     ----------
-    faults : sequence of CheckedFault
     period : float
         Sampling period, s.
 

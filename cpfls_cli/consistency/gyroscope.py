@@ -196,7 +196,6 @@ class GyroFit:
         How far noise of the gyroscope can have pulled the value at most.
     known : array of bool, shape (13,)
         What the motion could tell.
-    blocks : int
     variance : array, shape (3,), rad^2/s^2
         Left about each axis.
     flight_bias : array, shape (flight, 3), rad/s

@@ -38,7 +38,6 @@ class Gyroscope:
         What can be told.
     untested : mapping of str to str
         Faults that cannot, with the reason.
-    fit : GyroFit or None
     apart : tuple of Finding
         That the two do not show one motion in one unit.
     """

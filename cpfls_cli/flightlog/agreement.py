@@ -16,14 +16,25 @@ from cpfls_cli.units import STANDARD_GRAVITY
 
 _FILTER_ORDER = 2
 _EDGE_S = 0.5
+"""At both ends, where the filter settles, s."""
+
 SLOW_HZ = 3.0
 """Below which rates are compared: between two sensors with clocks of their own a few ten ms do not matter there."""
 
 _TILT_HZ = 1.0
+"""Below which an acceleration over ground is compared with the lean: a position derived twice is full of noise."""
+
 _RISES = 0.4
+"""Correlation with the lift from which on a vertical axis follows it."""
+
 _AS_NAMED_IS_GOOD_ENOUGH = 0.02
+"""Share that other axes may explain more by noise alone."""
+
 _CLEARLY, _TIMES_BETTER = 0.6, 2.0
+"""Share that other axes than named have to explain, and how many times less they have to leave."""
+
 _MOVES_RAD_S = 0.03
+"""Rate below which noise and drift of an attitude are as large as its motion."""
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,8 @@ _BODY_SIGNALS = ("body_rate", "body_torque")
 _SCALAR_SIGNALS = ("thrust", "voltage")
 _MOST_NEAREST, _MOST_LISTED = 3, 20
 _ALIKE, _ALIKE_SHORT, _SHORT_NAME = 0.5, 0.7, 2
+"""Likeness of names by difflib that is worth a hint, and that of names of so many letters."""
+
 # Names that are far apart, so that the nearest one would mislead: of actuator_motors it is actuator_controls, which is
 # what mixers get and no command of a rotor.
 _SAME_IN_PX4 = (
@@ -53,8 +55,6 @@ def drop_absent_signals(columns: Container[str], settings: ImportSettings) -> Im
     ----------
     columns : container of str
         Names of the log's columns.
-    settings : ImportSettings
-        The section `import`.
 
     Returns
     -------
@@ -92,8 +92,6 @@ def select_columns(columns: Mapping[str, Array], settings: ImportSettings) -> tu
     ----------
     columns : mapping from str to array, shape (sample,)
         The log.
-    settings : ImportSettings
-        The section `import`.
 
     Returns
     -------
@@ -237,33 +235,13 @@ def _as_body_vectors(signals: Mapping[str, Array], settings: ImportSettings) -> 
 
 
 def body_to_flu(vectors: Array, frame: BodyFrame) -> Array:
-    """Convert body vectors to front, left, up (FLU).
-
-    Parameters
-    ----------
-    vectors : array, shape (time, 3), body frame `frame`
-    frame : {"FLU", "FRD"}
-
-    Returns
-    -------
-    array, shape (time, 3), body frame FLU
-    """
+    """Convert body vectors, shape (time, 3), to front, left, up (FLU)."""
     turned: Array = vectors @ _BODY[frame].T
     return turned
 
 
 def world_to_enu(vectors: Array, frame: WorldFrame) -> Array:
-    """Convert world vectors to east, north, up (ENU).
-
-    Parameters
-    ----------
-    vectors : array, shape (time, 3), world frame `frame`
-    frame : {"ENU", "NED"}
-
-    Returns
-    -------
-    array, shape (time, 3), world frame ENU
-    """
+    """Convert world vectors, shape (time, 3), to east, north, up (ENU)."""
     turned: Array = vectors @ _WORLD[frame].T
     return turned
 
@@ -275,8 +253,6 @@ def attitude_to_enu_flu(attitude: Array, body: BodyFrame, world: WorldFrame) -> 
     ----------
     attitude : array, shape (time, 3), rad
         Roll, pitch and yaw (intrinsic ZYX) of the log's body frame in the log's world frame.
-    body : {"FLU", "FRD"}
-    world : {"ENU", "NED"}
 
     Returns
     -------

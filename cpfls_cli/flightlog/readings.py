@@ -70,7 +70,6 @@ class Witnesses:
 
     Attributes
     ----------
-    rate_hz : float
     gyroscope : array, shape (time, 3), or None
         In any unit and any axes.
     moving : array, shape (time, 3), or None
@@ -149,7 +148,6 @@ class Verdict:
 
     Attributes
     ----------
-    best : Reading
     tied : tuple of Reading
         With other maps, at less than twice the price: too near to be ruled out.
     others : tuple of Reading

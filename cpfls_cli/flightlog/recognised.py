@@ -37,12 +37,7 @@ class Rival:
 
 @dataclass(frozen=True, kw_only=True)
 class Guess:
-    """A signal of the log.
-
-    Attributes
-    ----------
-    sure : {"data", "named", "guess"}
-    """
+    """A signal of the log."""
 
     signal: SignalName
     columns: SignalMap
@@ -53,12 +48,7 @@ class Guess:
 
 @dataclass(frozen=True)
 class Choice:
-    """A key of the section `import` that holds for the whole log.
-
-    Attributes
-    ----------
-    sure : {"data", "named", "guess"}
-    """
+    """A key of the section `import` that holds for the whole log."""
 
     key: str
     value: str
@@ -75,12 +65,10 @@ class Recognition:
     ----------
     time_column, time_unit : str
         As the section `import` takes them.
-    signals : tuple of Guess
     choices : tuple of Choice
         Frames, the order of a quaternion, what a command is.
     left_out : tuple of str
         Sentences on columns that look like a signal and are not mapped.
-    flown : Flown
     rate_hz : float
         Of the clock.
     slowest_s, slowest_but_voltage_s : float
@@ -91,7 +79,6 @@ class Recognition:
         The rotors as the motion tells them.
     speeds : array, shape (time, rotor), or None
         Rotor speeds in flight in rad/s, or commands as shares of the largest speed.
-    warnings : tuple of str
     """
 
     time_column: str

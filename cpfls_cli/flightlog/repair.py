@@ -9,7 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import InputError, SettingError
-from cpfls_cli.flightlog.clock import increasing_rows, refuse_restart
+from cpfls_cli.flightlog.clock import increasing_rows, refuse_restart, runs
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.units import KNOWN_UNITS
 
@@ -17,6 +17,8 @@ from cpfls_cli.units import KNOWN_UNITS
 # spikes of five standard deviations of their channel lie beyond 10.
 _SUSPECTED_DEVIATIONS = 10.0
 _DEVIATION_OF_MEDIAN = 1.4826
+"""Standard deviation of normal noise over the median of its departures."""
+
 # Far beyond what flies, by SI unit: what is larger is a broken value, or the unit is wrong.
 _LARGEST = {
     "rad": 1e6,
@@ -31,6 +33,7 @@ _LARGEST = {
     "s": 1e3,
 }
 _LARGEST_SHARE_BROKEN = 0.01
+"""Of values up to which some are broken, and not the unit wrong."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,6 @@ def crop_and_order(table: SignalTable, settings: ImportSettings) -> tuple[Signal
 
     Parameters
     ----------
-    table : Table
     settings : ImportSettings
         `crop_s`.
 
@@ -177,7 +179,6 @@ def find_signal_spikes(table: SignalTable, settings: ImportSettings) -> dict[str
 
     Parameters
     ----------
-    table : Table
     settings : ImportSettings
         `spike_deviations` (None: those that are suspected) and `spike_window_samples`.
 
@@ -201,7 +202,6 @@ def mask_values(table: SignalTable, marked: Mapping[str, BoolArray]) -> SignalTa
 
     Parameters
     ----------
-    table : Table
     marked : mapping from signal name to array of bool, shape (sample, column)
     """
     signals = {name: np.where(marked[name], np.nan, values) for name, values in table.signals.items()}
@@ -268,7 +268,8 @@ def count_saturated(values: Array, samples: int, rest: float | None = None) -> i
     if len(known) == 0 or known.min() == known.max():
         return 0
     extremes = [extreme for extreme in (known.min(), known.max()) if extreme != rest]
-    return sum(_values_in_runs(known == extreme, samples) for extreme in extremes)
+    lengths = (after - first for extreme in extremes for first, after in runs(known == extreme))
+    return sum(length for length in lengths if length >= samples)
 
 
 def fill(time: Array, values: Array, target: Array) -> Array:
@@ -339,9 +340,3 @@ def _medians(rows: Array) -> Array:
     half, odd = divmod(rows.shape[1], 2)
     ordered = np.partition(rows, [half] if odd else [half - 1, half], axis=1)
     return np.asarray(ordered[:, half] if odd else 0.5 * (ordered[:, half - 1] + ordered[:, half]))
-
-
-def _values_in_runs(marked: BoolArray, samples: int) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
-    lengths = np.diff(edges.reshape(-1, 2), axis=1)
-    return int(lengths[lengths >= samples].sum())

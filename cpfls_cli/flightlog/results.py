@@ -115,7 +115,6 @@ class LogSignals:
     rotor_speed : array, shape (time, rotor), rad/s, or None
     rotor_command : array, shape (time, rotor), SI unit of the signal's `unit`, or None
     voltage : array, shape (time,), V, or 1 as a share of the full battery's, or None
-    report : ImportReport
     """
 
     time: Array

@@ -15,10 +15,18 @@ from cpfls_cli.flightlog.vocabulary import ASKED, RANGES
 from cpfls_cli.units import SPEED_UNITS, UnitName
 
 _FEWEST = 3
+"""Rotors of a multirotor."""
+
 _MUCH_FASTER = 2.0
+"""Times as often that commands have to come to be preferred to measured speeds."""
+
 _SLOW_HZ = 25.0
+"""Two samples in the 50 ms within which motors follow, and a half."""
+
 _USUAL_POLE_PAIRS = 7
 _RPM_FROM = 4000.0
+"""Faster than rotors turn in rad/s; the smallest reach 3000."""
+
 _SAME = 0.02
 """Part of the largest one's spread below which an output is not connected to a motor."""
 
@@ -60,10 +68,8 @@ class RotorColumns:
 
     Attributes
     ----------
-    speed, command : RotorGuess or None
     command_is : Choice or None
         What a command of unit 1 is a share of; None without one.
-    left_out, warnings : tuple of str
     """
 
     speed: RotorGuess | None

@@ -258,10 +258,8 @@ def decode(data: Bytes, place: int, fields: Fields, constants: IntArray, rows: I
 
     Parameters
     ----------
-    data : array of bytes
     place : int
         Where the header ends.
-    fields : Fields
     constants : array of int, shape (4,)
         Least throttle, least motor output, reference of the battery, and the field of the first motor.
     rows : array of int, shape (frame, field)

@@ -75,7 +75,6 @@ class Folds:
         Sums of squares of the right side.
     prior : array, shape (column,)
         Information that bounds give before any data: one over the square of the largest possible coefficient.
-    made_of : BlockRows
     """
 
     gram: Array
@@ -94,7 +93,6 @@ class Folds:
 
         Parameters
         ----------
-        columns : array of int
         believed : int
             So many of the first columns are not in question: a block that alone shows one of these stays in the fit,
             because without it nothing is known of that coefficient.
@@ -173,8 +171,6 @@ class Beside:
 
     Attributes
     ----------
-    normal : Folds
-    base : array of int
     gram : array, shape (block + 1, column, column)
         Of columns without what the base explains of them, over the blocks that a fit sees.
     moment : array, shape (block + 1, column, draw)
@@ -224,7 +220,6 @@ class Beside:
 
         Parameters
         ----------
-        column : int
         weight : array, shape (channel,)
             On the rows.
 
@@ -362,8 +357,6 @@ def mirror_shifted(residual: Array, flight_index: IntArray, shifts: int, rng: np
     ----------
     residual : array, shape (window, channel)
     flight_index : array of int, shape (window,)
-    shifts : int
-    rng : numpy.random.Generator
 
     Returns
     -------
