@@ -1,6 +1,6 @@
 """Signals of a log held against each other: which axes, signs, units and frames let them agree."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations, product
 from typing import Final
@@ -37,6 +37,17 @@ _MOVES_RAD_S = 0.03
 """Rate below which noise and drift of an attitude are as large as its motion."""
 
 
+Order = tuple[int, ...]
+Sign = tuple[float, ...]
+AS_NAMED: Final[tuple[Order, Sign]] = ((0, 1, 2), (1.0, 1.0, 1.0))
+"""Order and signs of three axes that are what they are called."""
+
+
+def handed(order: Sequence[int], sign: Sequence[float]) -> float:
+    """Give 1 for axes that are right-handed, -1 for others."""
+    return float(np.round(np.linalg.det(np.eye(3)[list(order)])) * np.prod(sign))
+
+
 @dataclass(frozen=True)
 class AxisFit:
     """How the axes of a measured vector lie to those of a reference.
@@ -71,7 +82,7 @@ class AxisFit:
     @property
     def is_as_named(self) -> bool:
         """Whether the axes are in their order, with a plus."""
-        return self.order == (0, 1, 2) and self.sign == (1.0, 1.0, 1.0)
+        return (self.order, self.sign) == AS_NAMED
 
     @property
     def times_better(self) -> float:

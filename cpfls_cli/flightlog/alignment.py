@@ -108,15 +108,13 @@ def _shifted(signals: LogSignals, delay: float, speeds_command: bool) -> LogSign
     for name in (*_COMMANDS, *_MOTION):
         values = getattr(signals, name)
         if values is not None:
-            cut[name] = (_within(values, delay / period) if name in commands else values)[first:]
+            if name in commands:
+                # A cubic overshoots the steps of a command; it stays within what was commanded.
+                values = np.clip(delayed(values, delay / period), values.min(axis=0), values.max(axis=0))
+            cut[name] = values[first:]
     begin, end = signals.report.span_s
     report = replace(signals.report, samples=len(time), span_s=(begin + float(time[0]), end))
     return replace(signals, time=time - time[0], report=report, **cut)
-
-
-def _within(values: Array, steps: float) -> Array:
-    """Delay a command, whose steps a cubic overshoots, within what was commanded."""
-    return np.clip(delayed(values, steps), values.min(axis=0), values.max(axis=0))
 
 
 @dataclass(frozen=True)
@@ -256,15 +254,7 @@ def _refine(fit: _Fit, delays: Array, best: int) -> float:
 
 
 def apply_rotor_lag(signals: LogSignals, time_constant: float) -> LogSignals:
-    """Replace rotor commands by their first-order response, ``tau w' + w = u``, with u held between samples.
-
-    Parameters
-    ----------
-    signals : LogSignals
-        On a uniform clock.
-    time_constant : float
-        tau, s; 0 for rotors without lag.
-    """
+    """Replace rotor commands by their first-order response in tau s, ``tau w' + w = u``, u held between samples."""
     command = signals.rotor_command
     if command is None or time_constant == 0:
         return signals

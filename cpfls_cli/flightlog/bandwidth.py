@@ -77,15 +77,10 @@ class SlowSignal:
 
 
 def slow_signals(table: SignalTable) -> tuple[SlowSignal, ...]:
-    """Find signals whose updates come at less than half the rate of the rows.
+    """Find signals of a table as logged whose updates come at less than half the rate of the rows.
 
     Between updates the rows repeat the last value, or lie on a straight line. What a coarse resolution repeats is
     none: its steps are irregular.
-
-    Parameters
-    ----------
-    table : SignalTable
-        The part that is kept, as logged.
     """
     found = (_slow(name, table.time, values) for name, values in table.signals.items() if name not in _NOT_JUDGED)
     return tuple(signal for signal in found if signal is not None)

@@ -53,7 +53,7 @@ def increasing_rows(time: Array) -> tuple[IntArray, dict[str, int]]:
 
 
 def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -> KeptRows:
-    """Find the longest stretch in which no column lacks values for longer than the longest gap allowed.
+    """Find the longest stretch in which no column lacks values for longer than `gap_s`, as `gap_rule` has it.
 
     Parameters
     ----------
@@ -61,8 +61,6 @@ def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -
         Increasing time stamps.
     present : array of bool, shape (sample, column)
         Where each column has a value.
-    settings : ImportSettings
-        `gap_s` and `gap_rule`.
 
     Raises
     ------

@@ -51,16 +51,6 @@ def drop_absent_signals(columns: Container[str], settings: ImportSettings) -> Im
 
     A signal with some of its columns stays, so that the missing ones are named like those of a required signal.
 
-    Parameters
-    ----------
-    columns : container of str
-        Names of the log's columns.
-
-    Returns
-    -------
-    ImportSettings
-        With the remaining signals.
-
     Raises
     ------
     InputError
@@ -266,31 +256,13 @@ def attitude_to_enu_flu(attitude: Array, body: BodyFrame, world: WorldFrame) -> 
 
 
 def attitude_from_quaternion(quaternion: Array, order: Literal["wxyz", "xyzw"]) -> Array:
-    """Convert quaternions to roll, pitch, yaw in the same frames.
-
-    Parameters
-    ----------
-    quaternion : array, shape (time, 4)
-        Rotation from body to world; its length does not matter.
-    order : {"wxyz", "xyzw"}
-        Whether the scalar part stands first or last.
-
-    Returns
-    -------
-    array, shape (time, 3), rad
-        Roll and yaw without jumps.
-    """
+    """Convert quaternions from body to world, shape (time, 4), of any length, to `euler_angles`."""
     scalar_last = np.roll(quaternion, -1, axis=1) if order == "wxyz" else quaternion
     return euler_angles(Rotation.from_quat(scalar_last).as_matrix())
 
 
 def euler_angles(rotation: Array) -> Array:
-    """Extract roll, pitch, yaw (intrinsic ZYX) from rotation matrices.
-
-    Parameters
-    ----------
-    rotation : array, shape (time, 3, 3)
-        From body to world.
+    """Extract roll, pitch, yaw (intrinsic ZYX) from rotations of body to world, shape (time, 3, 3).
 
     Returns
     -------

@@ -5,9 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.flightlog.agreement import AxisFit, first_derivative, fit_axes, second_derivative, slow
+from cpfls_cli.flightlog.agreement import (
+    AS_NAMED,
+    AxisFit,
+    Order,
+    Sign,
+    first_derivative,
+    fit_axes,
+    second_derivative,
+    slow,
+)
 from cpfls_cli.flightlog.names import Named
-from cpfls_cli.flightlog.readings import AS_NAMED, CLEAR, Order, Reading, Sign
+from cpfls_cli.flightlog.readings import CLEAR, Reading
 from cpfls_cli.flightlog.recognised import Rival, Seen, Sure, called
 from cpfls_cli.flightlog.vocabulary import RATES, SENSED, Row
 from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit

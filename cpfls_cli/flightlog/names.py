@@ -190,7 +190,7 @@ def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Na
     system : str
         Kind of log, as its reader names it; empty where any may be meant.
     """
-    found = [named for group in groups for named in (*_known(group, system), *_by_words(group))]
+    found = [named for group in groups for named in (*_known_to_systems(group, system), *_by_words(group))]
     if any(_is_of(system, known) for known in (PX4, ARDUPILOT, BETAFLIGHT)):
         # Of these logs all that drives rotors is in the list; words would find parameters and allocations.
         found = [named for named in found if named.known or named.signal not in (*ROTORS, "voltage")]
@@ -205,7 +205,7 @@ def _is_of(system: str, known: str) -> bool:
     return system.startswith((known, *KIN.get(known, ())))
 
 
-def _known(group: ColumnGroup, system: str) -> Iterator[Named]:
+def _known_to_systems(group: ColumnGroup, system: str) -> Iterator[Named]:
     for rank, known in enumerate(KNOWN):
         of_other = system and not _is_of(system, known.system)
         angles = known.signal != "attitude" or group.kind == "angles"

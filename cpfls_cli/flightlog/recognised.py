@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.flightlog.agreement import handed
 from cpfls_cli.flightlog.airframe import MovedBy
 from cpfls_cli.flightlog.flown import Flown
 from cpfls_cli.flightlog.log_table import LogTable
@@ -182,7 +183,7 @@ class Seen:
 
     def warn_of_mirrored(self, named: Named, order: Sequence[int], sign: Sequence[float], whose: str) -> None:
         """Warn of axes that are left-handed beside those of all others."""
-        if np.prod(sign) * np.linalg.det(np.eye(3)[list(order)]) > 0:
+        if handed(order, sign) > 0:
             return
         columns = [named.group.columns[index] for index, own in zip(order, sign, strict=True) if own < 0]
         what = f"{columns[0]} runs against all others" if len(columns) == 1 else "its axes are left-handed"

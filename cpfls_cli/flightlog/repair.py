@@ -158,13 +158,7 @@ def _broken(name: str, column: str, unit: str, values: Array, marked: BoolArray)
 
 
 def make_continuous(table: SignalTable) -> SignalTable:
-    """Remove jumps that are not motion: full turns of roll and yaw, sign changes of a quaternion.
-
-    Returns
-    -------
-    Table
-        Signals that may be interpolated.
-    """
+    """Remove jumps that are not motion, full turns of roll and yaw and signs of a quaternion, for interpolation."""
     signals = dict(table.signals)
     if "attitude" in signals:
         roll, pitch, yaw = signals["attitude"].T
@@ -175,17 +169,11 @@ def make_continuous(table: SignalTable) -> SignalTable:
 
 
 def find_signal_spikes(table: SignalTable, settings: ImportSettings) -> dict[str, BoolArray]:
-    """Find the spikes of all signals except rotor commands, which may jump.
-
-    Parameters
-    ----------
-    settings : ImportSettings
-        `spike_deviations` (None: those that are suspected) and `spike_window_samples`.
+    """Mark the spikes, or without `spike_deviations` what is suspected of it, of all but rotor commands, which jump.
 
     Returns
     -------
     dict from signal name to array of bool, shape (sample, column)
-        True at a spike.
     """
     deviations, window = settings.spike_deviations or _SUSPECTED_DEVIATIONS, settings.spike_window_samples
     spikes = {
@@ -198,12 +186,7 @@ def find_signal_spikes(table: SignalTable, settings: ImportSettings) -> dict[str
 
 
 def mask_values(table: SignalTable, marked: Mapping[str, BoolArray]) -> SignalTable:
-    """Replace marked values by NaN.
-
-    Parameters
-    ----------
-    marked : mapping from signal name to array of bool, shape (sample, column)
-    """
+    """Replace marked values, by signal, shape (sample, column), by NaN."""
     signals = {name: np.where(marked[name], np.nan, values) for name, values in table.signals.items()}
     return SignalTable(table.time, signals)
 
@@ -248,21 +231,14 @@ def find_spikes(values: Array, deviations: float, window: int) -> BoolArray:
 
 
 def count_saturated(values: Array, samples: int, rest: float | None = None) -> int:
-    """Count the values in runs at the channel's smallest or largest value.
+    """Count the values of a channel, shape (sample,), in runs at its smallest or largest one; 0 for a constant one.
 
     Parameters
     ----------
-    values : array, shape (sample,)
-        One channel.
     samples : int
         Length from which a run counts.
     rest : float, optional
         Extreme at which the channel may stand without being saturated.
-
-    Returns
-    -------
-    int
-        Values in such runs; 0 for a channel that is constant throughout.
     """
     known = values[np.isfinite(values)]
     if len(known) == 0 or known.min() == known.max():
@@ -273,36 +249,13 @@ def count_saturated(values: Array, samples: int, rest: float | None = None) -> i
 
 
 def fill(time: Array, values: Array, target: Array) -> Array:
-    """Interpolate the present values linearly at other times.
-
-    Parameters
-    ----------
-    time : array, shape (sample,), s
-    values : array, shape (sample, column)
-        Values that are not finite are absent.
-    target : array, shape (time,), s
-
-    Returns
-    -------
-    array, shape (time, column)
-    """
+    """Interpolate the finite ones of values, shape (sample, column), linearly at other times, shape (time,), s."""
     known = np.isfinite(values)
     return np.column_stack([np.interp(target, time[k], v[k]) for k, v in zip(known.T, values.T, strict=True)])
 
 
 def unwrap_angles(angles: Array, turn: float = 2 * pi) -> Array:
-    """Unwrap angles, also across absent values.
-
-    Parameters
-    ----------
-    angles : array, shape (sample,)
-    turn : float
-        A full turn in the unit of the angles; rad if not given.
-
-    Returns
-    -------
-    array, shape (sample,)
-    """
+    """Unwrap angles, shape (sample,), also across absent values, by a full turn in their unit; rad if not given."""
     known = np.isfinite(angles)
     continuous = np.array(angles, dtype=float)
     continuous[known] = np.unwrap(continuous[known], period=turn)
@@ -310,16 +263,7 @@ def unwrap_angles(angles: Array, turn: float = 2 * pi) -> Array:
 
 
 def align_quaternion_signs(quaternion: Array) -> Array:
-    """Give each quaternion the sign nearer to the previous one; q and -q are the same attitude.
-
-    Parameters
-    ----------
-    quaternion : array, shape (sample, 4)
-
-    Returns
-    -------
-    array, shape (sample, 4)
-    """
+    """Give each quaternion, shape (sample, 4), the sign nearer to the previous one; q and -q are the same attitude."""
     known = np.isfinite(quaternion).all(axis=1)
     continuous = np.array(quaternion, dtype=float)
     present = continuous[known]

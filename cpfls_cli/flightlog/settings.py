@@ -191,7 +191,9 @@ class ImportSettings(Settings):
         if self.signals:
             _check_attitude(self)
             _check_torque(self)
-            _check_command(self)
+            command = self.signals.get("rotor_command")
+            if self.rotor_command_is == "thrust" and (command is None or command.unit != "1"):
+                raise SettingError("rotor_command_is", "'thrust' needs the signal rotor_command in unit 1")
 
     @property
     def mapped_columns(self) -> tuple[str, ...]:
@@ -225,9 +227,3 @@ def _check_torque(settings: ImportSettings) -> None:
         raise SettingError("torque_source", f"{settings.torque_source!r} needs the signal {missing}")
     if {"torque", "body_torque"} <= names:
         raise SettingError("signals", "torque and body_torque are both given; keep one")
-
-
-def _check_command(settings: ImportSettings) -> None:
-    command = settings.signals.get("rotor_command")
-    if settings.rotor_command_is == "thrust" and (command is None or command.unit != "1"):
-        raise SettingError("rotor_command_is", "'thrust' needs the signal rotor_command in unit 1")

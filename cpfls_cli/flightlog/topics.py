@@ -28,13 +28,7 @@ _ROUNDING = 1 + 1e-9
 
 
 def topic_and_field(column: str) -> tuple[str, str]:
-    """Split the name of a column, ``topic.field`` or ``topic[instance].field``; the first instance needs no number.
-
-    Returns
-    -------
-    tuple of str
-        Topic and field; the field is empty where the name has none.
-    """
+    """Split ``topic.field`` or ``topic[instance].field``, where 0 needs no number; without a field that is empty."""
     topic, _, field = column.partition(".")
     return re.sub(r"\[0\]$", "", topic), field
 

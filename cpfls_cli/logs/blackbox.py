@@ -29,7 +29,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         flights = [_flight(content[begin:end]) for begin, end in zip(begins, [*begins[1:], None], strict=True)]
         longest = max(range(len(flights)), key=lambda number: len(flights[number][1]))
         header, rows, broken = flights[longest]
-        columns, units = _columns(header, rows)
+        columns, units = _scaled_columns(header, rows)
     except KeyError as error:
         raise InputError(f"{path}: a broken blackbox log: its header: the line {error} is missing") from None
     except (ValueError, OverflowError) as error:
@@ -54,9 +54,9 @@ def _flight(content: bytes) -> tuple[dict[str, str], IntArray, int]:
     fields, names = _fields(header), header["Field I name"].split(",")
     constants = np.array(
         [
-            _numbers(header, "minthrottle", "1150")[0],
-            _numbers(header, "motorOutput", header.get("minthrottle", "1150"))[0],
-            _numbers(header, "vbatref", "4095")[0],
+            _integers(header, "minthrottle", "1150")[0],
+            _integers(header, "motorOutput", header.get("minthrottle", "1150"))[0],
+            _integers(header, "vbatref", "4095")[0],
             names.index("motor[0]") if "motor[0]" in names else -1,
         ]
     )
@@ -68,7 +68,7 @@ def _flight(content: bytes) -> tuple[dict[str, str], IntArray, int]:
     return header, rows, broken
 
 
-def _numbers(header: Mapping[str, str], key: str, otherwise: str = "") -> list[int]:
+def _integers(header: Mapping[str, str], key: str, otherwise: str = "") -> list[int]:
     return [int(word) for word in header.get(key, otherwise).split(",")]
 
 
@@ -83,16 +83,16 @@ def _fields(header: Mapping[str, str]) -> Fields:
             continue
         named = "I" if kind == "P" else kind
         count = fields.counts[number] = len(header[f"Field {named} name"].split(","))
-        fields.encoding[number, :count] = _numbers(header, f"Field {kind} encoding")
-        fields.predictor[number, :count] = _numbers(header, f"Field {kind} predictor")
-        fields.is_signed[number, :count] = _numbers(header, f"Field {named} signed")
+        fields.encoding[number, :count] = _integers(header, f"Field {kind} encoding")
+        fields.predictor[number, :count] = _integers(header, f"Field {kind} predictor")
+        fields.is_signed[number, :count] = _integers(header, f"Field {named} signed")
         unknown = set(fields.encoding[number, :count].tolist()) - set(ENCODINGS)
         if unknown:
             raise ValueError(f"fields of kind {kind} in the encoding {sorted(unknown)[0]}")
     return fields
 
 
-def _columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str, Array], dict[str, str]]:
+def _scaled_columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str, Array], dict[str, str]]:
     """Name the columns, and give those whose unit the header tells in that unit."""
     names = header["Field I name"].split(",")
     stamps = rows[:, 1] + ROLLOVER * np.cumsum(np.diff(rows[:, 1], prepend=rows[:1, 1]) < 0)

@@ -40,13 +40,13 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     left_out = [name for name in kept if wanted is None and not _is_numeric(schema.field(name).type)]
     columns: dict[str, Array] = {name: np.empty(0) for name in schema.names if name not in left_out}
     for name in set(columns) & set(kept):
-        columns[name] = _numbers(path, name, table.column(name))
+        columns[name] = _numbers_of_column(path, name, table.column(name))
     warnings = (f"columns that hold no numbers are left out: {some(left_out)}",) if left_out else ()
     units = {name: "s" for name in set(columns) & set(kept) if _states_unit(schema.field(name).type)}
     return LogContents({"": columns}, units, warnings=warnings)
 
 
-def _numbers(path: Path, name: str, column: Any) -> Array:
+def _numbers_of_column(path: Path, name: str, column: Any) -> Array:
     if not _is_numeric(column.type):
         raise InputError(
             f"{path}: column '{name}' holds {_kind(column.type)}: not numbers; map another column in import.signals, "

@@ -38,16 +38,7 @@ class BlockRows:
     parts: list[slice | BoolArray]
 
     def products(self, first: Array, second: Array) -> Array:
-        """Multiply columns with columns over the windows of each block and over all channels.
-
-        Parameters
-        ----------
-        first, second : array, shape (window, channel, column)
-
-        Returns
-        -------
-        array, shape (block, column of the first, column of the second)
-        """
+        """Multiply columns, shape (window, channel, column), over each block: shape (block, first, second column)."""
         pairs = ((first[rows], second[rows]) for rows in self.parts)
         return np.array([x.reshape(-1, x.shape[2]).T @ y.reshape(-1, y.shape[2]) for x, y in pairs])
 
@@ -331,17 +322,7 @@ def _solve(gram: Array, moment: Array, length: Array | None = None) -> Array:
 
 
 def about_flight_mean(values: Array, flight_index: IntArray) -> Array:
-    """Subtract the mean over each flight.
-
-    Parameters
-    ----------
-    values : array, shape (window, ...)
-    flight_index : array of int, shape (window,)
-
-    Returns
-    -------
-    array, shape (window, ...)
-    """
+    """Subtract from values, shape (window, ...), the mean over each flight, by the flight of each window."""
     flights, number = np.unique(flight_index, return_inverse=True)
     return np.asarray(values - np.array([values[number == f].mean(axis=0) for f in range(len(flights))])[number])
 

@@ -46,43 +46,16 @@ class Windows:
         return max(0, (samples - len(self.weight)) // self.hop + 1)
 
     def centres(self, time: Array) -> Array:
-        """Compute the middle of each window.
-
-        Parameters
-        ----------
-        time : array, shape (time,), s
-
-        Returns
-        -------
-        array, shape (window,), s
-        """
+        """Compute the middle of each window, shape (window,), s, of a flight by its time, shape (time,), s."""
         first = time[0] + 0.5 * (len(self.weight) - 1) * self.period
         return np.asarray(first + np.arange(self.count(len(time))) * self.hop * self.period)
 
     def average(self, values: Array) -> Array:
-        """Average over each window, ``int phi x dt``.
-
-        Parameters
-        ----------
-        values : array, shape (time, ...)
-
-        Returns
-        -------
-        array, shape (window, ...)
-        """
+        """Average values, shape (time, ...), over each window, ``int phi x dt``, shape (window, ...)."""
         return self._apply(values, self.weight)
 
     def derivative(self, values: Array) -> Array:
-        """Average the time derivative over each window, ``-int phi' x dt``; nothing is differentiated.
-
-        Parameters
-        ----------
-        values : array, shape (time, ...)
-
-        Returns
-        -------
-        array, shape (window, ...)
-        """
+        """Average the time derivative as `average` does, ``-int phi' x dt``; nothing is differentiated."""
         return -self._apply(values, self.slope)
 
     def alternating(self) -> "Windows":
