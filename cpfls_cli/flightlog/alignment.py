@@ -14,16 +14,6 @@ from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.rounding import less, levelled
 
 _COMMANDS = ("body_torque", "thrust", "rotor_command")
-_MOTION = (
-    "attitude",
-    "body_rate",
-    "position",
-    "velocity",
-    "acceleration",
-    "specific_force",
-    "rotor_speed",
-    "voltage",
-)
 _POOR_R2 = 0.5
 """Below which most of the torque is other than that of a rigid body, and the delay is not to be trusted."""
 
@@ -105,13 +95,12 @@ def _shifted(signals: LogSignals, delay: float, speeds_command: bool) -> LogSign
     time = signals.time[first:]
     commands = (*_COMMANDS, "rotor_speed") if speeds_command else _COMMANDS
     cut: dict[str, Array] = {}
-    for name in (*_COMMANDS, *_MOTION):
-        values = getattr(signals, name)
-        if values is not None:
-            if name in commands:
-                # A cubic overshoots the steps of a command; it stays within what was commanded.
-                values = np.clip(delayed(values, delay / period), values.min(axis=0), values.max(axis=0))
-            cut[name] = values[first:]
+    for name, values in signals.arrays.items():
+        cut[name] = values[first:]
+        if name in commands:
+            # A cubic overshoots the steps of a command; it stays within what was commanded.
+            moved = np.clip(delayed(values, delay / period), values.min(axis=0), values.max(axis=0))
+            cut[name] = moved[first:]
     begin, end = signals.report.span_s
     report = replace(signals.report, samples=len(time), span_s=(begin + float(time[0]), end))
     return replace(signals, time=time - time[0], report=report, **cut)

@@ -1,7 +1,7 @@
 """The import of a flight: read, align, filter, derive."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from math import pi
 from typing import Any
 
@@ -197,10 +197,10 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
     """
     filtered: dict[str, Any] = {
         name: low_pass(values, signals.report.log_rate_hz, settings.lowpass_hz, settings.lowpass_order)
-        for name, values in _arrays(signals).items()
+        for name, values in signals.arrays.items()
     }
     smooth = replace(signals, **filtered)
-    arrays = _arrays(smooth) | _derived(smooth)
+    arrays = smooth.arrays | _derived(smooth)
     time = smooth.time
     report = replace(signals.report, lowpass_hz=settings.lowpass_hz)
     if settings.rate_hz is not None:
@@ -226,11 +226,6 @@ def _clock(time: Array, rate_hz: float, log_rate_hz: float) -> Array:
             f" log's rate, and {_FEWEST_SAMPLES} samples at least",
         )
     return np.arange(samples) / rate_hz
-
-
-def _arrays(signals: LogSignals) -> dict[str, Array]:
-    names = {entry.name for entry in fields(signals)} - {"time", "report"}
-    return {name: getattr(signals, name) for name in sorted(names) if getattr(signals, name) is not None}
 
 
 def _derived(signals: LogSignals) -> dict[str, Array]:

@@ -10,13 +10,14 @@ from scipy.ndimage import median_filter
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.clock import increasing_rows
 from cpfls_cli.flightlog.nameless import nameless_clock
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics
 from cpfls_cli.units import KNOWN_UNITS, UnitName
 
-_TIME_NAMES = (
+_TIME_NAMES = [
     "t",
     "time",
     "time_s",
@@ -29,7 +30,7 @@ _TIME_NAMES = (
     "seconds",
     "sec",
     "t_s",
-)
+]
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _STEPS_S = (2e-4, 0.5)
 """Steps between stamps of logs of flights, s: 5 kHz to 2 Hz."""
@@ -97,10 +98,8 @@ class LogTable:
         rows = np.column_stack([np.asarray(self.topics[topic][self.parts(c)[1]], dtype=float) for c in columns])
         if len(rows) != len(time):
             return np.empty(0), np.empty((0, len(columns)))
-        known = np.isfinite(rows).all(axis=1) & np.isfinite(time)
-        highest = np.maximum.accumulate(np.where(known, time, -np.inf))
-        known[1:] &= time[1:] > highest[:-1]
-        return time[known], rows[known]
+        kept, _ = increasing_rows(np.where(np.isfinite(rows).all(axis=1), time, np.nan))
+        return time[kept], rows[kept]
 
     def without_spikes(self, columns: Sequence[str]) -> Array:
         """Values of columns, each the median of five neighbours: what rotors do takes longer."""
@@ -158,8 +157,8 @@ def _doubt_of_time(name: str, unit: str, fitting: Sequence[str], step: float) ->
 
 def _time_rank(name: str) -> int:
     lower = name.lower().strip()
-    if lower in _TIME_NAMES:
-        return _TIME_NAMES.index(lower) > 1
+    if lower in _TIME_NAMES.split():
+        return lower not in _TIME_NAMES.split()[:2]
     return 2 if "time" in lower or "stamp" in lower else 3
 
 

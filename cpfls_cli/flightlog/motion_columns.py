@@ -224,7 +224,12 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
         for weight in (carried, 1.0)
     )
     sensed = next((row for row in fitting if row[1] == (stated or row[1])), fitting[0] if fitting else None)
-    world = _world_acceleration(seen)
+    position, velocity = seen.first("position"), seen.guesses.get("velocity")
+    world = None
+    if velocity is not None:
+        world = first_derivative(seen.log.on_grid(velocity.columns.columns)[seen.part], seen.rate_hz)
+    elif position is not None:
+        world = second_derivative(seen.grid(position), seen.rate_hz)
     along_world = None
     if world is not None:
         ground = np.array([1.0, 1.0, 0.0 if sensed else 1.0])
@@ -271,13 +276,6 @@ def _carried(seen: Seen, reading: Reading | None) -> float:
     up = reading.place_sign[2] * (1.0 if reading.world == "ENU" else -1.0)
     size = np.linalg.norm(moving + np.array([0.0, 0.0, up * STANDARD_GRAVITY]), axis=1)
     return float(np.median(size)) / STANDARD_GRAVITY
-
-
-def _world_acceleration(seen: Seen) -> Array | None:
-    position, velocity = seen.first("position"), seen.guesses.get("velocity")
-    if velocity is not None:
-        return first_derivative(seen.log.on_grid(velocity.columns.columns)[seen.part], seen.rate_hz)
-    return None if position is None else second_derivative(seen.grid(position), seen.rate_hz)
 
 
 def _tell_sensed(

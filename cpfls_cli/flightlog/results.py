@@ -1,7 +1,7 @@
 """Results of an import: the signals on one clock, the flight derived from them, and the report."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 from cpfls_cli.arrays import Array
 
@@ -130,6 +130,12 @@ class LogSignals:
     rotor_command: Array | None = None
     voltage: Array | None = None
     report: ImportReport = field(repr=False)
+
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """Signals that there are, by name."""
+        names = sorted({entry.name for entry in fields(self)} - {"time", "report"})
+        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
 
 
 @dataclass(frozen=True, kw_only=True)

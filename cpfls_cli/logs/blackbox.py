@@ -39,7 +39,10 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     several = f"holds {len(begins)} flights; the longest, number {longest + 1}, is read: {columns['time'][-1]:.0f} s"
     lost = f"{broken} frames are broken; what follows up to the next whole one is missing"
     warnings = (*((several,) if len(begins) > 1 else ()), *((lost,) if broken else ()))
-    return LogContents({"": columns}, units, _parameters(header), header.get("Firmware revision", ""), warnings)
+    # Lines that are not about the log itself.
+    stated = {key: value for key, value in header.items() if not re.match(r"Product|Data version|Field|[IP] ", key)}
+    parameters = {key: float(own) if re.fullmatch(r"-?\d+(\.\d+)?", own) else own for key, own in stated.items()}
+    return LogContents({"": columns}, units, parameters, header.get("Firmware revision", ""), warnings)
 
 
 def _flight(content: bytes) -> tuple[dict[str, str], IntArray, int]:
@@ -138,9 +141,3 @@ def _scales(header: Mapping[str, str]) -> list[tuple[str, float, str]]:
         # Hundreds of electrical turns, of which each pair of poles takes one.
         scales += [("eRPM[", 200 / int(header["motor_poles"]), "rpm")]
     return scales
-
-
-def _parameters(header: Mapping[str, str]) -> dict[str, float | str]:
-    """Give the lines of the header that are not about the log itself."""
-    lines = {key: value for key, value in header.items() if not re.match(r"Product|Data version|Field|[IP] ", key)}
-    return {key: float(value) if re.fullmatch(r"-?\d+(\.\d+)?", value) else value for key, value in lines.items()}
