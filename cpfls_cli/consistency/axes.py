@@ -1,7 +1,5 @@
 """Two vectors that should be the same: axes swapped, reversed or missing, and the gyroscope beside the attitude."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import log, pi
 
@@ -9,6 +7,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.findings import Finding
+from cpfls_cli.rounding import levelled
 
 AXES = ("x", "y", "z")
 SAME = 0.9
@@ -32,6 +31,8 @@ _DEGREES_PER_RADIAN = 180 / pi
 _UNIT_TOLERANCE = 1.3
 """Ratio within which a gain is that of a unit."""
 
+_SENSORS = ("attitude", "gyroscope")
+
 
 def _correlated(first: Array, second: Array) -> Array:
     """Correlate each axis of one with each of the other, shape (3, 3); 0 for what is constant."""
@@ -39,44 +40,42 @@ def _correlated(first: Array, second: Array) -> Array:
         return np.nan_to_num(np.corrcoef(first.T, second.T)[:3, 3:])
 
 
-def axes_apart(
-    words: str, channels: tuple[str, str], first: Array, second: Array, floor: float, remedy: str
-) -> list[Finding]:
+def _instead(correlation: Array, axis: int) -> int | None:
+    """Find the axis of the other that surely stands in the place of an axis of the one."""
+    best = int(np.argmax(levelled(np.abs(correlation[axis]))))
+    return best if best != axis and abs(correlation[axis, best]) > SAME else None
+
+
+def axes_apart(words: str, first: Array, second: Array, floor: float) -> Iterator[tuple[str, float]]:
     """Detect axes that are swapped, reversed or missing.
 
     Parameters
     ----------
     words : str
         The two channels, "one and other".
-    channels : tuple of str
-        The same one by one.
     first, second : array, shape (window, 3)
         What should be the same.
     floor : float
         Standard deviation above which something moves.
-    remedy : str
+
+    Yields
+    ------
+    tuple of str and float
+        What is wrong, and the correlation along that axis.
     """
-    moving = (first.std(axis=0) > floor) & (second.std(axis=0) > 0)
+    spread, other_spread = first.std(axis=0), second.std(axis=0)
     correlation = _correlated(first, second)
     # Noise on one side that brings the correlation below a half makes that side more than twice as large.
-    larger, smaller = (
-        np.maximum(first.std(axis=0), second.std(axis=0)),
-        np.minimum(first.std(axis=0), second.std(axis=0)),
-    )
+    larger, smaller = np.maximum(spread, other_spread), np.minimum(spread, other_spread)
     alike = (smaller > floor) & (larger < TWICE * smaller)
-    findings = []
-    for axis in np.flatnonzero(moving):
-        same, best = float(correlation[axis, axis]), int(np.argmax(np.abs(correlation[axis])))
+    for axis in np.flatnonzero((spread > floor) & (other_spread > 0)).tolist():
+        same, instead = float(correlation[axis, axis]), _instead(correlation, axis)
         if same < -SAME:
-            what = f"{words} have opposite signs along {AXES[axis]}"
-        elif abs(same) < _OTHER and abs(correlation[axis, best]) > SAME:
-            what = f"{AXES[axis]} of the one is {AXES[best]} of the other in {words}: axes are swapped"
+            yield f"{words} have opposite signs along {AXES[axis]}", same
+        elif abs(same) < _OTHER and instead is not None:
+            yield f"{AXES[axis]} of the one is {AXES[instead]} of the other in {words}: axes are swapped", same
         elif abs(same) < _OTHER and alike[axis]:
-            what = f"{words} do not belong together along {AXES[axis]}: their correlation is {same:.2f}"
-        else:
-            continue
-        findings.append(Finding(what, remedy, channels, same))
-    return findings
+            yield f"{words} do not belong together along {AXES[axis]}: their correlation is {same:.2f}", same
 
 
 def gyroscope_apart(seen: Array, read: Array) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
@@ -98,32 +97,30 @@ def gyroscope_apart(seen: Array, read: Array) -> tuple[tuple[Finding, ...], tupl
         One for each other axis whose gain is not within 0.5 .. 2.
     """
     motion = np.maximum(seen.std(axis=0), read.std(axis=0))
-    moving = np.flatnonzero(motion > max(_TURNING_RAD_S, _TURNING_SHARE * motion.max()))
     correlation = _correlated(seen, read)
-    agrees = np.diag(correlation) >= _POOR
-    unlike = tuple(_one_axis_apart(int(axis), correlation[axis]) for axis in moving if not agrees[axis])
-    gain = {int(axis): float(read[:, axis].std() / seen[:, axis].std()) for axis in moving if agrees[axis]}
-    return unlike, tuple(_wrong_gains(gain))
+    unlike, scaled = [], []
+    for axis in np.flatnonzero(motion > max(_TURNING_RAD_S, _TURNING_SHARE * motion.max())).tolist():
+        if correlation[axis, axis] < _POOR:
+            unlike.append(_one_axis_apart(axis, correlation))
+            continue
+        gain = float(read[:, axis].std() / seen[:, axis].std())
+        if not 1 / TWICE <= gain <= TWICE:
+            about, remedy = _unit_of_gain(gain)
+            what = f"about body {_BODY_AXES[axis]} the body rate is {gain:.3g} times the attitude's derivative{about}"
+            scaled.append(Finding(what, remedy, _SENSORS, gain))
+    return tuple(unlike), tuple(scaled)
 
 
 def _one_axis_apart(axis: int, correlation: Array) -> Finding:
-    same, best = float(correlation[axis]), int(np.argmax(np.abs(correlation)))
+    same, instead = float(correlation[axis, axis]), _instead(correlation, axis)
     more = ""
     if same < -SAME:
         more = ", opposite signs"
-    elif best != axis and abs(correlation[best]) > SAME:
-        more = f", and {correlation[best]:.2f} with that about {AXES[best]}: axes are swapped"
+    elif instead is not None:
+        more = f", and {correlation[axis, instead]:.2f} with that about {AXES[instead]}: axes are swapped"
     what = f"about body {_BODY_AXES[axis]} the attitude's derivative and the body rate hardly agree"
     remedy = "check columns, signs and frames of import.signals.attitude (or quaternion) and import.signals.body_rate"
-    return Finding(f"{what} (correlation {same:.2f}{more})", remedy, ("attitude", "gyroscope"), same)
-
-
-def _wrong_gains(gain: dict[int, float]) -> Iterator[Finding]:
-    for axis, value in gain.items():
-        if not 1 / TWICE <= value <= TWICE:
-            what = f"about body {_BODY_AXES[axis]} the body rate is {value:.3g} times the attitude's derivative"
-            about, remedy = _unit_of_gain(value)
-            yield Finding(what + about, remedy, ("attitude", "gyroscope"), value)
+    return Finding(f"{what} (correlation {same:.2f}{more})", remedy, _SENSORS, same)
 
 
 def _unit_of_gain(gain: float) -> tuple[str, str]:

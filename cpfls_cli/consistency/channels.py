@@ -1,7 +1,5 @@
 """Checks of single channels: constant, clipped, coarsely rounded, filtered before they were logged."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from math import comb
 
@@ -31,16 +29,20 @@ _CHANNEL_WORDS = {
 _NO_NOISE_RAD_S = 2e-5
 
 
-def channel_warnings(flights: Sequence[Signals]) -> tuple[str, ...]:
+def channel_warnings(flights: Sequence[Signals]) -> Iterator[str]:
     """Name channels that never change, and a gyroscope that is clipped or coarsely rounded."""
-    return (*_constant(flights), *_gyro_warnings(np.concatenate([signals.body_rate for signals in flights])))
-
-
-def _constant(flights: Sequence[Signals]) -> Iterator[str]:
     for name in _channels(flights[0]):
         columns = [columns_[name] for signals in flights if name in (columns_ := _channels(signals))]
         if all(np.ptp(column) == 0 for column in columns):
             yield f"The channel {name} never changes."
+    for axis, column in zip(AXES, np.concatenate([signals.body_rate for signals in flights]).T, strict=True):
+        if np.ptp(column) == 0:
+            continue
+        if clipped(column, _LOWEST_LIMIT_RAD_S) or clipped(-column, _LOWEST_LIMIT_RAD_S):
+            yield f"The gyroscope about {axis} is clipped at {np.abs(column).max():.3g} rad/s."
+        step = float(np.diff(np.unique(column)).min())
+        if step > _COARSE_STEP_RAD_S:
+            yield f"The gyroscope about {axis} is rounded to steps of {step:.3g} rad/s."
 
 
 def _channels(signals: Signals) -> Mapping[str, Array]:
@@ -61,17 +63,6 @@ def _channels(signals: Signals) -> Mapping[str, Array]:
         if values is not None
         for label, column in zip(labels, values.T, strict=True)
     }
-
-
-def _gyro_warnings(body_rate: Array) -> Iterator[str]:
-    for axis, column in zip(AXES, body_rate.T, strict=True):
-        if np.ptp(column) == 0:
-            continue
-        if clipped(column, _LOWEST_LIMIT_RAD_S) or clipped(-column, _LOWEST_LIMIT_RAD_S):
-            yield f"The gyroscope about {axis} is clipped at {np.abs(column).max():.3g} rad/s."
-        step = float(np.diff(np.unique(column)).min())
-        if step > _COARSE_STEP_RAD_S:
-            yield f"The gyroscope about {axis} is rounded to steps of {step:.3g} rad/s."
 
 
 def known_up_to(signals: Signals) -> dict[str, float]:
@@ -106,7 +97,7 @@ def filter_warnings(flights: Sequence[Signals]) -> tuple[str, ...]:
             "taken from what is below and are less sure. Feed raw logs.",
         )
     gyros = [signals.body_rate for signals in flights if "body_rate" in signals.available]
-    if gyros and max(_noise(rate) for rate in gyros) < _NO_NOISE_RAD_S:
+    if gyros and max(least_noise([rate]) for rate in gyros) < _NO_NOISE_RAD_S:
         return (
             "The gyroscope shows less noise than any has: the log is simulated or was smoothed. The noise floor is not "
             "known; 0.3 % of torque and force stand for it. Feed raw logs.",
@@ -114,6 +105,7 @@ def filter_warnings(flights: Sequence[Signals]) -> tuple[str, ...]:
     return ()
 
 
-def _noise(rate: Array) -> float:
-    """Bound the noise of the quietest axis from above by fifth differences, which hold little of the motion, rad/s."""
-    return float(np.sqrt((np.diff(rate, 5, axis=0) ** 2).mean(axis=0).min() / comb(10, 5)))
+def least_noise(rates: Sequence[Array]) -> float:
+    """Estimate the noise of the quietest axis by fifth differences, which hold little of the motion, rad/s."""
+    fifth = np.concatenate([np.diff(rate, 5, axis=0) for rate in rates])
+    return float(np.sqrt((fifth**2).mean(axis=0).min() / comb(10, 5)))

@@ -1,7 +1,5 @@
 """Whether a log is right: one check, whose findings every command tells."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -37,14 +35,7 @@ def check(parts: Sequence[Signals], settings: WindowSettings) -> tuple[Finding, 
 
 
 def findings_of(parts: Sequence[Signals], sensors: Sensors | None) -> tuple[Finding, ...]:
-    """Gather what is wrong with rotors, attitude and sensors.
-
-    Parameters
-    ----------
-    parts : sequence of Signals
-    sensors : Sensors or None
-        What the sensors say of each other; None where the flights are too short to ask them.
-    """
+    """Gather what is wrong with rotors, attitude and sensors; None where the flights are too short to ask those."""
     return tuple(finding for finding in _findings(parts, sensors) if finding is not None)
 
 

@@ -1,19 +1,19 @@
 """The clocks of rotors, gyroscope and attitude: where two of them agree, the third is wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.consistency.findings import Finding
+from cpfls_cli.consistency.findings import Finding, off_clock
 from cpfls_cli.consistency.gyroscope import LONGEST_DELAY_S
 from cpfls_cli.consistency.repairs import ChannelRepair, shifted
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.flightlog.alignment import estimate_delay
 from cpfls_cli.flightlog.results import DelayEstimate
+from cpfls_cli.rounding import levelled
 from cpfls_cli.weak_form.windows import Windows
 
 # The gyroscope is shifted against rotors as far as against the attitude, by 5 ms.
@@ -38,6 +38,7 @@ _SCATTER_S, _SCATTER = 0.004, 0.2
 _FEWEST_SHIFTS = 4
 # Share of the torque that is left where no shift can do better, and share of that which a shift has to leave at most.
 _NEXT_TO_NOTHING, _HALF = 0.01, 0.5
+_DONE = "set right before the balance"
 _UNDECIDED = "Whether gyroscope or attitude is late these flights do not tell; the gyroscope is shifted."
 
 
@@ -74,8 +75,6 @@ def attitude_on_clock(
     ----------
     gyro_delay : float
         Of the gyroscope behind the attitude, s.
-    flights : sequence of Signals
-    windows : Windows
 
     Returns
     -------
@@ -84,7 +83,7 @@ def attitude_on_clock(
     notes : tuple of str
         That nobody knows.
     """
-    behind = rotor_clock(flights, windows)
+    behind = np.array([delay for half in _halves(flights, windows) if (delay := _behind(half)) is not None])
     if len(behind) < _FEWEST_HALVES:
         return (), (_UNDECIDED,)
     delay, unsure = np.median(behind), max(_SURE_S, 2 * behind.std(ddof=1) / np.sqrt(len(behind)))
@@ -92,9 +91,9 @@ def attitude_on_clock(
         return (), ()
     if abs(delay) + unsure >= 0.5 * abs(gyro_delay):
         return (), (_UNDECIDED,)
-    what = f"the attitude is {_way(-gyro_delay)}, judged by gyroscope and rotors, which keep one time"
+    what = f"the attitude is {off_clock(-gyro_delay)}, judged by gyroscope and rotors, which keep one time"
     finding = _late(what, "mend its clock in the log", ("attitude", "gyroscope", "rotors"), -gyro_delay)
-    return (ChannelRepair("attitude", delay_s=-gyro_delay).told(finding, "It is set right before the balance"),), ()
+    return (ChannelRepair("attitude", delay_s=-gyro_delay).told(finding, f"It is {_DONE}"),), ()
 
 
 def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepair | None:
@@ -109,35 +108,72 @@ def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepa
     ChannelRepair or None
         None where nothing is wrong, or nobody knows.
     """
-    told = [shift for signals, part in _halves(flights) for shift in _shifts(signals, part, windows)]
+    told = [shift for half in _halves(flights, windows) for shift in _shifts(half)]
     if len(told) < _FEWEST_SHIFTS:
         return None
     delay = float(np.median(told))
     if abs(delay) < _ROTORS_OFF_S or np.abs(np.array(told) - delay).max() > max(_SCATTER_S, _SCATTER * abs(delay)):
         return None
-    what, remedy = f"the rotor speeds are {_way(delay)}, judged by the gyroscope", "mend their clock in the log"
-    finding = _late(what, remedy, ("rotors", "gyroscope"), delay)
-    return ChannelRepair("rotor_speed", delay_s=delay).told(finding, "They are set right before the balance")
-
-
-def _way(delay: float) -> str:
-    return f"{'late' if delay > 0 else 'early'} by {abs(1000 * delay):.0f} ms"
+    what = f"the rotor speeds are {off_clock(delay)}, judged by the gyroscope"
+    finding = _late(what, "mend their clock in the log", ("rotors", "gyroscope"), delay)
+    return ChannelRepair("rotor_speed", delay_s=delay).told(finding, f"They are {_DONE}")
 
 
 def _late(what: str, remedy: str, channels: tuple[str, ...], delay: float) -> Finding:
     return Finding(what, remedy, channels, delay, "s", contradiction=False, repairable=True)
 
 
-def _shifts(signals: Signals, part: slice, windows: Windows) -> Iterator[float]:
+@dataclass(frozen=True)
+class _Half:
+    """Half of a flight: the torque of measured rotors, and what explains it about each axis.
+
+    That is angular acceleration, rate, air velocity and a constant, about each axis on its own: an inertia that is
+    wrong, a damping or a drag that is missing shifts no clock.
+    """
+
+    time: Array
+    torque: Array
+    motion: list[Array]
+    windows: Windows
+
+    def explained(self, late: float, axes: int) -> Array:
+        """Give the share that the motion explains of the torque of rotors late by so many s; NaN of a constant one."""
+        torque = self.windows.average(shifted(self.torque[:, :axes], self.time, late))
+        shares = np.full(axes, np.nan)
+        for axis in range(axes):
+            if np.ptp(torque[:, axis]):
+                about = torque[:, axis] - torque[:, axis].mean()
+                motion = self.motion[axis]
+                rest = about - motion @ np.linalg.lstsq(motion, about, rcond=None)[0]
+                shares[axis] = 1 - (rest**2).sum() / (about**2).sum()
+        return shares
+
+
+def _halves(flights: Sequence[Signals], windows: Windows) -> Iterator[_Half]:
+    """Cut the flights with measured rotor speeds into halves; commands, which a lag lies behind, tell nothing."""
+    for signals in flights:
+        if signals.rotor_speed is None or signals.commanded:
+            continue
+        assert signals.torque is not None, "rotors turn"
+        middle = len(signals) // 2
+        for part in (slice(0, middle), slice(middle, None)):
+            rate = signals.body_rate[part]
+            if windows.count(len(rate)) < _FEWEST_WINDOWS:
+                continue
+            air = signals.ground_velocity[part] if "velocity" in signals.available else np.zeros((len(rate), 0))
+            turning, turned, moved = windows.derivative(rate), windows.average(rate), windows.average(air)
+            columns = (np.column_stack([turning[:, axis], turned[:, axis], moved]) for axis in range(3))
+            motion = [each - each.mean(axis=0) for each in columns]
+            yield _Half(signals.time[part], signals.torque[part], motion, windows)
+
+
+def _shifts(half: _Half) -> Iterator[float]:
     """Estimate by how much the rotors are late about roll and pitch, s; 0 for no sure shift, nothing for no hint."""
-    time, motion, torque = signals.time[part], _motion(signals, part, windows), signals.torque
-    assert torque is not None, "rotors turn"
-    if motion is None or not np.ptp(torque[part, :2], axis=0).all():
+    if not np.ptp(half.torque[:, :2], axis=0).all():
         return
 
     def left(delay: float) -> Array:
-        turned = windows.average(shifted(torque[part, :2], time, delay))
-        return np.array([1 - _share(turned[:, axis], motion[axis]) for axis in (0, 1)])
+        return 1 - half.explained(delay, 2)
 
     as_logged = left(0.0)
     if as_logged.max() < _NEXT_TO_NOTHING:
@@ -145,47 +181,23 @@ def _shifts(signals: Signals, part: slice, windows: Windows) -> Iterator[float]:
         return
     coarse = np.linspace(-_TELEMETRY_S, _TELEMETRY_S, _TELEMETRY_STEPS)
     rest = np.array([left(delay) for delay in coarse])
-    for axis, best in enumerate(rest.argmin(axis=0)):
+    for axis in range(2):
+        best = int(np.argmin(levelled(rest[:, axis])))
         if rest[best, axis] > 1 - _SMALLEST_R2:
             continue
         near = np.linspace(-1.0, 1.0, _FINER) * (coarse[1] - coarse[0]) + coarse[best]
         fine = np.array([left(delay)[axis] for delay in near])
-        closest = int(fine.argmin())
+        closest = int(np.argmin(levelled(fine)))
         sure = 0 < best < _TELEMETRY_STEPS - 1 and 0 < closest < _FINER - 1 and fine[closest] < _HALF * as_logged[axis]
         yield _vertex(near, fine, closest) if sure else 0.0
 
 
-def rotor_clock(flights: Sequence[Signals], windows: Windows) -> Array:
-    """Estimate the delay of the gyroscope behind measured rotors, half flight by half flight.
-
-    The torque at each delay is explained by angular acceleration, rate, air velocity and a constant, about each axis on
-    its own: an inertia that is wrong, a damping or a drag that is missing shifts no clock.
-
-    Returns
-    -------
-    array, shape (half,), s
-        Halves that tell nothing are left out; empty for commands, which a lag lies behind.
-    """
-    found = (_delay(signals, part, windows) for signals, part in _halves(flights))
-    return np.array([delay for delay in found if delay is not None])
-
-
-def _halves(flights: Sequence[Signals]) -> Iterator[tuple[Signals, slice]]:
-    """Name both halves of the flights with measured rotor speeds."""
-    for signals in flights:
-        if signals.rotor_speed is not None and not signals.commanded:
-            middle = len(signals) // 2
-            yield from ((signals, slice(0, middle)), (signals, slice(middle, None)))
-
-
-def _delay(signals: Signals, part: slice, windows: Windows) -> float | None:
-    time, torque, motion = signals.time[part], signals.torque, _motion(signals, part, windows)
-    assert torque is not None, "rotors turn"
-    if motion is None:
-        return None
+def _behind(half: _Half) -> float | None:
+    """Estimate the delay of the gyroscope behind the rotors, s; all axes have equal weight."""
     delays = np.linspace(-LONGEST_DELAY_S, LONGEST_DELAY_S, _STEPS)
-    explained = np.array([_explained(windows.average(shifted(torque[part], time, -each)), motion) for each in delays])
-    best = int(np.argmax(explained))
+    shares = [half.explained(-delay, 3) for delay in delays]
+    explained = np.array([float(np.mean(own[~np.isnan(own)])) if np.isfinite(own).any() else 0.0 for own in shares])
+    best = int(np.argmin(levelled(-explained)))
     if explained[best] < _SMALLEST_R2 or best in (0, _STEPS - 1):
         return None
     return _vertex(delays, explained, best)
@@ -195,27 +207,3 @@ def _vertex(delays: Array, values: Array, best: int) -> float:
     """Give the extremum of a parabola through the best of some values and its neighbours."""
     below, top, above = values[best - 1 : best + 2]
     return float(delays[best] + 0.5 * (delays[1] - delays[0]) * (below - above) / (below - 2 * top + above))
-
-
-def _motion(signals: Signals, part: slice, windows: Windows) -> list[Array] | None:
-    """Give what explains a torque about each axis: angular acceleration, rate and air velocity, about their means."""
-    rate = signals.body_rate[part]
-    if windows.count(len(rate)) < _FEWEST_WINDOWS:
-        return None
-    air = signals.ground_velocity[part] if "velocity" in signals.available else np.zeros((len(rate), 0))
-    turning, turned, moved = windows.derivative(rate), windows.average(rate), windows.average(air)
-    columns = (np.column_stack([turning[:, axis], turned[:, axis], moved]) for axis in range(3))
-    return [each - each.mean(axis=0) for each in columns]
-
-
-def _explained(torque: Array, motion: Sequence[Array]) -> float:
-    """Give the share of the torque that the motion explains, all axes with equal weight."""
-    shares = [_share(torque[:, axis], motion[axis]) for axis in range(3) if np.ptp(torque[:, axis])]
-    return float(np.mean(shares)) if shares else 0.0
-
-
-def _share(torque: Array, motion: Array) -> float:
-    """Give the share of the torque about one axis that the motion explains."""
-    about = torque - torque.mean()
-    rest = about - motion @ np.linalg.lstsq(motion, about, rcond=None)[0]
-    return float(1 - (rest**2).sum() / (about**2).sum())

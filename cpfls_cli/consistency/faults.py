@@ -1,7 +1,5 @@
 """Faults of sensors that are significant and matter, each in one sentence."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -26,9 +24,6 @@ class FaultNumber(NamedTuple):
 
     Attributes
     ----------
-    name : str
-    value : float
-    unit : str
     low, high : float
         Interval of 95 %, widened by what noise of the gyroscope can have pulled.
     named : bool
@@ -51,12 +46,10 @@ class AuditFinding:
     ----------
     name : str
         Of the effect.
-    coefficients : tuple of FaultNumber
     p_value : float
         Probability that chance takes the most significant coefficient past half of the size that matters, after Holm.
     named : bool
         Whether any coefficient is named.
-    sentence : str
     """
 
     name: str
@@ -66,13 +59,7 @@ class AuditFinding:
     sentence: str
 
     def named_values(self, names: Sequence[str]) -> Array:
-        """Give the named values, 0 for those that are not.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Names of coefficients.
-        """
+        """Give the named values of coefficients, 0 for those that are not."""
         by_name = {each.name: each.value for each in self.coefficients if each.named}
         return np.array([by_name.get(name, 0.0) for name in names])
 
@@ -103,7 +90,6 @@ def findings(faults: Sequence[CheckedFault], period: float) -> tuple[AuditFindin
 
     Parameters
     ----------
-    faults : sequence of CheckedFault
     period : float
         Sampling period, s.
 

@@ -1,9 +1,8 @@
 """What a check finds: what is wrong with a log, how much, what mends it, and whether a verdict can stand beside it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Self
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ class Finding:
         """What is wrong and what would mend it, to stand behind the name of a flight."""
         return f"{self.what}: {self.remedy}"
 
-    def of(self, flight: str) -> Finding:
+    def of(self, flight: str) -> Self:
         """Say of which flight it is."""
         return replace(self, what=f"{flight}: {self.what}")
 
@@ -61,3 +60,13 @@ def joined(words: Iterable[str]) -> str:
     """List words, each once."""
     *most, last = dict.fromkeys(words)
     return f"{', '.join(most)} and {last}" if most else last
+
+
+def capitalised(words: str) -> str:
+    """Let words begin a sentence."""
+    return words[0].upper() + words[1:]
+
+
+def off_clock(delay_s: float) -> str:
+    """Say how late or early something is."""
+    return f"{'late' if delay_s > 0 else 'early'} by {abs(1000 * delay_s):.0f} ms"

@@ -1,7 +1,5 @@
 """The gyroscope judged by the attitude: bias, scale, misalignment and delay, by kinematics in weak form."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,6 +14,8 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.effects.hooks import FaultFit
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.flightlog.repair import align_quaternion_signs
+from cpfls_cli.rounding import levelled
 from cpfls_cli.weak_form.resampling import BLOCK_S, blocks_of, folds
 from cpfls_cli.weak_form.windows import Windows
 
@@ -34,211 +34,6 @@ _EXCITED = 10.0
 _NUMBERS = {"bias": slice(0, 3), "scale": slice(3, 6), "misalignment": slice(6, 9), "delay": slice(12, 13)}
 LONGEST_DELAY_S = 0.1
 """Longest shift between gyroscope and attitude that is looked for, s; a log beyond that is broken, not late."""
-
-
-@dataclass(frozen=True)
-class DelayScan:
-    """The delay at which the readings as they are fit best.
-
-    Attributes
-    ----------
-    delay : float
-        s, on a coarse grid.
-    variance : array, shape (3,), rad^2/s^2
-        Left about each axis.
-    excited : array of bool, shape (3,)
-        Axes that turn enough to tell a scale.
-    seen, read : array, shape (window, 3), rad/s
-        Averages of the rate by the attitude, and by the gyroscope at that delay.
-    """
-
-    delay: float
-    variance: Array
-    excited: BoolArray
-    seen: Array
-    read: Array
-
-
-@dataclass(frozen=True)
-class GyroFit:
-    """``omega_gyro(t) = (1 + scale + cross) C(misalignment) omega(t - delay) + bias``, estimated.
-
-    Attributes
-    ----------
-    value : array, shape (13,)
-        Bias (3, rad/s), scale (3), misalignment (3, rad), symmetric cross-axis (yz, zx, xy), delay (s). The
-        misalignment is the rotation of the gyroscope against the attitude, a rotation vector in body axes.
-    error : array, shape (13,)
-        Standard errors by the jackknife over blocks.
-    pull : array, shape (13,)
-        How far noise of the gyroscope can have pulled the value at most.
-    known : array of bool, shape (13,)
-        What the motion could tell.
-    blocks : int
-    variance : array, shape (3,), rad^2/s^2
-        Left about each axis.
-    flight_bias : array, shape (flight, 3), rad/s
-        Bias of each flight less that of all.
-    flight_bias_error : array, shape (flight, 3), rad/s
-    """
-
-    value: Array
-    error: Array
-    pull: Array
-    known: BoolArray
-    blocks: int
-    variance: Array
-    flight_bias: Array
-    flight_bias_error: Array
-
-    def of(self, name: str) -> FaultFit:
-        """Select the numbers of one kind of fault.
-
-        Parameters
-        ----------
-        name : {"bias", "scale", "misalignment", "delay"}
-        """
-        numbers = _NUMBERS[name]
-        return FaultFit(self.value[numbers], self.error[numbers], self.pull[numbers], self.known[numbers], self.blocks)
-
-
-def scan(flights: Sequence[Kinematics]) -> DelayScan:
-    """Scan the delay between gyroscope and attitude, positive where the gyroscope is late."""
-    step = max(float(flights[0].time[0, 1] - flights[0].time[0, 0]), _SCAN_STEP_S)
-    half = int(LONGEST_DELAY_S / step)
-    delays = step * np.arange(-half, half + 1)
-    seen = np.concatenate([flight.rate for flight in flights])
-    delay = float(delays[np.argmin([_unexplained(seen, _read(flights, delay)) for delay in delays])])
-    read = _read(flights, delay)
-    variance = np.maximum((seen - read).var(axis=0), np.finfo(float).tiny)
-    return DelayScan(delay, variance, _alone(read) > _EXCITED * variance, seen, read)
-
-
-def _read(flights: Sequence[Kinematics], delay: float) -> Array:
-    return np.concatenate([flight.gyro_rate(delay) for flight in flights])
-
-
-def _unexplained(seen: Array, read: Array) -> float:
-    """Compute the log variance left by any matrix on the readings, so that a swapped axis does not shift the delay."""
-    right, left = seen - seen.mean(axis=0), read - read.mean(axis=0)
-    rest = right - left @ np.linalg.lstsq(left, right, rcond=None)[0]
-    return float(np.log(np.maximum((rest**2).mean(axis=0), np.finfo(float).tiny)).sum())
-
-
-def _alone(read: Array) -> Array:
-    """Give the variance of each rate that the other two do not share."""
-    covariance = np.cov(read.T) + 1e-12 * np.eye(3)
-    return np.asarray(1.0 / np.diag(np.linalg.inv(covariance)))
-
-
-def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | None:
-    """Regress the rate by the attitude on the gyroscope, and invert the result.
-
-    The gyroscope is the cleaner side, hence the reverse regression ``omega(t) = M omega_gyro(t + delay) - c``; its
-    noise still pulls M by at most ``variance left / variance of the rate``, which is reported. The delay is a column
-    with the derivative of the reading, refined by Gauss-Newton steps.
-
-    Returns
-    -------
-    GyroFit or None
-        None where there are too few blocks. Nothing is known where some of them alone tell of a rotation.
-
-    References
-    ----------
-    Frisch 1934 (bounds of regression with noise on both sides).
-    """
-    index = np.repeat(np.arange(len(flights)), [len(flight.rate) for flight in flights])
-    block = _blocks(index, np.concatenate([flight.centres for flight in flights]))
-    if block.max() + 1 < FEWEST_BLOCKS:
-        return None
-    columns = _columns(scanned.excited)
-    matrix, delay, variance = np.eye(3), scanned.delay, scanned.variance
-    for _ in range(_ROUNDS):
-        design, right = _design(flights, matrix, delay), scanned.seen - _read(flights, delay)
-        normal = folds(design / np.sqrt(variance)[:, None], right / np.sqrt(variance), block)
-        solution = _padded(normal.fit(columns)[0][None, :, 0], columns)[0]
-        rest = right - design @ solution
-        base, variance = delay, np.maximum(rest.var(axis=0), np.finfo(float).tiny)
-        matrix = np.eye(3) + solution[:9].reshape(3, 3)
-        delay = float(np.clip(base + solution[12], -LONGEST_DELAY_S, LONGEST_DELAY_S))
-    left_out = _padded(normal.solve(columns)[0][..., 0], columns)
-    turns = _turns_right(np.vstack([solution, left_out]))
-    draws = np.array([_faults(each, base) if turns else each for each in left_out])
-    bias, error = _flight_bias(rest, index, block)
-    return GyroFit(
-        value=_faults(solution, base) if turns else np.zeros_like(solution),
-        error=jackknife_error(draws),
-        pull=_pull(scanned.read, variance),
-        known=_known(scanned.excited) & turns,
-        blocks=len(draws),
-        variance=variance,
-        flight_bias=bias,
-        flight_bias_error=error,
-    )
-
-
-def _blocks(index: IntArray, centres: Array) -> IntArray:
-    whole = sum(float(np.ptp(centres[index == flight])) for flight in np.unique(index))
-    return blocks_of(index, centres, min(BLOCK_S, max(_SHORTEST_BLOCK_S, whole / _WANTED_BLOCKS)))
-
-
-def _columns(excited: BoolArray) -> IntArray:
-    """Select the columns that the motion excites: axes that turn, and the delay if any does."""
-    used = np.concatenate([np.tile(excited, 3), np.ones(3, dtype=bool), [excited.any()]])
-    return np.flatnonzero(used)
-
-
-def _design(flights: Sequence[Kinematics], matrix: Array, delay: float) -> Array:
-    parts = []
-    for flight in flights:
-        later = np.einsum("waij,ij->wa", flight.products(delay, 1), matrix)
-        products = flight.products(delay).reshape(-1, 3, 9)
-        parts.append(np.concatenate([products, -flight.constants(), later[..., None]], axis=2))
-    return np.concatenate(parts)
-
-
-def _padded(solutions: Array, columns: IntArray) -> Array:
-    whole = np.zeros((len(solutions), 13))
-    whole[:, columns] = solutions
-    return whole
-
-
-def _turns_right(solutions: Array) -> bool:
-    """Tell whether no solution mirrors the axes, as only noise does where a flight hardly turns."""
-    return bool((np.linalg.det(np.eye(3) + solutions[:, :9].reshape(-1, 3, 3)) > 0).all())
-
-
-def _faults(solution: Array, base: float) -> Array:
-    """Invert ``M, c`` to faults; the left polar form separates scale and cross-axis from rotation exactly."""
-    inverse = np.linalg.inv(np.eye(3) + solution[:9].reshape(3, 3))
-    turned, stretched = polar(inverse, side="left")
-    misalignment = -Rotation.from_matrix(turned).as_rotvec()
-    cross = [stretched[1, 2], stretched[2, 0], stretched[0, 1]]
-    bias, scale = inverse @ solution[9:12], np.diag(stretched) - 1
-    return np.concatenate([bias, scale, misalignment, cross, [base + solution[12]]])
-
-
-def _pull(read: Array, variance: Array) -> Array:
-    inverse = np.abs(np.linalg.inv(np.cov(read.T) + 1e-12 * np.eye(3)))
-    pull = variance[:, None] * inverse
-    both = 0.5 * (pull + pull.T)
-    across = np.array([both[1, 2], both[2, 0], both[0, 1]])
-    return np.concatenate([np.zeros(3), np.diag(pull), across, across, [0.0]])
-
-
-def _known(excited: BoolArray) -> BoolArray:
-    across = np.array([excited[1] & excited[2], excited[2] & excited[0], excited[0] & excited[1]])
-    return np.concatenate([np.ones(3, dtype=bool), excited, across, across, [excited.any()]])
-
-
-def _flight_bias(rest: Array, index: IntArray, block: IntArray) -> tuple[Array, Array]:
-    means = np.array([-rest[block == b].mean(axis=0) for b in range(block.max() + 1)])
-    owner = np.array([index[block == b][0] for b in range(block.max() + 1)])
-    flight_mean = np.array([means[owner == flight].mean(axis=0) for flight in np.unique(owner)])
-    count = np.array([np.sum(owner == flight) for flight in np.unique(owner)])
-    spread = np.sqrt(((means - flight_mean[np.searchsorted(np.unique(owner), owner)]) ** 2).sum(axis=0))
-    error = spread / np.sqrt(max(1, len(means) - len(flight_mean))) / np.sqrt(count)[:, None]
-    return flight_mean, error
 
 
 @dataclass(frozen=True)
@@ -261,7 +56,7 @@ class Kinematics:
     rate: Array
     turning: Array
     time: Array
-    gyro: CubicSpline
+    gyro: "CubicSpline"
 
     @property
     def centres(self) -> Array:
@@ -269,17 +64,7 @@ class Kinematics:
         return np.asarray(self.time.mean(axis=1))
 
     def gyro_rate(self, delay: float) -> Array:
-        """Average the rate of a gyroscope that is late.
-
-        Parameters
-        ----------
-        delay : float
-            s.
-
-        Returns
-        -------
-        array, shape (window, 3), rad/s
-        """
+        """Average the rate of a gyroscope that is late by a delay in s, shape (window, 3), rad/s."""
         read = self.gyro(self.time + delay).reshape(len(self.time), -1)
         return np.asarray(np.einsum("wak,wk->wa", self._turning_rows, read))
 
@@ -307,29 +92,12 @@ class Kinematics:
         return np.asarray(averages.reshape(-1, 3, 3, 3))
 
     def constants(self) -> Array:
-        """Average a constant about each axis.
-
-        Returns
-        -------
-        array, shape (window, 3, 3)
-        """
+        """Average a constant about each axis, shape (window, 3, 3)."""
         return np.asarray(self.turning.sum(axis=1))
 
 
 def kinematics(signals: Signals, windows: Windows) -> Kinematics | None:
-    """Cut a flight into windows, clear of its ends by the longest delay.
-
-    Parameters
-    ----------
-    signals : Signals
-        With attitude.
-    windows : Windows
-
-    Returns
-    -------
-    Kinematics or None
-        None where the flight is shorter than a window.
-    """
+    """Cut a flight with attitude into windows, clear of its ends by the longest delay; None for too short a one."""
     from scipy.interpolate import CubicSpline
 
     margin = int(np.ceil(LONGEST_DELAY_S / windows.period))
@@ -339,18 +107,14 @@ def kinematics(signals: Signals, windows: Windows) -> Kinematics | None:
         return None
     # At an overlap of three quarters the windows add up to a constant, so attitude noise cancels between neighbours.
     hop = max(1, length // 4)
-    turned = _continuous(Rotation.from_euler("ZYX", signals.attitude[inside, ::-1]).as_quat())
+    turned = align_quaternion_signs(Rotation.from_euler("ZYX", signals.attitude[inside, ::-1]).as_quat())
     relative = _relative(np.moveaxis(sliding_window_view(turned, length, axis=0)[::hop], 1, 2))
     time = sliding_window_view(signals.time[inside], length)[::hop]
     rate = -2 * np.einsum("wsi,s->wi", relative[..., :3], windows.slope)
-    turning = _turning_matrix(relative) * windows.weight[:, None, None]
-    return Kinematics(rate, turning, np.asarray(time), CubicSpline(signals.time, signals.body_rate))
-
-
-def _continuous(turned: Array) -> Array:
-    """Choose of each quaternion and its negative the one near the sample before."""
-    flips = np.where((turned[1:] * turned[:-1]).sum(axis=1) < 0, -1.0, 1.0)
-    return np.asarray(turned * np.concatenate([[1.0], np.cumprod(flips)])[:, None])
+    x, y, z, scalar = np.moveaxis(relative, -1, 0)
+    turning = np.stack([scalar, -z, y, z, scalar, -x, -y, x, scalar], axis=-1).reshape(*relative.shape[:-1], 3, 3)
+    weighted = turning * windows.weight[:, None, None]
+    return Kinematics(rate, weighted, np.asarray(time), CubicSpline(signals.time, signals.body_rate))
 
 
 def _relative(turned: Array) -> Array:
@@ -363,6 +127,187 @@ def _relative(turned: Array) -> Array:
     return np.concatenate([product, rest], axis=-1)
 
 
-def _turning_matrix(relative: Array) -> Array:
-    x, y, z, scalar = np.moveaxis(relative, -1, 0)
-    return np.stack([scalar, -z, y, z, scalar, -x, -y, x, scalar], axis=-1).reshape(*relative.shape[:-1], 3, 3)
+@dataclass(frozen=True)
+class DelayScan:
+    """The delay at which the readings as they are fit best.
+
+    Attributes
+    ----------
+    delay : float
+        Positive where the gyroscope is late, s, on a coarse grid.
+    variance : array, shape (3,), rad^2/s^2
+        Left about each axis.
+    excited : array of bool, shape (3,)
+        Axes that turn enough to tell a scale.
+    seen, read : array, shape (window, 3), rad/s
+        Averages of the rate by the attitude, and by the gyroscope at that delay.
+    """
+
+    delay: float
+    variance: Array
+    excited: BoolArray
+    seen: Array
+    read: Array
+
+
+def scan(flights: Sequence[Kinematics]) -> DelayScan:
+    """Scan the delay between gyroscope and attitude."""
+    step = max(float(flights[0].time[0, 1] - flights[0].time[0, 0]), _SCAN_STEP_S)
+    half = int(LONGEST_DELAY_S / step)
+    delays = step * np.arange(-half, half + 1)
+    seen = np.concatenate([flight.rate for flight in flights])
+    unexplained = np.array([_unexplained(seen, _read(flights, delay)) for delay in delays])
+    delay = float(delays[np.argmin(levelled(unexplained))])
+    read = _read(flights, delay)
+    variance = np.maximum((seen - read).var(axis=0), np.finfo(float).tiny)
+    # The variance of each rate that the other two do not share.
+    alone = 1.0 / np.diag(_precision(read))
+    return DelayScan(delay, variance, alone > _EXCITED * variance, seen, read)
+
+
+def _read(flights: Sequence[Kinematics], delay: float) -> Array:
+    return np.concatenate([flight.gyro_rate(delay) for flight in flights])
+
+
+def _unexplained(seen: Array, read: Array) -> float:
+    """Compute the log variance left by any matrix on the readings, so that a swapped axis does not shift the delay."""
+    right, left = seen - seen.mean(axis=0), read - read.mean(axis=0)
+    rest = right - left @ np.linalg.lstsq(left, right, rcond=None)[0]
+    return float(np.log(np.maximum((rest**2).mean(axis=0), np.finfo(float).tiny)).sum())
+
+
+def _precision(read: Array) -> Array:
+    """Invert the covariance of three rates, of which some may never change."""
+    return np.asarray(np.linalg.inv(np.cov(read.T) + 1e-12 * np.eye(3)))
+
+
+@dataclass(frozen=True)
+class GyroFit:
+    """``omega_gyro(t) = (1 + scale + cross) C(misalignment) omega(t - delay) + bias``, estimated.
+
+    Attributes
+    ----------
+    value : array, shape (13,)
+        Bias (3, rad/s), scale (3), misalignment (3, rad), symmetric cross-axis (yz, zx, xy), delay (s). The
+        misalignment is the rotation of the gyroscope against the attitude, a rotation vector in body axes.
+    error : array, shape (13,)
+        Standard errors by the jackknife over blocks.
+    pull : array, shape (13,)
+        How far noise of the gyroscope can have pulled the value at most.
+    known : array of bool, shape (13,)
+        What the motion could tell.
+    variance : array, shape (3,), rad^2/s^2
+        Left about each axis.
+    flight_bias : array, shape (flight, 3), rad/s
+        Bias of each flight less that of all.
+    flight_bias_error : array, shape (flight, 3), rad/s
+    """
+
+    value: Array
+    error: Array
+    pull: Array
+    known: BoolArray
+    blocks: int
+    variance: Array
+    flight_bias: Array
+    flight_bias_error: Array
+
+    def of(self, name: str) -> FaultFit:
+        """Select the numbers of one kind of fault: bias, scale, misalignment or delay."""
+        numbers = _NUMBERS[name]
+        return FaultFit(self.value[numbers], self.error[numbers], self.pull[numbers], self.known[numbers], self.blocks)
+
+
+def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | None:
+    """Regress the rate by the attitude on the gyroscope, and invert the result.
+
+    The gyroscope is the cleaner side, hence the reverse regression ``omega(t) = M omega_gyro(t + delay) - c``; its
+    noise still pulls M by at most ``variance left / variance of the rate``, which is reported. The delay is a column
+    with the derivative of the reading, refined by Gauss-Newton steps.
+
+    Returns
+    -------
+    GyroFit or None
+        None where there are too few blocks. Nothing is known where some of them alone tell of a rotation.
+
+    References
+    ----------
+    Frisch 1934 (bounds of regression with noise on both sides).
+    """
+    index = np.repeat(np.arange(len(flights)), [len(flight.rate) for flight in flights])
+    whole = sum(float(np.ptp(flight.centres)) for flight in flights)
+    length_s = min(BLOCK_S, max(_SHORTEST_BLOCK_S, whole / _WANTED_BLOCKS))
+    block = blocks_of(index, np.concatenate([flight.centres for flight in flights]), length_s)
+    if block.max() + 1 < FEWEST_BLOCKS:
+        return None
+    excited = scanned.excited
+    # Axes that turn, and the delay if any does.
+    columns = np.flatnonzero(np.concatenate([np.tile(excited, 3), np.ones(3, dtype=bool), [excited.any()]]))
+    matrix, delay, variance = np.eye(3), scanned.delay, scanned.variance
+    for _ in range(_ROUNDS):
+        design, right = _design(flights, matrix, delay), scanned.seen - _read(flights, delay)
+        normal = folds(design / np.sqrt(variance)[:, None], right / np.sqrt(variance), block)
+        solution = _padded(normal.fit(columns)[0][None, :, 0], columns)[0]
+        rest = right - design @ solution
+        base, variance = delay, np.maximum(rest.var(axis=0), np.finfo(float).tiny)
+        matrix = np.eye(3) + solution[:9].reshape(3, 3)
+        delay = float(np.clip(base + solution[12], -LONGEST_DELAY_S, LONGEST_DELAY_S))
+    left_out = _padded(normal.solve(columns)[0][..., 0], columns)
+    # Where a flight hardly turns, noise mirrors axes.
+    matrices = np.eye(3) + np.vstack([solution, left_out])[:, :9].reshape(-1, 3, 3)
+    turns = bool((np.linalg.det(matrices) > 0).all())
+    draws = np.array([_faults(each, base) if turns else each for each in left_out])
+    across = np.array([excited[1] & excited[2], excited[2] & excited[0], excited[0] & excited[1]])
+    bias, error = _flight_bias(rest, index, block)
+    return GyroFit(
+        value=_faults(solution, base) if turns else np.zeros_like(solution),
+        error=jackknife_error(draws),
+        pull=_pull(scanned.read, variance),
+        known=np.concatenate([np.ones(3, dtype=bool), excited, across, across, [excited.any()]]) & turns,
+        blocks=len(draws),
+        variance=variance,
+        flight_bias=bias,
+        flight_bias_error=error,
+    )
+
+
+def _design(flights: Sequence[Kinematics], matrix: Array, delay: float) -> Array:
+    parts = []
+    for flight in flights:
+        later = np.einsum("waij,ij->wa", flight.products(delay, 1), matrix)
+        products = flight.products(delay).reshape(-1, 3, 9)
+        parts.append(np.concatenate([products, -flight.constants(), later[..., None]], axis=2))
+    return np.concatenate(parts)
+
+
+def _padded(solutions: Array, columns: IntArray) -> Array:
+    whole = np.zeros((len(solutions), 13))
+    whole[:, columns] = solutions
+    return whole
+
+
+def _faults(solution: Array, base: float) -> Array:
+    """Invert ``M, c`` to faults; the left polar form separates scale and cross-axis from rotation exactly."""
+    inverse = np.linalg.inv(np.eye(3) + solution[:9].reshape(3, 3))
+    turned, stretched = polar(inverse, side="left")
+    misalignment = -Rotation.from_matrix(turned).as_rotvec()
+    cross = [stretched[1, 2], stretched[2, 0], stretched[0, 1]]
+    bias, scale = inverse @ solution[9:12], np.diag(stretched) - 1
+    return np.concatenate([bias, scale, misalignment, cross, [base + solution[12]]])
+
+
+def _pull(read: Array, variance: Array) -> Array:
+    pull = variance[:, None] * np.abs(_precision(read))
+    both = 0.5 * (pull + pull.T)
+    across = np.array([both[1, 2], both[2, 0], both[0, 1]])
+    return np.concatenate([np.zeros(3), np.diag(pull), across, across, [0.0]])
+
+
+def _flight_bias(rest: Array, index: IntArray, block: IntArray) -> tuple[Array, Array]:
+    """Give the bias that each flight has of its own, and its standard error by the scatter of its blocks."""
+    means = np.array([-rest[block == b].mean(axis=0) for b in range(block.max() + 1)])
+    flights, owner = np.unique([index[block == b][0] for b in range(block.max() + 1)], return_inverse=True)
+    flight_mean = np.array([means[owner == flight].mean(axis=0) for flight in range(len(flights))])
+    spread = np.sqrt(((means - flight_mean[owner]) ** 2).sum(axis=0))
+    count = np.bincount(owner)[:, None]
+    return flight_mean, spread / np.sqrt(max(1, len(means) - len(flight_mean))) / np.sqrt(count)

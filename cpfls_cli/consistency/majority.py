@@ -1,53 +1,44 @@
 """Which channel of the motion is wrong where two contradict each other, by majority; it is set right or left out."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import product
+from typing import Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.consistency.axes import AXES
-from cpfls_cli.consistency.findings import Finding, joined
-from cpfls_cli.consistency.motion import ANOTHER_NORTH, KEYS, NAMES, TINY, TURNED_RAD, PairCheck, by_thrust, checked
+from cpfls_cli.consistency.findings import Finding, joined, off_clock
+from cpfls_cli.consistency.motion import ANOTHER_NORTH, CHANNELS, TINY, TURNED_RAD, PairCheck, by_thrust, checked
 from cpfls_cli.consistency.repairs import ChannelRepair, is_derived
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import fit_axes
+from cpfls_cli.rounding import largest, less
 from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, Windows
 
 # Channels that are mended one after the other: there are no more.
 _ROUNDS = 3
 # Parts of the flights whose scatter says whether a reading surely fits better, and by how many standard errors.
-_PARTS, _SIGMAS = 16, 4.0
+_PARTS, _PARTS_SIGMAS = 16, 4.0
 # Below this a vehicle hovers, and noise points anywhere.
 _MOVES_M_S2 = 0.1
 # Of 23 real flights with attitude all correlate by 0.91 and more in the plane, turned by 4 degrees at most, and by 0.33
 # and more along z.
-_TOGETHER, _APART, _REVERSED = 0.8, 0.5, 0.6
-_MENDED = ("velocity", "acceleration", "specific_force")
+_ONE_PLANE, _NOT_ONE_PLANE, _REVERSED = 0.8, 0.5, 0.6
 # Logarithms: of a size that is no unit, and of what a unit may be off by beside a sensor and beside the thrust.
 _SAME_UNIT = 0.15
 _UNIT_ERROR, _THRUST_ERROR = 0.05, 0.25
-_UNITS: Mapping[str, Mapping[str, float]] = {
-    "velocity": {"km/h": 1 / 3.6, "ft/s": 0.3048, "cm/s": 0.01, "mm/s": 0.001},
-    "acceleration": {
-        "g": STANDARD_GRAVITY,
-        "ft/s^2": 0.3048,
-        "cm/s^2": 0.01,
-        "mm/s^2": 0.001,
-        "mg": STANDARD_GRAVITY / 1000,
-    },
-}
 # Share of a channel that other axes have to explain.
 _EXPLAINED = 0.8
 _FORWARD_LEFT_UP = np.diag([1.0, -1.0, -1.0])
+_DONE = "It is set right before the balance"
 
-_Tuned = tuple[ChannelRepair, tuple[str, ...]]
+_Read = tuple[ChannelRepair, tuple[str, ...]]
+"""A way to read a channel, and the mistakes that it takes."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +47,6 @@ class Settled:
 
     Attributes
     ----------
-    repairs : tuple of ChannelRepair
     checks : tuple of PairCheck
         Of the repaired flights.
     against_thrust : Finding or None
@@ -70,14 +60,35 @@ class Settled:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What is wrong; of what stays between thrust and motion, which a diagnosis is about, the way it points."""
-        mended = [repair.finding for repair in self.repairs if repair.finding is not None]
-        return (*mended, *self.stays)
+        mended = (repair.finding for repair in self.repairs if repair.finding is not None)
+        between_sensors = (problem for check in self.checks if check.pair.exact for problem in check.problems)
+        world = () if self.against_thrust is None else (self.against_thrust,)
+        return (*mended, *world, *between_sensors)
 
-    @property
-    def stays(self) -> tuple[Finding, ...]:
-        """What no repair takes away."""
-        among = [problem for check in self.checks if check.pair.exact for problem in check.problems]
-        return (*([] if self.against_thrust is None else [self.against_thrust]), *among)
+
+@dataclass(frozen=True)
+class _Compared:
+    """Flights, and what their channels say of each other."""
+
+    flights: tuple[Signals, ...]
+    windows: Windows
+    checks: tuple[PairCheck, ...]
+
+    @classmethod
+    def of(cls, flights: tuple[Signals, ...], windows: Windows) -> Self:
+        return cls(flights, windows, checked(flights, windows))
+
+    def with_position(self, repair: ChannelRepair) -> tuple[ChannelRepair, ...]:
+        """Take the position along where it agrees with the velocity, so that its world is as wrong."""
+        along = any((one.pair.first, one.pair.second) == ("position", "velocity") and one.agrees for one in self.checks)
+        return (repair, replace(repair, channel="position")) if repair.channel == "velocity" and along else (repair,)
+
+    def repaired(self, *repairs: ChannelRepair) -> tuple[Signals, ...]:
+        return tuple(reduce(lambda s, each: each.applied(s), repairs, signals) for signals in self.flights)
+
+    def checked(self, repair: ChannelRepair) -> tuple[PairCheck, ...]:
+        """Compare a channel with the others once it is repaired."""
+        return checked(self.repaired(*self.with_position(repair)), self.windows, repair.channel)
 
 
 def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
@@ -91,24 +102,22 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
     ----------
     flights : sequence of Signals
         With the sampling period of the windows, and a late attitude set right.
-    windows : Windows
     """
     repairs: tuple[ChannelRepair, ...] = ()
     # What was made of the accelerometer is no second witness.
-    now = tuple(replace(signals, acceleration=None) if is_derived(signals) else signals for signals in flights)
-    checks = checked(now, windows)
-    against_thrust = _against_thrust(checks)
+    own = tuple(replace(signals, acceleration=None) if is_derived(signals) else signals for signals in flights)
+    now = _Compared.of(own, windows)
+    against_thrust = _against_thrust(now.checks)
     if against_thrust is not None:
         # Judged by the thrust every channel of such a world is wrong.
-        return Settled((), checks, against_thrust)
+        return Settled((), now.checks, against_thrust)
     for _ in range(_ROUNDS):
-        found = _mended(now, checks, windows)
+        found = _mended(now)
         if not found:
             break
         repairs = (*repairs, *found)
-        now = tuple(reduce(lambda s, repair: repair.applied(s), found, signals) for signals in now)
-        checks = checked(now, windows)
-    return Settled(repairs, checks)
+        now = _Compared.of(now.repaired(*found), windows)
+    return Settled(repairs, now.checks)
 
 
 def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:
@@ -116,13 +125,13 @@ def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:
     against = by_thrust(checks)
     if not against or any(len(check.first) < FEWEST_WINDOWS for check in against):
         return None
-    moved = [NAMES[check.pair.second] for check in against]
+    moved = [CHANNELS[check.pair.second].words for check in against]
     who, held = " and ".join(moved), ("thrust of the rotors", "attitude", *moved)
     if all(_reversed_along_z(check) for check in against):
         what = f"along z the thrust of the rotors is opposite to {who}"
         return Finding(what, "check import.world_frame and import.body_frame", held)
     turned, mirrored = zip(*(_about_the_vertical(check) for check in against), strict=True)
-    if all(abs(turn) > _TOGETHER and abs(np.angle(turn)) > ANOTHER_NORTH for turn in turned):
+    if all(abs(turn) > _ONE_PLANE and abs(np.angle(turn)) > ANOTHER_NORTH for turn in turned):
         angle = float(np.angle(turned[0]))
         return Finding(
             f"by thrust and attitude {who} lie turned by {np.degrees(angle):.0f} deg about the vertical",
@@ -131,7 +140,8 @@ def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:
             angle,
             "rad",
         )
-    if all(abs(turn) < _APART and abs(mirror) > _TOGETHER for turn, mirror in zip(turned, mirrored, strict=True)):
+    pairs = zip(turned, mirrored, strict=True)
+    if all(abs(turn) < _NOT_ONE_PLANE and abs(mirror) > _ONE_PLANE for turn, mirror in pairs):
         return Finding(
             f"by thrust and attitude {who} lie mirrored",
             "check order and signs of their x and y, import.world_frame and import.body_frame",
@@ -155,53 +165,30 @@ def _about_the_vertical(check: PairCheck) -> tuple[complex, complex]:
     return complex(np.vdot(first, second) / size), complex((first * second).sum() / size)
 
 
-def _mended(flights: tuple[Signals, ...], checks: Sequence[PairCheck], windows: Windows) -> tuple[ChannelRepair, ...]:
-    for channel, sure in _suspects(checks):
-        witnesses = _witnesses(checks, channel)
-        tuned = _read_rightly(flights, channel, checks, windows)
-        if tuned is not None and (sure or tuned[0].is_mistake):
-            return _told(*tuned, witnesses, checks)
-        if tuned is not None and _nearer_the_thrust(flights, tuned[0], checks, windows):
-            return _told(*tuned, [*witnesses, NAMES["thrust"]], checks)
+def _mended(now: _Compared) -> tuple[ChannelRepair, ...]:
+    for channel, sure in _suspects(now.checks):
+        contradicted = (check.pair for check in now.checks if check.problems and channel in check.pair)
+        witnesses = [
+            CHANNELS[name].words for pair in contradicted for name in (pair.first, pair.second) if name != channel
+        ]
+        read = _read_rightly(now, channel)
+        if read is not None and (sure or read[0].is_mistake):
+            return _told(now, *read, witnesses)
+        if read is not None and _nearer_the_thrust(now, read[0]):
+            return _told(now, *read, [*witnesses, CHANNELS["thrust"].words])
         # Noise on both sides can look like one contradiction, not like two.
-        if sure and tuned is None and len(set(witnesses)) > 1:
-            return (_left_out(channel, witnesses, checks),)
+        if sure and read is None and len(set(witnesses)) > 1:
+            return (_left_out(now, channel, witnesses),)
     return ()
 
 
-def _read_rightly(
-    flights: tuple[Signals, ...], channel: str, checks: Sequence[PairCheck], windows: Windows
-) -> _Tuned | None:
-    """Find the plainest reading of a channel that contradicts nothing, unless another one surely fits better."""
-    known = all(signals.attitude is not None for signals in flights)
-    best, least = None, np.empty(0)
-    for repair, what in _readings(channel):
-        tuned = _tuned(flights, repair, what, checks, windows) if known or not repair.needs_attitude else None
-        if tuned is not None:
-            nearest = _clearest(checked(_repaired(flights, tuned[0], checks), windows, channel))
-            rest = ((nearest.first - nearest.second) ** 2).sum(axis=1)
-            if best is None or (rest.sum() < least.sum() if _simple(tuned, best) else _surely_less(rest, least)):
-                best, least = tuned, rest
-    return best
-
-
-def _simple(tuned: _Tuned, other: _Tuned) -> bool:
-    """Tell whether a reading takes no more mistakes than another."""
-    return len(tuned[1]) + bool(tuned[0].delay_s) <= len(other[1]) + bool(other[0].delay_s)
-
-
-def _surely_less(after: Array, before: Array) -> bool:
-    """Tell whether squares are less by more than their scatter along the flights."""
-    parts = np.array([part.sum() for part in np.array_split(before - after, _PARTS)])
-    return bool(parts.mean() > _SIGMAS * mean_error(parts))
-
-
 def _suspects(checks: Sequence[PairCheck]) -> list[tuple[str, bool]]:
-    """List the channels that can be mended, and whether each alone has most against it.
-
-    That is: it contradicts more channels than any other, or as many and agrees with fewer.
-    """
-    blamed = {name for check in checks if _counts(check) for name in check.pair[:2]}
+    """List channels that can be mended, and whether each alone contradicts most, or as many and agrees with fewer."""
+    # A contradiction between velocity and thrust alone may be what a model misses, and asks for no decision.
+    asking = (
+        check.pair for check in checks if check.problems and (check.pair.exact or check.pair.second != "velocity")
+    )
+    blamed = {name for pair in asking for name in (pair.first, pair.second)}
     against = {
         name: (
             sum(bool(check.problems) for check in checks if name in check.pair),
@@ -209,16 +196,38 @@ def _suspects(checks: Sequence[PairCheck]) -> list[tuple[str, bool]]:
         )
         for name in blamed
     }
-    ordered = sorted((name for name in _MENDED if name in blamed), key=lambda name: against[name], reverse=True)
+    mended = (name for name, channel in CHANNELS.items() if channel.without and name in blamed)
+    ordered = sorted(mended, key=lambda name: against[name], reverse=True)
     return [(name, all(against[name] > against[other] for other in blamed - {name})) for name in ordered]
 
 
-def _nearer_the_thrust(
-    flights: tuple[Signals, ...], repair: ChannelRepair, checks: Sequence[PairCheck], windows: Windows
-) -> bool:
+def _read_rightly(now: _Compared, channel: str) -> _Read | None:
+    """Find the plainest reading of a channel that contradicts nothing, unless another one surely fits better."""
+    known = all(signals.attitude is not None for signals in now.flights)
+    best, least, mistakes = None, np.empty(0), 0
+    for repair, what in _readings(channel):
+        read = _tuned(now, repair, what) if known or not repair.needs_attitude else None
+        if read is None:
+            continue
+        nearest = _clearest(now.checked(read[0]))
+        rest = ((nearest.first - nearest.second) ** 2).sum(axis=1)
+        number = len(read[1]) + bool(read[0].delay_s)
+        better = best is None or (less(rest.sum(), least.sum()) if number <= mistakes else _surely_less(rest, least))
+        if better:
+            best, least, mistakes = read, rest, number
+    return best
+
+
+def _surely_less(after: Array, before: Array) -> bool:
+    """Tell whether squares are less by more than their scatter along the flights."""
+    parts = np.array([part.sum() for part in np.array_split(before - after, _PARTS)])
+    return bool(parts.mean() > _PARTS_SIGMAS * mean_error(parts))
+
+
+def _nearer_the_thrust(now: _Compared, repair: ChannelRepair) -> bool:
     """Tell whether a repair surely brings a channel nearer to what the thrust does: the third clock and frame."""
-    repaired = _repaired(flights, repair, checks)
-    before, after = (_off_the_thrust(each, repair.channel, windows) for each in (flights, repaired))
+    repaired = now.repaired(*now.with_position(repair))
+    before, after = (_off_the_thrust(each, repair.channel, now.windows) for each in (now.flights, repaired))
     return before is not None and after is not None and _surely_less(after, before)
 
 
@@ -237,23 +246,7 @@ def _off_the_thrust(flights: Sequence[Signals], channel: str, windows: Windows) 
     return np.asarray((rest**2).sum(axis=1))
 
 
-def _counts(check: PairCheck) -> bool:
-    """Tell whether a contradiction asks for a decision: one with the velocity alone may be what a model misses."""
-    return bool(check.problems) and (check.pair.exact or check.pair.second != "velocity")
-
-
-def _witnesses(checks: Sequence[PairCheck], channel: str) -> list[str]:
-    """List the channels that one contradicts."""
-    return [
-        NAMES[name]
-        for check in checks
-        if check.problems and channel in check.pair
-        for name in check.pair[:2]
-        if name != channel
-    ]
-
-
-def _readings(channel: str) -> Iterator[tuple[ChannelRepair, tuple[str, ...]]]:
+def _readings(channel: str) -> Iterator[_Read]:
     """List the ways to read a channel, the nearest to what it is called first; as it is says nothing."""
     gravity, plain = STANDARD_GRAVITY, ChannelRepair(channel)
     yield plain, ()
@@ -272,46 +265,31 @@ def _readings(channel: str) -> Iterator[tuple[ChannelRepair, tuple[str, ...]]]:
         yield replace(plain, in_body=True, gravity_m_s2=-gravity), ("is in body axes and holds gravity",)
 
 
-def _tuned(
-    flights: tuple[Signals, ...],
-    repair: ChannelRepair,
-    what: tuple[str, ...],
-    checks: Sequence[PairCheck],
-    windows: Windows,
-) -> _Tuned | None:
+def _tuned(now: _Compared, repair: ChannelRepair, what: tuple[str, ...]) -> _Read | None:
     """Find axes, unit and delay with which a reading contradicts nothing; None where there are none."""
     for step in (_with_axes, _with_unit, _with_turn, _with_delay):
-        against = checked(_repaired(flights, repair, checks), windows, repair.channel)
+        against = now.checked(repair)
         if not any(check.problems for check in against):
             break
         repair, more = step(repair, _clearest(against))
         what = (*what, *more)
     for _ in range(_ROUNDS if repair.delay_s else 0):
+        if abs(repair.delay_s) > min(map(len, now.flights)) * now.windows.period:
+            # What does not move together has no delay, and a fit of one runs away.
+            return None
         # Noise shrinks what is left of a delay, so a second look is worth it.
-        repair, _ = _with_delay(repair, _clearest(checked(_repaired(flights, repair, checks), windows, repair.channel)))
-    against = checked(_repaired(flights, repair, checks), windows, repair.channel)
+        repair, _ = _with_delay(repair, _clearest(now.checked(repair)))
+    against = now.checked(repair)
     # An accelerometer hardly moves in a gentle flight; what it shows of gravity is agreement enough.
     moves = repair.channel == "specific_force" or any(check.agrees for check in against)
     changed = bool(what) or repair.delay_s != 0
     return (repair, what) if changed and moves and not any(check.problems for check in against) else None
 
 
-def _repaired(flights: Sequence[Signals], repair: ChannelRepair, checks: Sequence[PairCheck]) -> tuple[Signals, ...]:
-    repairs = _with_position(repair, checks)
-    return tuple(reduce(lambda s, each: each.applied(s), repairs, signals) for signals in flights)
-
-
-def _with_position(repair: ChannelRepair, checks: Sequence[PairCheck]) -> tuple[ChannelRepair, ...]:
-    """Take the position along where it agrees with the velocity, so that its world is as wrong."""
-    along = [check for check in checks if check.pair[:2] == ("position", "velocity") and check.agrees]
-    if repair.channel != "velocity" or not along:
-        return (repair,)
-    return (repair, replace(repair, channel="position"))
-
-
 def _clearest(checks: Sequence[PairCheck]) -> PairCheck:
     """Choose the witness: the exact one that moves as the channel does, the thrust if there is no other."""
-    return max(checks, key=lambda check: (check.pair.exact, sum(match.r2 for match in check.matches)))
+    exact = [check for check in checks if check.pair.exact]
+    return largest(exact or checks, lambda check: float(check.r2.sum()))
 
 
 def _sides(repair: ChannelRepair, check: PairCheck) -> tuple[Array, Array]:
@@ -319,11 +297,7 @@ def _sides(repair: ChannelRepair, check: PairCheck) -> tuple[Array, Array]:
     return (check.first, check.second) if check.pair.second == repair.channel else (check.second, check.first)
 
 
-def _multiplied(repair: ChannelRepair, matrix: Array) -> ChannelRepair:
-    return replace(repair, matrix=matrix @ repair.matrix)
-
-
-def _with_axes(repair: ChannelRepair, check: PairCheck) -> _Tuned:
+def _with_axes(repair: ChannelRepair, check: PairCheck) -> _Read:
     if repair.channel == "specific_force" or repair.in_body:
         return repair, ()
     fit = fit_axes(*_sides(repair, check))
@@ -332,10 +306,10 @@ def _with_axes(repair: ChannelRepair, check: PairCheck) -> _Tuned:
     matrix = np.zeros((3, 3))
     matrix[np.arange(3), fit.order] = fit.sign
     names = ", ".join(("-" if sign < 0 else "") + AXES[axis] for axis, sign in zip(fit.order, fit.sign, strict=True))
-    return _multiplied(repair, matrix), (f"has {names} where x, y, z should be",)
+    return replace(repair, matrix=matrix @ repair.matrix), (f"has {names} where x, y, z should be",)
 
 
-def _with_unit(repair: ChannelRepair, check: PairCheck) -> _Tuned:
+def _with_unit(repair: ChannelRepair, check: PairCheck) -> _Read:
     should, reading = _sides(repair, check)
     if repair.channel != "specific_force":
         should, reading = should - should.mean(axis=0), reading - reading.mean(axis=0)
@@ -343,53 +317,48 @@ def _with_unit(repair: ChannelRepair, check: PairCheck) -> _Tuned:
     if squares.min() < TINY:
         return repair, ()
     size = float(np.sqrt(squares[0] / squares[1]))
+    correlation = abs(float((should * reading).sum())) / np.sqrt(squares[0] * squares[1] + TINY)
     # Noise on one side makes its size too large, by no more than the correlation tells.
-    error = (_UNIT_ERROR if check.pair.exact else _THRUST_ERROR) - np.log(_correlation(should, reading))
+    error = (_UNIT_ERROR if check.pair.exact else _THRUST_ERROR) - np.log(float(np.clip(correlation, 0.1, 1.0)))
     if abs(np.log(size)) < max(error, _SAME_UNIT):
         return repair, ()
-    units = _UNITS["velocity" if repair.channel == "velocity" else "acceleration"]
-    unit, factor = min(units.items(), key=lambda each: abs(np.log(size / each[1])))
+    unit, factor = min(CHANNELS[repair.channel].units.items(), key=lambda each: abs(np.log(size / each[1])))
     if abs(np.log(size / factor)) > error:
         return repair, ()
     return replace(repair, matrix=factor * repair.matrix), (f"is in {unit}",)
 
 
-def _correlation(should: Array, reading: Array) -> float:
-    both = float((should * reading).sum())
-    return float(np.clip(abs(both) / np.sqrt((should**2).sum() * (reading**2).sum() + TINY), 0.1, 1.0))
-
-
-def _with_turn(repair: ChannelRepair, check: PairCheck) -> _Tuned:
+def _with_turn(repair: ChannelRepair, check: PairCheck) -> _Read:
     if repair.channel == "specific_force" or not check.pair.exact:
         return repair, ()
     angle = float(np.arctan(check.turn.value)) * (1 if check.pair.second == repair.channel else -1)
     if abs(angle) < TURNED_RAD or check.turn.error > 0.1 * abs(angle):
         return repair, ()
     cos, sin = np.cos(angle), np.sin(angle)
-    matrix = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    return _multiplied(repair, matrix), (f"is turned by {np.degrees(angle):.0f} deg about the vertical",)
+    matrix = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ repair.matrix
+    return replace(repair, matrix=matrix), (f"is turned by {np.degrees(angle):.0f} deg about the vertical",)
 
 
-def _with_delay(repair: ChannelRepair, check: PairCheck) -> _Tuned:
+def _with_delay(repair: ChannelRepair, check: PairCheck) -> _Read:
     late = check.delay.value * (1 if check.pair.second == repair.channel else -1)
     return (replace(repair, delay_s=repair.delay_s + late) if check.pair.exact else repair), ()
 
 
 def _told(
-    repair: ChannelRepair, what: Sequence[str], witnesses: Sequence[str], checks: Sequence[PairCheck]
+    now: _Compared, repair: ChannelRepair, what: Sequence[str], witnesses: Sequence[str]
 ) -> tuple[ChannelRepair, ...]:
-    first, *others = _with_position(repair, checks)
-    way = "late" if repair.delay_s > 0 else "early"
-    clock = [f"is {way} by {abs(1000 * repair.delay_s):.0f} ms"] if repair.delay_s else []
-    who = f"the {NAMES[repair.channel]}" if not others else "the world of velocity and position"
+    channel = CHANNELS[repair.channel]
+    first, *others = now.with_position(repair)
+    clock = [f"is {off_clock(repair.delay_s)}"] if repair.delay_s else []
+    who = "the world of velocity and position" if others else f"the {channel.words}"
     finding = Finding(
         f"{who} {joined([*what, *clock])}, judged by the {joined(witnesses)}",
-        f"mend the log, or {KEYS[repair.channel]}",
-        (NAMES[repair.channel], *witnesses),
-        contradiction=bool(what) and _grave(repair.channel, checks),
+        f"mend the log, or {channel.keys}",
+        (channel.words, *witnesses),
+        contradiction=bool(what) and _grave(repair.channel, now.checks),
         repairable=True,
     )
-    return (first.told(finding, "It is set right before the balance"), *others)
+    return (first.told(finding, _DONE), *others)
 
 
 def _grave(channel: str, checks: Sequence[PairCheck]) -> bool:
@@ -397,18 +366,14 @@ def _grave(channel: str, checks: Sequence[PairCheck]) -> bool:
     return any(problem.contradiction for check in checks if channel in check.pair for problem in check.problems)
 
 
-def _left_out(channel: str, witnesses: Sequence[str], checks: Sequence[PairCheck]) -> ChannelRepair:
-    without = {
-        "velocity": "effects of the air are not tested",
-        "acceleration": "the force comes from other channels, if there are any",
-        "specific_force": "the force comes from other channels, if there are any",
-    }[channel]
+def _left_out(now: _Compared, name: str, witnesses: Sequence[str]) -> ChannelRepair:
+    channel = CHANNELS[name]
     finding = Finding(
-        f"the {NAMES[channel]} contradicts the {joined(witnesses)}, and neither unit, gravity, axes nor delay "
+        f"the {channel.words} contradicts the {joined(witnesses)}, and neither unit, gravity, axes nor delay "
         "explains it",
-        f"check {KEYS[channel]}",
-        (NAMES[channel], *witnesses),
-        contradiction=_grave(channel, checks),
+        f"check {channel.keys}",
+        (channel.words, *witnesses),
+        contradiction=_grave(name, now.checks),
         repairable=True,
     )
-    return ChannelRepair(channel, dropped=True).told(finding, f"It is left out: {without}")
+    return ChannelRepair(name, dropped=True).told(finding, f"It is left out: {channel.without}")

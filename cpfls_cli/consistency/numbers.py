@@ -1,7 +1,5 @@
 """Numbers of a vehicle that no vehicle has: stated so, or asked for by a log that is wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np
@@ -65,13 +63,14 @@ def impossible(off: Mapping[str, float]) -> tuple[Finding, ...]:
 
 
 def _suspect(off: Mapping[str, float]) -> str:
-    """Say what makes just these numbers impossible, by their ratios to the config.
-
-    Motion shows torque over inertia: a torque or an inertia of the config that is wrong changes one ratio, a unit all.
-    """
+    """Say what makes just these numbers impossible: a torque or inertia that is wrong changes one ratio, a unit all."""
     thrust, inertias = off.get("thrust_scale"), [off[name] for name in _INERTIAS if name in off]
     if min(off.values()) < _REVERSED:
-        return _reversed(off)
+        if off.keys() == {"inertia_z"}:
+            return "x and y fit, so check spin of vehicle.rotors, the order of the rotors' columns and the sign of yaw"
+        if off.keys() == {"thrust_scale"}:
+            return "check the sign and the frame of the acceleration, and thrust_factor_n_s2 of vehicle.rotors"
+        return "check signs and order of the gyroscope's and the rotors' columns"
     if thrust is not None and off.keys() == {"thrust_scale", "inertia_z"} and _alike(thrust * off["inertia_z"], 1.0):
         return f"the rotor speeds look {_times(1 / np.sqrt(thrust))}: check the unit of their columns (rpm for rad/s?)"
     if off.keys() == {"thrust_scale"} and thrust is not None:
@@ -87,14 +86,6 @@ def _suspect(off: Mapping[str, float]) -> str:
     if off.keys() <= {"inertia_x", "inertia_y"}:
         return "z fits, so the suspects are inertia_kg_m2 about it and position_m of vehicle.rotors"
     return "check signs, units and order of the gyroscope's and the rotors' columns"
-
-
-def _reversed(off: Mapping[str, float]) -> str:
-    if off.keys() == {"inertia_z"}:
-        return "x and y fit, so check spin of vehicle.rotors, the order of the rotors' columns and the sign of yaw"
-    if off.keys() == {"thrust_scale"}:
-        return "check the sign and the frame of the acceleration, and thrust_factor_n_s2 of vehicle.rotors"
-    return "check signs and order of the gyroscope's and the rotors' columns"
 
 
 def _alike(one: float, other: float) -> bool:

@@ -1,20 +1,21 @@
 """A channel that contradicts the others, set right or left out."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.consistency.findings import Finding
+from cpfls_cli.consistency.findings import Finding, capitalised
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.lag import delayed
 
 _UP = np.array([0.0, 0.0, 1.0])
-_ROUNDING = 1e-6
+_SAME = 1e-6
+"""Share of an acceleration up to which it is the one made of the accelerometer: the import computes it as here."""
+
 _SCALED = 0.1
+"""Logarithm of a change of volume from which a matrix changes the unit; axes that are turned leave it at 0."""
 
 
 @dataclass(frozen=True)
@@ -50,10 +51,9 @@ class ChannelRepair:
     sentence: str = ""
     finding: Finding | None = None
 
-    def told(self, finding: Finding, done: str) -> ChannelRepair:
+    def told(self, finding: Finding, done: str) -> Self:
         """Say what is wrong, and what is done about it."""
-        what = f"{finding.what[0].upper()}{finding.what[1:]}"
-        return replace(self, finding=finding, sentence=f"{what}. {done}; {finding.remedy}.")
+        return replace(self, finding=finding, sentence=f"{capitalised(finding.what)}. {done}; {finding.remedy}.")
 
     @property
     def is_mistake(self) -> bool:
@@ -102,19 +102,9 @@ def is_derived(signals: Signals) -> bool:
     made = accelerated(signals)
     if made is None or signals.acceleration is None:
         return False
-    return bool((made - signals.acceleration).std(axis=0).max() < _ROUNDING * max(1.0, float(np.abs(made).max())))
+    return bool((made - signals.acceleration).std(axis=0).max() < _SAME * max(1.0, float(np.abs(made).max())))
 
 
 def shifted(reading: Array, time: Array, delay: float) -> Array:
-    """Take a reading that is late at the time it belongs to.
-
-    Parameters
-    ----------
-    reading : array, shape (time, column)
-    time : array, shape (time,), s
-    delay : float
-        s.
-    """
-    if delay == 0:
-        return reading
-    return delayed(reading, -delay / (time[1] - time[0]))
+    """Take a reading, shape (time, column), that is late by a delay in s, at the time it belongs to."""
+    return reading if delay == 0 else delayed(reading, -delay / (time[1] - time[0]))

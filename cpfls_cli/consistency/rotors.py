@@ -1,7 +1,5 @@
 """Rotors and their thrust held against the motion and against what the config says of them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -10,7 +8,7 @@ import numpy as np
 from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.consistency.motion import PairCheck, by_thrust
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.flightlog.airframe import MovedBy, RotorPlace, airframe_from_motion, place_of
+from cpfls_cli.flightlog.airframe import airframe_from_motion, place_of
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _THRUST_TO_WEIGHT = 5.0
@@ -103,37 +101,21 @@ def misplaced(part: Signals) -> Finding | None:
     if part.rotor_speed is None:
         return None
     moved = airframe_from_motion(part.body_rate, part.rotor_speed, 1 / part.period, part.commanded)
-    stated = [RotorPlace("", each.position_m[:2], each.spin) for each in part.vehicle.rotors]
-    elsewhere = "" if moved is None else _elsewhere(moved, stated)
-    if moved is None or not elsewhere:
+    if moved is None or not moved.by_axes:
         return None
+    told = [(rotor.name, rotor.spin) for rotor in moved.airframe.rotors]
+    stated = [(place_of(each.position_m[:2]), each.spin) for each in part.vehicle.rotors]
+    # Of rotors that are stated as no X or plus such as it tells of, the motion says nothing.
+    if told == stated or {name for name, _ in told} != {name for name, _ in stated}:
+        return None
+    places = "; ".join(f"{name}, {'counter-clockwise' if spin > 0 else 'clockwise'}" for name, spin in told)
+    shares = ", ".join(f"{100 * share:.0f} %" for share in moved.explained)
     return Finding(
-        f"by the motion the rotors are, in the order of their columns: {elsewhere}. vehicle.rotors says otherwise",
+        f"by the motion the rotors are, in the order of their columns: {places} (which explains {shares} of the "
+        "acceleration about roll, pitch and yaw). vehicle.rotors says otherwise",
         "check position_m and spin there, the order of the columns, the axes of gyroscope (or attitude), and "
         "import.body_frame",
         ("rotors", "gyroscope", "vehicle.rotors"),
         # In a hover the axes may say it and single rotors not: enough for a word, not for a verdict.
         contradiction=moved.clear,
     )
-
-
-def _elsewhere(moved: MovedBy, stated: Sequence[RotorPlace]) -> str:
-    """Say where the motion puts rotors that are stated elsewhere, or turning the other way.
-
-    Parameters
-    ----------
-    stated : sequence of RotorPlace
-        As many, in the same order; directions of any length.
-
-    Returns
-    -------
-    str
-        Empty where the motion does not tell clearly, or where the stated ones are no X or plus such as it tells of.
-    """
-    told = [(rotor.name, rotor.spin) for rotor in moved.airframe.rotors]
-    known = [(place_of(rotor.direction), rotor.spin) for rotor in stated]
-    if not moved.by_axes or told == known or {name for name, _ in told} != {name for name, _ in known}:
-        return ""
-    words = "; ".join(f"{name}, {'counter-clockwise' if spin > 0 else 'clockwise'}" for name, spin in told)
-    shares = ", ".join(f"{100 * share:.0f} %" for share in moved.explained)
-    return f"{words} (which explains {shares} of the acceleration about roll, pitch and yaw)"

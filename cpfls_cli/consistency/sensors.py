@@ -1,14 +1,13 @@
 """What gyroscope, attitude, rotors and motion say of each other, each held against the others, before any torque."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import comb
+from typing import Self
 
 import numpy as np
 
 from cpfls_cli.consistency.axes import gyroscope_apart
+from cpfls_cli.consistency.channels import least_noise
 from cpfls_cli.consistency.clocks import attitude_on_clock, rotors_on_clock
 from cpfls_cli.consistency.faults import AuditFinding, CheckedFault, findings
 from cpfls_cli.consistency.findings import Finding
@@ -16,7 +15,7 @@ from cpfls_cli.consistency.gyroscope import GyroFit, fit_gyro, kinematics, scan
 from cpfls_cli.consistency.majority import Settled, settled
 from cpfls_cli.consistency.repairs import ChannelRepair
 from cpfls_cli.consistency.rotors import tells_thrust, weighed
-from cpfls_cli.effects.hooks import FaultFit, SensorTest
+from cpfls_cli.effects.hooks import SensorTest
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.weak_form.windows import Windows
@@ -39,7 +38,6 @@ class Gyroscope:
         What can be told.
     untested : mapping of str to str
         Faults that cannot, with the reason.
-    fit : GyroFit or None
     apart : tuple of Finding
         That the two do not show one motion in one unit.
     """
@@ -50,7 +48,7 @@ class Gyroscope:
     apart: tuple[Finding, ...] = ()
 
     @classmethod
-    def unjudged(cls, reason: str, apart: tuple[Finding, ...] = ()) -> Gyroscope:
+    def unjudged(cls, reason: str, apart: tuple[Finding, ...] = ()) -> Self:
         """Say why none of its faults can be told."""
         return cls(untested=dict.fromkeys(_of_gyroscope(), reason), apart=apart)
 
@@ -65,7 +63,7 @@ class Gyroscope:
         if self.apart:
             scaled = any(each.named and _estimate(each.name) == "scale" for each in told)
             return tuple(replace(each, repairable=scaled) for each in self.apart)
-        return tuple(_gross(each) for each in told if _is_gross(each))
+        return tuple(gross for each in told if (gross := _gross(each)) is not None)
 
 
 @dataclass(frozen=True)
@@ -97,14 +95,7 @@ class Sensors:
 
 
 def sensors_of(flights: Sequence[Signals], windows: Windows) -> Sensors:
-    """Hold the sensors of flights with the same hardware against each other.
-
-    Parameters
-    ----------
-    flights : sequence of Signals
-        At least one, with the sampling period of the windows.
-    windows : Windows
-    """
+    """Hold the sensors of flights with the same hardware, at the sampling period of the windows, against each other."""
     gyroscope = _gyroscope(flights, windows)
     late = gyroscope.late(windows)
     clocks, notes = attitude_on_clock(late.coefficients[0].value, flights, windows) if late else ((), ())
@@ -123,22 +114,23 @@ def sensors_of(flights: Sequence[Signals], windows: Windows) -> Sensors:
     return Sensors(gyroscope, clocks, notes, tuple(flights), motion, wrong)
 
 
-def _gross(fault: AuditFinding) -> Finding:
-    largest = max((number for number in fault.coefficients if number.named), key=lambda number: abs(number.value))
+def _gross(fault: AuditFinding) -> Finding | None:
+    """Say what is wrong where it is more than sensors of multirotors show."""
+    named = [number for number in fault.coefficients if number.named]
+    if not named:
+        return None
+    estimate, largest = str(_estimate(fault.name)), max(named, key=lambda number: abs(number.value))
+    if abs(largest.value) <= _GROSS[estimate]:
+        return None
     return Finding(
         f"{fault.sentence[0].lower()}{fault.sentence[1:-1]}",
         "check import.signals.body_rate",
         ("gyroscope", "attitude"),
         largest.value,
         largest.unit,
-        contradiction=_estimate(fault.name) != "delay",
+        contradiction=estimate != "delay",
         repairable=True,
     )
-
-
-def _is_gross(fault: AuditFinding) -> bool:
-    largest = max((abs(number.value) for number in fault.coefficients if number.named), default=0.0)
-    return bool(largest > _GROSS[str(_estimate(fault.name))])
 
 
 def _estimate(name: str) -> object:
@@ -167,26 +159,14 @@ def _gyroscope(flights: Sequence[Signals], windows: Windows) -> Gyroscope:
     if fit is None:
         return Gyroscope.unjudged("the flights are too short", apart)
     fits = {name: fit.of(str(test.estimate)) for name, test in _of_gyroscope().items()}
-    untested = _untestable(fits, fit, flights, windows)
-    faults = (CheckedFault(CATALOGUE[name], numbers) for name, numbers in fits.items() if name not in untested)
-    return Gyroscope(tuple(faults), untested, fit, apart)
-
-
-def _untestable(
-    fits: Mapping[str, FaultFit], fit: GyroFit, flights: Sequence[Signals], windows: Windows
-) -> Mapping[str, str]:
     still = "the flights hardly turn, so it would not show"
     untested = {name: still for name, numbers in fits.items() if not numbers.known.any()}
-    if np.sqrt(fit.variance.max()) < _SHARE_OF_NOISE * _gyro_noise(flights, windows):
+    noise = least_noise([signals.body_rate for signals in flights]) * np.sqrt((windows.weight**2).sum())
+    if np.sqrt(fit.variance.max()) < _SHARE_OF_NOISE * noise:
         derived = "the attitude contains the gyroscope's own noise, so it is integrated from it and would not show it"
         untested |= {name: derived for name, test in _of_gyroscope().items() if test.integrated}
-    return untested
-
-
-def _gyro_noise(flights: Sequence[Signals], windows: Windows) -> float:
-    """Bound the noise of a window from below by fifth differences, which motion hardly reaches, rad/s."""
-    fifth = np.concatenate([np.diff(signals.body_rate, 5, axis=0) for signals in flights])
-    return float(np.sqrt((fifth**2).mean(axis=0).min() / comb(10, 5) * (windows.weight**2).sum()))
+    faults = (CheckedFault(CATALOGUE[name], numbers) for name, numbers in fits.items() if name not in untested)
+    return Gyroscope(tuple(faults), untested, fit, apart)
 
 
 def _of_gyroscope() -> dict[str, SensorTest]:

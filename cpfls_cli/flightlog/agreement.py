@@ -1,8 +1,6 @@
 """Signals of a log held against each other: which axes, signs, units and frames let them agree."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations, product
 from typing import Final
@@ -13,18 +11,41 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.repair import align_quaternion_signs
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
+from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
 
 _FILTER_ORDER = 2
 _EDGE_S = 0.5
+"""At both ends, where the filter settles, s."""
+
 SLOW_HZ = 3.0
 """Below which rates are compared: between two sensors with clocks of their own a few ten ms do not matter there."""
 
 _TILT_HZ = 1.0
+"""Below which an acceleration over ground is compared with the lean: a position derived twice is full of noise."""
+
 _RISES = 0.4
+"""Correlation with the lift from which on a vertical axis follows it."""
+
 _AS_NAMED_IS_GOOD_ENOUGH = 0.02
+"""Share that other axes may explain more by noise alone."""
+
 _CLEARLY, _TIMES_BETTER = 0.6, 2.0
+"""Share that other axes than named have to explain, and how many times less they have to leave."""
+
 _MOVES_RAD_S = 0.03
+"""Rate below which noise and drift of an attitude are as large as its motion."""
+
+
+Order = tuple[int, ...]
+Sign = tuple[float, ...]
+AS_NAMED: Final[tuple[Order, Sign]] = ((0, 1, 2), (1.0, 1.0, 1.0))
+"""Order and signs of three axes that are what they are called."""
+
+
+def handed(order: Sequence[int], sign: Sequence[float]) -> float:
+    """Give 1 for axes that are right-handed, -1 for others."""
+    return float(np.round(np.linalg.det(np.eye(3)[list(order)])) * np.prod(sign))
 
 
 @dataclass(frozen=True)
@@ -61,7 +82,7 @@ class AxisFit:
     @property
     def is_as_named(self) -> bool:
         """Whether the axes are in their order, with a plus."""
-        return self.order == (0, 1, 2) and self.sign == (1.0, 1.0, 1.0)
+        return (self.order, self.sign) == AS_NAMED
 
     @property
     def times_better(self) -> float:
@@ -99,7 +120,8 @@ def fit_axes(reference: Array, measured: Array) -> AxisFit:
     }
     explained = {axes: max(value, 0.0) ** 2 / (power * total) for axes, value in together.items()}
     named = ((0, 1, 2), (1.0, 1.0, 1.0))
-    best = max(explained, key=lambda axes: explained[axes])
+    # An axis that does not move fits as well with either sign.
+    best = largest(explained, lambda axes: explained[axes])
     runner_up = max(value for axes, value in explained.items() if axes != best)
     # Other axes than the names say have to be clearly better.
     clearly = explained[best] > _CLEARLY and 1 - explained[best] < (1 - explained[named]) / _TIMES_BETTER

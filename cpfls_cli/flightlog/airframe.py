@@ -1,12 +1,10 @@
 """Where the rotors of a vehicle are and how they turn: from the parameters in a log, or from its motion."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import permutations
 from math import cos, hypot, pi, radians, sin
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -14,12 +12,17 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
 from cpfls_cli.lag import delayed, lagged
+from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
 
 Parameters = Mapping[str, float | str]
 _ACCELERATION_HZ = 12.0
+"""Below which torque and angular acceleration are compared: a controller answers slower, and noise is above."""
+
 _LAGS_S = (0.0, 0.02, 0.04, 0.07, 0.1)
 _SHIFTS_S = (-0.06, -0.04, -0.02, 0.02, 0.04, 0.06)
+"""Time constants of motors, from the smallest to those of large vehicles, and delays of telemetry; near enough."""
+
 _CORNERS: Final = {
     "front left": (1.0, 1.0),
     "front right": (1.0, -1.0),
@@ -27,12 +30,17 @@ _CORNERS: Final = {
     "rear left": (-1.0, 1.0),
 }
 _ENDS: Final = {"front": (1.0, 0.0), "right": (0.0, -1.0), "rear": (-1.0, 0.0), "left": (0.0, 1.0)}
-_FACTOR = 1e-9
+_ROUNDED = 1e-9
+"""Below which a place along an axis is 0."""
+
 _AIR_KG_M3 = 1.2
 _TURNS = ("roll", "pitch", "yaw")
 _LEAST_EXPLAINED = 0.05
-_LEAST_OF_BOTH = 0.2
-_LEAST_TIMES = 1.3
+"""Share of the acceleration about one axis that chance does not explain."""
+
+_LEAST_OF_BOTH, _LEAST_TIMES = 0.2, 1.3
+"""Sum of the shares of roll and pitch that rotors in their places explain, and how many times that of other places."""
+
 _LEAST_OF_MEAN = 0.2
 """How much a rotor by itself has to push as the layout has it, as a part of what they do on the mean."""
 
@@ -68,12 +76,10 @@ class Airframe:
 
     Attributes
     ----------
-    rotors : tuple of RotorPlace
     in_metres : bool
         Whether the places are lengths; False where they are directions.
     reason : str
         Where that is known from.
-    sure : {"stated", "data", "guess"}
     moment_ratio_m : float or None
         Drag factor over thrust factor that the parameters state.
     """
@@ -89,7 +95,7 @@ class Airframe:
         """Whether other places, or other ways to turn, are not ruled out."""
         return self.sure == "guess"
 
-    def with_arm(self, arm_m: float) -> Airframe:
+    def with_arm(self, arm_m: float) -> "Airframe":
         """Give the same rotors at a distance from the middle; the mean distance where they differ."""
         mean = float(np.mean([hypot(*rotor.direction) for rotor in self.rotors]))
         factor = arm_m / mean
@@ -131,8 +137,8 @@ def _of_px4(parameters: Parameters) -> Airframe | None:
 
 
 def _name(x: float, y: float) -> str:
-    along = "front" if x > _FACTOR else "rear" if x < -_FACTOR else ""
-    across = "left" if y > _FACTOR else "right" if y < -_FACTOR else ""
+    along = "front" if x > _ROUNDED else "rear" if x < -_ROUNDED else ""
+    across = "left" if y > _ROUNDED else "right" if y < -_ROUNDED else ""
     return f"{along} {across}".strip()
 
 
@@ -157,15 +163,9 @@ def _of_ardupilot(parameters: Parameters) -> Airframe | None:
     motors = _ARDUPILOT_FRAMES.get((kind or "", form or ""))
     if motors is None:
         return None
-    rotors = tuple(
-        RotorPlace(_name(round(cos(radians(a)), 9), round(-sin(radians(a)), 9)), _direction(a), spin)
-        for a, spin in motors
-    )
+    places = [(round(cos(radians(a)), 9) + 0.0, round(-sin(radians(a)), 9) + 0.0) for a, _ in motors]
+    rotors = tuple(RotorPlace(_name(*place), place, spin) for place, (_, spin) in zip(places, motors, strict=True))
     return Airframe(rotors, False, f"FRAME_CLASS and FRAME_TYPE in the log: {kind} {form}", "stated")
-
-
-def _direction(degrees: float) -> tuple[float, float]:
-    return round(cos(radians(degrees)), 9) + 0.0, round(-sin(radians(degrees)), 9) + 0.0
 
 
 _PX4_ORDER = (("front right", 1), ("rear left", 1), ("front left", -1), ("rear right", -1))
@@ -193,8 +193,8 @@ def _require_control(airframe: Airframe) -> None:
     rows = np.array([[1.0, r.direction[1], -r.direction[0], -float(r.spin)] for r in airframe.rotors]).T
     scale = np.abs(rows).max(axis=1, keepdims=True)
     for row, axis in ((1, "roll"), (2, "pitch"), (3, "yaw")):
-        others = np.delete(rows, row, axis=0) / np.maximum(np.delete(scale, row, axis=0), _FACTOR)
-        own = rows[row] / max(float(scale[row, 0]), _FACTOR)
+        others = np.delete(rows, row, axis=0) / np.maximum(np.delete(scale, row, axis=0), _ROUNDED)
+        own = rows[row] / max(float(scale[row, 0]), _ROUNDED)
         left = own - others.T @ np.linalg.lstsq(others.T, own, rcond=None)[0]
         if float(np.linalg.norm(left)) < 1e-6:
             raise InputError(
@@ -203,13 +203,21 @@ def _require_control(airframe: Airframe) -> None:
             )
 
 
-@dataclass(frozen=True)
-class _Layout:
+class _RotorLayout(NamedTuple):
     rotors: tuple[RotorPlace, ...]
     form: str
 
+    def weights(self) -> Array:
+        """Give what each rotor does about roll, pitch and yaw, array, shape (axis, rotor)."""
+        places = np.array([rotor.direction for rotor in self.rotors])
+        return np.array([places[:, 1], -places[:, 0], [-float(rotor.spin) for rotor in self.rotors]])
 
-def _layouts() -> Iterator[_Layout]:
+
+_Explained = tuple[float, float, float]
+"""Shares of the angular acceleration about roll, pitch and yaw."""
+
+
+def _layouts() -> Iterator[_RotorLayout]:
     """List how four rotors can be numbered, in an X and in a plus, and which pair turns which way."""
     for form, places in (("X", _CORNERS), ("plus", _ENDS)):
         for order in permutations(places):
@@ -220,7 +228,7 @@ def _layouts() -> Iterator[_Layout]:
                     RotorPlace(name, (places[name][0] / length, places[name][1] / length), turning[name])
                     for name in order
                 )
-                yield _Layout(rotors, form)
+                yield _RotorLayout(rotors, form)
 
 
 @dataclass(frozen=True)
@@ -229,7 +237,6 @@ class MovedBy:
 
     Attributes
     ----------
-    airframe : Airframe
     explained : tuple of float
         Share of the angular acceleration about roll, pitch and yaw that they explain.
     by_axes : bool
@@ -245,6 +252,7 @@ class MovedBy:
 
 
 _ON_AN_AXIS = 0.2
+"""Part of a direction up to which a rotor lies on an axis: arms of an H or of a stretched X are no plus."""
 
 
 def place_of(direction: tuple[float, float]) -> str:
@@ -283,11 +291,15 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     moved = [lagged(squared, rate_hz * lag).start for lag in (_LAGS_S if is_command else _LAGS_S[:3])]
     moved += [] if is_command else [delayed(squared, rate_hz * seconds) for seconds in _SHIFTS_S]
     tried = [_shares(acceleration, rate, low_pass(own, rate_hz, cutoff, 2)) for own in moved]
-    shares, weights = max(tried, key=lambda found: max(sum(share) for _, share in found[0]))
+    shares, weights = largest(tried, lambda found: max(sum(share) for _, share in found[0]))
     layout, explained, by_axes = _chosen(shares, ("X", "plus"))
     if not by_axes:
         layout, explained, by_axes = _chosen(shares, ("X",))
-    clear = by_axes and _push_alike(layout, weights)
+    # Columns that are of other moments than those beside them, or of something else than these rotors, may explain a
+    # part of the motion in some layout; but then single ones push the wrong way.
+    alike = layout.weights() * weights
+    least = _LEAST_OF_MEAN * np.abs(alike).mean(axis=1, keepdims=True)
+    clear = by_axes and bool((alike > least)[layout.weights() != 0].all())
     if sum(explained[:2]) < 2 * _LEAST_EXPLAINED:
         return None
     words = ", ".join(f"{100 * share:.0f} % of {axis}" for share, axis in zip(explained, _TURNS, strict=True))
@@ -297,45 +309,19 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
 
 
 def _chosen(
-    shares: list[tuple[_Layout, tuple[float, float, float]]], forms: tuple[str, ...]
-) -> tuple[_Layout, tuple[float, float, float], bool]:
+    shares: list[tuple[_RotorLayout, _Explained]], forms: tuple[str, ...]
+) -> tuple[_RotorLayout, _Explained, bool]:
     """Choose the layout that explains most, and tell whether another numbering comes near."""
     own = [found for found in shares if found[0].form in forms]
-    layout, explained = max(own, key=lambda found: sum(found[1]) * (_PREFER_X if found[0].form == "X" else 1.0))
+    layout, explained = largest(own, lambda found: sum(found[1]) * (_PREFER_X if found[0].form == "X" else 1.0))
     places = [rotor.name for rotor in layout.rotors]
     others = max(sum(share[:2]) for other, share in own if [rotor.name for rotor in other.rotors] != places)
     clear = sum(explained[:2]) > max(_LEAST_OF_BOTH, _LEAST_TIMES * others) and explained[2] > _LEAST_EXPLAINED
     return layout, explained, clear
 
 
-def _push_alike(layout: _Layout, weights: Array) -> bool:
-    """Tell whether every rotor by itself pushes about every axis as the layout has it.
-
-    Columns that are of other moments than those beside them, or of something else than these rotors, may explain a
-    part of the motion in some layout; but then single ones push the wrong way.
-    """
-    alike = _weights(layout) * weights
-    least = _LEAST_OF_MEAN * np.abs(alike).mean(axis=1, keepdims=True)
-    return bool((alike > least)[_weights(layout) != 0].all())
-
-
-def _weights(layout: _Layout) -> Array:
-    """Give what each rotor does about roll, pitch and yaw, array, shape (axis, rotor)."""
-    places = np.array([rotor.direction for rotor in layout.rotors])
-    return np.array([places[:, 1], -places[:, 0], [-float(rotor.spin) for rotor in layout.rotors]])
-
-
-def _shares(
-    acceleration: Array, rate: Array, squared: Array
-) -> tuple[list[tuple[_Layout, tuple[float, float, float]]], Array]:
-    """Tell of every layout which share of the angular acceleration about each axis it explains.
-
-    Returns
-    -------
-    shares : list of (layout, tuple of float)
-    weights : array, shape (axis, rotor)
-        With which each rotor pushes, where no layout ties them together.
-    """
+def _shares(acceleration: Array, rate: Array, squared: Array) -> tuple[list[tuple[_RotorLayout, _Explained]], Array]:
+    """Tell what every layout explains, and how each rotor pushes where none ties them together, shape (axis, rotor)."""
     edge = max(1, len(rate) // 50)
     inner = slice(edge, len(rate) - edge)
     # What turning itself does to the acceleration, and a constant torque, are not the work of the rotors.
@@ -345,7 +331,7 @@ def _shares(
     results = []
     for layout in _layouts():
         shares = []
-        for axis, weight in enumerate(_weights(layout)):
+        for axis, weight in enumerate(layout.weights()):
             along, power = float(weight @ together[:, axis]), float(weight @ own @ weight) * float(total[axis])
             shares.append(along**2 / power if along > 0 and power > 0 else 0.0)
         results.append((layout, (shares[0], shares[1], shares[2])))

@@ -1,7 +1,5 @@
 """Commands aligned with the motion: the lag of the rotors, and the delay between torque command and motion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,18 +14,11 @@ from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.rounding import less, levelled
 
 _COMMANDS = ("body_torque", "thrust", "rotor_command")
-_MOTION = (
-    "attitude",
-    "body_rate",
-    "position",
-    "velocity",
-    "acceleration",
-    "specific_force",
-    "rotor_speed",
-    "voltage",
-)
 _POOR_R2 = 0.5
+"""Below which most of the torque is other than that of a rigid body, and the delay is not to be trusted."""
+
 _SMALLEST_WINDOW = 50
+"""Samples for nine numbers, and for a delay."""
 
 
 def align_commands(signals: LogSignals, settings: ImportSettings, delay_share: float = 1.0) -> LogSignals:
@@ -104,18 +95,15 @@ def _shifted(signals: LogSignals, delay: float, speeds_command: bool) -> LogSign
     time = signals.time[first:]
     commands = (*_COMMANDS, "rotor_speed") if speeds_command else _COMMANDS
     cut: dict[str, Array] = {}
-    for name in (*_COMMANDS, *_MOTION):
-        values = getattr(signals, name)
-        if values is not None:
-            cut[name] = (_within(values, delay / period) if name in commands else values)[first:]
+    for name, values in signals.arrays.items():
+        cut[name] = values[first:]
+        if name in commands:
+            # A cubic overshoots the steps of a command; it stays within what was commanded.
+            moved = np.clip(delayed(values, delay / period), values.min(axis=0), values.max(axis=0))
+            cut[name] = moved[first:]
     begin, end = signals.report.span_s
     report = replace(signals.report, samples=len(time), span_s=(begin + float(time[0]), end))
     return replace(signals, time=time - time[0], report=report, **cut)
-
-
-def _within(values: Array, steps: float) -> Array:
-    """Delay a command, whose steps a cubic overshoots, within what was commanded."""
-    return np.clip(delayed(values, steps), values.min(axis=0), values.max(axis=0))
 
 
 @dataclass(frozen=True)
@@ -255,15 +243,7 @@ def _refine(fit: _Fit, delays: Array, best: int) -> float:
 
 
 def apply_rotor_lag(signals: LogSignals, time_constant: float) -> LogSignals:
-    """Replace rotor commands by their first-order response, ``tau w' + w = u``, with u held between samples.
-
-    Parameters
-    ----------
-    signals : LogSignals
-        On a uniform clock.
-    time_constant : float
-        tau, s; 0 for rotors without lag.
-    """
+    """Replace rotor commands by their first-order response in tau s, ``tau w' + w = u``, u held between samples."""
     command = signals.rotor_command
     if command is None or time_constant == 0:
         return signals

@@ -1,7 +1,5 @@
 """How fast a signal of a log really is: updates that come slower than the clock, and a filter before the log."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -17,27 +15,44 @@ _NOT_JUDGED = frozenset({"voltage"})
 # A rigid body hardly answers what is faster than half of this.
 _FAST_HZ = 100.0
 _FEWEST_UPDATES = 20
+"""Below which a regular step may be chance."""
+
 _REGULAR_SHARE = 0.8
 _LARGEST_SHARE_AT_ONCE = 0.2
+"""Of updates that come from row to row: jitter, not a rate."""
+
 # A knot between two rows bends the line at both of them.
 _ROWS_OF_KNOT = 2
 _STRAIGHT = 1e-3
+"""Bend of what is interpolated, by the rounding of a file, as a share of the largest."""
 
 # Measured: logs of five vehicles fall by 29 dB below their trend at most, those that were filtered forward and backward
 # by 38 to 85 dB.
 _CLIFF_DB = 30.0
 _STEEPEST_BEFORE_DB = 24.0
+"""Fall in an octave up to which a trend is that of motion, a filter of fourth order."""
+
 # A line of vibration is above its trend; a filter leaves no band beyond it near any band before it.
 _CLEARANCE_DB = 25.0
 _LOWEST_HZ = 8.0
 _HIGHEST_SHARE = 0.48
+"""Of the rate: above, aliasing shapes the spectrum."""
+
 _BANDS_PER_OCTAVE = 8
 _FEWEST_BANDS = 5
+"""For the line of a trend."""
+
 _LEAST_OCTAVES_BEYOND = 0.3
+"""That have to be known for a fall to be a cliff."""
+
 _LONGEST_SEGMENT = 2048
 _SEGMENTS = 4
 _FEWEST_IN_SEGMENT = 64
+"""Lines of a spectrum, below which bands hold none."""
+
 _LINES_OF_WINDOW = 8
+"""Over which the Blackman-Harris window smears a line."""
+
 _HALVED_DB = 6.0
 # The trend that the cut-off is read against, clear of the fall itself.
 _TREND_OCTAVES, _CLEAR_OCTAVES = 2.0, 0.5
@@ -62,15 +77,10 @@ class SlowSignal:
 
 
 def slow_signals(table: SignalTable) -> tuple[SlowSignal, ...]:
-    """Find signals whose updates come at less than half the rate of the rows.
+    """Find signals of a table as logged whose updates come at less than half the rate of the rows.
 
     Between updates the rows repeat the last value, or lie on a straight line. What a coarse resolution repeats is
     none: its steps are irregular.
-
-    Parameters
-    ----------
-    table : SignalTable
-        The part that is kept, as logged.
     """
     found = (_slow(name, table.time, values) for name, values in table.signals.items() if name not in _NOT_JUDGED)
     return tuple(signal for signal in found if signal is not None)
@@ -138,7 +148,6 @@ def cut_offs(signals: Mapping[str, Array], rate_hz: float, slow: tuple[SlowSigna
     ----------
     signals : mapping from signal name to array, shape (time, column)
         Uniform in time, without absent values.
-    rate_hz : float
     slow : tuple of SlowSignal
         Not judged: straight lines between updates have a spectrum of their own.
 

@@ -1,7 +1,5 @@
 """The clock of a log: time stamps that increase, restarts, and the longest stretch without a long gap."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -12,20 +10,15 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.settings import ImportSettings
 
 _LARGEST_SHARE_BEHIND = 0.05
-_SMALLEST_SHARE_KEPT = 0.1
+"""Of all rows, up to which packets merely come late."""
+
+SMALLEST_SHARE_KEPT = 0.1
+"""Of a log, below which a crop that keeps it is not worth a word."""
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """Rows of a log between two rows, both included.
-
-    Attributes
-    ----------
-    rows : slice
-        The rows that are kept.
-    incomplete_ends, beyond_gap : int
-        Rows left out because a column has no value yet or any more, and because they lie beyond a gap.
-    """
+class KeptRows:
+    """Rows that are kept; how many are left out as a column has no value yet or any more, and beyond a gap."""
 
     rows: slice
     incomplete_ends: int
@@ -59,8 +52,8 @@ def increasing_rows(time: Array) -> tuple[IntArray, dict[str, int]]:
     return kept, {reason: int(rows.sum()) for reason, rows in dropped.items()}
 
 
-def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -> Stretch:
-    """Find the longest stretch in which no column lacks values for longer than the longest gap allowed.
+def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -> KeptRows:
+    """Find the longest stretch in which no column lacks values for longer than `gap_s`, as `gap_rule` has it.
 
     Parameters
     ----------
@@ -68,29 +61,28 @@ def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -
         Increasing time stamps.
     present : array of bool, shape (sample, column)
         Where each column has a value.
-    settings : ImportSettings
-        `gap_s` and `gap_rule`.
-
-    Returns
-    -------
-    Stretch
-        The longest such stretch.
 
     Raises
     ------
     InputError
         If a column is empty, or there is a longer gap and the rule is to stop.
     """
-    first_full, last_full = _common_span(present)
+    if (present.sum(axis=0) < 2).any():
+        raise InputError("a mapped column has fewer than two values in the part of the log that is read")
+    # Between these rows every column has begun and none has ended.
+    first_full = int(np.argmax(present, axis=0).max())
+    last_full = len(present) - 1 - int(np.argmax(present[::-1], axis=0).max())
+    if first_full >= last_full:
+        raise InputError("the mapped columns of the log have no stretch of time in common")
     gaps = _gap_steps(time, present, settings.gap_s)[first_full:last_full]
     if gaps.any() and settings.gap_rule == "stop":
-        begin, end = (time[first_full + row] for row in _runs(gaps)[0])
+        begin, end = (time[first_full + row] for row in runs(gaps)[0])
         raise InputError(
             _slow_log(time, present, settings)
             or f"the log has a gap of {end - begin:.3g} s at {begin:.3f} s, longer than import.gap_s ="
             f" {settings.gap_s:g}: raise it, cut with import.crop_s, or set import.gap_rule to longest-part"
         )
-    stretches = [(first_full + begin, first_full + end) for begin, end in _runs(~gaps)]
+    stretches = [(first_full + begin, first_full + end) for begin, end in runs(~gaps)]
     if not stretches:
         raise InputError(
             _slow_log(time, present, settings)
@@ -98,7 +90,7 @@ def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -
         )
     first, last = max(stretches, key=lambda run: float(time[run[1]] - time[run[0]]))
     incomplete = first_full + len(time) - 1 - last_full
-    return Stretch(slice(first, last + 1), incomplete, len(time) - incomplete - (last + 1 - first))
+    return KeptRows(slice(first, last + 1), incomplete, len(time) - incomplete - (last + 1 - first))
 
 
 def _slow_log(time: Array, present: BoolArray, settings: ImportSettings) -> str | None:
@@ -118,17 +110,6 @@ def _slow_log(time: Array, present: BoolArray, settings: ImportSettings) -> str 
     return None
 
 
-def _common_span(present: BoolArray) -> tuple[int, int]:
-    """Find the first and the last row between which every column has begun and none has ended."""
-    if (present.sum(axis=0) < 2).any():
-        raise InputError("a mapped column has fewer than two values in the part of the log that is read")
-    first = int(np.argmax(present, axis=0).max())
-    last = len(present) - 1 - int(np.argmax(present[::-1], axis=0).max())
-    if first >= last:
-        raise InputError("the mapped columns of the log have no stretch of time in common")
-    return first, last
-
-
 def _gap_steps(time: Array, present: BoolArray, gap_s: float) -> BoolArray:
     """Mark the steps from row to row that lie inside a long gap of some column."""
     depth = np.zeros(len(time), dtype=int)
@@ -142,10 +123,10 @@ def _gap_steps(time: Array, present: BoolArray, gap_s: float) -> BoolArray:
     return inside
 
 
-def _runs(steps: BoolArray) -> list[tuple[int, int]]:
-    """List the first and the last row of each run of marked steps."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], steps, [False]]).astype(int)))
-    return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
+def runs(marked: BoolArray) -> list[tuple[int, int]]:
+    """List where each run of marked rows begins, and the row after its end."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
+    return [(int(first), int(after)) for first, after in edges.reshape(-1, 2)]
 
 
 def refuse_restart(time: Array, rows: IntArray) -> None:
@@ -168,10 +149,10 @@ def refuse_restart(time: Array, rows: IntArray) -> None:
     """
     finite = np.isfinite(time)
     time, rows = time[finite], rows[finite]
-    runs = _runs_behind(time)
-    if not _too_many(runs, len(time)):
+    behind = runs(_behind(time))
+    if not _too_many(behind, len(time)):
         return
-    first, length = (int(number) for number in runs[np.argmax(runs[:, 1])])
+    first, length = max(((begin, end - begin) for begin, end in behind), key=lambda run: run[1])
     raise InputError(
         f"time goes backward at row {rows[first]} (from {time[first - 1]:.6g} s to {time[first]:.6g} s after the first"
         f" stamp) and stays behind for {length} rows: the clock was reset or logs were joined; {_remedy(time)}"
@@ -179,7 +160,7 @@ def refuse_restart(time: Array, rows: IntArray) -> None:
 
 
 def _remedy(time: Array) -> str:
-    kept = {crop: rows for crop in _crops(time) if (rows := _rows_left(time, crop)) > _SMALLEST_SHARE_KEPT * len(time)}
+    kept = {crop: rows for crop in _crops(time) if (rows := _rows_left(time, crop)) > SMALLEST_SHARE_KEPT * len(time)}
     if not kept:
         return "split the log (import.crop_s cannot tell the parts apart: their time stamps overlap)"
     begin, end = max(kept, key=lambda crop: kept[crop])
@@ -201,17 +182,12 @@ def _crops(time: Array) -> Iterator[tuple[float, float]]:
 def _rows_left(time: Array, crop: tuple[float, float]) -> int:
     """Count the rows that a crop leaves; 0 where the clock goes back within it."""
     inside = time[(time >= crop[0]) & (time <= crop[1])]
-    return 0 if _too_many(_runs_behind(inside), len(inside)) else len(inside)
+    return 0 if _too_many(runs(_behind(inside)), len(inside)) else len(inside)
 
 
-def _too_many(runs: IntArray, rows: int) -> bool:
-    return bool(runs[runs[:, 1] > 1, 1].sum() > _LARGEST_SHARE_BEHIND * rows)
-
-
-def _runs_behind(time: Array) -> IntArray:
-    """List the first row and the length of each run of rows behind, shape (run, 2)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], _behind(time), [False]]).astype(int))).reshape(-1, 2)
-    return np.column_stack([edges[:, 0], edges[:, 1] - edges[:, 0]])
+def _too_many(behind: list[tuple[int, int]], rows: int) -> bool:
+    """Tell whether more rows are behind than come late one by one."""
+    return sum(end - begin for begin, end in behind if end - begin > 1) > _LARGEST_SHARE_BEHIND * rows
 
 
 def _behind(time: Array) -> BoolArray:

@@ -1,7 +1,5 @@
 """Conversion of a log's columns: selected by name, in SI, in body FLU and world ENU."""
 
-from __future__ import annotations
-
 from collections.abc import Container, Mapping
 from dataclasses import fields, replace
 from difflib import get_close_matches
@@ -14,16 +12,17 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.repair import unwrap_angles
-from cpfls_cli.flightlog.settings import ColumnMap, ImportSettings, SignalMap
+from cpfls_cli.flightlog.settings import ROTORS, ColumnMap, ImportSettings, SignalMap
 from cpfls_cli.units import STANDARD_GRAVITY, to_si
 
 _SUFFICIENT_SIGNALS = ("attitude", "quaternion", "body_rate", "rotor_speed", "rotor_command")
 _WORLD_SIGNALS = ("position", "velocity", "acceleration")
 _BODY_SIGNALS = ("body_rate", "body_torque")
-_ROTOR_SIGNALS = ("rotor_speed", "rotor_command")
 _SCALAR_SIGNALS = ("thrust", "voltage")
 _MOST_NEAREST, _MOST_LISTED = 3, 20
 _ALIKE, _ALIKE_SHORT, _SHORT_NAME = 0.5, 0.7, 2
+"""Likeness of names by difflib that is worth a hint, and that of names of so many letters."""
+
 # Names that are far apart, so that the nearest one would mislead: of actuator_motors it is actuator_controls, which is
 # what mixers get and no command of a rotor.
 _SAME_IN_PX4 = (
@@ -51,18 +50,6 @@ def drop_absent_signals(columns: Container[str], settings: ImportSettings) -> Im
     """Leave out the optional signals whose columns the log does not hold.
 
     A signal with some of its columns stays, so that the missing ones are named like those of a required signal.
-
-    Parameters
-    ----------
-    columns : container of str
-        Names of the log's columns.
-    settings : ImportSettings
-        The section `import`.
-
-    Returns
-    -------
-    ImportSettings
-        With the remaining signals.
 
     Raises
     ------
@@ -95,8 +82,6 @@ def select_columns(columns: Mapping[str, Array], settings: ImportSettings) -> tu
     ----------
     columns : mapping from str to array, shape (sample,)
         The log.
-    settings : ImportSettings
-        The section `import`.
 
     Returns
     -------
@@ -206,7 +191,7 @@ def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) ->
         Names among those of `LogSignals`.
     """
     in_body = _as_body_vectors(signals, settings)
-    converted = {name: signals[name] for name in _ROTOR_SIGNALS if name in signals}
+    converted: dict[str, Array] = {name: signals[name] for name in ROTORS if name in signals}
     if "rotor_command" in signals and settings.rotor_command_is == "thrust":
         # Thrust goes with the square of the speed; a share below 0 gives none.
         converted["rotor_command"] = np.sqrt(np.maximum(signals["rotor_command"], 0.0))
@@ -240,33 +225,13 @@ def _as_body_vectors(signals: Mapping[str, Array], settings: ImportSettings) -> 
 
 
 def body_to_flu(vectors: Array, frame: BodyFrame) -> Array:
-    """Convert body vectors to front, left, up (FLU).
-
-    Parameters
-    ----------
-    vectors : array, shape (time, 3), body frame `frame`
-    frame : {"FLU", "FRD"}
-
-    Returns
-    -------
-    array, shape (time, 3), body frame FLU
-    """
+    """Convert body vectors, shape (time, 3), to front, left, up (FLU)."""
     turned: Array = vectors @ _BODY[frame].T
     return turned
 
 
 def world_to_enu(vectors: Array, frame: WorldFrame) -> Array:
-    """Convert world vectors to east, north, up (ENU).
-
-    Parameters
-    ----------
-    vectors : array, shape (time, 3), world frame `frame`
-    frame : {"ENU", "NED"}
-
-    Returns
-    -------
-    array, shape (time, 3), world frame ENU
-    """
+    """Convert world vectors, shape (time, 3), to east, north, up (ENU)."""
     turned: Array = vectors @ _WORLD[frame].T
     return turned
 
@@ -278,8 +243,6 @@ def attitude_to_enu_flu(attitude: Array, body: BodyFrame, world: WorldFrame) -> 
     ----------
     attitude : array, shape (time, 3), rad
         Roll, pitch and yaw (intrinsic ZYX) of the log's body frame in the log's world frame.
-    body : {"FLU", "FRD"}
-    world : {"ENU", "NED"}
 
     Returns
     -------
@@ -293,31 +256,13 @@ def attitude_to_enu_flu(attitude: Array, body: BodyFrame, world: WorldFrame) -> 
 
 
 def attitude_from_quaternion(quaternion: Array, order: Literal["wxyz", "xyzw"]) -> Array:
-    """Convert quaternions to roll, pitch, yaw in the same frames.
-
-    Parameters
-    ----------
-    quaternion : array, shape (time, 4)
-        Rotation from body to world; its length does not matter.
-    order : {"wxyz", "xyzw"}
-        Whether the scalar part stands first or last.
-
-    Returns
-    -------
-    array, shape (time, 3), rad
-        Roll and yaw without jumps.
-    """
+    """Convert quaternions from body to world, shape (time, 4), of any length, to `euler_angles`."""
     scalar_last = np.roll(quaternion, -1, axis=1) if order == "wxyz" else quaternion
     return euler_angles(Rotation.from_quat(scalar_last).as_matrix())
 
 
 def euler_angles(rotation: Array) -> Array:
-    """Extract roll, pitch, yaw (intrinsic ZYX) from rotation matrices.
-
-    Parameters
-    ----------
-    rotation : array, shape (time, 3, 3)
-        From body to world.
+    """Extract roll, pitch, yaw (intrinsic ZYX) from rotations of body to world, shape (time, 3, 3).
 
     Returns
     -------

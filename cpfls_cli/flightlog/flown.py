@@ -1,7 +1,5 @@
 """The part of a log in which the vehicle flies: not on the ground, not idling, not disarmed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,10 +12,14 @@ _OF_HOVER = 0.6
 """Share of the level at hover below which rotors idle."""
 
 _OF_LARGEST = 0.5
+"""Share of the largest level above which rotors carry the vehicle."""
+
 _SHORT_S = 1.0
 """Shorter pauses are part of a flight, and shorter flights none."""
 
 _OF_HEIGHT, _LEAST_HEIGHT = 0.1, 0.05
+"""Above the ground it flies: as a share of the highest, and in m."""
+
 _MARGIN_S = 0.5
 """Left out after take-off and before landing, where the ground pushes."""
 
@@ -25,8 +27,13 @@ _STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
 """Below the first a vehicle stands, whatever an estimate of its height does; below the second it has to move."""
 
 _ALIVE = 0.02
+"""Share of the largest command below which rotors stand."""
+
 _TURNS_RAD_S, _OF_TURNING = 0.2, 0.3
+"""Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand."""
+
 _MOST_CLOCK_HZ = 50.0
+"""Rate that is enough to find a flight."""
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,7 @@
 """The import of a flight: read, align, filter, derive."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from math import pi
 from typing import Any
 
@@ -40,10 +38,13 @@ from cpfls_cli.flightlog.stretches import (
 
 _STEEPEST_PITCH = pi / 2 - pi / 180
 _LARGEST_REFINEMENT = 10
+"""Rows of the result for one of the log: more hold nothing new."""
+
 _SHORTEST_PERIOD_S = 1e-6
 _FASTEST_HZ = 40e3
 """Above the 32 kHz at which the fastest gyroscopes are read."""
 _FEWEST_SAMPLES = 10
+"""Of which a flight can be told."""
 
 
 def import_log(
@@ -59,8 +60,6 @@ def import_log(
     ----------
     columns : mapping from str to array, shape (sample,)
         The log.
-    settings : ImportSettings
-        The section `import`.
     rotor_torque : callable, optional
         Body torque, array of shape (time, 3), N m, FLU, from the signals of the rotors; called where
         `torque_source` names the rotors.
@@ -91,8 +90,6 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
     ----------
     columns : mapping from str to array, shape (sample,)
         The log.
-    settings : ImportSettings
-        The section `import`.
 
     Returns
     -------
@@ -122,7 +119,7 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
     clock, rate_hz = _uniform_clock(table.time)
     on_clock = {name: fill(table.time, values, clock) for name, values in repaired.signals.items()}
     refuse_steep_pitch(on_clock)
-    gaps, longest_gap_s = _gaps(table.time)
+    steps = np.diff(table.time)
     slow = slow_signals(table)
     filtered = cut_offs(on_clock, rate_hz, slow)
     report = ImportReport(
@@ -133,8 +130,8 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
         spikes=counts.spikes,
         suspected_spikes=counts.suspected_spikes,
         saturated=counts.saturated,
-        gaps=gaps,
-        longest_gap_s=longest_gap_s,
+        gaps=int((steps > 1.5 * np.median(steps)).sum()),
+        longest_gap_s=float(steps.max()),
         span_s=(float(clock[0]), float(clock[-1])),
         log_rate_hz=rate_hz,
         rate_hz=rate_hz,
@@ -146,7 +143,7 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
             *warn_of_rest(table, resting, settings),
             *warn_of_slow(slow, rate_hz),
             *warn_of_cut_offs(filtered, settings),
-            *_warn_of_gap(stretch.beyond_gap),
+            *([f"{stretch.beyond_gap} rows beyond a gap are not used"] if stretch.beyond_gap else []),
             *_warn_of_clock(rate_hz, settings),
             *warn_of_angles(read.signals),
         ),
@@ -164,15 +161,6 @@ def _uniform_clock(time: Array) -> tuple[Array, float]:
     # A whole number of periods that rounding made a little short must not lose its last sample.
     samples = int((time[-1] - time[0]) / period * (1 + 1e-9) + 1e-6) + 1
     return time[0] + period * np.arange(samples), 1 / period
-
-
-def _gaps(time: Array) -> tuple[int, float]:
-    steps = np.diff(time)
-    return int((steps > 1.5 * np.median(steps)).sum()), float(steps.max())
-
-
-def _warn_of_gap(rows: int) -> list[str]:
-    return [f"{rows} rows beyond a gap are not used"] if rows else []
 
 
 def _warn_of_clock(rate_hz: float, settings: ImportSettings) -> list[str]:
@@ -207,8 +195,12 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
     ----------
     Section 1 of the method's description.
     """
-    smooth = _filtered(signals, settings)
-    arrays = _arrays(smooth) | _derived(smooth)
+    filtered: dict[str, Any] = {
+        name: low_pass(values, signals.report.log_rate_hz, settings.lowpass_hz, settings.lowpass_order)
+        for name, values in signals.arrays.items()
+    }
+    smooth = replace(signals, **filtered)
+    arrays = smooth.arrays | _derived(smooth)
     time = smooth.time
     report = replace(signals.report, lowpass_hz=settings.lowpass_hz)
     if settings.rate_hz is not None:
@@ -236,20 +228,6 @@ def _clock(time: Array, rate_hz: float, log_rate_hz: float) -> Array:
     return np.arange(samples) / rate_hz
 
 
-def _arrays(signals: LogSignals) -> dict[str, Array]:
-    names = {entry.name for entry in fields(signals)} - {"time", "report"}
-    return {name: getattr(signals, name) for name in sorted(names) if getattr(signals, name) is not None}
-
-
-def _filtered(signals: LogSignals, settings: ImportSettings) -> LogSignals:
-    rate_hz = signals.report.log_rate_hz
-    smooth: dict[str, Any] = {
-        name: low_pass(values, rate_hz, settings.lowpass_hz, settings.lowpass_order)
-        for name, values in _arrays(signals).items()
-    }
-    return replace(signals, **smooth)
-
-
 def _derived(signals: LogSignals) -> dict[str, Array]:
     derived: dict[str, Array] = {}
     body_rate = body_rate_of(signals.time, signals.attitude, signals.body_rate)
@@ -257,21 +235,17 @@ def _derived(signals: LogSignals) -> dict[str, Array]:
         derived["body_rate"] = body_rate
     if signals.attitude is None or body_rate is None:
         return derived
-    _require_regular(signals.time, signals.attitude)
+    steep = np.flatnonzero(np.abs(signals.attitude[:, 1]) > _STEEPEST_PITCH)
+    if len(steep):
+        raise ComputationError(
+            f"the pitch comes within a degree of +-90 degrees at {signals.time[steep[0]]:.3f} s of the flight, where"
+            " Euler rates are not defined: cut that part off with import.crop_s"
+        )
     attitude_rate = rotations.attitude_rate(signals.attitude, body_rate)
     derived |= {"attitude_rate": attitude_rate, "attitude_acceleration": derivative(signals.time, attitude_rate)}
     if signals.body_torque is not None:
         derived["torque"] = rotations.generalised_torque(signals.attitude, signals.body_torque)
     return derived
-
-
-def _require_regular(time: Array, attitude: Array) -> None:
-    steep = np.flatnonzero(np.abs(attitude[:, 1]) > _STEEPEST_PITCH)
-    if len(steep):
-        raise ComputationError(
-            f"the pitch comes within a degree of +-90 degrees at {time[steep[0]]:.3f} s of the flight, where"
-            " Euler rates are not defined: cut that part off with import.crop_s"
-        )
 
 
 def _warn_of_aliasing(settings: ImportSettings, log_rate_hz: float) -> tuple[str, ...]:

@@ -1,7 +1,5 @@
 """Columns of a log of any kind by name, each on its own clock and all on one, and the column that is its clock."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -12,13 +10,14 @@ from scipy.ndimage import median_filter
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.clock import increasing_rows
 from cpfls_cli.flightlog.nameless import nameless_clock
 from cpfls_cli.flightlog.names import Named
-from cpfls_cli.flightlog.settings import UNITS_OF_SIGNAL, SignalName
+from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics
 from cpfls_cli.units import KNOWN_UNITS, UnitName
 
-_TIME_NAMES = (
+_TIME_NAMES = [
     "t",
     "time",
     "time_s",
@@ -31,16 +30,24 @@ _TIME_NAMES = (
     "seconds",
     "sec",
     "t_s",
-)
+]
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-ROTORS: Final[tuple[SignalName, ...]] = ("rotor_speed", "rotor_command")
 _STEPS_S = (2e-4, 0.5)
+"""Steps between stamps of logs of flights, s: 5 kHz to 2 Hz."""
+
 _SEVERAL = 3.0
+"""Times as often that other columns have to come to be preferred."""
+
 _SLOWEST_HZ = 0.5
+"""Below which a signal tells nothing of a flight."""
+
 _FEWEST_SAMPLES = 20
+"""For medians and rates."""
+
 _LARGEST_SPAN = 100
 """Time that stamps span over that which rows of one rate fill, up to which they are a clock with pauses."""
 _GRID_HZ = 100.0
+"""Rate at which signals are compared, whose motion is below a tenth of it."""
 
 
 class LogTable:
@@ -91,10 +98,8 @@ class LogTable:
         rows = np.column_stack([np.asarray(self.topics[topic][self.parts(c)[1]], dtype=float) for c in columns])
         if len(rows) != len(time):
             return np.empty(0), np.empty((0, len(columns)))
-        known = np.isfinite(rows).all(axis=1) & np.isfinite(time)
-        highest = np.maximum.accumulate(np.where(known, time, -np.inf))
-        known[1:] &= time[1:] > highest[:-1]
-        return time[known], rows[known]
+        kept, _ = increasing_rows(np.where(np.isfinite(rows).all(axis=1), time, np.nan))
+        return time[kept], rows[kept]
 
     def without_spikes(self, columns: Sequence[str]) -> Array:
         """Values of columns, each the median of five neighbours: what rotors do takes longer."""
@@ -152,8 +157,8 @@ def _doubt_of_time(name: str, unit: str, fitting: Sequence[str], step: float) ->
 
 def _time_rank(name: str) -> int:
     lower = name.lower().strip()
-    if lower in _TIME_NAMES:
-        return _TIME_NAMES.index(lower) > 1
+    if lower in _TIME_NAMES.split():
+        return lower not in _TIME_NAMES.split()[:2]
     return 2 if "time" in lower or "stamp" in lower else 3
 
 
@@ -171,21 +176,19 @@ def holding_values(log: LogTable, candidates: Sequence[Named]) -> dict[SignalNam
         time, values = log.values(named.group.columns)
         if named.signal in ROTORS and len(time) < _FEWEST_SAMPLES:
             # Outputs that are not there hold no numbers.
-            named = _with_values(log, named)
+            enough = tuple(c for c in named.group.columns if len(log.values((c,))[0]) >= _FEWEST_SAMPLES)
+            named = replace(named, group=replace(named.group, columns=enough or named.group.columns))
             time, values = log.values(named.group.columns)
         if len(time) < _FEWEST_SAMPLES or log.rate_hz(named.group.columns) < _SLOWEST_HZ:
             continue
         if float(np.ptp(values, axis=0).max()) > 0:
             kept.setdefault(named.signal, []).append(named)
     for found in kept.values():
-        found.sort(key=lambda named: _too_slow(log, named, found))
+        # Columns that the same kind of log is known for, and that come several times as often, go first.
+        fastest = max((log.rate_hz(named.group.columns) for named in found if named.known), default=0.0)
+        slow = [bool(named.known) and log.rate_hz(named.group.columns) * _SEVERAL < fastest for named in found]
+        found[:] = [named for _, named in sorted(zip(slow, found, strict=True), key=lambda entry: entry[0])]
     return kept
-
-
-def _too_slow(log: LogTable, named: Named, others: Sequence[Named]) -> bool:
-    """Tell whether columns that the same kind of log is known for come several times as often."""
-    rates = [log.rate_hz(other.group.columns) for other in others if other.known and named.known]
-    return bool(rates) and log.rate_hz(named.group.columns) * _SEVERAL < max(rates)
 
 
 def refuse_dead_rotors(log: LogTable, named: Sequence[Named], candidates: Mapping[SignalName, Sequence[Named]]) -> None:
@@ -195,11 +198,6 @@ def refuse_dead_rotors(log: LogTable, named: Sequence[Named], candidates: Mappin
     dead = next((n for n in named if n.signal in ROTORS and len(log.values(n.group.columns[:1])[0])), None)
     if dead is not None:
         raise InputError(f"nothing flies in it: the rotors ({dead.group.pattern}) never change")
-
-
-def _with_values(log: LogTable, named: Named) -> Named:
-    columns = tuple(c for c in named.group.columns if len(log.values((c,))[0]) >= _FEWEST_SAMPLES)
-    return replace(named, group=replace(named.group, columns=columns or named.group.columns))
 
 
 def make_grid(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) -> None:

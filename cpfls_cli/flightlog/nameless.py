@@ -1,7 +1,5 @@
 """Columns of a matrix that bear numbers and no names, recognised by how they move together."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
@@ -21,17 +19,30 @@ from cpfls_cli.flightlog.agreement import (
 )
 from cpfls_cli.flightlog.names import ColumnGroup, Named
 from cpfls_cli.flightlog.settings import SignalName
+from cpfls_cli.rounding import less
 from cpfls_cli.units import STANDARD_GRAVITY
 
 _FEWEST_COLUMNS = 12
-_STEPS_S = (2e-4, 0.2)
-_EVEN = 0.05
+"""Attitude, rates, accelerometer and rotors are as many and more; what is narrower is another matrix."""
+
+_STEPS_S, _EVEN = (2e-4, 0.2), 0.05
+"""Steps of a clock in s, and the share of them by which they differ on the mean."""
+
 _UNIT_LENGTH = 0.02
-_FOLLOWS = 0.8
-_NEAR = 1.3
-_SLOWEST_ROTOR, _ALIKE = 50.0, 1.3
+"""By which the length of a quaternion is off 1, in single precision or filtered."""
+
+_FOLLOWS, _NEAR = 0.8, 1.3
+"""Share that a derivative has to explain, and the ratio of sizes, where no name speaks for it."""
+
+_SLOWEST_ROTOR, _ROTORS_ALIKE = 50.0, 1.3
+"""Level in rad/s, or more in another unit, of every rotor in flight, and the ratio of their levels."""
+
 _SIZE = 0.1
+"""Share by which an accelerometer may be off what carries the vehicle."""
+
 _RATE_HZ = 100.0
+"""Rate to which a fast matrix is thinned: every pair of runs is compared."""
+
 OF_A_MATRIX: Final = "a matrix without names"
 
 
@@ -114,9 +125,11 @@ class _Matrix:
         sensed = self._accelerometer()
         if sensed is not None:
             yield self.take("acceleration", sensed, 3)
-        rotors = next((f for f, v in self.runs(4) if _like_rotors(v)), None)
-        if rotors is not None:
-            yield self.take("rotor_speed", rotors, 4)
+        for first, values in self.runs(4):
+            middle = np.median(values, axis=0)
+            if values.min() >= 0 and middle.min() > _SLOWEST_ROTOR and middle.max() < _ROTORS_ALIKE * middle.min():
+                yield self.take("rotor_speed", first, 4)
+                return
 
     def _attitude(self) -> tuple[int, Rotation, int] | None:
         """Find the quaternion whose derivative explains three other columns best."""
@@ -129,7 +142,7 @@ class _Matrix:
                 for rates, measured in self.runs(3):
                     fit = fit_rates(rotation, measured, self.rate_hz)
                     apart = rates + 3 <= first or rates >= first + 4
-                    if apart and fit is not None and fit.as_named > max(_FOLLOWS, best[0] if best else 0.0):
+                    if apart and fit is not None and less(max(_FOLLOWS, best[0] if best else 0.0), fit.as_named):
                         best = (fit.as_named, first, rotation, rates)
         return None if best is None else best[1:]
 
@@ -146,18 +159,15 @@ class _Matrix:
                 for reference in (derived, turned):
                     fit = fit_axes(slow(reference, self.rate_hz, SLOW_HZ), own)
                     near = 1 / _NEAR < fit.gain < _NEAR
-                    if near and fit.as_named > max(_FOLLOWS, best[0] if best else 0.0):
+                    if near and less(max(_FOLLOWS, best[0] if best else 0.0), fit.as_named):
                         best = (fit.as_named, place, speed)
         if best is not None:
-            self.carried = self._sizes(best[1])
+            # The usual size of what carries the vehicle, z of the position upward and downward.
+            moving = second_derivative(self.table[:, best[1] : best[1] + 3], self.rate_hz)
+            forces = (moving + np.array([0.0, 0.0, up * STANDARD_GRAVITY]) for up in (1.0, -1.0))
+            self.carried = tuple(float(np.median(np.linalg.norm(force, axis=1))) for force in forces)
             yield self.take("position", best[1], 3)
             yield self.take("velocity", best[2], 3)
-
-    def _sizes(self, place: int) -> tuple[float, ...]:
-        """Give the usual size of what carries the vehicle, z of the position upward and downward."""
-        moving = second_derivative(self.table[:, place : place + 3], self.rate_hz)
-        sizes = (np.linalg.norm(moving + np.array([0.0, 0.0, up * STANDARD_GRAVITY]), axis=1) for up in (1.0, -1.0))
-        return tuple(float(np.median(size)) for size in sizes)
 
     def _accelerometer(self) -> int | None:
         """Find three columns of the size of what carries the vehicle, nearly all of it in the third."""
@@ -169,8 +179,3 @@ class _Matrix:
             if middle[:2].max() < 0.3 * middle[2] and off < (best[0] if best else _SIZE):
                 best = (off, first)
         return None if best is None else best[1]
-
-
-def _like_rotors(values: Array) -> bool:
-    middle = np.median(values, axis=0)
-    return bool(values.min() >= 0 and middle.min() > _SLOWEST_ROTOR and middle.max() < _ALIKE * middle.min())

@@ -1,79 +1,37 @@
-"""What the names of a log's columns say: columns that belong together, what they may hold, in which unit.
-
-Three tables say it: `KNOWN`, what kinds of logs call their columns; `MEANINGS`, the words for each signal; and
-`SPELLINGS`, the ways to write a unit into a name. A new log usually takes one row more.
-"""
-
-from __future__ import annotations
+"""What the names of a log's columns say by the tables of `vocabulary`: columns that belong together, what they hold."""
 
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from math import tau
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal
 
-from cpfls_cli.flightlog.settings import UNITS_OF_SIGNAL, SignalName
+from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalName
+from cpfls_cli.flightlog.vocabulary import (
+    A_WORD,
+    ALLOWED,
+    ARDUPILOT,
+    ASKED,
+    BETAFLIGHT,
+    CRAZYFLIE,
+    FAST,
+    IN_FULL,
+    IN_RADIANS,
+    KIN,
+    KNOWN,
+    MEANINGS,
+    NOT_MEASURED,
+    PX4,
+    RATE_WORDS,
+    SECOND_HAND,
+    SPELLINGS,
+    Meaning,
+)
 from cpfls_cli.units import KNOWN_UNITS, UnitName
 
-Kind = Literal["xyz", "wxyz", "angles", "numbers", "one"]
-
-
-def _each(words: str) -> frozenset[str]:
-    return frozenset(words.split())
-
-
-class Spelling(NamedTuple):
-    """A unit, the factor that makes it of what is written, and how names write it."""
-
-    unit: UnitName
-    scale: float
-    written: str
-
-
-SPELLINGS: Final = (
-    # "_" and "per" are read as "/", and words in full as their symbols.
-    Spelling("rad/s", 1.0, "rad/s rads radps rads-1"),
-    Spelling("rad/s", 1e-3, "mrad/s mrads mradps"),
-    Spelling("deg/s", 1.0, "deg/s degs degps dps degs-1"),
-    Spelling("deg/s", 1e-3, "mdeg/s mdps"),
-    Spelling("rpm", 1.0, "rpm"),
-    Spelling("rpm", 1e3, "krpm"),
-    Spelling("rad/s", tau, "hz rps rev/s"),
-    Spelling("rad", 1.0, "rad"),
-    Spelling("rad", 1e-3, "mrad"),
-    Spelling("deg", 1.0, "deg"),
-    Spelling("deg", 1e-2, "cdeg centideg"),
-    Spelling("m/s^2", 1.0, "m/s2 m/s/s mps2 ms2 ms-2"),
-    Spelling("g", 1.0, "g"),
-    Spelling("g", 1e-3, "mg"),
-    Spelling("m/s", 1.0, "m/s mps ms-1"),
-    Spelling("mm/s", 1.0, "mm/s mmps"),
-    Spelling("m/s", 1e-2, "cm/s cmps"),
-    Spelling("m/s", 1 / 3.6, "km/h kmh kph"),
-    Spelling("m", 1.0, "m"),
-    Spelling("mm", 1.0, "mm"),
-    Spelling("m", 1e-2, "cm"),
-    Spelling("m", 0.3048, "ft feet"),
-    Spelling("N m", 1.0, "nm n/m"),
-    Spelling("N mm", 1.0, "nmm n/mm"),
-    Spelling("N", 1.0, "n"),
-    Spelling("V", 1.0, "v"),
-    Spelling("V", 1e-3, "mv"),
-    Spelling("1", 1e-2, "pct percent %"),
-    Spelling("us", 1.0, "us usec"),
-)
-_WRITTEN: Final = {text: own for own in SPELLINGS for text in own.written.split()}
-_IN_FULL: Final = {"radians?": "rad", "degrees?": "deg", "met(er|re)s?": "m", "sec(onds?)?": "s", "volts?": "v"}
-_A_WORD: Final = _each("rad rads deg degs dps rpm mm g radps degps mps rads-1")
-"""Spellings that state a unit wherever they stand as a word of a name."""
-
-_IN_RADIANS: Final[Mapping[str, tuple[SignalName, ...]]] = {
-    # An angular frequency by its letter.
-    "w": ("body_rate",),
-    "om": ("body_rate", "rotor_speed", "rotor_command"),
-    "omega": ("body_rate", "rotor_speed", "rotor_command"),
-    "omcmd": ("rotor_command",),
+_WRITTEN: Final = {
+    text: (unit, scale) for unit, own in SPELLINGS.items() for scale, written in own.items() for text in written.split()
 }
+Kind = Literal["xyz", "wxyz", "angles", "numbers", "one"]
 
 
 @dataclass(frozen=True)
@@ -122,7 +80,7 @@ def _symbols(text: str) -> str:
     """Write a unit as `SPELLINGS` do, such as rad/s for rad_per_sec."""
     text = re.sub(r"([a-z]{2})([A-Z])", r"\1_\2", text.strip("[]()_ ")).lower().replace("²", "2")
     parts = re.split(r"[/_ .·^]+|(?<=[a-z])per(?=[a-z])", text)
-    for full, symbol in _IN_FULL.items():
+    for full, symbol in IN_FULL.items():
         parts = [symbol if re.fullmatch(full, part) else part for part in parts]
     joined = "/".join(part for part in parts if part not in ("", "per"))
     return joined.replace("s/2", "s2").replace("s/-", "s-")
@@ -220,134 +178,6 @@ def _numbered(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
             yield ColumnGroup(pattern, "numbers", tuple(columns[number] for number in numbers))
 
 
-class Known(NamedTuple):
-    """Columns that a kind of log is known for, in the order in which they are preferred."""
-
-    system: str
-    signal: SignalName
-    pattern: str
-    unit: UnitName | None
-    frame: str | None = None
-    scale: float = 1.0
-    sign: tuple[float, ...] | None = None
-
-
-_PX4, _ARDUPILOT, _BETAFLIGHT, _CRAZYFLIE = "PX4", "ArduPilot", "Betaflight", "Crazyflie"
-_KIN: Final = {_ARDUPILOT: ("Ardu",), _BETAFLIGHT: ("INAV", "Cleanflight", "EmuFlight")}
-KNOWN: Final = (
-    Known(_PX4, "quaternion", "vehicle_attitude.q[*]", "1", "FRD"),
-    Known(_PX4, "body_rate", "vehicle_angular_velocity.xyz[*]", "rad/s", "FRD"),
-    Known(_PX4, "body_rate", "sensor_combined.gyro_rad[*]", "rad/s", "FRD"),
-    Known(_PX4, "body_rate", "vehicle_attitude.*speed", "rad/s", "FRD"),
-    Known(_PX4, "acceleration", "sensor_combined.accelerometer_m_s2[*]", "m/s^2", "FRD"),
-    Known(_PX4, "acceleration", "vehicle_acceleration.xyz[*]", "m/s^2", "FRD"),
-    Known(_PX4, "position", "vehicle_local_position.*", "m", "NED"),
-    Known(_PX4, "velocity", "vehicle_local_position.v*", "m/s", "NED"),
-    Known(_PX4, "rotor_speed", "esc_status.esc[*].esc_rpm", "rpm"),
-    Known(_PX4, "rotor_command", "actuator_motors.control[*]", "1"),
-    Known(_PX4, "rotor_command", "actuator_outputs.output[*]", None),
-    Known(_PX4, "voltage", "battery_status.voltage_v", "V"),
-    Known(_ARDUPILOT, "attitude", "ATT.*", "deg", "FRD"),
-    Known(_ARDUPILOT, "body_rate", "IMU.Gyr*", "rad/s", "FRD"),
-    Known(_ARDUPILOT, "body_rate", "RATE.*", "deg/s", "FRD"),
-    Known(_ARDUPILOT, "acceleration", "IMU.Acc*", "m/s^2", "FRD"),
-    Known(_ARDUPILOT, "position", "XKF1.P*", "m", "NED"),
-    Known(_ARDUPILOT, "position", "NKF1.P*", "m", "NED"),
-    Known(_ARDUPILOT, "velocity", "XKF1.V*", "m/s", "NED"),
-    Known(_ARDUPILOT, "velocity", "NKF1.V*", "m/s", "NED"),
-    Known(_ARDUPILOT, "rotor_command", "RCOU.C*", None),
-    Known(_ARDUPILOT, "rotor_speed", "ESC[*].RPM", "rpm"),
-    Known(_ARDUPILOT, "voltage", "BAT.Volt", "V"),
-    Known(_BETAFLIGHT, "body_rate", "gyroADC[*]", "deg/s", "FLU"),
-    Known(_BETAFLIGHT, "acceleration", "accSmooth[*]", None, "FLU"),
-    Known(_BETAFLIGHT, "rotor_command", "motor[*]", None),
-    Known(_BETAFLIGHT, "rotor_speed", "rpm[*]", "rpm"),
-    Known(_BETAFLIGHT, "rotor_speed", "eRPM[*]", None),
-    Known(_BETAFLIGHT, "voltage", "vbatLatest", "V"),
-    Known(_CRAZYFLIE, "quaternion", "stateEstimate.q*", "1", "FLU"),
-    Known(_CRAZYFLIE, "attitude", "stabilizer.*", "deg", "FLU"),
-    Known(_CRAZYFLIE, "attitude", "stateEstimate.*", "deg", "FLU"),
-    Known(_CRAZYFLIE, "body_rate", "gyro.*", "deg/s", "FLU"),
-    # The controller takes a pitch for positive with the nose up: r_pitch = -gyro.y in the firmware.
-    Known(_CRAZYFLIE, "body_rate", "controller.r_*", None, "FLU", sign=(1.0, -1.0, 1.0)),
-    Known(_CRAZYFLIE, "acceleration", "acc.*", "g", "FLU"),
-    Known(_CRAZYFLIE, "acceleration", "stateEstimate.a*", "g", "ENU"),
-    Known(_CRAZYFLIE, "position", "stateEstimate.*", "m", "ENU"),
-    Known(_CRAZYFLIE, "velocity", "stateEstimate.v*", "m/s", "ENU"),
-    # The compressed state counts in thousandths.
-    Known(_CRAZYFLIE, "position", "stateEstimateZ.*", "mm", "ENU"),
-    Known(_CRAZYFLIE, "velocity", "stateEstimateZ.v*", "mm/s", "ENU"),
-    Known(_CRAZYFLIE, "rotor_speed", "rpm.m*", "rpm"),
-    # The pwm columns are these after the firmware's compensation of the battery.
-    Known(_CRAZYFLIE, "rotor_command", "motor.m*", "1", scale=1 / 65536),
-    Known(_CRAZYFLIE, "rotor_command", "pwm.m*_pwm", "1", scale=1 / 65536),
-    Known(_CRAZYFLIE, "voltage", "pm.vbat", "V"),
-    Known(_CRAZYFLIE, "voltage", "pm.vbatMV", "V", scale=1e-3),
-)
-
-
-class Meaning(NamedTuple):
-    """What words of a name mean a signal.
-
-    Attributes
-    ----------
-    words : str
-        One of them has to stand in the name.
-    kinds, number : str, int
-        How its columns are told apart, and how many there are; of rotors at least.
-    last : int
-        Only so many words at the end of the name count; 0: all of them.
-    never : str
-        Words that rule it out, beside those of `NOT_MEASURED`.
-    """
-
-    signal: SignalName
-    words: str
-    kinds: str
-    number: int
-    last: int = 0
-    never: str = ""
-
-
-_RATE_WORDS: Final = "gyro gyr gyroscope gyros omega om w rate rates angular angvel pqr"
-MEANINGS: Final = (
-    Meaning(
-        "position",
-        "pos position p translation point poses pose mocap local state estimate v",
-        "xyz",
-        3,
-        never="vel velocity linear twist acc accel accelerometer acceleration a sf f imu torque tau moment rpy euler"
-        " attitude att angle angles ypr q quat quaternion orientation rpm erpm rads rotor speed motor m cmd command"
-        " pwm u control output throttle omcmd esc thrust lift voltage vbat volt vbatt battery batt home global"
-        f" {_RATE_WORDS}",
-    ),
-    Meaning("velocity", "vel velocity v linear twist", "xyz numbers", 3, 2, "angular acc acceleration a"),
-    Meaning("acceleration", "acc accel accelerometer acceleration a sf f", "xyz numbers", 3, 2, "angular"),
-    Meaning("body_rate", _RATE_WORDS, "xyz angles numbers", 3),
-    Meaning("body_torque", "torque tau moment", "xyz angles numbers", 3),
-    Meaning("attitude", "rpy euler attitude att angle angles ypr", "xyz angles numbers", 3),
-    Meaning("quaternion", "q quat quaternion orientation att attitude pose", "wxyz", 4),
-    Meaning("quaternion", "q quat quaternion orientation", "numbers", 4, 1),
-    Meaning("rotor_speed", "", "numbers", 3),
-    Meaning("rotor_command", "", "numbers", 3),
-    Meaning("thrust", "thrust lift", "one", 1),
-    Meaning("voltage", "voltage vbat volt vbatt battery batt", "one", 1),
-)
-_ROTOR_SIGNALS: Final = ("rotor_speed", "rotor_command")
-_FAST: Final = _each("rpm erpm rads rotor om omega speed speeds velocities angular")
-ASKED: Final = _each("cmd command commands pwm u control output throttle omcmd ref des d r")
-NOT_MEASURED: Final = _each(
-    "des desired d sp setpoint ref reference target goal r cmd command ctrltarget controller cov covariance var"
-    " variance bias noise std err error integral reset delta innov innovation offset mag magnetometer rc gps status"
-    " temperature current thrust thrusts jerk snap stamp timestamp counter padding derivative test ratio ratios clip"
-)
-"""Words of what is wished, estimated of a sensor or something else; a name with one of them is no measurement."""
-
-_SECOND_HAND: Final = _each("raw groundtruth mocap poses estimator filtered filt unfilt backup")
-_ALLOWED: Final = {
-    "thrust": frozenset({"thrust"}),
-    **dict.fromkeys(_ROTOR_SIGNALS, _each("cmd command status r ref des d")),
-}
 _BY_WORDS, _OF_OTHER_INSTANCE = 100.0, 50.0
 _AXES_OF_A_BODY = 3
 
@@ -360,10 +190,10 @@ def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Na
     system : str
         Kind of log, as its reader names it; empty where any may be meant.
     """
-    found = [named for group in groups for named in (*_known(group, system), *_by_words(group))]
-    if any(_is_of(system, known) for known in (_PX4, _ARDUPILOT, _BETAFLIGHT)):
+    found = [named for group in groups for named in (*_known_to_systems(group, system), *_by_words(group))]
+    if any(_is_of(system, known) for known in (PX4, ARDUPILOT, BETAFLIGHT)):
         # Of these logs all that drives rotors is in the list; words would find parameters and allocations.
-        found = [named for named in found if named.known or named.signal not in (*_ROTOR_SIGNALS, "voltage")]
+        found = [named for named in found if named.known or named.signal not in (*ROTORS, "voltage")]
     best: dict[tuple[SignalName, tuple[str, ...]], Named] = {}
     for named in sorted(found, key=lambda named: named.rank):
         best.setdefault((named.signal, named.group.columns), named)
@@ -372,15 +202,15 @@ def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Na
 
 def _is_of(system: str, known: str) -> bool:
     """Tell whether a log was written by a program or its kin."""
-    return system.startswith((known, *_KIN.get(known, ())))
+    return system.startswith((known, *KIN.get(known, ())))
 
 
-def _known(group: ColumnGroup, system: str) -> Iterator[Named]:
+def _known_to_systems(group: ColumnGroup, system: str) -> Iterator[Named]:
     for rank, known in enumerate(KNOWN):
         of_other = system and not _is_of(system, known.system)
         angles = known.signal != "attitude" or group.kind == "angles"
         # On its card a Crazyflie puts the name of an event before that of a variable.
-        patterns = (group.pattern, group.pattern.partition(".")[2] if system.startswith(_CRAZYFLIE) else "")
+        patterns = (group.pattern, group.pattern.partition(".")[2] if system.startswith(CRAZYFLIE) else "")
         suits = any(own.signal == known.signal and _suits(own, group) for own in MEANINGS)
         if not of_other and angles and known.pattern in patterns and suits:
             yield Named(
@@ -390,44 +220,39 @@ def _known(group: ColumnGroup, system: str) -> Iterator[Named]:
 
 def _suits(meaning: Meaning, group: ColumnGroup) -> bool:
     count = len(group.columns)
-    enough = count >= meaning.number if meaning.signal in _ROTOR_SIGNALS else count == meaning.number
+    enough = count >= meaning.number if meaning.signal in ROTORS else count == meaning.number
     return enough and group.kind in meaning.kinds.split()
 
 
 def _by_words(group: ColumnGroup) -> Iterator[Named]:
     """List what the words of a name and a unit in it suggest; words that speak of no measurement rule it out."""
     words = group.words
-    rank = _BY_WORDS + len(words) + 10 * sum(word in _SECOND_HAND for word in words)
+    rank = _BY_WORDS + len(words) + 10 * sum(word in SECOND_HAND for word in words)
     rank += _OF_OTHER_INSTANCE * bool(re.search(r"\[\d+\]\.", group.pattern))
     for meaning in MEANINGS:
         signal = meaning.signal
         squared = bool(re.search(r"[a-z]2($|_)", group.pattern.replace("*", ""))) or bool({"squared", "sq"} & {*words})
-        if (squared and signal in _ROTOR_SIGNALS) or not _suits(meaning, group):
+        if (squared and signal in ROTORS) or not _suits(meaning, group):
             continue
         stated = stated_unit(group, signal)
         of_other = group.ending and stated is None and (len(group.ending.strip("_ ")) > 1 or group.ending == "_m")
-        if of_other or (NOT_MEASURED - _ALLOWED.get(signal, frozenset())) & {*words}:
+        if of_other or (NOT_MEASURED - ALLOWED.get(signal, frozenset())) & {*words}:
             continue
         if _means(meaning, group, words):
-            unit, scale = stated or _usual_unit(signal, words)
-            yield Named(signal, group, rank, unit, scale)
+            fast = any(signal in IN_RADIANS.get(word, ()) for word in words)
+            usual: UnitName | None = "rad/s" if fast else "1" if signal == "quaternion" else None
+            yield Named(signal, group, rank, *(stated or (usual, 1.0)))
 
 
 def stated_unit(group: ColumnGroup, signal: SignalName) -> tuple[UnitName, float] | None:
     """Give the unit that a name states for a signal, at its end or as a word, and the factor that makes it."""
-    words = (_symbols(word) for word in group.words if word in _A_WORD)
+    words = (_symbols(word) for word in group.words if word in A_WORD)
     for text in (_symbols(group.ending), *words):
         for own in (_WRITTEN.get(text), _WRITTEN.get(f"{text}/s")):
             # Of a rate "deg" is deg/s.
-            if own is not None and KNOWN_UNITS[own.unit].si in UNITS_OF_SIGNAL[signal]:
-                return own.unit, own.scale
+            if own is not None and KNOWN_UNITS[own[0]].si in UNITS_OF_SIGNAL[signal]:
+                return own
     return None
-
-
-def _usual_unit(signal: SignalName, words: tuple[str, ...]) -> tuple[UnitName | None, float]:
-    if any(signal in _IN_RADIANS.get(word, ()) for word in words):
-        return "rad/s", 1.0
-    return ("1" if signal == "quaternion" else None), 1.0
 
 
 def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool:
@@ -435,19 +260,19 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
     own, signal = {*words}, meaning.signal
     # A name that ends in the unit of a rate or of a speed is one.
     ending = _WRITTEN.get(_symbols(group.ending))
-    ends_in_speed = ending is not None and KNOWN_UNITS[ending.unit].si == "rad/s"
+    ends_in_speed = ending is not None and KNOWN_UNITS[ending[0]].si == "rad/s"
     if own & set(meaning.never.split()):
         return False
-    if signal in _ROTOR_SIGNALS:
+    if signal in ROTORS:
         # Three columns of the letter w, or in the unit of a rate, are the axes of a gyroscope.
         many = len(group.columns) > _AXES_OF_A_BODY
-        fast = bool(own & _FAST) or (many and (words == ("w",) or ends_in_speed))
+        fast = bool(own & FAST) or (many and (words == ("w",) or ends_in_speed))
         motors = words == ("m",) or bool({"motor", "motors"} & own)
         return (fast and not own & ASKED) if signal == "rotor_speed" else bool(own & ASKED) or (motors and not fast)
     if signal == "position":
         return re.search(r"(^|[^A-Za-z])\*($|[^A-Za-z])", group.pattern) is not None
     if group.kind == "angles" and signal in ("attitude", "body_rate"):
         pqr = group.columns[0].removesuffix(group.ending) == "p"
-        turns = pqr or ends_in_speed or bool(own & {*_RATE_WORDS.split(), "speed"})
+        turns = pqr or ends_in_speed or bool(own & {*RATE_WORDS.split(), "speed"})
         return turns if signal == "body_rate" else not turns and not own & {"torque", "tau", "moment"}
     return bool({*words[-meaning.last :]} & set(meaning.words.split()))

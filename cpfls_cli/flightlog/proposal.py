@@ -1,7 +1,5 @@
 """One proposal for several logs of one vehicle: the same signals for all, what differs, and the vehicle itself."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from math import ceil, floor, log10
@@ -19,15 +17,22 @@ from cpfls_cli.flightlog.topics import Topics
 from cpfls_cli.units import UnitName, known_unit
 
 _SURENESS: Final = ("data", "named", "guess")
-_SAME_PLACE_M = 0.005
 _WORTH_IT = 0.8
 """Share of every flight that a stretch common to all logs has to keep."""
 
 _STEPS_BRIDGED = 2.5
+"""Steps of the slowest topic that a gap may have: one sample of it may be lost."""
+
 _WAY: Final = {1: "counter-clockwise", -1: "clockwise", 0: "?"}
 _LEAST_GAP_S, _SLOWEST_VOLTAGE_S = 0.1, 0.5
+"""Gap that is bridged in any log, and the step of a voltage from which on it is left out, not all gaps made long."""
+
 _ROOM = 1.2
+"""By which a limit of the rotor speeds lies above the fastest one that is logged."""
+
 _PROPELLERS = (0.003, 0.2)
+"""Thrust numbers of real propellers; see `thrust_number`."""
+
 DECIDES_ROTORS: Final = "a log with more motion beside this one, or a look at the vehicle, decides"
 _MULTIROTORS: Final = (2, 13, 14, 15, 29)
 """MAV_TYPE: quadrotor, hexarotor, octorotor, tricopter, dodecarotor."""
@@ -97,7 +102,6 @@ class Proposal:
         Round number above the largest rotor speed, rad/s.
     facts : tuple of str
         That the logs state beside.
-    warnings : tuple of str
     """
 
     logs: tuple[KnownLog, ...]
@@ -151,7 +155,9 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
         rotors that are stated cannot turn a vehicle.
     """
     for one in logs:
-        _require_multirotor(one)
+        kind = one.parameters.get("MAV_TYPE")
+        if kind is not None and int(float(kind)) not in _MULTIROTORS:
+            raise InputError(f"{one.name}: MAV_TYPE = {int(float(kind))} in its parameters is no multirotor")
     for other in logs[1:]:
         _require_same_vehicle(logs[0], other)
     signals, slowest = _without_slow_voltage(logs, _merged_signals(logs))
@@ -174,15 +180,9 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
         airframe=airframe,
         rotors=len(airframe.rotors) if airframe else max(one.recognition.rotors for one in logs),
         speed_max=_speed_max(logs, signals),
-        facts=tuple(_facts(logs[0])),
+        facts=_facts(logs[0]),
         warnings=tuple(dict.fromkeys((*warnings, *doubts))),
     )
-
-
-def _require_multirotor(one: KnownLog) -> None:
-    kind = one.parameters.get("MAV_TYPE")
-    if kind is not None and int(float(kind)) not in _MULTIROTORS:
-        raise InputError(f"{one.name}: MAV_TYPE = {int(float(kind))} in its parameters is no multirotor")
 
 
 def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
@@ -302,9 +302,8 @@ def _merged_choices(logs: Sequence[KnownLog]) -> tuple[Choice, ...]:
 
 def _without_slow_voltage(logs: Sequence[KnownLog], signals: tuple[Guess, ...]) -> tuple[tuple[Guess, ...], float]:
     """Leave a voltage out that would make gaps of all signals long; give the longest step of the others too."""
-    fastest = {one.name: one.recognition for one in logs}
-    slow = max(recognition.slowest_s for recognition in fastest.values())
-    others = max(recognition.slowest_but_voltage_s for recognition in fastest.values())
+    slow = max(one.recognition.slowest_s for one in logs)
+    others = max(one.recognition.slowest_but_voltage_s for one in logs)
     if slow > max(_SLOWEST_VOLTAGE_S, others):
         return tuple(guess for guess in signals if guess.signal != "voltage"), others
     return signals, slow
@@ -381,9 +380,9 @@ def _rounded_up(value: float) -> float:
     return float(f"{ceil(value / unit - 1e-9) * unit:.6g}")
 
 
-def _facts(one: KnownLog) -> list[str]:
-    noted = [f"{key} = {_plain(one.parameters[key])}" for key in _NOTED if key in one.parameters]
-    return [*([f"written by {one.system}"] if one.system else []), *noted]
+def _facts(one: KnownLog) -> tuple[str, ...]:
+    noted = (f"{key} = {_plain(one.parameters[key])}" for key in _NOTED if key in one.parameters)
+    return (*([f"written by {one.system}"] if one.system else []), *noted)
 
 
 def _plain(value: float | str) -> str:

@@ -7,8 +7,6 @@ than it is named. A column that disagrees with all others is then the odd one, a
 takes less than twice as much, the log does not tell.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
@@ -18,7 +16,18 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.flightlog.agreement import AxisFit, LeanFit, fit_lean, fit_rates, on_clock, rotations_of
+from cpfls_cli.flightlog.agreement import (
+    AS_NAMED,
+    AxisFit,
+    LeanFit,
+    Order,
+    Sign,
+    fit_lean,
+    fit_rates,
+    handed,
+    on_clock,
+    rotations_of,
+)
 
 CLEAR: Final = 0.3
 """Share of a signal that another has to explain to say something about it."""
@@ -30,10 +39,6 @@ _ODD_ENOUGH = 2
 """Price from which the columns of a quaternion are tried in every order and with every sign."""
 
 Body = Literal["FLU", "FRD"]
-Order = tuple[int, ...]
-Sign = tuple[float, ...]
-AS_NAMED: Final[tuple[Order, Sign]] = ((0, 1, 2), (1.0, 1.0, 1.0))
-"""Order and signs of three axes that are what they are called."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +77,6 @@ class Witnesses:
 
     Attributes
     ----------
-    rate_hz : float
     gyroscope : array, shape (time, 3), or None
         In any unit and any axes.
     moving : array, shape (time, 3), or None
@@ -130,7 +134,7 @@ class Reading:
         rates = AS_NAMED if self.rates is None else (self.rates.order, self.rates.sign)
         return {"attitude": (own.order, own.sign), "body_rate": rates, "position": (self.place_order, self.place_sign)}
 
-    def differs(self, other: Reading) -> bool:
+    def differs(self, other: "Reading") -> bool:
         """Tell whether another reading makes something else of the log."""
         return (self.maps, self.body, self.attitude.scalar_last) != (other.maps, other.body, other.attitude.scalar_last)
 
@@ -151,7 +155,6 @@ class Verdict:
 
     Attributes
     ----------
-    best : Reading
     tied : tuple of Reading
         With other maps, at less than twice the price: too near to be ruled out.
     others : tuple of Reading
@@ -171,15 +174,10 @@ def axes_price(order: Sequence[int], sign: Sequence[float]) -> int:
     """
     if (tuple(order), tuple(sign)) == AS_NAMED:
         return 0
-    if _handed(order, sign) > 0:
+    if handed(order, sign) > 0:
         return 1 if order[2] == 2 else 2
     mirrored = ([-own if index == axis else own for index, own in enumerate(sign)] for axis in range(3))
     return 1 + min(axes_price(order, flipped) for flipped in mirrored)
-
-
-def _handed(order: Sequence[int], sign: Sequence[float]) -> float:
-    """Give 1 for axes that are right-handed, -1 for others."""
-    return float(np.round(np.linalg.det(np.eye(3)[list(order)])) * np.prod(sign))
 
 
 def _changed(order: Sequence[int], sign: Sequence[float]) -> int:
@@ -300,7 +298,7 @@ def _place_axes(lean: LeanFit, body: Body, level: float) -> tuple[Order, Sign, f
     for (first, second), (along, across) in product(((0, 1), (1, 0)), product((1.0, -1.0), repeat=2)):
         share = lean.shares[((first, second), (up * along, up * across))]
         # The world's third axis points up where that of the body does, as the vehicle is level.
-        vertical = lean.rises * up * float(np.sign(level)) or _handed((first, second, 2), (along, across, 1.0))
+        vertical = lean.rises * up * float(np.sign(level)) or handed((first, second, 2), (along, across, 1.0))
         options.append(((first, second, 2), (along, across, vertical), share))
     good = [own for own in options if own[2] > lean.explained - _AS_GOOD_RATES]
     return min(good, key=lambda own: axes_price(own[0], own[1]))

@@ -1,14 +1,20 @@
-"""What a log is taken for: signals, keys that hold for all of it, and the reason and the rivals of each guess."""
+"""What a log is taken for, and what is told of it so far: signals, keys, the reason and the rivals of each guess."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
+import numpy as np
+
 from cpfls_cli.arrays import Array
+from cpfls_cli.flightlog.agreement import handed
 from cpfls_cli.flightlog.airframe import MovedBy
 from cpfls_cli.flightlog.flown import Flown
-from cpfls_cli.flightlog.settings import SignalMap, SignalName
+from cpfls_cli.flightlog.log_table import LogTable
+from cpfls_cli.flightlog.nameless import OF_A_MATRIX
+from cpfls_cli.flightlog.names import Named
+from cpfls_cli.flightlog.settings import ROTORS, SignalMap, SignalName
+from cpfls_cli.units import UnitName, known_unit
 
 Sure = Literal["data", "named", "guess"]
 """Whether the data decided, a name or the kind of log says so, or neither does."""
@@ -32,12 +38,7 @@ class Rival:
 
 @dataclass(frozen=True, kw_only=True)
 class Guess:
-    """A signal of the log.
-
-    Attributes
-    ----------
-    sure : {"data", "named", "guess"}
-    """
+    """A signal of the log."""
 
     signal: SignalName
     columns: SignalMap
@@ -48,12 +49,7 @@ class Guess:
 
 @dataclass(frozen=True)
 class Choice:
-    """A key of the section `import` that holds for the whole log.
-
-    Attributes
-    ----------
-    sure : {"data", "named", "guess"}
-    """
+    """A key of the section `import` that holds for the whole log."""
 
     key: str
     value: str
@@ -70,12 +66,10 @@ class Recognition:
     ----------
     time_column, time_unit : str
         As the section `import` takes them.
-    signals : tuple of Guess
     choices : tuple of Choice
         Frames, the order of a quaternion, what a command is.
     left_out : tuple of str
         Sentences on columns that look like a signal and are not mapped.
-    flown : Flown
     rate_hz : float
         Of the clock.
     slowest_s, slowest_but_voltage_s : float
@@ -86,7 +80,6 @@ class Recognition:
         The rotors as the motion tells them.
     speeds : array, shape (time, rotor), or None
         Rotor speeds in flight in rad/s, or commands as shares of the largest speed.
-    warnings : tuple of str
     """
 
     time_column: str
@@ -116,3 +109,92 @@ class Recognition:
         """Number of rotors that the columns name; 0 where none do."""
         names: tuple[SignalName, ...] = ("rotor_speed", "rotor_command")
         return max((len(guess.columns.columns) for name in names if (guess := self.signal(name))), default=0)
+
+
+@dataclass
+class Seen:
+    """A log, the part of it that is flown, and what has been told of it so far."""
+
+    log: LogTable
+    candidates: Mapping[SignalName, Sequence[Named]]
+    part: slice
+    level: Array | None
+    guesses: dict[SignalName, Guess] = field(default_factory=dict)
+    choices: dict[str, Choice] = field(default_factory=dict)
+    left_out: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def rate_hz(self) -> float:
+        """Of the one clock."""
+        return 1 / float(self.log.grid[1] - self.log.grid[0])
+
+    def first(self, name: SignalName) -> Named | None:
+        """Give the best candidate for a signal."""
+        return next(iter(self.candidates.get(name, ())), None)
+
+    def grid(self, named: Named) -> Array:
+        """Give a candidate's columns in the part that is flown, in the unit that is stated."""
+        return named.scale * self.log.on_grid(named.group.columns)[self.part]
+
+    def mapped(self, guess: Guess) -> Array:
+        """Give the columns of a guess in the part that is flown, as they are mapped, in SI."""
+        columns = guess.columns
+        values = columns.scale * self.log.on_grid(columns.columns, spikes=guess.signal not in ROTORS)[self.part]
+        return known_unit(columns.unit).factor * np.asarray(columns.sign or 1.0) * (values + columns.offset)
+
+    def tell(
+        self,
+        named: Named,
+        unit: UnitName,
+        reason: str,
+        sure: Sure,
+        *,
+        scale: float = 1.0,
+        order: Sequence[int] | None = None,
+        sign: Sequence[float] | None = None,
+        rivals: tuple[Rival, ...] = (),
+        required: bool = True,
+    ) -> None:
+        """Take columns for a signal, in an order and with signs."""
+        columns = named.group.columns
+        mapped = SignalMap(
+            columns=columns if order is None else tuple(columns[index] for index in order),
+            unit=unit,
+            scale=named.scale * scale,
+            sign=None if sign is None or min(sign) > 0 else tuple(sign),
+            required=required,
+        )
+        guess = Guess(signal=named.signal, columns=mapped, reason=reason, sure=sure, rivals=rivals)
+        self.guesses[named.signal] = guess
+
+    def choose(self, key: str, value: str, reason: str, sure: Sure, *rivals: Rival) -> None:
+        """Take a value of a key that holds for the whole log."""
+        self.choices[key] = Choice(key, value, reason, sure, rivals)
+
+    def doubt(self, name: SignalName, *rivals: Rival) -> None:
+        """Make a guess of what was told."""
+        guess = self.guesses[name]
+        self.guesses[name] = replace(guess, sure="guess", rivals=(*guess.rivals, *rivals))
+
+    def disagree(self, named: Named, unit: str, by: str = "its size says") -> None:
+        """Warn of columns that are in another unit than is said."""
+        self.warnings.append(f"{named.group.pattern} is said to be in {named.unit}; {by} {unit}")
+
+    def warn_of_mirrored(self, named: Named, order: Sequence[int], sign: Sequence[float], whose: str) -> None:
+        """Warn of axes that are left-handed beside those of all others."""
+        if handed(order, sign) > 0:
+            return
+        columns = [named.group.columns[index] for index, own in zip(order, sign, strict=True) if own < 0]
+        what = f"{columns[0]} runs against all others" if len(columns) == 1 else "its axes are left-handed"
+        self.warnings.append(f"{named.group.pattern}: {what}, and is taken as {whose} has it")
+
+
+def called(named: Named) -> str:
+    """Say what a log calls columns."""
+    pattern = named.group.pattern
+    if named.known == OF_A_MATRIX:
+        return f"{pattern} of {OF_A_MATRIX}"
+    if any(letter.isalnum() for letter in pattern):
+        return f"a log of {named.known} calls it {pattern}" if named.known else f"called {pattern}"
+    return f"called {', '.join(named.group.columns)}"

@@ -1,7 +1,5 @@
 """Rows of a log on their way to a uniform clock: cropped, made continuous, spikes removed, absent values filled."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi
@@ -11,7 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import InputError, SettingError
-from cpfls_cli.flightlog.clock import increasing_rows, refuse_restart
+from cpfls_cli.flightlog.clock import increasing_rows, refuse_restart, runs
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.units import KNOWN_UNITS
 
@@ -19,6 +17,8 @@ from cpfls_cli.units import KNOWN_UNITS
 # spikes of five standard deviations of their channel lie beyond 10.
 _SUSPECTED_DEVIATIONS = 10.0
 _DEVIATION_OF_MEDIAN = 1.4826
+"""Standard deviation of normal noise over the median of its departures."""
+
 # Far beyond what flies, by SI unit: what is larger is a broken value, or the unit is wrong.
 _LARGEST = {
     "rad": 1e6,
@@ -33,6 +33,7 @@ _LARGEST = {
     "s": 1e3,
 }
 _LARGEST_SHARE_BROKEN = 0.01
+"""Of values up to which some are broken, and not the unit wrong."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class SignalTable:
     time: Array
     signals: dict[str, Array]
 
-    def rows(self, kept: slice | IntArray | BoolArray) -> SignalTable:
+    def rows(self, kept: slice | IntArray | BoolArray) -> "SignalTable":
         """Select rows."""
         return SignalTable(self.time[kept], {name: values[kept] for name, values in self.signals.items()})
 
@@ -64,7 +65,6 @@ def crop_and_order(table: SignalTable, settings: ImportSettings) -> tuple[Signal
 
     Parameters
     ----------
-    table : Table
     settings : ImportSettings
         `crop_s`.
 
@@ -158,13 +158,7 @@ def _broken(name: str, column: str, unit: str, values: Array, marked: BoolArray)
 
 
 def make_continuous(table: SignalTable) -> SignalTable:
-    """Remove jumps that are not motion: full turns of roll and yaw, sign changes of a quaternion.
-
-    Returns
-    -------
-    Table
-        Signals that may be interpolated.
-    """
+    """Remove jumps that are not motion, full turns of roll and yaw and signs of a quaternion, for interpolation."""
     signals = dict(table.signals)
     if "attitude" in signals:
         roll, pitch, yaw = signals["attitude"].T
@@ -175,18 +169,11 @@ def make_continuous(table: SignalTable) -> SignalTable:
 
 
 def find_signal_spikes(table: SignalTable, settings: ImportSettings) -> dict[str, BoolArray]:
-    """Find the spikes of all signals except rotor commands, which may jump.
-
-    Parameters
-    ----------
-    table : Table
-    settings : ImportSettings
-        `spike_deviations` (None: those that are suspected) and `spike_window_samples`.
+    """Mark the spikes, or without `spike_deviations` what is suspected of it, of all but rotor commands, which jump.
 
     Returns
     -------
     dict from signal name to array of bool, shape (sample, column)
-        True at a spike.
     """
     deviations, window = settings.spike_deviations or _SUSPECTED_DEVIATIONS, settings.spike_window_samples
     spikes = {
@@ -199,13 +186,7 @@ def find_signal_spikes(table: SignalTable, settings: ImportSettings) -> dict[str
 
 
 def mask_values(table: SignalTable, marked: Mapping[str, BoolArray]) -> SignalTable:
-    """Replace marked values by NaN.
-
-    Parameters
-    ----------
-    table : Table
-    marked : mapping from signal name to array of bool, shape (sample, column)
-    """
+    """Replace marked values, by signal, shape (sample, column), by NaN."""
     signals = {name: np.where(marked[name], np.nan, values) for name, values in table.signals.items()}
     return SignalTable(table.time, signals)
 
@@ -250,60 +231,31 @@ def find_spikes(values: Array, deviations: float, window: int) -> BoolArray:
 
 
 def count_saturated(values: Array, samples: int, rest: float | None = None) -> int:
-    """Count the values in runs at the channel's smallest or largest value.
+    """Count the values of a channel, shape (sample,), in runs at its smallest or largest one; 0 for a constant one.
 
     Parameters
     ----------
-    values : array, shape (sample,)
-        One channel.
     samples : int
         Length from which a run counts.
     rest : float, optional
         Extreme at which the channel may stand without being saturated.
-
-    Returns
-    -------
-    int
-        Values in such runs; 0 for a channel that is constant throughout.
     """
     known = values[np.isfinite(values)]
     if len(known) == 0 or known.min() == known.max():
         return 0
     extremes = [extreme for extreme in (known.min(), known.max()) if extreme != rest]
-    return sum(_values_in_runs(known == extreme, samples) for extreme in extremes)
+    lengths = (after - first for extreme in extremes for first, after in runs(known == extreme))
+    return sum(length for length in lengths if length >= samples)
 
 
 def fill(time: Array, values: Array, target: Array) -> Array:
-    """Interpolate the present values linearly at other times.
-
-    Parameters
-    ----------
-    time : array, shape (sample,), s
-    values : array, shape (sample, column)
-        Values that are not finite are absent.
-    target : array, shape (time,), s
-
-    Returns
-    -------
-    array, shape (time, column)
-    """
+    """Interpolate the finite ones of values, shape (sample, column), linearly at other times, shape (time,), s."""
     known = np.isfinite(values)
     return np.column_stack([np.interp(target, time[k], v[k]) for k, v in zip(known.T, values.T, strict=True)])
 
 
 def unwrap_angles(angles: Array, turn: float = 2 * pi) -> Array:
-    """Unwrap angles, also across absent values.
-
-    Parameters
-    ----------
-    angles : array, shape (sample,)
-    turn : float
-        A full turn in the unit of the angles; rad if not given.
-
-    Returns
-    -------
-    array, shape (sample,)
-    """
+    """Unwrap angles, shape (sample,), also across absent values, by a full turn in their unit; rad if not given."""
     known = np.isfinite(angles)
     continuous = np.array(angles, dtype=float)
     continuous[known] = np.unwrap(continuous[known], period=turn)
@@ -311,16 +263,7 @@ def unwrap_angles(angles: Array, turn: float = 2 * pi) -> Array:
 
 
 def align_quaternion_signs(quaternion: Array) -> Array:
-    """Give each quaternion the sign nearer to the previous one; q and -q are the same attitude.
-
-    Parameters
-    ----------
-    quaternion : array, shape (sample, 4)
-
-    Returns
-    -------
-    array, shape (sample, 4)
-    """
+    """Give each quaternion, shape (sample, 4), the sign nearer to the previous one; q and -q are the same attitude."""
     known = np.isfinite(quaternion).all(axis=1)
     continuous = np.array(quaternion, dtype=float)
     present = continuous[known]
@@ -341,9 +284,3 @@ def _medians(rows: Array) -> Array:
     half, odd = divmod(rows.shape[1], 2)
     ordered = np.partition(rows, [half] if odd else [half - 1, half], axis=1)
     return np.asarray(ordered[:, half] if odd else 0.5 * (ordered[:, half - 1] + ordered[:, half]))
-
-
-def _values_in_runs(marked: BoolArray, samples: int) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
-    lengths = np.diff(edges.reshape(-1, 2), axis=1)
-    return int(lengths[lengths >= samples].sum())

@@ -1,9 +1,7 @@
 """Results of an import: the signals on one clock, the flight derived from them, and the report."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 from cpfls_cli.arrays import Array
 
@@ -117,7 +115,6 @@ class LogSignals:
     rotor_speed : array, shape (time, rotor), rad/s, or None
     rotor_command : array, shape (time, rotor), SI unit of the signal's `unit`, or None
     voltage : array, shape (time,), V, or 1 as a share of the full battery's, or None
-    report : ImportReport
     """
 
     time: Array
@@ -133,6 +130,12 @@ class LogSignals:
     rotor_command: Array | None = None
     voltage: Array | None = None
     report: ImportReport = field(repr=False)
+
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """Signals that there are, by name."""
+        names = sorted({entry.name for entry in fields(self)} - {"time", "report"})
+        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,62 +1,34 @@
 """Which columns drive the rotors or say how fast they turn, in which unit, and which of them are connected."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf
-from typing import Final, Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.airframe import Parameters
-from cpfls_cli.flightlog.names import ASKED, Named
+from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Choice, Guess, Rival, Sure
 from cpfls_cli.flightlog.settings import SignalMap
+from cpfls_cli.flightlog.vocabulary import ASKED, RANGES
 from cpfls_cli.units import SPEED_UNITS, UnitName
 
 _FEWEST = 3
+"""Rotors of a multirotor."""
+
 _MUCH_FASTER = 2.0
+"""Times as often that commands have to come to be preferred to measured speeds."""
+
 _SLOW_HZ = 25.0
+"""Two samples in the 50 ms within which motors follow, and a half."""
+
 _USUAL_POLE_PAIRS = 7
 _RPM_FROM = 4000.0
+"""Faster than rotors turn in rad/s; the smallest reach 3000."""
+
 _SAME = 0.02
 """Part of the largest one's spread below which an output is not connected to a motor."""
-
-
-class Range(NamedTuple):
-    """Numbers of a command that is no speed by its name, and what they are taken for: a share of the largest.
-
-    Attributes
-    ----------
-    low, high_from, high : float
-        No number is below the first or above the last; the largest lies above the second.
-    tells : {"always", "of commands", "never"}
-        Whether the range alone tells it: of commands it does where the name is that of one.
-    rivals : tuple of Rival
-        Other readings of such numbers, beside speeds.
-    """
-
-    low: float
-    high_from: float
-    high: float
-    scale: float
-    offset: float
-    words: str
-    tells: Literal["always", "of commands", "never"]
-    rivals: tuple[Rival, ...] = ()
-
-
-_OLD_PX4 = Rival("scale: 0.00114286, offset: -1.22857", "where the range is 1075 to 1950, as PX4 once had it")
-RANGES: Final = (
-    Range(-1.05, -inf, 1.05, 1.0, 0.0, "shares of the largest", "always"),
-    Range(0.0, -inf, 101.0, 0.01, 0.0, "per cent", "of commands"),
-    Range(800.0, -inf, 2300.0, 1e-3, -1.0, "pulses of 1000 to 2000 us", "never", (_OLD_PX4,)),
-    Range(0.0, 32768.0, 65536.0, 1 / 65536, 0.0, "16 bits", "of commands"),
-    Range(0.0, 2300.0, 32768.0, 1 / 65536, 0.0, "16 bits", "never"),
-    Range(0.0, -inf, 2048.0, 1 / 2000, -48 / 2000, "48 to 2047 of DShot", "never"),
-)
 
 
 class _Unit(NamedTuple):
@@ -96,10 +68,8 @@ class RotorColumns:
 
     Attributes
     ----------
-    speed, command : RotorGuess or None
     command_is : Choice or None
         What a command of unit 1 is a share of; None without one.
-    left_out, warnings : tuple of str
     """
 
     speed: RotorGuess | None
@@ -257,12 +227,11 @@ def _command_unit(named: Named, values: Array, parameters: Parameters) -> _Unit 
     for own in RANGES:
         if low >= own.low and own.high_from < high <= own.high:
             told = own.tells == "always" or (own.tells == "of commands" and bool(words & ASKED))
-            if told or named.unit == "us" or "pwm" in words:
-                return _Unit(
-                    "1", own.scale, own.offset, f"{called}: {own.words}", "data" if told else "guess", own.rivals
-                )
-            speeds = (Rival(f"unit: {unit}", f"if it is a speed, up to {high:.4g}") for unit in ("rad/s", "rpm"))
-            return _Unit("1", own.scale, own.offset, f"{called}: {own.words}", "guess", (*own.rivals, *speeds))
+            others = [Rival(*rival) for rival in own.rivals]
+            if not (told or named.unit == "us" or "pwm" in words):
+                others += [Rival(f"unit: {unit}", f"if it is a speed, up to {high:.4g}") for unit in ("rad/s", "rpm")]
+            reason = f"{called}: {own.words}"
+            return _Unit("1", own.scale, own.offset, reason, "data" if told else "guess", tuple(others))
     return None
 
 

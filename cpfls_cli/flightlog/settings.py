@@ -1,7 +1,5 @@
 """Settings of the section `import`: how the columns of a log map to signals, and how these become a flight."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -46,7 +44,8 @@ UNITS_OF_SIGNAL: Final = MappingProxyType(
         "voltage": ("V", "1"),
     }
 )
-_ANY_NUMBER: Final = frozenset({"rotor_speed", "rotor_command"})
+ROTORS: Final[tuple[SignalName, ...]] = ("rotor_speed", "rotor_command")
+"""Signals with a column for each rotor."""
 _COLUMNS_OF_SIGNAL: Final = MappingProxyType({"quaternion": 4, "thrust": 1, "voltage": 1})
 _COLUMNS_OF_VECTOR = 3
 
@@ -106,13 +105,13 @@ def _check_signal(name: SignalName, signal: SignalMap) -> None:
     SettingError
         Naming the key below the section `import`.
     """
-    fixed = None if name in _ANY_NUMBER else _COLUMNS_OF_SIGNAL.get(name, _COLUMNS_OF_VECTOR)
+    fixed = None if name in ROTORS else _COLUMNS_OF_SIGNAL.get(name, _COLUMNS_OF_VECTOR)
     expected = fixed or len(signal.names)
     # A flight keeps one unit of a signal, whichever columns it came from.
     kinds = UNITS_OF_SIGNAL[name]
     for number, choice in enumerate(signal.choices):
         key = f"signals.{name}.otherwise.{number - 1}" if number else f"signals.{name}"
-        if choice.mixer is not None and name not in _ANY_NUMBER:
+        if choice.mixer is not None and name not in ROTORS:
             raise SettingError(f"{key}.mixer", "mixes for rotors: it belongs to rotor_speed or rotor_command")
         if len(choice.names) != expected:
             words = f"{expected} columns" if expected > 1 else "1 column"
@@ -192,7 +191,9 @@ class ImportSettings(Settings):
         if self.signals:
             _check_attitude(self)
             _check_torque(self)
-            _check_command(self)
+            command = self.signals.get("rotor_command")
+            if self.rotor_command_is == "thrust" and (command is None or command.unit != "1"):
+                raise SettingError("rotor_command_is", "'thrust' needs the signal rotor_command in unit 1")
 
     @property
     def mapped_columns(self) -> tuple[str, ...]:
@@ -226,9 +227,3 @@ def _check_torque(settings: ImportSettings) -> None:
         raise SettingError("torque_source", f"{settings.torque_source!r} needs the signal {missing}")
     if {"torque", "body_torque"} <= names:
         raise SettingError("signals", "torque and body_torque are both given; keep one")
-
-
-def _check_command(settings: ImportSettings) -> None:
-    command = settings.signals.get("rotor_command")
-    if settings.rotor_command_is == "thrust" and (command is None or command.unit != "1"):
-        raise SettingError("rotor_command_is", "'thrust' needs the signal rotor_command in unit 1")

@@ -1,7 +1,5 @@
 """Zero-phase low-pass filter and time derivative of uniformly sampled signals, and body rates from an attitude."""
 
-from __future__ import annotations
-
 from math import ceil
 
 import numpy as np
@@ -70,19 +68,7 @@ def derivative(time: Array, values: Array) -> Array:
 
 
 def body_rate_of(time: Array, attitude: Array | None, measured: Array | None) -> Array | None:
-    """Take the measured body rates, or derive them from the attitude, ``omega = W(q) dq/dt``.
-
-    Parameters
-    ----------
-    time : array, shape (time,), s
-    attitude : array, shape (time, 3), rad, or None
-    measured : array, shape (time, 3), rad/s, body frame, or None
-
-    Returns
-    -------
-    array, shape (time, 3), rad/s, body frame, or None
-        None where there is neither.
-    """
+    """Take the measured body rates, shape (time, 3), rad/s, or derive them from the attitude, rad, ``W(q) dq/dt``."""
     if measured is not None or attitude is None:
         return measured
     return rotations.body_rate(attitude, derivative(time, attitude))

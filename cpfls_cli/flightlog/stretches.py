@@ -1,7 +1,5 @@
 """Parts of a log that measure no flight: bad values, rotors at rest or below zero, columns dead, clipped or still."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, floor, pi
@@ -11,15 +9,16 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.clock import SMALLEST_SHARE_KEPT, runs
 from cpfls_cli.flightlog.repair import SignalTable, count_saturated
-from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
+from cpfls_cli.flightlog.settings import ROTORS, ImportSettings, SignalMap
 from cpfls_cli.units import KNOWN_UNITS
 
-_ROTORS = ("rotor_speed", "rotor_command")
 _SHORTEST_REST_S = 0.5
+"""Shorter ones are those of a throttle that is cut in flight."""
+
 # A speed that is measured, or a command that was filtered, may undershoot zero a little.
 _UNDERSHOOT = 0.01
-_SMALLEST_SHARE_KEPT = 0.1
 _MOST_LISTED = 3
 # A sensor at its limit stays there for several samples, and far longer than at the level just before it; the peak of a
 # slow signal that is rounded stays too, but longer at the level before.
@@ -31,33 +30,26 @@ _MEASURED = frozenset(
     {"attitude", "quaternion", "body_rate", "attitude_rate", "position", "velocity", "acceleration", "rotor_speed"}
 )
 _SHORTEST_PAUSE_S = 0.5
+"""Shorter ones are bridged like gaps."""
+
 _FEWEST_IN_PAUSE = 20
 _USUAL_STEPS = 10
+"""Times the usual step between updates, and so many rows, from which on a source was silent."""
+
 _NEVER_SATURATED = {"quaternion", "voltage"}
 # A quarter turn, and a margin for noise and filters.
 _LARGEST_PITCH = pi / 2 + 0.05
 _FULL_TURN = 7.0
+"""Somewhat more than a full turn, rad."""
+
 _ANGLE_QUANTILE = 0.99
 
 
 def rotors_at_rest(table: SignalTable, settings: ImportSettings) -> dict[str, BoolArray]:
-    """Mark the rows of stretches in which no rotor turns: all of them at zero or below, or at their smallest value.
-
-    Parameters
-    ----------
-    table : SignalTable
-        The part that is kept, as logged.
-    settings : ImportSettings
-        `saturation_samples`, the fewest rows of a stretch.
-
-    Returns
-    -------
-    dict from signal name to array of bool, shape (sample,)
-        For each signal that has a column for each rotor.
-    """
+    """Mark the rows, by signal, in which no rotor turns: all of them at zero or below, or at their smallest value."""
     return {
         name: _at_rest(table.time, table.signals[name], settings.saturation_samples)
-        for name in _ROTORS
+        for name in ROTORS
         if name in table.signals
     }
 
@@ -67,24 +59,14 @@ def _at_rest(time: Array, values: Array, samples: int) -> BoolArray:
     resting = np.asarray((values <= lowest).all(axis=1), dtype=bool)
     kept = np.zeros(len(time), dtype=bool)
     # Commands that never change are a matter of dead columns.
-    for first, last in [] if np.ptp(values) == 0 else _runs(resting):
-        if last - first + 1 >= samples and time[last] - time[first] >= _SHORTEST_REST_S:
-            kept[first : last + 1] = True
+    for first, after in [] if np.ptp(values) == 0 else runs(resting):
+        if after - first >= samples and time[after - 1] - time[first] >= _SHORTEST_REST_S:
+            kept[first:after] = True
     return kept
 
 
 def warn_of_rest(table: SignalTable, resting: Mapping[str, BoolArray], settings: ImportSettings) -> Iterator[str]:
-    """Say where rotors do not turn, and which crop leaves the longest flight; and where they would turn backward.
-
-    Parameters
-    ----------
-    table : SignalTable
-        The part that is kept, as logged.
-    resting : mapping from signal name to array of bool, shape (sample,)
-        See `rotors_at_rest`.
-    settings : ImportSettings
-        The columns and units.
-    """
+    """Say where rotors rest by `rotors_at_rest`, which crop leaves the longest flight, and where they turn backward."""
     for name, signal in settings.signals.items():
         if name in resting:
             yield from _warn_of_rest(name, signal, table, resting[name])
@@ -116,66 +98,48 @@ def _shown(value: float, signal: SignalMap) -> str:
 
 
 def _when(time: Array, marked: BoolArray) -> str:
-    stretches = [f"from {time[first]:.2f} s to {time[last]:.2f} s" for first, last in _runs(marked)]
+    stretches = [f"from {time[first]:.2f} s to {time[after - 1]:.2f} s" for first, after in runs(marked)]
     more = len(stretches) - _MOST_LISTED
     listed = ", ".join(stretches[:_MOST_LISTED])
     return f"{listed} and in {more} more stretches" if more > 0 else listed
 
 
 def _crop(time: Array, rest: BoolArray) -> str:
-    flown = [(time[first], time[last]) for first, last in _runs(~rest)]
+    flown = [(time[first], time[after - 1]) for first, after in runs(~rest)]
     begin, end = max(flown, key=lambda part: float(part[1] - part[0]), default=(0.0, 0.0))
-    if end - begin < _SMALLEST_SHARE_KEPT * (time[-1] - time[0]):
+    if end - begin < SMALLEST_SHARE_KEPT * (time[-1] - time[0]):
         return "hardly anything else is in the log"
     return f"import.crop_s: [{ceil(100 * begin) / 100:g}, {floor(100 * end) / 100:g}] keeps the longest part without"
 
 
 def warn_of_dead(table: SignalTable, known: Sequence[str], settings: ImportSettings) -> Iterator[str]:
-    """Name columns that are constant, clipped at a limit of their sensor, or stand still for a while.
-
-    Parameters
-    ----------
-    table : SignalTable
-        The part that is kept, as logged.
-    known : sequence of str
-        Columns that are known to stand at an extreme, and said to.
-    settings : ImportSettings
-        The columns.
-    """
+    """Name columns that are constant, or, unless they are known to be, clipped, or that stand still for a while."""
     for name, signal in settings.signals.items():
         values = table.signals[name]
         by_column = dict(zip(signal.names, values.T, strict=True))
-        constant = [column for column, of in by_column.items() if _spread(of) == 0]
+        constant = [column for column, own in by_column.items() if np.nanmax(own) == np.nanmin(own)]
         if constant:
-            yield _constant(name, constant, len(values))
+            subject, others = ("columns", "do") if len(constant) > 1 else ("column", "does")
+            yield (
+                f"{subject} {', '.join(constant)} of import.signals.{name} {others} not change in {len(values)} rows:"
+                " dead, or never updated; map what changes, or leave the signal out"
+            )
         for column in (each for each in by_column if each not in {*constant, *known}):
             limit = _limit(name, by_column[column])
             if limit is not None:
                 count = int((by_column[column] == limit).sum())
                 yield f"column {column} is clipped at {_shown(limit, signal)}, for {count} samples: the rest is lost"
         if name in _MEASURED and len(constant) < len(by_column):
-            known_rest = name in _ROTORS and _at_rest(table.time, values, settings.saturation_samples)
+            known_rest = name in ROTORS and _at_rest(table.time, values, settings.saturation_samples)
             moves = np.broadcast_to(np.logical_not(known_rest), len(values))
             yield from _warn_of_pause(name, table.time[moves], values[moves])
-
-
-def _constant(name: str, columns: Sequence[str], rows: int) -> str:
-    subject, others = ("columns", "do") if len(columns) > 1 else ("column", "does")
-    return (
-        f"{subject} {', '.join(columns)} of import.signals.{name} {others} not change in {rows} rows: dead, or never"
-        " updated; map what changes, or leave the signal out"
-    )
-
-
-def _spread(values: Array) -> float:
-    return float(np.nanmax(values) - np.nanmin(values))
 
 
 def _limit(name: str, values: Array) -> float | None:
     """Find the limit at which a channel is clipped; a rotor's command has no lower one."""
     if name not in _LOWEST_LIMIT:
         return None
-    signs = (1.0,) if name in _ROTORS else (1.0, -1.0)
+    signs = (1.0,) if name in ROTORS else (1.0, -1.0)
     return next(
         (sign * np.nanmax(sign * values) for sign in signs if clipped(sign * values, _LOWEST_LIMIT[name])), None
     )
@@ -195,7 +159,7 @@ def clipped(values: Array, lowest_limit: float) -> bool:
         return False
     highest = values == levels[-1]
     crowded = highest.sum() > _CLIPPED_TO_NEXT * (values == levels[-2]).sum()
-    return bool(crowded and max(last - first + 1 for first, last in _runs(highest)) >= _CLIPPED_SAMPLES)
+    return bool(crowded and max(after - first for first, after in runs(highest)) >= _CLIPPED_SAMPLES)
 
 
 def _warn_of_pause(name: str, time: Array, values: Array) -> Iterator[str]:
@@ -205,27 +169,18 @@ def _warn_of_pause(name: str, time: Array, values: Array) -> Iterator[str]:
     same = (np.diff(values, axis=0) == 0).all(axis=1)
     updates = np.flatnonzero(~same)
     usual = float(np.median(np.diff(updates))) if len(updates) > _FEWEST_IN_PAUSE else np.inf
-    pauses = [
-        (first, last + 1)
-        for first, last in _runs(same)
-        if last - first + 2 >= max(_FEWEST_IN_PAUSE, _USUAL_STEPS * usual)
-        and time[last + 1] - time[first] >= _SHORTEST_PAUSE_S
-    ]
-    if pauses:
-        marked = np.zeros(len(time), dtype=bool)
-        for first, last in pauses:
+    marked = np.zeros(len(time), dtype=bool)
+    for first, last in runs(same):
+        # Steps from row to row: the row after the last one is still the same.
+        enough = last - first + 1 >= max(_FEWEST_IN_PAUSE, _USUAL_STEPS * usual)
+        if enough and time[last] - time[first] >= _SHORTEST_PAUSE_S:
             marked[first : last + 1] = True
-        each = "rotor" if name in _ROTORS else "axis"
+    if marked.any():
+        each = "rotor" if name in ROTORS else "axis"
         yield (
             f"{name} does not change on any {each} {_when(time, marked)}: its source was silent there, and the last"
             " value was repeated; cut it off with import.crop_s"
         )
-
-
-def _runs(marked: BoolArray) -> list[tuple[int, int]]:
-    """List the first and the last row of each run of marked rows."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
-    return [(int(first), int(after) - 1) for first, after in edges.reshape(-1, 2)]
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """Topics of a log, each with a clock of its own, resampled to the clock of one of them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -23,18 +21,14 @@ STAMP = "timestamp"
 _SETPOINTS = ("torque", "body_torque", "thrust", "rotor_command")
 _ANGLES_THAT_JUMP = (0, 2)
 _THINNED = 1.5
+"""Times as fast that a topic has to be for its thinning to matter."""
+
 # Stamps are rounded, so a pause of exactly the allowed length must pass.
 _ROUNDING = 1 + 1e-9
 
 
 def topic_and_field(column: str) -> tuple[str, str]:
-    """Split the name of a column, ``topic.field`` or ``topic[instance].field``; the first instance needs no number.
-
-    Returns
-    -------
-    tuple of str
-        Topic and field; the field is empty where the name has none.
-    """
+    """Split ``topic.field`` or ``topic[instance].field``, where 0 needs no number; without a field that is empty."""
     topic, _, field = column.partition(".")
     return re.sub(r"\[0\]$", "", topic), field
 
@@ -54,8 +48,6 @@ def on_one_clock(
         Stamps in s from one origin; of a flat log, one topic with an empty name.
     units : mapping from column to str
         Units that the log states; stamps that have one are in s.
-    settings : ImportSettings
-        The section `import`.
 
     Returns
     -------
@@ -149,7 +141,9 @@ def _resampled(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Arra
             topic = topic_and_field(column)[0]
             used.add(topic)
             if topic != base:
-                _require_fast(topic, clocks[topic], settings)
+                if _step(clocks[topic]) > settings.gap_s:
+                    slow = _slowness(topic, clocks[topic], settings)
+                    raise InputError(f"{slow}: raise import.gap_s, or leave its signals out of import.signals")
                 between = hold_previous if name in _SETPOINTS else interpolate
                 values = between(clocks[topic], values, target, settings.gap_s)
             columns[column] = values
@@ -182,13 +176,6 @@ def _continuous(name: str, signal: SignalMap, topics: Topics) -> dict[str, Array
         jumping = {column for axis, column in enumerate(signal.columns) if axis in _ANGLES_THAT_JUMP}
         return {column: unwrap_angles(v, turn) if column in jumping else v for column, v in existing.items()}
     return existing
-
-
-def _require_fast(topic: str, time: Array, settings: ImportSettings) -> None:
-    if _step(time) > settings.gap_s:
-        raise InputError(
-            f"{_slowness(topic, time, settings)}: raise import.gap_s, or leave its signals out of import.signals"
-        )
 
 
 def _slowness(topic: str, time: Array, settings: ImportSettings) -> str:
@@ -236,18 +223,7 @@ def interpolate(time: Array, values: Array, target: Array, longest_s: float) -> 
 
 
 def hold_previous(time: Array, values: Array, target: Array, longest_s: float) -> Array:
-    """Hold the previous value between samples that are near enough.
-
-    Parameters
-    ----------
-    time, values, target, longest_s
-        See `interpolate`.
-
-    Returns
-    -------
-    array, shape (row,)
-        NaN before the first sample, after the last and in longer steps.
-    """
+    """Hold the previous value between samples that are near enough; arguments and result are those of `interpolate`."""
     time, values = _present(time, values)
     if not len(time):
         return np.full(len(target), np.nan)

@@ -1,7 +1,5 @@
 """Reader of blackbox logs, as Betaflight, INAV and their kin write them: a header in text, then packed frames."""
 
-from __future__ import annotations
-
 import re
 import struct
 from collections.abc import Collection, Mapping
@@ -14,29 +12,16 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import InputError
 from cpfls_cli.logs.blackbox_frames import ENCODINGS, KINDS, MAIN, ROLLOVER, Fields, decode
 from cpfls_cli.logs.formats import BLACKBOX_MAGIC, LogContents
+from cpfls_cli.logs.records import bytes_of
 
 _LARGEST_SHORT = 0x7FFF
 _DEGREES = 180 / pi
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
-    """Read the main fields of the longest flight in a file, on one clock, ``time``.
-
-    Parameters
-    ----------
-    wanted : collection of str, optional
-        Not needed: frames are read as a whole.
-
-    Raises
-    ------
-    InputError
-        If the file is no such log, or holds no frames that can be read.
-    """
+    """Read the main fields of the longest flight in a file, on one clock, ``time``; frames are read as a whole."""
     del wanted
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
+    content = bytes_of(path)
     begins = [found.start() for found in re.finditer(re.escape(BLACKBOX_MAGIC), content)]
     if not begins:
         raise InputError(f"{path}: not a blackbox log: it does not begin as one")
@@ -44,7 +29,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         flights = [_flight(content[begin:end]) for begin, end in zip(begins, [*begins[1:], None], strict=True)]
         longest = max(range(len(flights)), key=lambda number: len(flights[number][1]))
         header, rows, broken = flights[longest]
-        columns, units = _columns(header, rows)
+        columns, units = _scaled_columns(header, rows)
     except KeyError as error:
         raise InputError(f"{path}: a broken blackbox log: its header: the line {error} is missing") from None
     except (ValueError, OverflowError) as error:
@@ -54,7 +39,10 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     several = f"holds {len(begins)} flights; the longest, number {longest + 1}, is read: {columns['time'][-1]:.0f} s"
     lost = f"{broken} frames are broken; what follows up to the next whole one is missing"
     warnings = (*((several,) if len(begins) > 1 else ()), *((lost,) if broken else ()))
-    return LogContents({"": columns}, units, _parameters(header), header.get("Firmware revision", ""), warnings)
+    # Lines that are not about the log itself.
+    stated = {key: value for key, value in header.items() if not re.match(r"Product|Data version|Field|[IP] ", key)}
+    parameters = {key: float(own) if re.fullmatch(r"-?\d+(\.\d+)?", own) else own for key, own in stated.items()}
+    return LogContents({"": columns}, units, parameters, header.get("Firmware revision", ""), warnings)
 
 
 def _flight(content: bytes) -> tuple[dict[str, str], IntArray, int]:
@@ -66,13 +54,13 @@ def _flight(content: bytes) -> tuple[dict[str, str], IntArray, int]:
         begin = end + 1
     if header.get("Data version") != "2":
         raise ValueError(f"Data version {header.get('Data version', 'missing')}, not 2")
-    fields = _fields(header)
+    fields, names = _fields(header), header["Field I name"].split(",")
     constants = np.array(
         [
-            _numbers(header, "minthrottle", "1150")[0],
-            _numbers(header, "motorOutput", header.get("minthrottle", "1150"))[0],
-            _numbers(header, "vbatref", "4095")[0],
-            _names(header).index("motor[0]") if "motor[0]" in _names(header) else -1,
+            _integers(header, "minthrottle", "1150")[0],
+            _integers(header, "motorOutput", header.get("minthrottle", "1150"))[0],
+            _integers(header, "vbatref", "4095")[0],
+            names.index("motor[0]") if "motor[0]" in names else -1,
         ]
     )
     data = np.frombuffer(content, dtype=np.uint8)
@@ -83,17 +71,13 @@ def _flight(content: bytes) -> tuple[dict[str, str], IntArray, int]:
     return header, rows, broken
 
 
-def _names(header: Mapping[str, str]) -> list[str]:
-    return header["Field I name"].split(",")
-
-
-def _numbers(header: Mapping[str, str], key: str, otherwise: str = "") -> list[int]:
+def _integers(header: Mapping[str, str], key: str, otherwise: str = "") -> list[int]:
     return [int(word) for word in header.get(key, otherwise).split(",")]
 
 
 def _fields(header: Mapping[str, str]) -> Fields:
     """Read how the fields of each kind of frame are written; frames of kind P have the fields of those of kind I."""
-    if _names(header)[1:2] != ["time"]:
+    if header["Field I name"].split(",")[1:2] != ["time"]:
         raise ValueError("the second field is not time")
     width = max(len(header.get(f"Field {kind} name", "").split(",")) for kind in KINDS)
     fields = Fields(np.zeros(len(KINDS), dtype=np.int64), *np.zeros((3, len(KINDS), width), dtype=np.int64))
@@ -102,18 +86,18 @@ def _fields(header: Mapping[str, str]) -> Fields:
             continue
         named = "I" if kind == "P" else kind
         count = fields.counts[number] = len(header[f"Field {named} name"].split(","))
-        fields.encoding[number, :count] = _numbers(header, f"Field {kind} encoding")
-        fields.predictor[number, :count] = _numbers(header, f"Field {kind} predictor")
-        fields.is_signed[number, :count] = _numbers(header, f"Field {named} signed")
+        fields.encoding[number, :count] = _integers(header, f"Field {kind} encoding")
+        fields.predictor[number, :count] = _integers(header, f"Field {kind} predictor")
+        fields.is_signed[number, :count] = _integers(header, f"Field {named} signed")
         unknown = set(fields.encoding[number, :count].tolist()) - set(ENCODINGS)
         if unknown:
             raise ValueError(f"fields of kind {kind} in the encoding {sorted(unknown)[0]}")
     return fields
 
 
-def _columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str, Array], dict[str, str]]:
+def _scaled_columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str, Array], dict[str, str]]:
     """Name the columns, and give those whose unit the header tells in that unit."""
-    names = _names(header)
+    names = header["Field I name"].split(",")
     stamps = rows[:, 1] + ROLLOVER * np.cumsum(np.diff(rows[:, 1], prepend=rows[:1, 1]) < 0)
     # The number of a frame follows from which frames are left out, which nothing here needs.
     columns = {name: rows[:, place].astype(float) for place, name in enumerate(names) if name != "loopIteration"}
@@ -157,9 +141,3 @@ def _scales(header: Mapping[str, str]) -> list[tuple[str, float, str]]:
         # Hundreds of electrical turns, of which each pair of poles takes one.
         scales += [("eRPM[", 200 / int(header["motor_poles"]), "rpm")]
     return scales
-
-
-def _parameters(header: Mapping[str, str]) -> dict[str, float | str]:
-    """Give the lines of the header that are not about the log itself."""
-    lines = {key: value for key, value in header.items() if not re.match(r"Product|Data version|Field|[IP] ", key)}
-    return {key: float(value) if re.fullmatch(r"-?\d+(\.\d+)?", value) else value for key, value in lines.items()}

@@ -5,8 +5,6 @@ frame of kind I stands by itself, one of kind P builds on the two before it. Fra
 stepped over.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -260,10 +258,8 @@ def decode(data: Bytes, place: int, fields: Fields, constants: IntArray, rows: I
 
     Parameters
     ----------
-    data : array of bytes
     place : int
         Where the header ends.
-    fields : Fields
     constants : array of int, shape (4,)
         Least throttle, least motor output, reference of the battery, and the field of the first motor.
     rows : array of int, shape (frame, field)

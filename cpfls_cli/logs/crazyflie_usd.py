@@ -1,7 +1,5 @@
 """Reader of what a Crazyflie writes on its micro SD card: events, each with stamps and variables of its own."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -13,7 +11,7 @@ import numpy as np
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP
 from cpfls_cli.logs.formats import LogContents
-from cpfls_cli.logs.records import numbers, seconds, table
+from cpfls_cli.logs.records import bytes_of, numbers, seconds, table
 
 _STAMPS = {1: ("<u4", 10**3), 2: ("<u8", 10**6)}
 """Type of the stamps and how many there are in a second, by version of the format."""
@@ -31,23 +29,9 @@ class _Event:
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
-    """Read all events, ``event.group.variable``.
-
-    Parameters
-    ----------
-    wanted : collection of str, optional
-        Not needed: such a log is small.
-
-    Raises
-    ------
-    InputError
-        If the file is no such log, of another version, or has no samples.
-    """
+    """Read all events, ``event.group.variable``; such a log is small."""
     del wanted
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
+    content = bytes_of(path)
     whole = crc32(content[:-_CHECK_SUM]) == int.from_bytes(content[-_CHECK_SUM:], "little")
     try:
         version, events, begin = _header(content)

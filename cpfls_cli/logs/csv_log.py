@@ -1,7 +1,5 @@
 """Reader of CSV: plain or gzip-compressed, comma, semicolon or tab, every field a number."""
 
-from __future__ import annotations
-
 import csv
 import gzip
 import io
@@ -23,7 +21,8 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     """Read columns of a log; without a wish, those whose first value is a number or absent."""
     if wanted is not None:
         return LogContents({"": read_csv(path, set(wanted))})
-    names, first = _first_row(path)
+    with _rows(path) as (names, rows):
+        first = next((row for row in rows if row), [])
     numeric = [name for name, text in zip(names, first, strict=False) if _is_number(text)]
     left_out = sorted(set(names) - set(numeric))
     warnings = (f"columns that hold text are left out: {some(left_out)}",) if left_out else ()
@@ -32,27 +31,38 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
 
 
 def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
-    """Read columns of a CSV.
-
-    Parameters
-    ----------
-    path : Path
-        ``.csv`` or ``.csv.gz`` with one line of names.
-    wanted : set of str
-        Columns to read as numbers; others by name only, so that a message can suggest them.
+    """Read columns of a CSV; those that are not wanted by name only, so that a message can suggest them.
 
     Returns
     -------
     dict of str to array, shape (rows,)
-        Wanted columns that exist; the others map to empty arrays. Empty fields are NaN.
+        Empty fields are NaN, and columns that are not wanted empty arrays.
 
     Raises
     ------
     InputError
         If the file is empty, not text, has rows of unequal length or fields that are not numbers.
     """
-    with _rows(path) as (names, rows):
-        return _columns(path, names, rows, wanted)
+    with _rows(path) as (names, lines):
+        repeated = sorted(name for name, count in Counter(names).items() if count > 1 and name in wanted)
+        if repeated:
+            raise InputError(f"{path}: column '{repeated[0]}' stands twice")
+        kept = [index for index, name in enumerate(names) if name in wanted]
+        rows = []
+        for number, row in enumerate(lines, start=2):
+            if not row:
+                continue
+            if len(row) != len(names):
+                raise InputError(f"{path}:{number}: {len(row)} fields, but {len(names)} column names")
+            try:
+                rows.append(_plain_numbers([row[index] for index in kept]))
+            except ValueError:
+                rows.append([_number(row[index], path, number, names[index]) for index in kept])
+    if not rows:
+        raise InputError(f"{path}: holds column names but no samples")
+    values = np.array(rows, dtype=float).reshape(len(rows), len(kept))
+    columns: dict[str, Array] = {name: np.empty(0) for name in names}
+    return columns | {names[index]: values[:, position] for position, index in enumerate(kept)}
 
 
 @contextmanager
@@ -79,55 +89,16 @@ def _open(path: Path) -> Iterator[TextIO]:
         yield text
 
 
-def _columns(path: Path, names: list[str], lines: Iterator[list[str]], wanted: set[str]) -> dict[str, Array]:
-    repeated = sorted(name for name, count in Counter(names).items() if count > 1 and name in wanted)
-    if repeated:
-        raise InputError(f"{path}: column '{repeated[0]}' stands twice")
-    kept = [index for index, name in enumerate(names) if name in wanted]
-    rows = []
-    for number, row in enumerate(lines, start=2):
-        if not row:
-            continue
-        if len(row) != len(names):
-            raise InputError(f"{path}:{number}: {len(row)} fields, but {len(names)} column names")
-        fields = [row[index] for index in kept]
-        try:
-            rows.append(_plain_numbers(fields))
-        except ValueError:
-            rows.append([_number(row[index], path, number, names[index]) for index in kept])
-    if not rows:
-        raise InputError(f"{path}: holds column names but no samples")
-    values = np.array(rows, dtype=float).reshape(len(rows), len(kept))
-    columns: dict[str, Array] = {name: np.empty(0) for name in names}
-    return columns | {names[index]: values[:, position] for position, index in enumerate(kept)}
-
-
 def row_lines(path: Path) -> list[int]:
-    """List the line number of each row of values in a CSV; empty lines hold none.
-
-    Parameters
-    ----------
-    path : Path
-        As `read_csv` takes it.
-
-    Returns
-    -------
-    list of int
-        From 1; the line of names comes before the first row.
-    """
+    """List the line number, from 1, of each row of values in a CSV; empty lines hold none."""
     with _open(path) as stream:
         lines = [number for number, line in enumerate(stream, start=1) if line.strip()]
     return lines[1:]
 
 
-def _first_row(path: Path) -> tuple[list[str], list[str]]:
-    with _rows(path) as (names, rows):
-        return names, next((row for row in rows if row), [])
-
-
 def _is_number(text: str) -> bool:
     try:
-        _value(text.strip() or "nan")
+        _plain_numbers([text.strip() or "nan"])
     except ValueError:
         return False
     return True
@@ -138,13 +109,9 @@ def _number(field: str, path: Path, row: int, column: str) -> float:
     if not text:
         return float("nan")
     try:
-        return _value(text)
+        return _plain_numbers([text])[0]
     except ValueError:
         raise InputError(f"{path}:{row}: column '{column}' = {text[:40]!r}: not a number") from None
-
-
-def _value(text: str) -> float:
-    return _plain_numbers([text])[0]
 
 
 def _plain_numbers(fields: list[str]) -> list[float]:

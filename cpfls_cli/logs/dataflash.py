@@ -1,7 +1,5 @@
 """Reader of ArduPilot's DataFlash logs: messages that describe themselves, each kind with stamps of its own."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -13,7 +11,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP
 from cpfls_cli.logs.formats import DATAFLASH_MAGIC, LogContents
-from cpfls_cli.logs.records import numbers, seconds, table
+from cpfls_cli.logs.records import bytes_of, numbers, seconds, table
 
 _HEAD = b"\xa3\x95"
 _OF_FORMATS = 0x80
@@ -50,23 +48,9 @@ class _Kind:
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
-    """Read all messages, ``MESSAGE.field`` or ``MESSAGE[instance].field``.
-
-    Parameters
-    ----------
-    wanted : collection of str, optional
-        Not needed: the file is read as a whole, and a part of it takes no less time.
-
-    Raises
-    ------
-    InputError
-        If the file is no such log, or holds no messages with stamps.
-    """
+    """Read all messages, ``MESSAGE.field`` or ``MESSAGE[instance].field``; a part of them takes no less time."""
     del wanted
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
+    content = bytes_of(path)
     if not content.startswith(DATAFLASH_MAGIC):
         raise InputError(f"{path}: not a DataFlash log: it does not begin as one (encrypted, or of another program?)")
     kinds, lost = _find_messages(content)
@@ -80,15 +64,22 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     }
     if not topics:
         raise InputError(f"{path}: holds no messages with stamps (TimeUS)")
-    _from_first_stamp(topics)
+    origin = min(fields[STAMP][0] for fields in topics.values())
+    for fields in topics.values():
+        # Whole microseconds again: a difference of two large numbers of seconds is none.
+        fields[STAMP] = np.round(fields[STAMP] - origin, 6)
     units = {
         f"{topic}.{each}": unit
         for topic, fields in topics.items()
         for each, unit in stated.get(topic.partition("[")[0], {}).items()
         if each in fields and unit != _INSTANCE
     }
+    parameters: dict[str, float | str] = {}
+    for row in tables.get("PARM", ()):
+        # As the log begins.
+        parameters.setdefault(_text(row["Name"]), float(row["Value"]))
     broken = (f"{lost} bytes are no messages: the file is broken in places; what could be read of it is used",)
-    return LogContents(topics, units, _parameters(tables), _system(tables), broken if lost else ())
+    return LogContents(topics, units, parameters, _system(tables), broken if lost else ())
 
 
 def _find_messages(content: bytes) -> tuple[dict[int, _Kind], int]:
@@ -145,13 +136,6 @@ def _topics(kind: _Kind, samples: np.ndarray, units: Mapping[str, str]) -> Itera
         )
 
 
-def _from_first_stamp(topics: Mapping[str, dict[str, Array]]) -> None:
-    origin = min(fields[STAMP][0] for fields in topics.values())
-    for fields in topics.values():
-        # Whole microseconds again: a difference of two large numbers of seconds is none.
-        fields[STAMP] = np.round(fields[STAMP] - origin, 6)
-
-
 def _stated_units(tables: Mapping[str, np.ndarray], kinds: Mapping[int, _Kind]) -> dict[str, dict[str, str]]:
     """Look up the units that the log states, by kind and field, of fields that need no further factor to be in them."""
     try:
@@ -170,14 +154,6 @@ def _stated_units(tables: Mapping[str, np.ndarray], kinds: Mapping[int, _Kind]) 
         for number, kind in kinds.items()
         if number in stated
     }
-
-
-def _parameters(tables: Mapping[str, np.ndarray]) -> dict[str, float | str]:
-    """Give the parameters as the log begins."""
-    known: dict[str, float | str] = {}
-    for row in tables.get("PARM", ()):
-        known.setdefault(_text(row["Name"]), float(row["Value"]))
-    return known
 
 
 def _system(tables: Mapping[str, np.ndarray]) -> str:

@@ -1,11 +1,9 @@
 """The formats of flight logs: one table, and all that names a format follows from it.
 
-A new format is one reader, a module with a function ``contents(path, wanted)``, and one row of `LOG_FORMATS`. The
+A new format is one reader, a module with a function ``contents(path, wanted)``, and one row here. The
 command line lists the formats in its help, so nothing heavy is imported here: a reader, and the package it needs, is
 loaded when the first file of its format is read.
 """
-
-from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
@@ -49,7 +47,7 @@ class LogContents:
         Faults of the file as a whole.
     """
 
-    topics: dict[str, dict[str, Array]]
+    topics: dict[str, dict[str, "Array"]]
     units: dict[str, str] = field(default_factory=dict)
     parameters: dict[str, float | str] = field(default_factory=dict)
     system: str = ""
@@ -66,12 +64,10 @@ class LogColumns:
         The mapped ones; the others by name only, as empty arrays, so that a message can suggest them.
     settings : ImportSettings
         The section `import` as it suits the log: of columns that stand in for each other, those that the log has.
-    warnings : tuple of str
-        Faults of the file as a whole.
     """
 
-    columns: dict[str, Array]
-    settings: ImportSettings
+    columns: dict[str, "Array"]
+    settings: "ImportSettings"
     warnings: tuple[str, ...] = ()
 
 
@@ -83,8 +79,6 @@ class LogFormat:
     ----------
     suffix : str
         End of a file's name, in lower case; empty where such files have none.
-    name : str
-        Of the format, in help texts.
     content : str
         What a file that begins in this way holds, in messages.
     magic : bytes
@@ -95,10 +89,8 @@ class LogFormat:
         Whether artifacts of this program end so too; ``is_log(path)`` of the reader tells them apart.
     reader : str
         Module with ``contents(path, wanted)``, which returns `LogContents`.
-    packages : tuple of str
-        Modules of the optional package that the reader needs.
-    extra : str
-        Extra of this program that installs the package.
+    packages, extra : tuple of str, str
+        Modules of the optional package that the reader needs, and the extra of this program that installs it.
     """
 
     suffix: str
@@ -116,77 +108,29 @@ class LogFormat:
         return line.startswith(self.magic) if self.magic else _is_header(line)
 
 
-def _rows(*suffixes: str, **own: Any) -> tuple[LogFormat, ...]:
-    return tuple(LogFormat(suffix=suffix, **own) for suffix in suffixes)
-
-
-LOG_FORMATS = (
-    *_rows(".csv", name="CSV", content="CSV", reader="cpfls_cli.logs.csv_log"),
-    *_rows(".csv.gz", name="CSV", content="gzip-compressed data", magic=b"\x1f\x8b", reader="cpfls_cli.logs.csv_log"),
-    *_rows(
-        ".parquet",
-        name="Parquet",
-        content="Parquet",
-        magic=b"PAR1",
-        reader="cpfls_cli.logs.parquet_log",
-        packages=("pyarrow", "pyarrow.parquet"),
-        extra="parquet",
-    ),
-    *_rows(
-        ".ulg",
-        name="ULog",
-        content="ULog",
-        magic=ULOG_MAGIC,
-        reader="cpfls_cli.logs.ulog",
-        packages=("pyulog",),
-        extra="ulog",
-    ),
-    *_rows(
-        ".bin",
-        name="ArduPilot DataFlash",
-        content="a DataFlash log",
-        magic=DATAFLASH_MAGIC,
-        reader="cpfls_cli.logs.dataflash",
-    ),
-    *_rows(
-        ".bbl",
-        ".bfl",
-        name="Betaflight blackbox",
-        content="a blackbox log",
-        magic=BLACKBOX_MAGIC,
-        named_freely=True,
-        reader="cpfls_cli.logs.blackbox",
-    ),
-    *_rows(
-        "",
-        name="Crazyflie uSD",
-        content="a log of a Crazyflie's uSD card",
-        magic=USD_MAGIC,
-        named_freely=True,
-        reader="cpfls_cli.logs.crazyflie_usd",
-    ),
-    *_rows(
-        ".db3",
-        name="ROS 2 bag",
-        content="SQLite",
-        magic=b"SQLite format 3\x00",
-        reader="cpfls_cli.logs.rosbag",
-        packages=("rosbags",),
-        extra="rosbag",
-    ),
-    *_rows(
-        ".mcap",
-        name="ROS 2 bag",
-        content="MCAP",
-        magic=b"\x89MCAP",
-        reader="cpfls_cli.logs.rosbag",
-        packages=("rosbags",),
-        extra="rosbag",
-    ),
-    *_rows(
-        ".h5", ".hdf5", name="HDF5", content="HDF5", magic=HDF5_MAGIC, shared=True, reader="cpfls_cli.logs.matrices"
-    ),
-    *_rows(".mat", name="MATLAB", content="MATLAB", magic=b"MATLAB ", reader="cpfls_cli.logs.matrices"),
+_PYARROW = {"packages": ("pyarrow", "pyarrow.parquet"), "extra": "parquet"}
+_PYULOG = {"packages": ("pyulog",), "extra": "ulog"}
+_ROSBAGS = {"packages": ("rosbags",), "extra": "rosbag"}
+_NAMED_FREELY = {"named_freely": True}
+_OURS_TOO = {"shared": True}
+_TABLE: tuple[tuple[str, str, str, bytes, str, dict[str, Any]], ...] = (
+    (".csv", "CSV", "CSV", b"", "csv_log", {}),
+    (".csv.gz", "CSV", "gzip-compressed data", b"\x1f\x8b", "csv_log", {}),
+    (".parquet", "Parquet", "Parquet", b"PAR1", "parquet_log", _PYARROW),
+    (".ulg", "ULog", "ULog", ULOG_MAGIC, "ulog", _PYULOG),
+    (".bin", "ArduPilot DataFlash", "a DataFlash log", DATAFLASH_MAGIC, "dataflash", {}),
+    (".bbl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, "blackbox", _NAMED_FREELY),
+    (".bfl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, "blackbox", _NAMED_FREELY),
+    ("", "Crazyflie uSD", "a log of a Crazyflie's uSD card", USD_MAGIC, "crazyflie_usd", _NAMED_FREELY),
+    (".db3", "ROS 2 bag", "SQLite", b"SQLite format 3\x00", "rosbag", _ROSBAGS),
+    (".mcap", "ROS 2 bag", "MCAP", b"\x89MCAP", "rosbag", _ROSBAGS),
+    (".h5", "HDF5", "HDF5", HDF5_MAGIC, "matrices", _OURS_TOO),
+    (".hdf5", "HDF5", "HDF5", HDF5_MAGIC, "matrices", _OURS_TOO),
+    (".mat", "MATLAB", "MATLAB", b"MATLAB ", "matrices", {}),
+)
+LOG_FORMATS = tuple(
+    LogFormat(suffix=suffix, name=name, content=content, magic=magic, reader=f"cpfls_cli.logs.{reader}", **others)
+    for suffix, name, content, magic, reader, others in _TABLE
 )
 """The formats in the order in which messages list them."""
 
@@ -242,13 +186,8 @@ def log_contents(path: Path, wanted: Collection[str] | None = None) -> LogConten
     return contents
 
 
-def read_log(path: Path, settings: ImportSettings) -> LogColumns:
+def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
     """Read the columns of a log that a config maps, on one clock.
-
-    Parameters
-    ----------
-    settings : ImportSettings
-        The section `import`.
 
     Raises
     ------

@@ -1,7 +1,5 @@
 """Reader of HDF5 and of MATLAB's .mat: arrays of numbers by their path, the columns of a matrix one by one."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Collection, Iterable, Iterator
@@ -53,7 +51,11 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     try:
         hdf5 = h5py.is_hdf5(path)
         if hdf5:
-            _require_readable(path)
+            found = _probed(state_of(path))
+            if not found.readable:
+                raise InputError(f"{path}: {found.fault}")
+            if found.artifact:
+                raise InputError(f"{path}: is an artifact of this program ({found.artifact}), not a log")
         columns, units = _of_hdf5(path, wanted) if hdf5 else (dict(_named(_of_mat(path), wanted)), {})
     except InputError:
         raise
@@ -95,14 +97,6 @@ def _probed(state: State) -> _Probed:
         last = (done.stderr.strip().splitlines() or [f"HDF5 ended with {done.returncode}"])[-1]
         return _Probed(False, "", f"cannot be read as HDF5: {last}")
     return _Probed(True, done.stdout.strip())
-
-
-def _require_readable(path: Path) -> None:
-    found = _probed(state_of(path))
-    if not found.readable:
-        raise InputError(f"{path}: {found.fault}")
-    if found.artifact:
-        raise InputError(f"{path}: is an artifact of this program ({found.artifact}), not a log")
 
 
 def _of_hdf5(path: Path, wanted: Collection[str] | None) -> tuple[dict[str, Array], dict[str, str]]:

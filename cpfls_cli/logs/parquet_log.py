@@ -1,7 +1,5 @@
 """Reader of Parquet: the mapped columns only, as numbers."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection
 from pathlib import Path
@@ -23,18 +21,14 @@ _LONGEST = 200
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
-    """Read columns of a log; nulls are NaN, and stamps whose type states a unit count s from the first one.
-
-    Raises
-    ------
-    InputError
-        If the file is no Parquet or broken, has no rows or a name twice, or a wanted column does not hold numbers.
-    """
+    """Read columns of a log; nulls are NaN, and stamps whose type states a unit count s from the first one."""
     try:
         with parquet.ParquetFile(path) as file:
             schema = file.schema_arrow
             kept = schema.names if wanted is None else [name for name in schema.names if name in wanted]
-            _require_single(path, kept)
+            repeated = sorted(name for name, count in Counter(kept).items() if count > 1)
+            if repeated:
+                raise InputError(f"{path}: column '{repeated[0]}' stands twice")
             table = file.read(columns=kept)
     # A column's name may be no text.
     except (OSError, pyarrow.ArrowException, UnicodeDecodeError) as error:
@@ -46,19 +40,13 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     left_out = [name for name in kept if wanted is None and not _is_numeric(schema.field(name).type)]
     columns: dict[str, Array] = {name: np.empty(0) for name in schema.names if name not in left_out}
     for name in set(columns) & set(kept):
-        columns[name] = _numbers(path, name, table.column(name))
+        columns[name] = _numbers_of_column(path, name, table.column(name))
     warnings = (f"columns that hold no numbers are left out: {some(left_out)}",) if left_out else ()
     units = {name: "s" for name in set(columns) & set(kept) if _states_unit(schema.field(name).type)}
     return LogContents({"": columns}, units, warnings=warnings)
 
 
-def _require_single(path: Path, names: list[str]) -> None:
-    repeated = sorted(name for name, count in Counter(names).items() if count > 1)
-    if repeated:
-        raise InputError(f"{path}: column '{repeated[0]}' stands twice")
-
-
-def _numbers(path: Path, name: str, column: Any) -> Array:
+def _numbers_of_column(path: Path, name: str, column: Any) -> Array:
     if not _is_numeric(column.type):
         raise InputError(
             f"{path}: column '{name}' holds {_kind(column.type)}: not numbers; map another column in import.signals, "

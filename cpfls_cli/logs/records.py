@@ -1,33 +1,27 @@
 """Binary records of several kinds, mixed in one file, as tables of numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.errors import InputError
+
+
+def bytes_of(path: Path) -> bytes:
+    """Read a file as a whole."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error}") from None
 
 
 def table(content: bytes, begins: Sequence[int], kind: np.dtype) -> np.ndarray:
-    """Gather the records of one kind.
-
-    Parameters
-    ----------
-    content : bytes
-        Of the file.
-    begins : sequence of int
-        Where each record begins.
-    kind : dtype
-        Fields of a record, packed.
-
-    Returns
-    -------
-    structured array, shape (record,)
-    """
-    bytes_of = np.frombuffer(content, dtype=np.uint8)
+    """Gather the records of one kind, whose fields are packed, from where each begins: shape (record,)."""
+    single = np.frombuffer(content, dtype=np.uint8)
     places = np.asarray(begins, dtype=np.int64)[:, None] + np.arange(kind.itemsize)
-    return np.ascontiguousarray(bytes_of[places]).view(kind)[:, 0]
+    return np.ascontiguousarray(single[places]).view(kind)[:, 0]
 
 
 def numbers(values: np.ndarray) -> Array:

@@ -1,7 +1,5 @@
 """Reader of ROS 2 bags, SQLite or MCAP: topics of messages, flattened to their numbers."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import fields, is_dataclass
@@ -36,7 +34,7 @@ _UNITS = (
     (re.compile(r"^voltage$"), "V"),
 )
 
-_Step = str | int
+_Path = tuple[str | int, ...]
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
@@ -76,14 +74,16 @@ def _read(path: Path, reader: Reader, wanted: set[str] | None) -> LogContents:
             topics[topic] = {STAMP: np.empty(0)}
         elif about.msgcount and not _WITHOUT_NUMBERS.match(kind):
             try:
-                received, columns = _columns(reader, about.connections)
+                received, columns = _columns_of_topic(reader, about.connections)
             except Exception:
                 # A definition that is missing, of another version or cannot be parsed costs its topic, not the bag.
                 unknown.append(f"{topic} ({kind})")
                 continue
             topics[topic], offset = _on_clock(received, columns, reader.start_time)
             shifted += [f"{topic} ({offset:+.3g} s)"] if offset else []
-            units |= {f"{topic}.{name}": unit for name, unit in _units(kind, columns)}
+            if _STANDARD.match(kind):
+                known = ((name, unit) for name in columns for pattern, unit in _UNITS if pattern.search(name))
+                units |= {f"{topic}.{name}": unit for name, unit in known}
     if not topics:
         listed = f": there is no fitting definition of {', '.join(unknown)}" if unknown else ""
         raise InputError(f"{path}: a ROS 2 bag without messages that can be read{listed}")
@@ -95,14 +95,14 @@ def _read(path: Path, reader: Reader, wanted: set[str] | None) -> LogContents:
     return LogContents(topics, units, system="ROS 2", warnings=tuple(present))
 
 
-def _columns(reader: Reader, connections: Sequence[Connection]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def _columns_of_topic(reader: Reader, connections: Sequence[Connection]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Read all messages of a topic: when they were received, ns, and their numbers by name."""
     types = _types(connections[0])
     received, rows = [], []
-    paths: dict[str, tuple[_Step, ...]] = {}
+    paths: dict[str, _Path] = {}
     for connection, stamp, data in reader.messages(connections=connections):
         message = types.deserialize_cdr(data, connection.msgtype)
-        paths = paths or dict(_numbers(message))
+        paths = paths or dict(_ways_to_numbers(message))
         received.append(stamp)
         rows.append([_at(message, path) for path in paths.values()])
     values = zip(paths, zip(*rows, strict=True), strict=False)
@@ -124,13 +124,13 @@ def _types(connection: Connection) -> Typestore:
     return types
 
 
-def _numbers(value: Any, name: str = "", path: tuple[_Step, ...] = ()) -> Iterator[tuple[str, tuple[_Step, ...]]]:
+def _ways_to_numbers(value: Any, name: str = "", path: _Path = ()) -> Iterator[tuple[str, _Path]]:
     """Give the name of each number in a message, and the way to it."""
     if is_dataclass(value):
         for own in fields(value):
             # What is in capitals is a constant of the type.
             if own.name != "__msgtype__" and not own.name.isupper():
-                yield from _numbers(
+                yield from _ways_to_numbers(
                     getattr(value, own.name), f"{name}.{own.name}" if name else own.name, (*path, own.name)
                 )
     elif isinstance(value, bool | int | float | np.number):
@@ -139,10 +139,10 @@ def _numbers(value: Any, name: str = "", path: tuple[_Step, ...] = ()) -> Iterat
         isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes) and len(value) <= _MOST_NUMBERS
     ):
         for index, own in enumerate(value):
-            yield from _numbers(own, f"{name}[{index}]", (*path, index))
+            yield from _ways_to_numbers(own, f"{name}[{index}]", (*path, index))
 
 
-def _at(value: Any, path: tuple[_Step, ...]) -> Any:
+def _at(value: Any, path: _Path) -> Any:
     for step in path:
         if isinstance(step, str):
             value = getattr(value, step)
@@ -167,9 +167,3 @@ def _on_clock(received: np.ndarray, columns: dict[str, np.ndarray], origin: int)
     stamps = {STAMP: received} | {name: own + offset for name, own in sent.items()} | {f"{STAMP}_received": received}
     numbers = {name: own.astype(float) for name, own in columns.items()}
     return numbers | {name: seconds(own, origin, _NANOSECOND) for name, own in stamps.items()}, offset / _NANOSECOND
-
-
-def _units(kind: str, columns: Collection[str]) -> Iterator[tuple[str, str]]:
-    if _STANDARD.match(kind):
-        for name in columns:
-            yield from ((name, unit) for pattern, unit in _UNITS if pattern.search(name))

@@ -1,7 +1,5 @@
 """Reader of ULog, as PX4 writes it: topics, each with stamps in microseconds."""
 
-from __future__ import annotations
-
 import io
 import struct
 from collections.abc import Collection
@@ -21,20 +19,7 @@ _PER_SECOND = 10**6
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
-    """Read all topics, ``topic`` or ``topic[instance]``.
-
-    Warnings name dropouts of the logger and a broken file.
-
-    Parameters
-    ----------
-    wanted : collection of str, optional
-        Not needed: the file is read as a whole, and a part of it takes no less time.
-
-    Raises
-    ------
-    InputError
-        If the file is no ULog, or holds no samples.
-    """
+    """Read all topics, ``topic`` or ``topic[instance]``; a part of them takes no less time."""
     del wanted
     log = _parsed(path)
     origin = int(log.start_timestamp)
@@ -46,7 +31,10 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     }
     if not topics:
         raise InputError(f"{path}: a ULog file without samples: was the logger stopped at once, or the file cut off?")
-    return LogContents(topics, {}, _parameters(log), _system(log), _warn_of_file(log, origin))
+    # As the log begins; in a broken one some parameters are no numbers.
+    known = log.initial_parameters.items()
+    parameters: dict[str, float | str] = {name: float(own) for name, own in known if isinstance(own, int | float)}
+    return LogContents(topics, {}, parameters, _system(log), _warn_of_file(log, origin))
 
 
 def _parsed(path: Path) -> Any:
@@ -61,12 +49,6 @@ def _parsed(path: Path) -> Any:
         raise InputError(f"{path}: cannot be read: {error}") from None
     except (pyulog.core.ULogException, struct.error, ValueError, KeyError, IndexError, TypeError) as error:
         raise InputError(f"{path}: a broken ULog file: {error}") from None
-
-
-def _parameters(log: Any) -> dict[str, float | str]:
-    """Give the parameters as the log begins; in a broken log some are no numbers."""
-    known = log.initial_parameters.items()
-    return {name: float(value) for name, value in known if isinstance(value, int | float)}
 
 
 def _system(log: Any) -> str:

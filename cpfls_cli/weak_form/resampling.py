@@ -1,7 +1,5 @@
 """Resampling of windows: blocks left out by cross-validation as normal equations, and residuals shifted in time."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -40,16 +38,7 @@ class BlockRows:
     parts: list[slice | BoolArray]
 
     def products(self, first: Array, second: Array) -> Array:
-        """Multiply columns with columns over the windows of each block and over all channels.
-
-        Parameters
-        ----------
-        first, second : array, shape (window, channel, column)
-
-        Returns
-        -------
-        array, shape (block, column of the first, column of the second)
-        """
+        """Multiply columns, shape (window, channel, column), over each block: shape (block, first, second column)."""
         pairs = ((first[rows], second[rows]) for rows in self.parts)
         return np.array([x.reshape(-1, x.shape[2]).T @ y.reshape(-1, y.shape[2]) for x, y in pairs])
 
@@ -77,7 +66,6 @@ class Folds:
         Sums of squares of the right side.
     prior : array, shape (column,)
         Information that bounds give before any data: one over the square of the largest possible coefficient.
-    made_of : BlockRows
     """
 
     gram: Array
@@ -96,7 +84,6 @@ class Folds:
 
         Parameters
         ----------
-        columns : array of int
         believed : int
             So many of the first columns are not in question: a block that alone shows one of these stays in the fit,
             because without it nothing is known of that coefficient.
@@ -138,7 +125,7 @@ class Folds:
         )
         return np.asarray(self.square - explained)
 
-    def beside(self, base: IntArray) -> Beside:
+    def beside(self, base: IntArray) -> "Beside":
         """Fit a base, so that a fit of it with a few columns more costs no more than those columns.
 
         Parameters
@@ -175,8 +162,6 @@ class Beside:
 
     Attributes
     ----------
-    normal : Folds
-    base : array of int
     gram : array, shape (block + 1, column, column)
         Of columns without what the base explains of them, over the blocks that a fit sees.
     moment : array, shape (block + 1, column, draw)
@@ -226,7 +211,6 @@ class Beside:
 
         Parameters
         ----------
-        column : int
         weight : array, shape (channel,)
             On the rows.
 
@@ -338,17 +322,7 @@ def _solve(gram: Array, moment: Array, length: Array | None = None) -> Array:
 
 
 def about_flight_mean(values: Array, flight_index: IntArray) -> Array:
-    """Subtract the mean over each flight.
-
-    Parameters
-    ----------
-    values : array, shape (window, ...)
-    flight_index : array of int, shape (window,)
-
-    Returns
-    -------
-    array, shape (window, ...)
-    """
+    """Subtract from values, shape (window, ...), the mean over each flight, by the flight of each window."""
     flights, number = np.unique(flight_index, return_inverse=True)
     return np.asarray(values - np.array([values[number == f].mean(axis=0) for f in range(len(flights))])[number])
 
@@ -364,8 +338,6 @@ def mirror_shifted(residual: Array, flight_index: IntArray, shifts: int, rng: np
     ----------
     residual : array, shape (window, channel)
     flight_index : array of int, shape (window,)
-    shifts : int
-    rng : numpy.random.Generator
 
     Returns
     -------

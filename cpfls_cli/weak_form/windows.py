@@ -1,7 +1,5 @@
 """Weak form: averages over smooth windows, with derivatives moved onto the window by integration by parts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -48,46 +46,19 @@ class Windows:
         return max(0, (samples - len(self.weight)) // self.hop + 1)
 
     def centres(self, time: Array) -> Array:
-        """Compute the middle of each window.
-
-        Parameters
-        ----------
-        time : array, shape (time,), s
-
-        Returns
-        -------
-        array, shape (window,), s
-        """
+        """Compute the middle of each window, shape (window,), s, of a flight by its time, shape (time,), s."""
         first = time[0] + 0.5 * (len(self.weight) - 1) * self.period
         return np.asarray(first + np.arange(self.count(len(time))) * self.hop * self.period)
 
     def average(self, values: Array) -> Array:
-        """Average over each window, ``int phi x dt``.
-
-        Parameters
-        ----------
-        values : array, shape (time, ...)
-
-        Returns
-        -------
-        array, shape (window, ...)
-        """
+        """Average values, shape (time, ...), over each window, ``int phi x dt``, shape (window, ...)."""
         return self._apply(values, self.weight)
 
     def derivative(self, values: Array) -> Array:
-        """Average the time derivative over each window, ``-int phi' x dt``; nothing is differentiated.
-
-        Parameters
-        ----------
-        values : array, shape (time, ...)
-
-        Returns
-        -------
-        array, shape (window, ...)
-        """
+        """Average the time derivative as `average` does, ``-int phi' x dt``; nothing is differentiated."""
         return -self._apply(values, self.slope)
 
-    def alternating(self) -> Windows:
+    def alternating(self) -> "Windows":
         """Turn the sign of every other sample: white noise stays as large as it was, and what is smooth vanishes."""
         sign = 1.0 - 2.0 * (np.arange(len(self.weight)) % 2)
         return Windows(sign * self.weight, sign * self.slope, self.hop, self.period)

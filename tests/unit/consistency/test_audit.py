@@ -10,6 +10,7 @@ from cpfls_cli.consistency.audit import audit
 from cpfls_cli.consistency.sensors import sensors_of
 from cpfls_cli.vehicle.rotors import body_wrench
 from cpfls_cli.weak_form.windows import windows
+from tests.builders.closed_loop_flights import flown, signals_of
 from tests.builders.faulty_gyroscopes import LEVELS, Faults, faulty_flight
 
 WINDOWS = windows(0.01, 0.4, 0.5)
@@ -99,10 +100,10 @@ def test_channels_that_agree_are_not_warned_about(turning):
     found = audit([moved(turning)], WINDOWS)
     assert (found.warnings, found.contradictions) == ((), ())
     checks = sensors_of([moved(turning)], WINDOWS).motion.checks
-    matches = [match for check in checks if check.pair.exact for match in check.matches]
-    assert {match.channels for match in matches} == {"position and velocity", "velocity and acceleration"}
-    np.testing.assert_allclose([match.scale for match in matches], 1.0, atol=1e-3)
-    np.testing.assert_allclose([match.delay_s for match in matches], 0.0, atol=1e-3)
+    exact = [check for check in checks if check.pair.exact]
+    assert {check.pair.words for check in exact} == {"position and velocity", "velocity and acceleration"}
+    np.testing.assert_allclose([check.scale for check in exact], 1.0, atol=1e-3)
+    np.testing.assert_allclose([check.delay.value for check in exact], 0.0, atol=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -181,3 +182,11 @@ def test_rotors_that_hold_one_speed_are_named(turning):
     assert body_wrench(turning.vehicle, speed).thrust.std() == 0
     told = audit([replace(turning, rotor_speed=speed)], WINDOWS).warnings
     assert sum("rotor speed" in sentence for sentence in told) == 4
+
+
+def test_a_delay_that_runs_away_is_no_repair():
+    """Shifted beyond the flight a channel stands still, and the next delay had no bound: an array of exabytes."""
+    noise = {"body_rate": 0.01, "attitude": 0.003, "velocity": 0.02, "position": 0.005, "acceleration": 0.1}
+    flights = [signals_of(flown(20.0, seed=seed, noise=noise, also=0.05)) for seed in (3, 13)]
+    found = audit([replace(signals, position=1e3 * signals.position) for signals in flights], WINDOWS)
+    assert any("is the position in mm" in sentence for sentence in found.contradictions)

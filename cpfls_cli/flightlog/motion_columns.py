@@ -1,0 +1,308 @@
+"""What the columns of motion are: gyroscope, position, velocity and accelerometer, each held against all others."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.flightlog.agreement import (
+    AS_NAMED,
+    AxisFit,
+    Order,
+    Sign,
+    first_derivative,
+    fit_axes,
+    second_derivative,
+    slow,
+)
+from cpfls_cli.flightlog.names import Named
+from cpfls_cli.flightlog.readings import CLEAR, Reading
+from cpfls_cli.flightlog.recognised import Rival, Seen, Sure, called
+from cpfls_cli.flightlog.vocabulary import RATES, SENSED, Row
+from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
+
+GOOD = 0.6
+"""Share of a signal that another has to explain to overrule a name."""
+
+_TOLERANCE, _TEN = 1.4, 10.0
+"""Wind and clocks change a size by less than the first, and never from one unit of length to the next."""
+
+_RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
+"""Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s."""
+
+NEAR_GRAVITY, _WEIGHT = 1.3, 1.15
+"""Ratios to gravity: of what is gravity in some unit, since a vehicle pushes, and of what is no more than that."""
+
+_CLOSER = 0.4
+"""What is left of a velocity in body axes, as a share of what is left in those of the world, that tells the former."""
+
+_ALONG, _AGAINST = 0.3, -0.6
+"""Correlations of one axis: below the first a column follows nothing, below the second it runs the other way."""
+
+
+def nearest(size: float, rows: Sequence[Row]) -> Row:
+    """Give the row of the nearest size."""
+    return min(rows, key=lambda row: abs(np.log(size / row[0])))
+
+
+def over_ground(seen: Seen) -> Array | None:
+    """Derive the acceleration over ground from the position, or else from the velocity."""
+    position, velocity = seen.first("position"), seen.first("velocity")
+    if position is not None:
+        return second_derivative(seen.grid(position), seen.rate_hz)
+    return None if velocity is None else first_derivative(seen.grid(velocity), seen.rate_hz)
+
+
+# The gyroscope.
+
+
+def tell_body_rate(seen: Seen, reading: Reading | None) -> None:
+    """Take the gyroscope as the derivative of the attitude has it, or else by its name and its spread."""
+    named = seen.first("body_rate")
+    if named is None:
+        return
+    fit, stated = None if reading is None else reading.rates, named.unit
+    if fit is not None and fit.explained > CLEAR:
+        size, unit, scale = nearest(fit.gain, RATES)
+        agrees = bool(abs(np.log(fit.gain / size)) < np.log(_TOLERANCE))
+        if stated is not None and known_unit(stated).factor != known_unit(unit).factor * scale:
+            if agrees:
+                seen.disagree(named, unit)
+            else:
+                unit, scale = stated, 1.0
+        if not agrees:
+            seen.warnings.append(
+                f"{named.group.pattern} is {fit.gain:.3g} times as large as the attitude's derivative, which no unit"
+                " makes: is the unit of the stamps right?"
+            )
+        seen.tell(
+            named,
+            unit,
+            _rates_in_words(named, fit, unit, scale),
+            "data" if agrees else "guess",
+            scale=scale,
+            order=fit.order,
+            sign=fit.sign,
+        )
+        _doubt_rates(seen, named, fit)
+        return
+    values = seen.grid(named)
+    spread = float(np.sqrt(values.var(axis=0).sum()))
+    between = _RADIANS_UP_TO <= spread <= _DEGREES_FROM
+    unit = stated or ("deg/s" if spread > _DEGREES_FROM else "rad/s")
+    rivals = (Rival("unit: deg/s", f"a spread of {spread:.2g} is possible in both"),) if between and not stated else ()
+    size_in_words = f"a spread of {spread:.2g} in flight" if stated is None else f"which is in {stated}"
+    turned = "" if named.sign is None else "; signs as that log has them"
+    against = "no attitude that turns is there to hold it against"
+    if fit is not None:
+        against = f"the derivative of the attitude explains only {100 * fit.explained:.0f} % of it"
+        seen.warnings.append(
+            f"{named.group.pattern}: {against}; one of the two is late, of other axes, or full of noise, and the axes"
+            " are taken as named"
+        )
+    sure: Sure = "guess" if rivals or fit is not None else "named"
+    reason = f"{called(named)}, {size_in_words}{turned}; {against}"
+    seen.tell(named, unit, reason, sure, sign=named.sign, rivals=rivals)
+
+
+def _rates_in_words(named: Named, fit: AxisFit, unit: str, scale: float) -> str:
+    axes = "" if fit.is_as_named else ", with its axes in this order and with these signs"
+    better = f"{fit.times_better:.1f} times better than in any other order or with other signs"
+    gain = f"{fit.gain:.3g}"
+    large = "as large" if gain == "1" else f"{gain} times as large"
+    size = f" and is {large}, so it is in {unit}" if scale == 1.0 else f", in thousandths of {unit}"
+    return f"{called(named)}; follows the attitude's derivative{axes} ({100 * fit.explained:.0f} %, {better}){size}"
+
+
+def _doubt_rates(seen: Seen, named: Named, fit: AxisFit) -> None:
+    """Warn of axes of a gyroscope that are not as the others."""
+    columns = [named.group.columns[index] for index in fit.order]
+    seen.warn_of_mirrored(named, fit.order, fit.sign, "the attitude")
+    loose = [c for c, own in zip(columns, fit.along, strict=True) if not own > _ALONG]
+    if loose and max(fit.along) > GOOD:
+        seen.warnings.append(f"{', '.join(loose)}: does not follow the attitude's derivative as the other axes do")
+        seen.doubt("body_rate", Rival("leave body_rate out", f"{', '.join(loose)} follows nothing that is logged"))
+
+
+# Position and velocity.
+
+
+def tell_places(seen: Seen, reading: Reading | None) -> None:
+    """Take position and velocity in the axes in which the lean explains the motion, and the one derives the other."""
+    position, velocity = seen.first("position"), seen.first("velocity")
+    relative = None
+    if velocity is not None and position is not None:
+        derived = first_derivative(seen.grid(position), seen.rate_hz)
+        measured = slow(seen.grid(velocity), seen.rate_hz)
+        relative = fit_axes(slow(derived, seen.rate_hz), measured)
+        if reading is not None:
+            in_body = reading.attitude.rotation.inv().apply(derived)
+            body = fit_axes(slow(in_body, seen.rate_hz), measured)
+            if body.explained > GOOD and 1 - body.explained < _CLOSER * (1 - relative.explained):
+                seen.left_out.append(
+                    f"{velocity.group.pattern}: a velocity in body axes (the position's derivative explains"
+                    f" {100 * body.explained:.0f} % there, {100 * relative.explained:.0f} % in the world);"
+                    " import.signals takes velocities of the world"
+                )
+                velocity = None
+    tilt = None if reading is None or reading.lean is None else reading
+    if position is not None:
+        _tell_place(seen, position, ("m", "mm"), tilt, None)
+    if velocity is not None:
+        _tell_place(seen, velocity, ("m/s", "mm/s"), tilt, relative)
+
+
+def _tell_place(
+    seen: Seen,
+    named: Named,
+    units: tuple[UnitName, UnitName],
+    tilt: Reading | None,
+    relative: AxisFit | None,
+) -> None:
+    stated, place = named.unit, seen.guesses.get("position")
+    unit: UnitName = stated or units[0]
+    sure: Sure = "named"
+    rivals: tuple[Rival, ...] = ()
+    reason = called(named)
+    follows = relative is not None and relative.explained > CLEAR
+    gain = float("nan") if tilt is None or tilt.lean is None else tilt.lean.gain
+    if follows and relative is not None and stated is None and place is not None:
+        # What it is in follows from the position, whatever else is logged in other units.
+        small = known_unit(place.columns.unit).factor / relative.gain < 0.03
+        unit, sure = units[1] if small else units[0], place.sure
+    elif tilt is not None and stated is None:
+        unit = units[1] if gain > 100 else units[0]
+        sure = "data" if 1 / _TEN < gain / (1000 if unit == units[1] else 1) < _TEN else "guess"
+        reason += (
+            f"; tilt and gravity explain {100 * tilt.place_share:.0f} % of the acceleration in {unit.split('/')[0]}"
+        )
+    elif stated is None:
+        spread = float(np.ptp(seen.grid(named), axis=0).max())
+        sure = "data" if spread < 50 else "guess"
+        reason += f"; ranges over {spread:.3g}"
+        rivals = () if sure == "data" else (Rival(f"unit: {units[1]}", "no attitude that leans speaks against it"),)
+    else:
+        reason += f", which is in {stated}"
+        # The lean was held against the velocity only where there is no position.
+        leans = tilt is not None and tilt.place_share > GOOD and (named.signal == "position" or place is None)
+        if leans and tilt is not None and not 1 / _TEN < gain * known_unit(stated).factor < _TEN:
+            unit, sure = units[gain > 100], "data" if gain > 100 else "guess"
+            reason += f"; tilt and gravity explain {100 * tilt.place_share:.0f} % of the acceleration in {unit}"
+            seen.disagree(named, unit, "by tilt and gravity it is in")
+    order, sign = AS_NAMED if tilt is None else (tilt.place_order, tilt.place_sign)
+    if named.signal == "velocity" and follows and relative is not None:
+        reason += f"; the position's derivative explains {100 * relative.explained:.0f} % of it"
+        order, sign = _behind(relative, order, sign)
+    if (order, sign) != AS_NAMED:
+        reason += "; turned into the axes of the attitude, as the tilt asks for"
+    seen.tell(named, unit, reason, sure, order=order, sign=sign, rivals=rivals)
+    seen.warn_of_mirrored(named, order, sign, "the rest of the log")
+
+
+def _behind(relative: AxisFit, order: Order, sign: Sign) -> tuple[Order, Sign]:
+    """Put the axes of a velocity, as they lie to those of the position, behind those of the position."""
+    own = [-one if along < _AGAINST else one for one, along in zip(relative.sign, relative.along, strict=True)]
+    return tuple(relative.order[index] for index in order), tuple(
+        own[index] * one for index, one in zip(order, sign, strict=True)
+    )
+
+
+# The accelerometer.
+
+
+def tell_acceleration(seen: Seen, reading: Reading | None) -> None:
+    """Take the first candidate that holds gravity, or follows the motion over ground."""
+    any(_take_acceleration(seen, named, reading) for named in seen.candidates.get("acceleration", ()))
+
+
+def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> bool:
+    values, stated = seen.grid(named), named.unit
+    vertical = float(np.median(values[:, 2]))
+    carried = _carried(seen, reading)
+    fitting, at_hover = (
+        [row for row in SENSED if 1 / NEAR_GRAVITY < abs(vertical) / (weight * row[0]) < NEAR_GRAVITY]
+        for weight in (carried, 1.0)
+    )
+    sensed = next((row for row in fitting if row[1] == (stated or row[1])), fitting[0] if fitting else None)
+    position, velocity = seen.first("position"), seen.guesses.get("velocity")
+    world = None
+    if velocity is not None:
+        world = first_derivative(seen.log.on_grid(velocity.columns.columns)[seen.part], seen.rate_hz)
+    elif position is not None:
+        world = second_derivative(seen.grid(position), seen.rate_hz)
+    along_world = None
+    if world is not None:
+        ground = np.array([1.0, 1.0, 0.0 if sensed else 1.0])
+        along_world = fit_axes(slow(ground * world, seen.rate_hz, 1.0), slow(ground * values, seen.rate_hz, 1.0))
+    if sensed is not None:
+        # In body axes next to nothing is sensed along x and y in flight; over ground the world's axes have it all.
+        of_body = named.frame in ("FLU", "FRD")
+        if along_world is not None and along_world.as_named > GOOD and along_world.gain > 0.5 and not of_body:
+            seen.left_out.append(
+                f"{named.group.pattern}: an acceleration of the world with gravity in it (the motion explains"
+                f" {100 * along_world.as_named:.0f} %), which import.signals has no word for"
+            )
+            return False
+        _tell_sensed(seen, named, vertical, carried, sensed, reading)
+        if at_hover and sensed not in at_hover:
+            other = at_hover[0][1]
+            seen.doubt(
+                "acceleration", Rival(f"unit: {other}", f"at hover it would be {other}; are stamps in their unit?")
+            )
+        return True
+    if along_world is None or along_world.explained < CLEAR:
+        seen.left_out.append(
+            f"{named.group.pattern}: no gravity is in it (z has a median of {vertical:.3g}), and the motion over"
+            " ground does not explain it"
+        )
+        return False
+    unit: UnitName = "g" if abs(np.log(along_world.gain * STANDARD_GRAVITY)) < np.log(2) else "m/s^2"
+    reason = (
+        f"{called(named)}; the motion over ground explains {100 * along_world.explained:.0f} %, in"
+        f" {stated or unit}, and no gravity is in it"
+    )
+    seen.tell(named, stated or unit, reason, "data")
+    words = "the acceleration has no gravity in it and follows the motion"
+    seen.choose("acceleration_frame", "world", words, "data")
+    return True
+
+
+def _carried(seen: Seen, reading: Reading | None) -> float:
+    """Give how many times its weight the rotors carry, by the motion; 1 where that says nothing."""
+    position = seen.first("position")
+    if position is None or reading is None or reading.lean is None:
+        return 1.0
+    moving = second_derivative(seen.grid(position), seen.rate_hz) / (1000.0 if reading.lean.gain > 100 else 1.0)
+    up = reading.place_sign[2] * (1.0 if reading.world == "ENU" else -1.0)
+    size = np.linalg.norm(moving + np.array([0.0, 0.0, up * STANDARD_GRAVITY]), axis=1)
+    return float(np.median(size)) / STANDARD_GRAVITY
+
+
+def _tell_sensed(
+    seen: Seen, named: Named, vertical: float, carried: float, sensed: Row, reading: Reading | None
+) -> None:
+    _, unit, scale = sensed
+    up = "FLU" if vertical > 0 else "FRD"
+    told = None if reading is None or reading.lean is None else reading.body
+    body = told or (named.frame if named.frame in ("FLU", "FRD") else None)
+    weight = "gravity" if 1 / _WEIGHT < carried < _WEIGHT else f"{carried:.2g} times gravity, as it moves"
+    reason = f"{called(named)}; z has a median of {vertical:.3g} in flight: {weight}, in {unit}"
+    if named.unit not in (None, unit):
+        seen.disagree(named, unit)
+    if body is None or body == up:
+        seen.tell(named, unit, reason, "data", scale=scale)
+    else:
+        reason += f", and points the wrong way for {body}, so it is gravity that is logged, not what carries it"
+        others = (
+            Rival("sign: [1, -1, -1]", "where its y and z point the other way than those of all others"),
+            Rival("sign: [1, 1, -1]", "where its z alone does; a push or a lean on the ground along x and y decides"),
+        )
+        seen.tell(named, unit, reason, "guess", scale=scale, sign=(-1.0, -1.0, -1.0), rivals=others)
+    words = f"gravity stays in z (median {vertical:.3g}) in flight"
+    seen.choose("acceleration_frame", "body-specific-force", words, "data")
+    if body is None:
+        points = "up" if up == "FLU" else "down"
+        words = f"the accelerometer reads {vertical:.3g} along z, so z points {points}"
+        # Some log gravity itself, which points down.
+        other = Rival("body_frame: FLU", "where the accelerometer logs gravity, not what carries the vehicle")
+        seen.choose("body_frame", up, words, *(("data",) if up == "FLU" else ("guess", other)))

@@ -1,0 +1,251 @@
+"""What names of columns and sizes of numbers mean: the tables that logs are recognised by.
+
+A new log usually takes one row more: of `KNOWN`, what kinds of logs call their columns; of `MEANINGS`, the words for
+each signal; of `SPELLINGS`, the ways to write a unit into a name; of `RATES`, `ANGLES` and `SENSED`, what
+numbers a unit makes; or of `RANGES`, what numbers a command of rotors may be.
+"""
+
+from collections.abc import Mapping
+from fractions import Fraction
+from math import inf, pi, tau
+from typing import Final, Literal, NamedTuple, cast, get_args
+
+from cpfls_cli.flightlog.settings import ROTORS, SignalName
+from cpfls_cli.units import STANDARD_GRAVITY, UnitName
+
+
+def _each(words: str) -> frozenset[str]:
+    return frozenset(words.split())
+
+
+SPELLINGS: Final[Mapping[UnitName, Mapping[float, str]]] = {
+    # Of each unit how names write it, by the factor that makes it of what is written; "_" and "per" are read as "/",
+    # and words in full as their symbols.
+    "rad/s": {1.0: "rad/s rads radps rads-1", 0.001: "mrad/s mrads mradps", tau: "hz rps rev/s"},
+    "deg/s": {1.0: "deg/s degs degps dps degs-1", 0.001: "mdeg/s mdps"},
+    "rpm": {1.0: "rpm", 1000.0: "krpm"},
+    "rad": {1.0: "rad", 0.001: "mrad"},
+    "deg": {1.0: "deg", 0.01: "cdeg centideg"},
+    "m/s^2": {1.0: "m/s2 m/s/s mps2 ms2 ms-2"},
+    "g": {1.0: "g", 0.001: "mg"},
+    "m/s": {1.0: "m/s mps ms-1", 0.01: "cm/s cmps", 1 / 3.6: "km/h kmh kph"},
+    "mm/s": {1.0: "mm/s mmps"},
+    "m": {1.0: "m", 0.01: "cm", 0.3048: "ft feet"},
+    "mm": {1.0: "mm"},
+    "N m": {1.0: "nm n/m"},
+    "N mm": {1.0: "nmm n/mm"},
+    "N": {1.0: "n"},
+    "V": {1.0: "v", 0.001: "mv"},
+    "1": {0.01: "pct percent %"},
+    "us": {1.0: "us usec"},
+}
+IN_FULL: Final = {"radians?": "rad", "degrees?": "deg", "met(er|re)s?": "m", "sec(onds?)?": "s", "volts?": "v"}
+A_WORD: Final = _each("rad rads deg degs dps rpm mm g radps degps mps rads-1")
+"""Spellings that state a unit wherever they stand as a word of a name."""
+
+IN_RADIANS: Final[Mapping[str, tuple[SignalName, ...]]] = {
+    # An angular frequency by its letter.
+    "w": ("body_rate",),
+    "om": ("body_rate", "rotor_speed", "rotor_command"),
+    "omega": ("body_rate", "rotor_speed", "rotor_command"),
+    "omcmd": ("rotor_command",),
+}
+
+
+class Known(NamedTuple):
+    """Columns that a kind of log is known for, in the order in which they are preferred."""
+
+    system: str
+    signal: SignalName
+    pattern: str
+    unit: UnitName | None
+    frame: str | None = None
+    scale: float = 1.0
+    sign: tuple[float, ...] | None = None
+
+
+PX4, ARDUPILOT, BETAFLIGHT, CRAZYFLIE = "PX4", "ArduPilot", "Betaflight", "Crazyflie"
+KIN: Final = {ARDUPILOT: ("Ardu",), BETAFLIGHT: ("INAV", "Cleanflight", "EmuFlight")}
+_KNOWN: Final = """
+    # system, signal, columns, unit, axes, factor that makes the unit of what is logged, signs
+    PX4         quaternion     vehicle_attitude.q[*]                  1      FRD  1        +
+    PX4         body_rate      vehicle_angular_velocity.xyz[*]        rad/s  FRD  1        +
+    PX4         body_rate      sensor_combined.gyro_rad[*]            rad/s  FRD  1        +
+    PX4         body_rate      vehicle_attitude.*speed                rad/s  FRD  1        +
+    PX4         acceleration   sensor_combined.accelerometer_m_s2[*]  m/s^2  FRD  1        +
+    PX4         acceleration   vehicle_acceleration.xyz[*]            m/s^2  FRD  1        +
+    PX4         position       vehicle_local_position.*               m      NED  1        +
+    PX4         velocity       vehicle_local_position.v*              m/s    NED  1        +
+    PX4         rotor_speed    esc_status.esc[*].esc_rpm              rpm    -    1        +
+    PX4         rotor_command  actuator_motors.control[*]             1      -    1        +
+    PX4         rotor_command  actuator_outputs.output[*]             -      -    1        +
+    PX4         voltage        battery_status.voltage_v               V      -    1        +
+    ArduPilot   attitude       ATT.*                                  deg    FRD  1        +
+    ArduPilot   body_rate      IMU.Gyr*                               rad/s  FRD  1        +
+    ArduPilot   body_rate      RATE.*                                 deg/s  FRD  1        +
+    ArduPilot   acceleration   IMU.Acc*                               m/s^2  FRD  1        +
+    ArduPilot   position       XKF1.P*                                m      NED  1        +
+    ArduPilot   position       NKF1.P*                                m      NED  1        +
+    ArduPilot   velocity       XKF1.V*                                m/s    NED  1        +
+    ArduPilot   velocity       NKF1.V*                                m/s    NED  1        +
+    ArduPilot   rotor_command  RCOU.C*                                -      -    1        +
+    ArduPilot   rotor_speed    ESC[*].RPM                             rpm    -    1        +
+    ArduPilot   voltage        BAT.Volt                               V      -    1        +
+    Betaflight  body_rate      gyroADC[*]                             deg/s  FLU  1        +
+    Betaflight  acceleration   accSmooth[*]                           -      FLU  1        +
+    Betaflight  rotor_command  motor[*]                               -      -    1        +
+    Betaflight  rotor_speed    rpm[*]                                 rpm    -    1        +
+    Betaflight  rotor_speed    eRPM[*]                                -      -    1        +
+    Betaflight  voltage        vbatLatest                             V      -    1        +
+    Crazyflie   quaternion     stateEstimate.q*                       1      FLU  1        +
+    Crazyflie   attitude       stabilizer.*                           deg    FLU  1        +
+    Crazyflie   attitude       stateEstimate.*                        deg    FLU  1        +
+    Crazyflie   body_rate      gyro.*                                 deg/s  FLU  1        +
+    # The controller takes a pitch for positive with the nose up: r_pitch = -gyro.y in the firmware.
+    Crazyflie   body_rate      controller.r_*                         -      FLU  1        +-+
+    Crazyflie   acceleration   acc.*                                  g      FLU  1        +
+    Crazyflie   acceleration   stateEstimate.a*                       g      ENU  1        +
+    Crazyflie   position       stateEstimate.*                        m      ENU  1        +
+    Crazyflie   velocity       stateEstimate.v*                       m/s    ENU  1        +
+    # The compressed state counts in thousandths.
+    Crazyflie   position       stateEstimateZ.*                       mm     ENU  1        +
+    Crazyflie   velocity       stateEstimateZ.v*                      mm/s   ENU  1        +
+    Crazyflie   rotor_speed    rpm.m*                                 rpm    -    1        +
+    # The pwm columns are these after the firmware's compensation of the battery.
+    Crazyflie   rotor_command  motor.m*                               1      -    1/65536  +
+    Crazyflie   rotor_command  pwm.m*_pwm                             1      -    1/65536  +
+    Crazyflie   voltage        pm.vbat                                V      -    1        +
+    Crazyflie   voltage        pm.vbatMV                              V      -    1e-3     +
+"""
+
+
+def _known(row: str) -> Known:
+    system, signal, pattern, unit, frame, scale, signs = row.split()
+    stated = next((own for own in get_args(UnitName) if own == unit), None)
+    sign = None if signs == "+" else tuple(1.0 if own == "+" else -1.0 for own in signs)
+    axes = None if frame == "-" else frame
+    return Known(system, cast("SignalName", signal), pattern, stated, axes, float(Fraction(scale)), sign)
+
+
+KNOWN: Final = tuple(_known(row) for row in _KNOWN.splitlines() if row.strip() and "#" not in row)
+
+
+class Meaning(NamedTuple):
+    """What words of a name mean a signal.
+
+    Attributes
+    ----------
+    words : str
+        One of them has to stand in the name.
+    kinds, number : str, int
+        How its columns are told apart, and how many there are; of rotors at least.
+    last : int
+        Only so many words at the end of the name count; 0: all of them.
+    never : str
+        Words that rule it out, beside those of `NOT_MEASURED`.
+    """
+
+    signal: SignalName
+    words: str
+    kinds: str
+    number: int
+    last: int = 0
+    never: str = ""
+
+
+RATE_WORDS: Final = "gyro gyr gyroscope gyros omega om w rate rates angular angvel pqr"
+MEANINGS: Final = (
+    Meaning(
+        "position",
+        "pos position p translation point poses pose mocap local state estimate v",
+        "xyz",
+        3,
+        never="vel velocity linear twist acc accel accelerometer acceleration a sf f imu torque tau moment rpy euler"
+        " attitude att angle angles ypr q quat quaternion orientation rpm erpm rads rotor speed motor m cmd command"
+        " pwm u control output throttle omcmd esc thrust lift voltage vbat volt vbatt battery batt home global"
+        f" {RATE_WORDS}",
+    ),
+    Meaning("velocity", "vel velocity v linear twist", "xyz numbers", 3, 2, "angular acc acceleration a"),
+    Meaning("acceleration", "acc accel accelerometer acceleration a sf f", "xyz numbers", 3, 2, "angular"),
+    Meaning("body_rate", RATE_WORDS, "xyz angles numbers", 3),
+    Meaning("body_torque", "torque tau moment", "xyz angles numbers", 3),
+    Meaning("attitude", "rpy euler attitude att angle angles ypr", "xyz angles numbers", 3),
+    Meaning("quaternion", "q quat quaternion orientation att attitude pose", "wxyz", 4),
+    Meaning("quaternion", "q quat quaternion orientation", "numbers", 4, 1),
+    Meaning("rotor_speed", "", "numbers", 3),
+    Meaning("rotor_command", "", "numbers", 3),
+    Meaning("thrust", "thrust lift", "one", 1),
+    Meaning("voltage", "voltage vbat volt vbatt battery batt", "one", 1),
+)
+FAST: Final = _each("rpm erpm rads rotor om omega speed speeds velocities angular")
+ASKED: Final = _each("cmd command commands pwm u control output throttle omcmd ref des d r")
+NOT_MEASURED: Final = _each(
+    "des desired d sp setpoint ref reference target goal r cmd command ctrltarget controller cov covariance var"
+    " variance bias noise std err error integral reset delta innov innovation offset mag magnetometer rc gps status"
+    " temperature current thrust thrusts jerk snap stamp timestamp counter padding derivative test ratio ratios clip"
+)
+"""Words of what is wished, estimated of a sensor or something else; a name with one of them is no measurement."""
+
+SECOND_HAND: Final = _each("raw groundtruth mocap poses estimator filtered filt unfilt backup")
+ALLOWED: Final = {
+    "thrust": frozenset({"thrust"}),
+    **dict.fromkeys(ROTORS, _each("cmd command status r ref des d")),
+}
+
+_DEGREES = 180 / pi
+Row = tuple[float, UnitName, float]
+"""Size that speaks for a unit, the unit, and the factor that makes it of what is logged."""
+
+RATES: Final[tuple[Row, ...]] = ((1.0, "rad/s", 1.0), (_DEGREES, "deg/s", 1.0), (1000.0, "rad/s", 1e-3))
+"""Sizes of a gyroscope beside the attitude's derivative."""
+
+ANGLES: Final[tuple[Row, ...]] = (
+    (1.0, "rad", 1.0),
+    (1000.0, "rad", 1.0),
+    (1 / _DEGREES, "deg", 1.0),
+    (1000.0 / _DEGREES, "deg", 1.0),
+)
+"""Sizes of an acceleration over ground, in m or mm, beside that which gravity and a lean in rad make."""
+
+SENSED: Final[tuple[Row, ...]] = (
+    (STANDARD_GRAVITY, "m/s^2", 1.0),
+    (1.0, "g", 1.0),
+    (1000.0, "g", 1e-3),
+    (2048.0, "g", 1 / 2048),
+    (4096.0, "g", 1 / 4096),
+)
+"""Sizes of an accelerometer at hover."""
+
+
+class Range(NamedTuple):
+    """Numbers of a command that is no speed by its name, and what they are taken for: a share of the largest.
+
+    Attributes
+    ----------
+    low, high_from, high : float
+        No number is below the first or above the last; the largest lies above the second.
+    tells : {"always", "of commands", "never"}
+        Whether the range alone tells it: of commands it does where the name is that of one.
+    rivals : tuple of tuple of str
+        Other readings of such numbers, beside speeds, and where they hold.
+    """
+
+    low: float
+    high_from: float
+    high: float
+    scale: float
+    offset: float
+    words: str
+    tells: Literal["always", "of commands", "never"]
+    rivals: tuple[tuple[str, str], ...] = ()
+
+
+_OLD_PX4 = ("scale: 0.00114286, offset: -1.22857", "where the range is 1075 to 1950, as PX4 once had it")
+RANGES: Final = (
+    Range(-1.05, -inf, 1.05, 1.0, 0.0, "shares of the largest", "always"),
+    Range(0.0, -inf, 101.0, 0.01, 0.0, "per cent", "of commands"),
+    Range(800.0, -inf, 2300.0, 1e-3, -1.0, "pulses of 1000 to 2000 us", "never", (_OLD_PX4,)),
+    Range(0.0, 32768.0, 65536.0, 1 / 65536, 0.0, "16 bits", "of commands"),
+    Range(0.0, 2300.0, 32768.0, 1 / 65536, 0.0, "16 bits", "never"),
+    Range(0.0, -inf, 2048.0, 1 / 2000, -48 / 2000, "48 to 2047 of DShot", "never"),
+)
