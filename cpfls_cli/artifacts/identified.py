@@ -22,6 +22,7 @@ from cpfls_cli.artifacts.evidence import (
     evidence_groups,
     group_of,
 )
+from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.model import InertiaFunctionsGroup, ModelRecord, VehicleGroup
 from cpfls_cli.artifacts.scores import MODEL, TRAINING, JudgedGroup
 from cpfls_cli.artifacts.spec import BODY, EULER, Format, dataset, group, record
@@ -173,6 +174,7 @@ class IdentifiedRecord(ModelRecord):
         learned: IntArray,
         evidence: Validation | None,
         vehicle: VehicleSettings,
+        parts: LearnedGroup,
     ) -> Self:
         """Arrange an identification and the evidence on it.
 
@@ -186,12 +188,15 @@ class IdentifiedRecord(ModelRecord):
             None where it was not gathered.
         vehicle : VehicleSettings
             As stated: what was identified is its inertia.
+        parts : LearnedGroup
+            How much of each flight trained.
         """
         from cpfls_cli.playback.model import VehicleModel
 
         baselines = {baseline.name: baseline.parameters for baseline in result.baselines}
         return cls(
             vehicle=IdentifiedVehicleGroup.of(VehicleModel(vehicle=vehicle, fuzzy=result.model)),
+            learned=parts,
             model=ChosenGroup(
                 weights=result.front.chromosomes[result.front.chosen],
                 base=base,

@@ -9,7 +9,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.gap_flights import AuditGroup
-from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, InputFile, Record, dataset, group, record
+from cpfls_cli.artifacts.learned import LearnedFlight, LearnedGroup, learned_in
+from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 
@@ -412,6 +413,7 @@ class ModelRecord(Record):
     )
 
     vehicle: VehicleGroup = group("vehicle")
+    learned: LearnedGroup | None = group("learned", default=None)
 
     def vehicle_model(self) -> VehicleModel:
         """Rebuild the model.
@@ -424,10 +426,9 @@ class ModelRecord(Record):
         return self.vehicle.vehicle_model()
 
     @property
-    def learned(self) -> dict[str, InputFile]:
-        """Flights that it was found in, by hash."""
-        roles = self.origin.inputs.items()
-        return {file.sha256: file for role, file in roles if role == "flight" or role.startswith("flight-")}
+    def learned_from(self) -> tuple[LearnedFlight, ...]:
+        """Flights that it was found in, those of what it was built on among them."""
+        return learned_in(self.origin.inputs, self.learned, "flight")
 
     @property
     def verdict_label(self) -> str | None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
 from cpfls_cli.artifacts.parameters import Parameter, parameters_of
 from cpfls_cli.artifacts.replay import HeldOutGroup, better_to
@@ -130,12 +131,14 @@ class VehicleRecord(ModelRecord):
         held_out: HeldOutGroup | None,
         warnings: Sequence[str],
         contradictions: Sequence[str] | None = None,
+        learned: LearnedGroup | None = None,
         *,
         commanded: bool,
     ) -> Self:
         """Arrange a vehicle that was found, and how well it predicts flights that it was not found in."""
         return cls(
             vehicle=VehicleGroup.of(replace(found.model, commanded=commanded)),
+            learned=learned,
             found=columns_of(
                 FoundNumbersGroup,
                 found.numbers,

@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish
+from cpfls_cli.artifacts.learned import MODEL_FLIGHT, as_inputs
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.config.unknown import require_known
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
-from cpfls_cli.flights.inputs import numbered_roles
+from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.recordings import Flights, read_flights
-from cpfls_cli.flights.same_vehicle import read_model
+from cpfls_cli.flights.same_vehicle import learned_by, read_model
 from cpfls_cli.gap.compare import compare
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.pages.disagreement import answer
 from cpfls_cli.pages.source import source_of
+from cpfls_cli.pages.trust import KnownBy, seen_warnings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.outcome import Outcome, nothing_written
 
@@ -36,13 +39,16 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     model : Path or None
         Identified, with effects, or of a whole vehicle; None for the rigid body of the vehicle.
     """
-    inputs = begin(job, numbered_roles("flight", flights) | ({} if model is None else {"model": model}))
+    roles = numbered_roles("flight", flights)
+    inputs = begin(job, roles | ({} if model is None else {"model": model}))
     check_ignored(job.study)
     require_known(job.study, "compare", whole=model is not None and holds(model, VehicleRecord))
     given, base = _with_model(read_flights(flights, job.study), model, job.study)
     if job.dry_run:
         return nothing_written(job)
-    record = finish(job, compared(job.study, given, base, progress_of(job.progress)), inputs)
+    given = with_seen(given, model, known_by(roles, inputs))
+    record = compared(job.study, given, base, progress_of(job.progress))
+    record = finish_disagreement(job, record, model, inputs)
     return Outcome(record.summary, tuple(answer(source_of(job, record))))
 
 
@@ -51,6 +57,20 @@ def _with_model(given: Flights, path: Path | None, study: Study) -> tuple[Flight
     model = VehicleModel(vehicle=study.vehicle) if path is None else read_model(path, study)
     recordings = tuple(of_vehicle(given.recordings, model))
     return replace(given, recordings=recordings), model
+
+
+def with_seen(given: Flights, model: Path | None, judged: KnownBy) -> Flights:
+    """Say of flights which of them the model that is held against them learned from."""
+    seen = seen_warnings("" if model is None else model.name, learned_by(model), judged)
+    return replace(given, warnings=(*seen, *given.warnings))
+
+
+def finish_disagreement(
+    job: Job, record: DisagreementRecord, model: Path | None, inputs: Mapping[str, InputFile]
+) -> DisagreementRecord:
+    """Write a disagreement, with the flights that its model learned from as inputs."""
+    of_model, parts = as_inputs(MODEL_FLIGHT, learned_by(model))
+    return finish(job, replace(record, learned=parts), {**inputs, **of_model})
 
 
 def compared(

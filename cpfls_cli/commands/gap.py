@@ -10,16 +10,23 @@ from pathlib import Path
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.job import Job, finish, input_file, take_inputs
+from cpfls_cli.artifacts.job import Job, input_file, take_inputs
 from cpfls_cli.artifacts.output import check_folder, filled_folder, refuse_inputs, write_text
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.commands import report
-from cpfls_cli.commands.compare import check_ignored, compared, progress_of
-from cpfls_cli.commands.diagnose import diagnosed, folded_notes, whole_answer, whole_summary
-from cpfls_cli.commands.extend import extended
+from cpfls_cli.commands.compare import check_ignored, compared, finish_disagreement, progress_of, with_seen
+from cpfls_cli.commands.diagnose import (
+    diagnosed,
+    finish_diagnosis,
+    folded_notes,
+    seen_notes,
+    whole_answer,
+    whole_summary,
+)
+from cpfls_cli.commands.extend import extended, finish_extended
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.flights.inputs import numbered_roles
-from cpfls_cli.flights.recordings import Flights, FlightSplit, read_flights, seen_twice, split_flights
+from cpfls_cli.flights.inputs import known_by, numbered_roles
+from cpfls_cli.flights.recordings import Flights, FlightSplit, read_flights, split_flights
 from cpfls_cli.flights.same_vehicle import read_base
 from cpfls_cli.gap.naming.results import Diagnosis
 from cpfls_cli.pages.disagreement import where
@@ -39,6 +46,7 @@ class _Given:
 
     flights: Flights
     split: FlightSplit
+    model: Path | None
     base: VehicleModel
     inputs: Mapping[str, InputFile]
 
@@ -103,7 +111,8 @@ def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: P
     given, held = read.recordings[: len(flights)], read.recordings[len(flights) :]
     split = split_flights(given, held, job.study.gap)
     base = read_base(model, job.study)
-    return _Given(Flights(given, read.warnings), split, base, inputs)
+    judged = known_by(numbered_roles("flight", flights), inputs)
+    return _Given(with_seen(Flights(given, read.warnings), model, judged), split, model, base, inputs)
 
 
 def _answers(job: Job, given: _Given) -> _Answers:
@@ -122,20 +131,20 @@ def _written(job: Job, given: _Given, answers: _Answers, folder: Path) -> tuple[
     """Write the artifacts, each made from the one before, and give them back with the headers that say so."""
     paths = [folder / name for name in FILES[:3]]
     jobs = [replace(job, output=path) for path in paths]
-    first = finish(jobs[0], answers.disagreement, given.inputs_of("flight") | given.inputs_of("model"))
+    compared_with = given.inputs_of("flight") | given.inputs_of("model")
+    first = finish_disagreement(jobs[0], answers.disagreement, given.model, compared_with)
     inputs = {"disagreement": input_file(paths[0]), **given.inputs_of("held-out")}
-    second = finish(jobs[1], answers.diagnosed, inputs)
+    second = finish_diagnosis(jobs[1], answers.diagnosed, first, inputs)
     if answers.extended is None:
         return replace(answers, disagreement=first, diagnosed=second), paths[:2]
-    third = finish(jobs[2], answers.extended, {"diagnosis": input_file(paths[1])})
+    third = finish_extended(jobs[2], answers.extended, second, {"diagnosis": input_file(paths[1])})
     return replace(answers, disagreement=first, diagnosed=second, extended=third), paths
 
 
 def _blocks(job: Job, given: _Given, answers: _Answers) -> Iterator[Block]:
     disagreement = source_of(replace(job, output=job.output / FILES[0]), answers.disagreement)
     diagnosis = source_of(replace(job, output=job.output / FILES[1]), answers.diagnosed)
-    twice = seen_twice(given.inputs_of("flight").values(), given.inputs_of("held-out").values())
-    yield from (Text(note, "warning") for note in twice)
+    yield from seen_notes(answers.diagnosed)
     yield from whole_answer(diagnosis, answers.diagnosis)
     yield from where(disagreement)
     if answers.extended is None:

@@ -14,9 +14,10 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish_parts
+from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.artifacts.store import count_rows, holds, read_header, read_record
+from cpfls_cli.artifacts.store import count_rows, read_header, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
@@ -28,6 +29,7 @@ from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradien
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.flight_source import Stretch, Stretches, check_file, flight_source, flight_stretches
+from cpfls_cli.flights.inputs import hashes_of
 from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles, read_model, rebuilt
 from cpfls_cli.gap.extended import inertial_force, inertial_torque
 from cpfls_cli.gap.whole_vehicle import of_vehicle
@@ -36,6 +38,7 @@ from cpfls_cli.logs.formats import is_log
 from cpfls_cli.pages.model import trust_notes
 from cpfls_cli.pages.prediction import answer
 from cpfls_cli.pages.sensors import contradicted
+from cpfls_cli.pages.trust import NOT_SEEN, seen_words
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.report.content import Text
@@ -58,11 +61,14 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
         Identified, one with effects, or of a whole vehicle.
     """
     inputs = begin(job, {"model": model, "flight": flight})
-    require_known(job.study, "predict", whole=holds(model, VehicleRecord))
-    whole = not holds(model, IdentifiedRecord)
-    found, wrong = Findings(), contradictions(check_file(flight, job.study, driven=whole))
+    record = read_record(model, ModelRecord)
+    require_known(job.study, "predict", whole=isinstance(record, VehicleRecord))
+    identified = record if isinstance(record, IdentifiedRecord) else None
+    found, wrong = Findings(), contradictions(check_file(flight, job.study, driven=identified is None))
+    seen = seen_words(record, hashes_of(flight, inputs["flight"]))
     said = [Text(contradicted(each), "warning") for each in wrong]
-    if whole:
+    said += [] if seen == NOT_SEEN else [Text(f"{model.name} along {flight.name}: {seen}")]
+    if identified is None:
         predicted, stretches = _of_vehicle(model, flight, job.study), flight_stretches(flight, job.study)
         if job.dry_run:
             predicted(next(iter(stretches)))
@@ -70,7 +76,6 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
         finish_parts(job, _by_stretches(predicted, stretches, found, job.progress), len(stretches), inputs)
         about = (Text(f"{stretches.name}: {warning}", "warning") for warning in stretches.warnings)
         return Outcome(found.summary | {"contradictions": list(wrong)}, (*said, *about, *answer(found)))
-    identified = read_record(model, IdentifiedRecord)
     functions = rebuilt(model, identified).fuzzy
     assert isinstance(functions, InertiaFunctions), "what is identified"
     torque = count_rows(flight, FlightRecord.spec(), FlightRecord.path("torque")) is not None

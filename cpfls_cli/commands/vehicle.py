@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from cpfls_cli.artifacts.job import Job, check_outputs, finish
+from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.output import refuse_own, write_text
 from cpfls_cli.artifacts.parameters import vehicle_section
 from cpfls_cli.artifacts.replay import HeldOutGroup, contradictions_of
@@ -98,9 +99,10 @@ def run(
         judged = _judged(found, rest, job) if rest else None
         warnings = [*twice, *(warning for flight in read for warning in flight.warnings)]
         commanded = any(flight.parts[0].commanded for flight in training)
-        record = finish(
-            job, VehicleRecord.of(found, judged, warnings, contradictions_of(read), commanded=commanded), inputs
-        )
+        samples = [sum(map(len, flight.parts)) for flight in training]
+        parts = LearnedGroup.parts(learned, [(own, own) for own in samples])
+        found_vehicle = VehicleRecord.of(found, judged, warnings, contradictions_of(read), parts, commanded=commanded)
+        record = finish(job, found_vehicle, inputs)
     written: tuple[Text, ...] = ()
     if record.complete:
         # Of a search that goes on, the numbers are not those that are found; nothing is then in the way of --resume.

@@ -12,8 +12,8 @@ from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.artifacts.spec import Record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.trust import seen_words
 from cpfls_cli.pages.uncertainty import MISFIT_WORDS, OUTSIDE_WORDS
 from cpfls_cli.report.canvas import BASELINE, band, legend_above, line, plot, runs, stacked, style_of
 from cpfls_cli.report.content import Block, Heading, Plot, Section, Text
@@ -120,7 +120,7 @@ def prediction_section(sources: Sources) -> Section | None:
 def _prediction(prediction: Source[PredictionRecord], index: int, sources: Sources) -> Iterator[Block]:
     model = sources.by_hash(prediction.made_from("model"))
     yield Heading(prediction.label)
-    yield Text(_seen(prediction, model))
+    yield Text(_seen(prediction, model, sources))
     yield from answer(prediction.record.findings, None if model is None else model.record)
     if prediction.record.error is not None:
         yield error_figure(f"figure-7-error-{index}", prediction)
@@ -130,21 +130,14 @@ def _prediction(prediction: Source[PredictionRecord], index: int, sources: Sourc
     yield inertia_figure(f"inertia-matrix-{index}", prediction)
 
 
-def _seen(prediction: Source[PredictionRecord], model: Source | None) -> str:
+def _seen(prediction: Source[PredictionRecord], model: Source | None, sources: Sources) -> str:
     """Tell whether the model has seen the flight before."""
     names = _model_and_flight(prediction)
     if model is None:
         return f"{names}. The model was not given, so it is not known here whether it learned from this flight."
-    if isinstance(model.record, VehicleRecord):
-        learned = {file.sha256 for role, file in model.header.inputs.items() if role.startswith("flight")}
-        if prediction.made_from("flight") in learned:
-            return f"{names}: one of the flights that it was found in."
-    elif model.made_from("flight") == prediction.made_from("flight"):
-        samples = len(prediction.record.time)
-        training = int(model.record.judged.samples[0])
-        part = "" if training == samples else f" (its first {training} of {samples} samples; the rest was held out)"
-        return f"{names}: the flight that it learned from{part}."
-    return f"{names}: a flight that it did not learn from."
+    flight = sources.by_hash(prediction.made_from("flight"))
+    hashes = (prediction.made_from("flight"), flight and flight.made_from("log"))
+    return f"{names}: {seen_words(model.record, [sha256 for sha256 in hashes if sha256])}."
 
 
 def _model_and_flight(prediction: Source[PredictionRecord]) -> str:
