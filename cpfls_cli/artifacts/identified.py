@@ -27,6 +27,7 @@ from cpfls_cli.artifacts.model import InertiaFunctionsGroup, ModelRecord, Vehicl
 from cpfls_cli.artifacts.scores import MODEL, TRAINING, JudgedGroup
 from cpfls_cli.artifacts.spec import BODY, EULER, Format, dataset, group, record
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
+from cpfls_cli.validation.trust import Trust
 
 if TYPE_CHECKING:
     # What evaluates a model loads compiled kernels, which nobody waits for who only reads one.
@@ -285,9 +286,9 @@ class IdentifiedRecord(ModelRecord):
         return self.same_everywhere and full and self.solve.condition_number <= WELL_CONDITIONED
 
     @property
-    def verdict_label(self) -> str | None:
-        """How far to trust it, as `Verdict` names it; None where that was not judged."""
-        return None if self.verdict is None else self.verdict.label
+    def trust(self) -> str:
+        """How far to trust it by its verdict, a word of `Trust`; of a file by a newer program possibly another."""
+        return (self.verdict and self.verdict.label) or Trust.NOT_JUDGED
 
     @property
     def validated(self) -> bool:
@@ -328,6 +329,7 @@ class IdentifiedRecord(ModelRecord):
             "held_out": {part: self._held_out_summary(part) for part in judged.held_out},
             "findings": list(self.findings),
             "verdict": None if self.verdict is None or self.verdict.label is None else self.verdict.summary,
+            **self.provenance,
         }
 
     def _held_out_summary(self, part: str) -> dict[str, Any]:

@@ -20,7 +20,8 @@ from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
 from cpfls_cli.gap.playback import errors_by_horizon, left_out, played_pairs
 from cpfls_cli.gap.whole_vehicle import require_body, whole_vehicle
-from cpfls_cli.pages.extended import answer, warnings
+from cpfls_cli.pages.extended import warnings
+from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.outcome import Outcome, nothing_written

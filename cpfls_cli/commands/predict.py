@@ -75,7 +75,8 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
             return nothing_written(job)
         finish_parts(job, _by_stretches(predicted, stretches, found, job.progress), len(stretches), inputs)
         about = (Text(f"{stretches.name}: {warning}", "warning") for warning in stretches.warnings)
-        return Outcome(found.summary | {"contradictions": list(wrong)}, (*said, *about, *answer(found)))
+        notes = (*trust_notes(record, model), *about)
+        return Outcome(found.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(found)))
     functions = rebuilt(model, identified).fuzzy
     assert isinstance(functions, InertiaFunctions), "what is identified"
     torque = count_rows(flight, FlightRecord.spec(), FlightRecord.path("torque")) is not None

@@ -22,8 +22,8 @@ from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.playback import flights_to_play, played
 from cpfls_cli.flights.recordings import seen_twice
+from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.source import source_of
-from cpfls_cli.pages.vehicle_model import answer
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.parameters import MASS, blocks_of
 from cpfls_cli.playback.replay import replay

@@ -13,6 +13,7 @@ from cpfls_cli.pages.extended import extension_section
 from cpfls_cli.pages.flight import flight_section, vehicle_section
 from cpfls_cli.pages.fuzzy_part import partitions_section, rules_section
 from cpfls_cli.pages.identification import identification_section, search_section
+from cpfls_cli.pages.model import model_section
 from cpfls_cli.pages.prediction import prediction_section
 from cpfls_cli.pages.provenance import missing, provenance_section
 from cpfls_cli.pages.replay import replay_section
@@ -36,6 +37,7 @@ _SECTIONS = (
     summary_section,
     comparison_section,
     models_section,
+    model_section,
     diagnosis_section,
     extension_section,
     found_vehicle_section,

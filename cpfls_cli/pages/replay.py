@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.replay import VEHICLE, DrawnGroup, ErrorsByHorizon, ReplayRecord, SignalErrorGroup
+from cpfls_cli.artifacts.replay import (
+    VEHICLE,
+    DrawnGroup,
+    ErrorsByHorizon,
+    HeldOutGroup,
+    PlaybackGroup,
+    ReplayRecord,
+    SignalErrorGroup,
+    better_to,
+)
 from cpfls_cli.pages.gap import AXES, MEASURED, keep_in_view
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source, Sources, section_of_each
@@ -28,6 +37,7 @@ from cpfls_cli.report.canvas import (
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import joined, number, sentence, whole_percent
 from cpfls_cli.rounding import tied
+from cpfls_cli.validation.trust import Trust
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -104,6 +114,49 @@ def verdict_box(replay: Source[ReplayRecord]) -> Box:
 def beside_rivals(errors: ErrorsByHorizon) -> list[str]:
     """Say of each signal to which horizon a model is better than what it has to beat, one sentence each."""
     return [_sentence(errors, name, group, rival) for name, (group, rival) in _rivals(errors).items()]
+
+
+def playback_words(trust: str, held: PlaybackGroup | None, contradictions: Sequence[str] | None) -> Iterator[str]:
+    """Say what a model is good for, to which horizon, and where; by playback along flights held out alone.
+
+    Parameters
+    ----------
+    trust : str
+        See `trust_by_playback`.
+    held : PlaybackGroup or None
+        None where no flight was held out.
+    contradictions : sequence of str or None
+        What no verdict can stand beside.
+    """
+    if contradictions:
+        first, *others = contradictions
+        yield f"Do not use it. {contradicted(first)}"
+        yield from map(sentence, others)
+    elif held is None:
+        yield "No flight was held out, so what it is good for is open; --held-out FLIGHT says it."
+    elif trust == Trust.SIMULATION:
+        reached = min(better_to(held, "body_rate"), better_to(held, "velocity"))
+        yield f"Good for simulation and for control to {number(reached, 2)} s{_region(held)}."
+    elif trust == Trust.CONTROL:
+        reached = better_to(held, "body_rate")
+        yield f"Good for control of the attitude: it predicts body rates to {number(reached, 2)} s{_region(held)}."
+    else:
+        yield "Do not use it: held out, its errors of the body rate add up to more than those of what knows no model."
+
+
+def _region(held: PlaybackGroup) -> str:
+    """Say at which speeds and rates it is better than what knows no model."""
+    region = held.better if isinstance(held, HeldOutGroup) else None
+    if region is None:
+        return ""
+    spans = [("speeds", region.speed, "m/s"), ("rates", region.rate, "rad/s")]
+    known = joined(
+        f"{name} of {number(span[0], 2)} to {number(span[1], 2)} {unit}"
+        for name, span, unit in spans
+        if span is not None
+    )
+    share = whole_percent(region.share)
+    return f", at {known}, where most of the windows lie in which its body rates are better ({share} of all)"
 
 
 def _name(record: ErrorsByHorizon) -> str:

@@ -8,11 +8,12 @@ from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
 from cpfls_cli.pages.diagnosis import gap_blocks
-from cpfls_cli.pages.model import scores_table, solution, verdict_line
+from cpfls_cli.pages.identification import scores_table, solution, verdict_line
+from cpfls_cli.pages.model import trust_box
 from cpfls_cli.pages.provenance import missing
 from cpfls_cli.pages.replay import told_at, verdict_box
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.vehicle_model import found_box
+from cpfls_cli.pages.trust import learned_words
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Text, Tone
 from cpfls_cli.report.numbers import ROUNDING, percent, plain, sentence
 
@@ -22,7 +23,7 @@ def summary_section(sources: Sources) -> Section:
     blocks: list[Block] = [verdict_line(model) for model in sources.models]
     blocks += [Text(note, "note") for note in sources.settings.notes]
     blocks += gap_blocks(sources)
-    blocks += [found_box(vehicle) for vehicle in sources.vehicles]
+    blocks += [trust_box(vehicle) for vehicle in sources.vehicles]
     blocks += [verdict_box(replay) for replay in sources.replays if told_at(replay.record, sources) is None]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)
@@ -80,11 +81,9 @@ def _model(model: Source[IdentifiedRecord], sources: Sources, index: int) -> Ite
 def _facts(model: Source[IdentifiedRecord]) -> list[tuple[str, str]]:
     record = model.record
     learned, training = len(record.training_indices), record.judged.samples_of(TRAINING)
-    file = record.origin.inputs.get("flight")
-    flight = f"{file.name} (sha256 {file.sha256[:12]})" if file else "unknown"
     chosen = f", chosen in {model.input_name('selection')}" if model.made_from("selection") else ""
     return [
-        ("Learned from", f"{flight}: {learned} of {training} training samples{chosen}"),
+        ("Learned from", f"{learned_words(record)}: {learned} of {training} training samples{chosen}"),
         ("Structure", _structure(model)),
         ("Parameters", _parameters(record)),
         ("Search", _search(model)),

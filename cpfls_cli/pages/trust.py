@@ -1,16 +1,61 @@
-"""How far to trust a model, in words: whether it has seen a flight that it is judged on."""
+"""How far to trust a model, in words: one table of them, and whether it has seen a flight that it is judged on."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 from cpfls_cli.artifacts.learned import LearnedFlight, part_learned
 from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.report.content import Tone
+from cpfls_cli.report.numbers import joined
+from cpfls_cli.validation.trust import Trust
+
+
+class Words(NamedTuple):
+    """A word of trust as people read it: in a cell of a table or, in capitals, before a box; and as a sentence."""
+
+    short: str
+    sentence: str
+    tone: Tone
+
+
+_WORDS: dict[str, Words] = {
+    Trust.SIMULATION: Words("good for simulation and control", "Good for simulation and control", "good"),
+    Trust.CONTROL: Words("good for control", "Good for control", "good"),
+    Trust.INSIDE: Words(
+        "good inside its region", "Good inside the region that training visited, and only there", "note"
+    ),
+    Trust.NOT_JUDGED: Words("not judged", "Not judged", "note"),
+    Trust.RIGID_BODY: Words("no better than a rigid body", "Not better than the rigid body", "warning"),
+    Trust.DO_NOT_USE: Words("do not use", "Do not use it", "warning"),
+}
 
 KnownBy = Iterable[tuple[str, Collection[str]]]
 """Flights by file name, each with the hashes of its file and of its log."""
 
 NOT_SEEN = "a flight that it did not learn from"
+
+
+def trust_words(trust: str) -> Words:
+    """Put a word of trust as people read it; one that a newer program wrote stands as it is."""
+    return _WORDS.get(trust, Words(trust, trust, "note"))
+
+
+def trust_facts(model: ModelRecord) -> list[tuple[str, str]]:
+    """Say in a word how far to trust a model, and which flights it learned from."""
+    return [("How far to trust it", trust_words(model.trust).sentence), ("Learned from", learned_words(model))]
+
+
+def learned_words(model: ModelRecord) -> str:
+    """Name the flights that a model learned from, each with the part of it."""
+    flights = [_with_part(flight) for flight in model.learned_from]
+    return joined(flights) if flights else "the file does not say"
+
+
+def _with_part(flight: LearnedFlight) -> str:
+    part = "" if flight.samples is None else f", {_part(flight) if not flight.whole else f'{flight.of} samples'}"
+    return f"{flight.file.name} (sha256 {flight.file.sha256[:12]}{part})"
 
 
 def seen_words(model: ModelRecord, hashes: Collection[str]) -> str:
