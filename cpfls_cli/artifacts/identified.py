@@ -226,7 +226,10 @@ class IdentifiedRecord(ModelRecord):
     @cached_property
     def study(self) -> Study:
         """The study that it was identified with."""
-        return _study(self.origin.config, self.FORMAT.name)
+        from cpfls_cli.config.load import parse_config, validate
+
+        source = f"{self.FORMAT.name}: /config"
+        return validate(parse_config(self.origin.config, source), source)
 
     @property
     def functions(self) -> InertiaFunctionsGroup:
@@ -340,10 +343,3 @@ class IdentifiedRecord(ModelRecord):
             "outside": int(judged.outside[judged.parts.index(part)]),
             "baselines": {name: judged.summary_of(name, part) for name in judged.baselines},
         }
-
-
-def _study(config: str, path: object) -> Study:
-    from cpfls_cli.config.load import parse_config, validate
-
-    source = f"{path}: /config"
-    return validate(parse_config(config, source), source)

@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
-from cpfls_cli.artifacts.parameters import Parameter, parameters_of
+from cpfls_cli.artifacts.parameters import parameters_of
 from cpfls_cli.artifacts.replay import HeldOutGroup, trust_by_playback
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, record, rows_of
 from cpfls_cli.validation.trust import Trust, capped
@@ -184,7 +184,7 @@ class VehicleRecord(ModelRecord):
             **self.vehicle.summary,
             "verdict": self.verdict,
             **self.provenance,
-            "parameters": {each.key: _but_key(each) for each in parameters_of(self)},
+            "parameters": {row.pop("key"): row for row in (each._asdict() for each in parameters_of(self))},
             "numbers": numbers,
             "differences": {}
             if self.difference is None
@@ -198,7 +198,3 @@ class VehicleRecord(ModelRecord):
             "contradictions": list(self.contradiction or ()),
             "warnings": list(self.warning),
         }
-
-
-def _but_key(parameter: Parameter) -> dict[str, Any]:
-    return {name: value for name, value in parameter._asdict().items() if name != "key"}

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish
-from cpfls_cli.artifacts.learned import MODEL_FLIGHT, as_inputs
+from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
@@ -43,33 +43,28 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     inputs = begin(job, roles | ({} if model is None else {"model": model}))
     check_ignored(job.study)
     require_known(job.study, "compare", whole=model is not None and holds(model, VehicleRecord))
-    given, base = _with_model(read_flights(flights, job.study), model, job.study)
+    read, learned = read_flights(flights, job.study), learned_by(model)
+    base = VehicleModel(vehicle=job.study.vehicle) if model is None else read_model(model, job.study)
+    given = replace(read, recordings=tuple(of_vehicle(read.recordings, base)))
     if job.dry_run:
         return nothing_written(job)
-    given = with_seen(given, model, known_by(roles, inputs))
+    given = with_seen(given, model, learned, known_by(roles, inputs))
     record = compared(job.study, given, base, progress_of(job.progress))
-    record = finish_disagreement(job, record, model, inputs)
+    record = finish_disagreement(job, record, learned, inputs)
     return Outcome(record.summary, tuple(answer(source_of(job, record))))
 
 
-def _with_model(given: Flights, path: Path | None, study: Study) -> tuple[Flights, VehicleModel]:
-    """Read a model; flights become those of its vehicle."""
-    model = VehicleModel(vehicle=study.vehicle) if path is None else read_model(path, study)
-    recordings = tuple(of_vehicle(given.recordings, model))
-    return replace(given, recordings=recordings), model
-
-
-def with_seen(given: Flights, model: Path | None, judged: KnownBy) -> Flights:
+def with_seen(given: Flights, model: Path | None, learned: Sequence[LearnedFlight], judged: KnownBy) -> Flights:
     """Say of flights which of them the model that is held against them learned from."""
-    seen = seen_warnings("" if model is None else model.name, learned_by(model), judged)
+    seen = () if model is None else seen_warnings(model.name, learned, judged)
     return replace(given, warnings=(*seen, *given.warnings))
 
 
 def finish_disagreement(
-    job: Job, record: DisagreementRecord, model: Path | None, inputs: Mapping[str, InputFile]
+    job: Job, record: DisagreementRecord, learned: Sequence[LearnedFlight], inputs: Mapping[str, InputFile]
 ) -> DisagreementRecord:
     """Write a disagreement, with the flights that its model learned from as inputs."""
-    of_model, parts = as_inputs(MODEL_FLIGHT, learned_by(model))
+    of_model, parts = as_inputs(MODEL_FLIGHT, learned)
     return finish(job, replace(record, learned=parts), {**inputs, **of_model})
 
 
@@ -88,12 +83,7 @@ def compared(
 
 
 def check_ignored(study: Study) -> None:
-    """Refuse names in `gap.ignore` that no effect has.
-
-    Raises
-    ------
-    ConfigError
-    """
+    """Refuse names in `gap.ignore` that no effect has."""
     for name in study.gap.ignore:
         if name not in CATALOGUE:
             near = get_close_matches(name, CATALOGUE, n=1, cutoff=0.4)

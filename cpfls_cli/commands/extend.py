@@ -98,10 +98,6 @@ def require_named(verdict: str, effects: Sequence[NamedEffect]) -> None:
     ----------
     effects : sequence of NamedEffect
         Those that it names.
-
-    Raises
-    ------
-    ComputationError
     """
     if verdict not in _EXTENDS or not effects:
         closest = " (those that it calls closest are not it)" if verdict == GapVerdict.UNEXPLAINED else ""

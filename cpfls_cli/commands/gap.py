@@ -11,6 +11,7 @@ from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.job import Job, input_file, take_inputs
+from cpfls_cli.artifacts.learned import LearnedFlight
 from cpfls_cli.artifacts.output import check_folder, filled_folder, refuse_inputs, write_text
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.commands import report
@@ -27,7 +28,7 @@ from cpfls_cli.commands.extend import extended, finish_extended
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.recordings import Flights, FlightSplit, read_flights, split_flights
-from cpfls_cli.flights.same_vehicle import read_base
+from cpfls_cli.flights.same_vehicle import learned_by, read_base
 from cpfls_cli.gap.naming.results import Diagnosis
 from cpfls_cli.pages.disagreement import where
 from cpfls_cli.pages.extended import model_with, warnings
@@ -46,8 +47,8 @@ class _Given:
 
     flights: Flights
     split: FlightSplit
-    model: Path | None
     base: VehicleModel
+    learned: tuple[LearnedFlight, ...]
     inputs: Mapping[str, InputFile]
 
     def inputs_of(self, role: str) -> dict[str, InputFile]:
@@ -94,7 +95,8 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path
         text = json.dumps(plain(summary), indent=1, allow_nan=False)
         write_text(folder / "gap.json", text + "\n")
         job.progress(0.97, 1, "report")
-        report.run(replace(job, output=folder / "report.html", progress=_quiet), written)
+        # Without a bar of its own: the bar is that of the whole.
+        report.run(replace(job, output=folder / "report.html", progress=lambda *_: None), written)
     job.progress(1, 1)
     return Outcome(summary, tuple(_blocks(job, given, answers)))
 
@@ -111,8 +113,9 @@ def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: P
     given, held = read.recordings[: len(flights)], read.recordings[len(flights) :]
     split = split_flights(given, held, job.study.gap)
     base = read_base(model, job.study)
-    judged = known_by(numbered_roles("flight", flights), inputs)
-    return _Given(with_seen(Flights(given, read.warnings), model, judged), split, model, base, inputs)
+    learned, judged = learned_by(model), known_by(numbered_roles("flight", flights), inputs)
+    whole = with_seen(Flights(given, read.warnings), model, learned, judged)
+    return _Given(whole, split, base, learned, inputs)
 
 
 def _answers(job: Job, given: _Given) -> _Answers:
@@ -132,7 +135,7 @@ def _written(job: Job, given: _Given, answers: _Answers, folder: Path) -> tuple[
     paths = [folder / name for name in FILES[:3]]
     jobs = [replace(job, output=path) for path in paths]
     compared_with = given.inputs_of("flight") | given.inputs_of("model")
-    first = finish_disagreement(jobs[0], answers.disagreement, given.model, compared_with)
+    first = finish_disagreement(jobs[0], answers.disagreement, given.learned, compared_with)
     inputs = {"disagreement": input_file(paths[0]), **given.inputs_of("held-out")}
     second = finish_diagnosis(jobs[1], answers.diagnosed, first, inputs)
     if answers.extended is None:
@@ -153,7 +156,3 @@ def _blocks(job: Job, given: _Given, answers: _Answers) -> Iterator[Block]:
         yield from (Text(warning, "warning") for warning in warnings(answers.extended))
         yield Text(model_with(str(job.output / "extended.h5"), answers.extended))
     yield from folded_notes(given.flights.warnings, f"{job.output / 'report.html'} lists them")
-
-
-def _quiet(done: float, total: int, note: str = "") -> None:
-    """Show nothing: the bar is that of the whole."""

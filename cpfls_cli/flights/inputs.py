@@ -60,17 +60,12 @@ def known_by(paths: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> list
 
 
 def choosing_source(flights: Sequence[Path], inputs: Mapping[str, InputFile]) -> TorqueSource | None:
-    """Open the flights to choose on.
+    """Open the flights to choose on; None where there are none.
 
     Parameters
     ----------
     inputs : mapping of str to InputFile
         All inputs of the command by role.
-
-    Returns
-    -------
-    TorqueSource or None
-        None where there are none.
 
     Raises
     ------
@@ -124,10 +119,6 @@ def held_out_parts(
     for role, path in numbered_roles("validate", validate).items():
         if inputs[role].sha256 in learned:
             raise InputError(f"--validate {path}: is the flight that trains; validate on another one")
-        parts[_free_name(path.name, {TRAINING, *parts})] = flight_source(path)
+        names = chain([path.name], (f"{path.name} ({number})" for number in count(2)))
+        parts[next(name for name in names if name not in {TRAINING, *parts})] = flight_source(path)
     return parts
-
-
-def _free_name(name: str, taken: set[str]) -> str:
-    numbered = (f"{name} ({number})" for number in count(2))
-    return next(candidate for candidate in chain([name], numbered) if candidate not in taken)

@@ -93,11 +93,10 @@ def read_flight(path: Path, study: Study) -> ReadFlight:
     InputError
         If it is of another vehicle.
     """
-    return _log(path, study) if is_log(path) else _artifact(path, study)
-
-
-def _log(path: Path, study: Study) -> ReadFlight:
-    return read_import(path.name, [imported(path, study)], study)
+    if is_log(path):
+        return read_import(path.name, [imported(path, study)], study)
+    record = read_record(path, FlightRecord)
+    return ReadFlight(path.name, record.signals, units_of(path, record.origin, study), ())
 
 
 def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> ReadFlight:
@@ -118,11 +117,6 @@ def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> Rea
         own["time"] = own["time"] + part.report.span_s[0]
     joined = {each: np.concatenate([own[each] for own in signals]) for each in shared}
     return ReadFlight(name, joined, _units(study), ())
-
-
-def _artifact(path: Path, study: Study) -> ReadFlight:
-    record = read_record(path, FlightRecord)
-    return ReadFlight(path.name, record.signals, units_of(path, record.origin, study), ())
 
 
 def units_of(path: Path, made: Header, study: Study) -> Mapping[str, str]:

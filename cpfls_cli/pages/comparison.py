@@ -80,13 +80,7 @@ class JudgedOn:
 
 
 def comparison_section(sources: Sources) -> Section | None:
-    """Compare the models with each other.
-
-    Returns
-    -------
-    Section or None
-        None for fewer than two models.
-    """
+    """Compare the models with each other; None for fewer than two models."""
     models = sources.models
     if len(models) < 2:
         return None

@@ -42,8 +42,9 @@ def _shrunk(record: ExtendedRecord) -> str:
 
 def worth(record: ExtendedRecord) -> Iterator[str]:
     """Say what a model that is used elsewhere is worth, and what has to be repaired in the signals that it is given."""
+    yield next(playback_words(record.trust, record.playback, record.audit.contradiction))
     yield _shrunk(record)
-    yield from (f"{sentence(warning)}" for warning in warnings(record))
+    yield from (sentence(warning) for warning in warnings(record))
     yield from (
         f"Not in the model, to be repaired in the signals that it is given: {fault}"
         for fault in (*record.audit.settled, *record.audit.faults)
@@ -70,13 +71,7 @@ def _by(record: ExtendedRecord) -> str:
 
 
 def extension_section(sources: Sources) -> Section | None:
-    """Show the extended models; what stands in their diagnosis is not shown again.
-
-    Returns
-    -------
-    Section or None
-        None where none was given.
-    """
+    """Show the extended models; what stands in their diagnosis is not shown again; None where none was given."""
     return section_of_each(
         "extension",
         "The extended model",

@@ -184,12 +184,7 @@ def verdict_line(model: Source[IdentifiedRecord]) -> Text:
 
 
 def identification_section(sources: Sources) -> Section | None:
-    """Show the models beside each other, and their baselines.
-
-    Returns
-    -------
-    Section or None
-        None where no model was given.
+    """Show the models beside each other, and their baselines; None where no model was given.
 
     References
     ----------
@@ -259,13 +254,7 @@ def _rows(judged: JudgedGroup, part: str, name: str) -> Iterator[list[str | Cell
 
 
 def search_section(sources: Sources) -> Section | None:
-    """Show how the models were found.
-
-    Returns
-    -------
-    Section or None
-        None where no model was given.
-    """
+    """Show how the models were found; None where no model was given."""
     return section_of_each("search", "Search", sources.models, _search)
 
 

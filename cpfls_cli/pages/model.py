@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,17 +13,15 @@ from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.model import EffectsGroup, InertiaFunctionsGroup, ModelRecord, ResponseGroup, RotorsGroup
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages import extended, identification, vehicle_model
 from cpfls_cli.pages.effects import effect_title, unit_words
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.pages.trust import trust_facts, trust_words
-from cpfls_cli.report.content import Block, Box, Facts, Heading, Section, Text
+from cpfls_cli.report.content import Block, Box, Facts, Heading, Section, Table, Text
 from cpfls_cli.report.numbers import joined, number, plain, whole_percent
 from cpfls_cli.validation.trust import Trust
-
-if TYPE_CHECKING:
-    from cpfls_cli.playback.model import ModelEffect
 
 
 class _Kind(NamedTuple):
@@ -99,12 +98,14 @@ def worth_in_words(record: ModelRecord) -> Iterator[str]:
 def model_section(sources: Sources) -> Section | None:
     """Say what each model is, part by part; None where none was given."""
     models: list[Source[Any]] = [source for source in sources.all if isinstance(source.record, ModelRecord)]
-    return section_of_each("model", "What the model is", models, lambda model, _: _section(model, len(models) > 1))
+    return section_of_each("model", "What the model is", models, partial(_section, len(models) > 1))
 
 
-def _section(model: Source[Any], several: bool) -> Iterator[Block]:
+def _section(several: bool, model: Source[Any], index: int) -> Iterator[Block]:
     yield from [Heading(model.label)] if several else []
     yield Facts(facts(model.record))
+    if model.record.vehicle.effect.name:
+        yield _effects_table(f"model-effects-{index}", model.record.vehicle.effect)
 
 
 def facts(record: ModelRecord) -> list[tuple[str, str]]:
@@ -118,7 +119,7 @@ def facts(record: ModelRecord) -> list[tuple[str, str]]:
         ("Inertia, kg m²", rigid if vehicle.inertia_functions is None else _functions(vehicle.inertia_functions)),
         ("Rotors", _rotors(vehicle.rotor)),
         ("Their response", _response(vehicle.response)),
-        ("Effects", _effects(vehicle.effect)),
+        ("Effects", joined(map(_effect, vehicle.effect.name)) if vehicle.effect.name else "none"),
     ]
     if vehicle.remainder is not None:
         size = vehicle.remainder.coefficients.size
@@ -163,23 +164,25 @@ def _response(response: ResponseGroup) -> str:
     told = [f"{name} {number(1e3 * seconds, 3)} ms" for name, seconds in parts if seconds]
     slow = [("roll and pitch", response.slow_roll_pitch), ("yaw", response.slow_yaw)]
     told += [
-        f"{whole_percent(share)} of the torque of {axes} back within {number(response.slow, 3)} s"
+        f"{whole_percent(abs(share))} of the torque of {axes} {'back' if share > 0 else 'gone'} within "
+        f"{number(response.slow, 3)} s"
         for axes, share in slow
         if share
     ]
     return f"{joined(told)}, behind {'commands alone' if response.commanded else 'any speed'}" if told else "at once"
 
 
-def _effects(group: EffectsGroup) -> str:
-    told = [
-        f"{'numbers refitted' if each.known.kind == 'parameter' else effect_title(each.name)} ({_values(each)})"
-        for each in group.effects()
-    ]
-    return "; ".join(told) or "none"
+def _effect(name: str) -> str:
+    return "numbers refitted" if CATALOGUE[name].kind == "parameter" else effect_title(name)
 
 
-def _values(effect: ModelEffect) -> str:
-    units = {each.name: unit_words(each.unit) for each in effect.known.numbers}
-    return ", ".join(
-        f"{name} = {number(value)} {units.get(name, '')}".rstrip() for name, value in effect.values.items()
-    )
+def _effects_table(name: str, group: EffectsGroup) -> Table:
+    rows = []
+    for effect in group.effects():
+        known = {each.name: each for each in effect.known.numbers}
+        for index, (label, value) in enumerate(effect.values.items()):
+            words = f"{label}: {known[label].meaning}" if label in known else label
+            unit = unit_words(known[label].unit) if label in known else ""
+            rows.append([_effect(effect.name) if index == 0 else "", words, number(value), unit])
+    header = ("Effect", "Number", "Value", "Unit")
+    return Table(name, "The numbers of its effects.", header, rows, frozenset({0, 1, 3}), frozenset({1}))

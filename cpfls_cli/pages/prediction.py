@@ -98,12 +98,7 @@ def _outside_words(model: Record | None) -> str:
 
 
 def prediction_section(sources: Sources) -> Section | None:
-    """Show the predictions.
-
-    Returns
-    -------
-    Section or None
-        None where no prediction was given.
+    """Show the predictions; None where no prediction was given.
 
     References
     ----------

@@ -108,7 +108,13 @@ def _commands(sources: Sources) -> list[str]:
         Lines for a shell; what cannot be known stands in comments.
     """
     paths = _paths(sources)
-    foreign = [f"# needs {shlex.quote(file.name)}, sha256 {file.sha256}" for file in _foreign(sources)]
+    # What the commands read and the report does not hold.
+    needed = {file.sha256: file for source in sources.all for file in _read(source)}
+    foreign = [
+        f"# needs {shlex.quote(file.name)}, sha256 {sha256}"
+        for sha256, file in needed.items()
+        if sources.by_hash(sha256) is None
+    ]
     folders = sorted({path.rsplit("/", 1)[0] for path in paths.values() if "/" in path})
     lines = [line for source in _in_order(sources.all) for line in _lines(source, paths)]
     return [*foreign, *(f"mkdir -p {folder}" for folder in folders), *lines]
@@ -121,12 +127,6 @@ def _paths(sources: Sources) -> dict[str, str]:
     names = {sha256: called.get(sha256, label) for sha256, label in labels.items()}
     count = Counter(names.values())
     return {sha256: name if count[name] == 1 else f"{sha256[:HASH_SHOWN]}/{name}" for sha256, name in names.items()}
-
-
-def _foreign(sources: Sources) -> list[InputFile]:
-    """List what the commands read and the report does not hold."""
-    files = {file.sha256: file for source in sources.all for file in _read(source)}
-    return [file for sha256, file in files.items() if sources.by_hash(sha256) is None]
 
 
 def _read(source: Source) -> list[InputFile]:
@@ -161,16 +161,13 @@ def _lines(source: Source, paths: dict[str, str]) -> Iterator[str]:
         yield f"# the search for {output} was stopped before its end; this one goes on to it"
     words = ["cpfls", command.name, _config_name(source)]
     for role in command.arguments:
-        words += _files(inputs, role, paths) or _without_file(source.record, role)
+        # Of a replay of the vehicle of the config a word stands in the place of the model.
+        of_config = [VEHICLE] if isinstance(source.record, ReplayRecord) and role == "model" else []
+        words += _files(inputs, role, paths) or of_config
     for role in command.options:
         for file in _files(inputs, role, paths):
             words += [f"--{role}", file]
     yield " ".join([*words, *_asked(source.record), "-o", output])
-
-
-def _without_file(record: Record, role: str) -> list[str]:
-    """Give the word that stands in the place of a file."""
-    return [VEHICLE] if isinstance(record, ReplayRecord) and role == "model" else []
 
 
 def _asked(record: Record) -> list[str]:

@@ -11,7 +11,6 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.replay import (
     VEHICLE,
-    DrawnGroup,
     ErrorsByHorizon,
     HeldOutGroup,
     PlaybackGroup,
@@ -221,20 +220,15 @@ def _first_lost(record: ReplayRecord) -> str:
     return f"in {flight} from {begin:.2f} s after {after:.3g} s"
 
 
-def _chosen_horizons(record: ErrorsByHorizon) -> list[int]:
-    """Choose the first horizon, a fifth of the longest, and the longest."""
-    last = len(record.horizon_s) - 1
-    return sorted({0, max((last + 1) // 5 - 1, 0), last})
-
-
 def _shown(record: ErrorsByHorizon) -> list[int]:
     """List the predictions that are shown: the stated vehicle once."""
     return [row for row in range(len(record.prediction)) if row != _STATED or record.played != VEHICLE]
 
 
 def errors_table(record: ErrorsByHorizon, index: int) -> Table:
-    """Show the errors of all predictions after some horizons, and their sums."""
-    chosen = _chosen_horizons(record)
+    """Show the errors of all predictions after the first horizon, a fifth of the longest, the longest; and sums."""
+    last = len(record.horizon_s) - 1
+    chosen = sorted({0, max((last + 1) // 5 - 1, 0), last})
     rows: list[list[str | Cell]] = []
     for name, (group, rival) in _rivals(record).items():
         words, unit, scale = _SIGNALS[name]
@@ -277,13 +271,7 @@ def _worst_table(record: ReplayRecord, index: int) -> Table:
 
 
 def replay_section(sources: Sources) -> Section | None:
-    """Show how models predict the motion of flights.
-
-    Returns
-    -------
-    Section or None
-        None where no replay was given.
-    """
+    """Show how models predict the motion of flights; None where no replay was given."""
     return section_of_each("replay", "Played back along flights", sources.replays, partial(_section, sources))
 
 
@@ -298,11 +286,10 @@ def told_at(replay: ReplayRecord, sources: Sources) -> str | None:
 
 def _same_errors(first: ErrorsByHorizon, second: ErrorsByHorizon) -> bool:
     groups = zip(first.errors.values(), second.errors.values(), strict=True)
-    return all(a is b if a is None or b is None else _same(a.mae, b.mae) for a, b in groups)
-
-
-def _same(first: Array, second: Array) -> bool:
-    return first.shape == second.shape and bool(tied(first, second).all())
+    return all(
+        a is b if a is None or b is None else a.mae.shape == b.mae.shape and bool(tied(a.mae, b.mae).all())
+        for a, b in groups
+    )
 
 
 def _section(sources: Sources, replay: Source[ReplayRecord], index: int) -> Iterator[Block]:
@@ -409,7 +396,8 @@ def drawn_figure(name: str, record: ReplayRecord) -> Plot:
     flight = record.flight.name[window.flight[drawn.window[0]]]
     times = window.start[drawn.window][:, None] + np.concatenate([[0.0], record.horizon_s])
     panels_of: list[tuple[str, Array, Array]] = [
-        (f"rate about {axis}, rad/s", *_rates(drawn, index)) for index, axis in enumerate(AXES)
+        (f"rate about {axis}, rad/s", drawn.measured[:, :, index], drawn.model[:, :, index])
+        for index, axis in enumerate(AXES)
     ]
     if drawn.measured_position is not None and drawn.model_position is not None:
         measured_position, model_position = drawn.measured_position, drawn.model_position
@@ -435,10 +423,6 @@ def drawn_figure(name: str, record: ReplayRecord) -> Plot:
         "stretches half are better and half are worse."
     )
     return plot(name, caption, "A flight beside its playback over time", 0.8 + 1.25 * len(panels_of), draw)
-
-
-def _rates(drawn: DrawnGroup, axis: int) -> tuple[Array, Array]:
-    return drawn.measured[:, :, axis], drawn.model[:, :, axis]
 
 
 def where_figure(name: str, record: ReplayRecord) -> Plot:

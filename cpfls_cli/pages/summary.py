@@ -30,20 +30,16 @@ def summary_section(sources: Sources) -> Section:
     if not sources.models and not sources.only_gap:
         blocks.append(Text("No model was given, so there is nothing to judge yet.", "note"))
     for flight in sources.flights:
-        blocks += _flight_warnings(flight)
+        quality = flight.record.quality
+        said = () if quality is None else quality.warning or ()
+        blocks += [Text(f"{flight.label}: {warning}.", "warning") for warning in said]
     if len(sources.models) < 2:
         blocks += _missing(sources)
     return Section("summary", "Summary", blocks)
 
 
 def models_section(sources: Sources) -> Section | None:
-    """Summarise each model; one alone stands in the summary itself.
-
-    Returns
-    -------
-    Section or None
-        None for fewer than two models.
-    """
+    """Summarise each model; one alone stands in the summary itself; None for fewer than two models."""
     if len(sources.models) < 2:
         return None
     blocks = [block for index, model in enumerate(sources.models, start=1) for block in _model(model, sources, index)]
@@ -52,12 +48,6 @@ def models_section(sources: Sources) -> Section | None:
 
 def _missing(sources: Sources) -> list[Text]:
     return [Text(sentence, "note") for sentence in missing(sources).values()]
-
-
-def _flight_warnings(flight: Source[FlightRecord]) -> Iterator[Block]:
-    quality = flight.record.quality
-    for warning in (quality.warning or ()) if quality is not None else ():
-        yield Text(f"{flight.label}: {warning}.", "warning")
 
 
 def _model(model: Source[IdentifiedRecord], sources: Sources, index: int) -> Iterator[Block]:
@@ -159,16 +149,13 @@ def _noise_free(flight: Source[FlightRecord]) -> bool:
 def _comparison(judged: JudgedGroup, part: str, winners: Sequence[Winner]) -> str:
     ours, axis = judged.worst(MODEL, part)
     rigid, rigid_axis = judged.worst(RIGID_BODY, part)
+    where = {TRAINING: "In training", "held-out rest": "On the held-out rest"}.get(part, f"On {part}")
     reached = (
-        f"{_where(part)} ({judged.samples_of(part)} samples) the largest error of the model is {percent(ours)} of the "
+        f"{where} ({judged.samples_of(part)} samples) the largest error of the model is {percent(ours)} of the "
         f"largest torque ({axis}, the worst axis); the rigid body with six inertia parameters: {percent(rigid)}"
     )
     other_axis = f" ({rigid_axis})" if rigid > ROUNDING and rigid_axis != axis else ""
     return f"{reached}{other_axis}. {_who_is_better(winners)}"
-
-
-def _where(part: str) -> str:
-    return {TRAINING: "In training", "held-out rest": "On the held-out rest"}.get(part, f"On {part}")
 
 
 def _who_is_better(winners: Sequence[Winner]) -> str:

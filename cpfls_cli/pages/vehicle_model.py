@@ -145,7 +145,8 @@ def warnings(record: VehicleRecord) -> list[str]:
         for row in rows_of(record.trade)
         if not (_is_learned(row["first"]) and _is_learned(row["second"]))
     )
-    far = [row["name"] for row in rows_of(found) if _far(row["value"], row["stated"])]
+    stated = [row for row in rows_of(found) if np.isfinite(row["stated"]) and row["stated"] > 0]
+    far = [row["name"] for row in stated if not 1 / _FAR < row["value"] / row["stated"] < _FAR]
     if far:
         said.append(
             f"{joined(far)}: more than {_FAR:g} times off what is stated; an effective number that predicts, not a "
@@ -161,10 +162,6 @@ def warnings(record: VehicleRecord) -> list[str]:
 def _is_learned(name: str) -> bool:
     """Tell whether a number belongs to a remainder: to that of the torque, or of the force."""
     return name.startswith(_REMAINDER)
-
-
-def _far(value: float, stated: float) -> bool:
-    return bool(np.isfinite(stated) and stated > 0 and not 1 / _FAR < value / stated < _FAR)
 
 
 def _numbers_table(found: Source[VehicleRecord], index: int) -> Iterator[Table]:
