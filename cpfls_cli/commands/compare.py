@@ -18,7 +18,7 @@ from cpfls_cli.config.unknown import require_known
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
-from cpfls_cli.flights.recordings import Flights, read_flights
+from cpfls_cli.flights.recordings import Recordings, read_flights
 from cpfls_cli.flights.same_vehicle import learned_by, read_model
 from cpfls_cli.gap.compare import compare
 from cpfls_cli.gap.whole_vehicle import of_vehicle
@@ -54,7 +54,7 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     return Outcome(record.summary, tuple(answer(source_of(job, record))))
 
 
-def with_seen(given: Flights, model: Path | None, learned: Sequence[LearnedFlight], judged: KnownBy) -> Flights:
+def with_seen(given: Recordings, model: Path | None, learned: Sequence[LearnedFlight], judged: KnownBy) -> Recordings:
     """Say of flights which of them the model that is held against them learned from."""
     seen = () if model is None else seen_warnings(model.name, learned, judged)
     return replace(given, warnings=(*seen, *given.warnings))
@@ -69,7 +69,7 @@ def finish_disagreement(
 
 
 def compared(
-    study: Study, given: Flights, model: VehicleModel, progress: Callable[[float, str], None]
+    study: Study, given: Recordings, model: VehicleModel, progress: Callable[[float, str], None]
 ) -> DisagreementRecord:
     """Compare a model with flights.
 

@@ -27,7 +27,7 @@ from cpfls_cli.commands.diagnose import (
 from cpfls_cli.commands.extend import extended, finish_extended
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
-from cpfls_cli.flights.recordings import Flights, FlightSplit, read_flights, split_flights
+from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, split_flights
 from cpfls_cli.flights.same_vehicle import learned_by, read_base
 from cpfls_cli.gap.naming.results import Diagnosis
 from cpfls_cli.pages.disagreement import where
@@ -45,7 +45,7 @@ FILES = ("disagreement.h5", "diagnosis.h5", "extended.h5", "report.html", "gap.j
 class _Given:
     """What the workflow starts from."""
 
-    flights: Flights
+    flights: Recordings
     split: FlightSplit
     base: VehicleModel
     learned: tuple[LearnedFlight, ...]
@@ -114,7 +114,7 @@ def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: P
     split = split_flights(given, held, job.study.gap)
     base = read_base(model, job.study)
     learned, judged = learned_by(model), known_by(numbered_roles("flight", flights), inputs)
-    whole = with_seen(Flights(given, read.warnings), model, learned, judged)
+    whole = with_seen(Recordings(given, read.warnings), model, learned, judged)
     return _Given(whole, split, base, learned, inputs)
 
 

@@ -185,7 +185,7 @@ def _evidence(
     try:
         with settings_of("identification", job.study):
             tell = partial(job.progress, total, total)
-            found = examine(data.training, data.learned, held_out, settings, result, rng, tell)
-            return replace(found, verdict=contradicted(found.verdict, wrong)), None
+            evidence = examine(data.training, data.learned, held_out, settings, result, rng, tell)
+            return replace(evidence, verdict=contradicted(evidence.verdict, wrong)), None
     except KeyboardInterrupt as interrupt:
         return None, next(iter(interrupt.args), SIGINT)

@@ -103,13 +103,13 @@ def run(job: Job, diagnosis: Path | None = None, plot: bool = False) -> Outcome:
     if job.dry_run:
         return nothing_written(job)
     asked = goal(case.questions, case.flights, room, case.logging)
-    found = next_flight(asked, generator(study, "next-flight"), job.progress)
-    planned = room.planned(found.path, study.trajectory.sample_time_s)
+    flight = next_flight(asked, generator(study, "next-flight"), job.progress)
+    planned = room.planned(flight.path, study.trajectory.sample_time_s)
     demand = flyability(vars(planned), study.vehicle, study.trajectory.tilt_max_rad)
     problems = demand_sentences(demand, planned)
     if problems:
         raise ComputationError("\n".join([*problems, f"{job.output}: no path was written; lower trajectory.limits"]))
-    questions, notes = _told(study, asked, found, planned)
+    questions, notes = _told(study, asked, flight, planned)
     record = finish(job, TrajectoryRecord.of(planned, questions), inputs)
     write_text(waypoints, waypoint_lines(planned))
     source = source_of(job, record)
@@ -222,11 +222,11 @@ def _open_effects(
     return [], unseen
 
 
-def _told(study: Study, asked: Goal, found: NextFlight, planned: Trajectory) -> tuple[QuestionGroup, list[str]]:
+def _told(study: Study, asked: Goal, flight: NextFlight, planned: Trajectory) -> tuple[QuestionGroup, list[str]]:
     """Judge the path that was found, as planned and as flown, beside other flights."""
     room, logging = asked.room, asked.logging
     answers = asked.judgements(planned_signals(planned, room, logging))
-    others = [asked.judgements(planned_signals(room.planned(path), room, logging)) for path in found.random]
+    others = [asked.judgements(planned_signals(room.planned(path), room, logging)) for path in flight.random]
     again = asked.judgements(None, again=2)
     known = any(evidence.rows for evidence in asked.known)
     flown, notes = _flown(study, asked, planned)

@@ -28,7 +28,7 @@ from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.flight_source import Stretch, Stretches, check_file, flight_source, flight_stretches
+from cpfls_cli.flights.flight_source import FlightStretch, FlightStretches, check_file, flight_source, flight_stretches
 from cpfls_cli.flights.inputs import hashes_of
 from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles, read_model, rebuilt
 from cpfls_cli.gap.extended import inertial_force, inertial_torque
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from cpfls_cli.validation.bootstrap import Draws
 
 
-_Predicted = Callable[[Stretch], PredictionRecord]
+_Predicted = Callable[[FlightStretch], PredictionRecord]
 
 
 def run(job: Job, model: Path, flight: Path) -> Outcome:
@@ -64,7 +64,7 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
     record = read_record(model, ModelRecord)
     require_known(job.study, "predict", whole=isinstance(record, VehicleRecord))
     identified = record if isinstance(record, IdentifiedRecord) else None
-    found, wrong = Findings(), contradictions(check_file(flight, job.study, driven=identified is None))
+    findings, wrong = Findings(), contradictions(check_file(flight, job.study, driven=identified is None))
     seen = seen_words(record, hashes_of(flight, inputs["flight"]))
     said = [Text(contradicted(each), "warning") for each in wrong]
     said += [] if seen == NOT_SEEN else [Text(f"{model.name} along {flight.name}: {seen}")]
@@ -73,44 +73,49 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
         if job.dry_run:
             predicted(next(iter(stretches)))
             return nothing_written(job)
-        finish_parts(job, _by_stretches(predicted, stretches, found, job.progress), len(stretches), inputs)
+        finish_parts(job, _by_stretches(predicted, stretches, findings, job.progress), len(stretches), inputs)
         about = (Text(f"{stretches.name}: {warning}", "warning") for warning in stretches.warnings)
         notes = (*trust_notes(record, model), *about)
-        return Outcome(found.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(found)))
+        return Outcome(findings.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(findings)))
     functions = rebuilt(model, identified).fuzzy
     assert isinstance(functions, InertiaFunctions), "what is identified"
     torque = count_rows(flight, FlightRecord.spec(), FlightRecord.path("torque")) is not None
     flown = flight_source(flight, torque=torque)
     if job.dry_run:
         return nothing_written(job)
-    finish_parts(job, _along(functions, identified.draws(), flown, torque, found, job.progress), len(flown), inputs)
+    finish_parts(job, _along(functions, identified.draws(), flown, torque, findings, job.progress), len(flown), inputs)
     others = (*model_of_another(model, job.study), *other_vehicles([flight], job.study))
     notes = (*trust_notes(identified, model), *(Text(note, "warning") for note in others))
-    return Outcome(found.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(found, identified)))
+    return Outcome(findings.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(findings, identified)))
 
 
 def _along(
-    model: InertiaFunctions, draws: Draws | None, flown: TorqueSource, torque: bool, found: Findings, progress: Progress
+    model: InertiaFunctions,
+    draws: Draws | None,
+    flown: TorqueSource,
+    torque: bool,
+    findings: Findings,
+    progress: Progress,
 ) -> Iterator[PredictionRecord]:
     """Predict part by part, and take note of what is found."""
     for data in flown.chunks():
         for some in (data[start : start + PART] for start in range(0, len(data), PART)):
             part = PredictionRecord.of(model, some.time, some.motion, some.torque if torque else None, draws)
-            found.add(part)
-            progress(found.samples, len(flown))
+            findings.add(part)
+            progress(findings.samples, len(flown))
             yield part
 
 
 def _by_stretches(
-    predicted: _Predicted, stretches: Stretches, found: Findings, progress: Progress
+    predicted: _Predicted, stretches: FlightStretches, findings: Findings, progress: Progress
 ) -> Iterator[PredictionRecord]:
     """Predict stretch by stretch, and take note of what is found."""
     for stretch in stretches:
         own = predicted(stretch).part(stretch.own)
         for start in range(0, len(own.time), PART):
             part = own.part(slice(start, start + PART))
-            found.add(part)
-            progress(found.samples, len(stretches))
+            findings.add(part)
+            progress(findings.samples, len(stretches))
             yield part
 
 
@@ -122,7 +127,7 @@ def _of_vehicle(path: Path, flight: Path, study: Study) -> _Predicted:
     """
     model, told = read_model(path, study), _tells_torque(flight, study)
 
-    def predicted(stretch: Stretch) -> PredictionRecord:
+    def predicted(stretch: FlightStretch) -> PredictionRecord:
         (recording,) = of_vehicle([Recording(flight.name, stretch.signals)], model)
         if recording.signals.attitude is None:
             raise InputError(f"{flight}: lacks the attitude; a prediction is in Euler coordinates")

@@ -40,8 +40,8 @@ _FULL = 1.5
 
 
 @dataclass(frozen=True)
-class Flights:
-    """Flights and what to know about them."""
+class Recordings:
+    """Flights as signals on one clock each, and what to know about them."""
 
     recordings: tuple[Recording, ...]
     warnings: tuple[str, ...]
@@ -65,7 +65,7 @@ class ReadFlight:
     warnings: tuple[str, ...]
 
 
-def read_flights(paths: Sequence[Path], study: Study) -> Flights:
+def read_flights(paths: Sequence[Path], study: Study) -> Recordings:
     """Read flights, and import those that are logs.
 
     Parameters
@@ -82,7 +82,7 @@ def read_flights(paths: Sequence[Path], study: Study) -> Flights:
     made = [_recording(flight, study) for flight in flights]
     recordings, notes = with_voltage([recording for recording, _ in made], flights)
     warnings = [f"{flight.name}: {w}" for flight, (_, about) in zip(flights, made, strict=True) for w in about]
-    return Flights(tuple(recordings), (*warnings, *notes))
+    return Recordings(tuple(recordings), (*warnings, *notes))
 
 
 def read_flight(path: Path, study: Study) -> ReadFlight:

@@ -16,7 +16,7 @@ from cpfls_cli.report.content import Block, Facts, Heading, Section, Table, Text
 from cpfls_cli.report.numbers import joined, number, sentence
 
 
-def found(extended: Source[ExtendedRecord]) -> Iterator[Block]:
+def details(extended: Source[ExtendedRecord]) -> Iterator[Block]:
     """Say what the gap of an extended model becomes, and about which axes it gets worse."""
     yield _gap_table(extended, 1)
     yield from _playback_text(extended.record)

@@ -82,7 +82,7 @@ def grounds(record: IdentifiedRecord) -> Iterator[str]:
             yield f"{_SPEAKS.get(speaks, 'To know')}: {sentence(reason)}"
 
 
-def found(model: Source[IdentifiedRecord]) -> Iterator[Block]:
+def details(model: Source[IdentifiedRecord]) -> Iterator[Block]:
     """Say what was found, how good it is beside its baselines, and what to distrust."""
     yield from solution(model)
     yield scores_table(model, 1)

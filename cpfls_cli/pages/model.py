@@ -31,7 +31,7 @@ class _Kind(NamedTuple):
     ----------
     title, grounds : callable
         Of a record: what the model is, and the sentences behind the word of trust.
-    found : callable
+    details : callable
         Of a source: what stands below the box.
     worth : callable
         Of a record: what it is worth that is used elsewhere.
@@ -39,17 +39,17 @@ class _Kind(NamedTuple):
 
     title: Callable[[Any], str]
     grounds: Callable[[Any], Iterator[str]]
-    found: Callable[[Source[Any]], Iterator[Block]]
+    details: Callable[[Source[Any]], Iterator[Block]]
     worth: Callable[[Any], Iterator[str]]
 
 
 _KINDS: dict[str, _Kind] = {
     IdentifiedRecord.FORMAT.kind: _Kind(
-        identification.title, identification.grounds, identification.found, identification.worth
+        identification.title, identification.grounds, identification.details, identification.worth
     ),
-    ExtendedRecord.FORMAT.kind: _Kind(extended.title, extended.grounds, extended.found, extended.worth),
+    ExtendedRecord.FORMAT.kind: _Kind(extended.title, extended.grounds, extended.details, extended.worth),
     VehicleRecord.FORMAT.kind: _Kind(
-        vehicle_model.title, vehicle_model.grounds, vehicle_model.found, vehicle_model.worth
+        vehicle_model.title, vehicle_model.grounds, vehicle_model.details, vehicle_model.worth
     ),
 }
 
@@ -57,7 +57,7 @@ _KINDS: dict[str, _Kind] = {
 def answer(model: Source[Any]) -> Iterator[Block]:
     """Say how far to trust a model and why, what was found and how well it does, and what to distrust."""
     yield trust_box(model)
-    yield from _KINDS[model.record.FORMAT.kind].found(model)
+    yield from _KINDS[model.record.FORMAT.kind].details(model)
 
 
 def trust_box(model: Source[Any]) -> Box:

@@ -30,7 +30,7 @@ _AGAINST = {
 _INERTIA_PANELS = (("D22", "D33"), ("D13", "D23"))
 
 
-def answer(found: Findings, model: Record | None = None) -> Iterator[Text]:
+def answer(findings: Findings, model: Record | None = None) -> Iterator[Text]:
     """Say how well a model explains a flight, and where it cannot be trusted.
 
     Parameters
@@ -38,33 +38,33 @@ def answer(found: Findings, model: Record | None = None) -> Iterator[Text]:
     model : Record or None
         That predicted; None where it is not at hand.
     """
-    if found.held_against is None:
-        yield Text(f"{found.samples} samples, {found.outside} outside the region that the training data visited")
+    if findings.held_against is None:
+        yield Text(f"{findings.samples} samples, {findings.outside} outside the region that the training data visited")
     else:
-        against = _AGAINST[found.held_against]
-        yield Text(f"{found.samples} samples; torque of the whole vehicle, held against {against}")
-    score = found.score
+        against = _AGAINST[findings.held_against]
+        yield Text(f"{findings.samples} samples; torque of the whole vehicle, held against {against}")
+    score = findings.score
     if score is None:
         yield Text("the flight holds no torque, so there is no error to show")
     else:
         error = f"MSE {score.mse.mean():.4g} (N m)^2, relative error {score.worst_relative_error:.3%} (worst axis)"
         r2 = " ".join(f"{value:.4f}" for value in score.r2_body)
-        without = f" (without {found.vertical} samples near a vertical pitch)" if found.vertical else ""
+        without = f" (without {findings.vertical} samples near a vertical pitch)" if findings.vertical else ""
         yield from (Text(error), Text(f"R2 of body torque, roll pitch yaw: {r2}{without}"))
-    yield from _errors_of_vehicle(found)
-    yield from trust_along(found.outside, found.not_positive_definite, found.samples, model)
+    yield from _errors_of_vehicle(findings)
+    yield from trust_along(findings.outside, findings.not_positive_definite, findings.samples, model)
 
 
-def _errors_of_vehicle(found: Findings) -> Iterator[Text]:
+def _errors_of_vehicle(findings: Findings) -> Iterator[Text]:
     """Say how far torque and force of a whole vehicle are off at a sample, and what that does not tell."""
-    if found.held_against is None:
+    if findings.held_against is None:
         return
-    rows = (("torque about", "N m", found.body_torque_rms), ("force along", "N", found.force_rms))
+    rows = (("torque about", "N m", findings.body_torque_rms), ("force along", "N", findings.force_rms))
     for name, unit, rms in rows:
         if rms is not None:
             values = " ".join(number(value, 3) for value in rms.tolist())
             yield Text(f"rms error of the {name} x, y, z of the body: {values} {unit}")
-    if found.force_rms is None:
+    if findings.force_rms is None:
         yield Text("the flight knows neither acceleration nor velocity, so there is no force to hold the model against")
     yield Text("a torque that is right at each sample may still predict nothing; `cpfls replay` says what it predicts")
 

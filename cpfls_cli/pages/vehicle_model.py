@@ -94,7 +94,7 @@ def grounds(record: VehicleRecord) -> Iterator[str]:
     yield f"It holds {blocks}." if blocks else f"It holds nothing but {alone}."
 
 
-def found(vehicle: Source[VehicleRecord]) -> Iterator[Block]:
+def details(vehicle: Source[VehicleRecord]) -> Iterator[Block]:
     """Say how well a vehicle predicts what it was not fitted to, its numbers, and what to be careful with."""
     record = vehicle.record
     if record.held_out is not None:
