@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.spec import BODY, WORLD, Format, Record, dataset, group, record
+from cpfls_cli.rounding import less
 from cpfls_cli.validation.trust import Trust
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ class SignalErrorGroup:
     def rival(self) -> int:
         """What a model has to beat: the better over all horizons of the two predictions that know no model."""
         nothing, stays = 1, 2
-        return stays if self.total[stays] < self.total[nothing] else nothing
+        return stays if less(self.total[stays], self.total[nothing]) else nothing
 
     def summary(self, prediction: int) -> dict[str, Any]:
         """One prediction for machines."""
@@ -241,8 +242,8 @@ def better_to(errors: ErrorsByHorizon, signal: str) -> float:
     if group is None:
         return float("nan")
     summed = np.cumsum(group.mae[:3], axis=1)
-    less = np.flatnonzero(summed[_MODEL] < summed[1:].min(axis=0))
-    return float(errors.horizon_s[less[-1]]) if len(less) else 0.0
+    better = np.flatnonzero(less(summed[_MODEL], summed[1:].min(axis=0)))
+    return float(errors.horizon_s[better[-1]]) if len(better) else 0.0
 
 
 def trust_by_playback(held_out: PlaybackGroup | None) -> Trust:

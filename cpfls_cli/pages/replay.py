@@ -35,7 +35,7 @@ from cpfls_cli.report.canvas import (
 )
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import joined, number, sentence, whole_percent
-from cpfls_cli.rounding import tied
+from cpfls_cli.rounding import less, tied
 from cpfls_cli.validation.trust import Trust
 
 if TYPE_CHECKING:
@@ -64,7 +64,6 @@ _STYLES: tuple[dict[str, Any], ...] = (
 )
 _PLAYED: dict[str, Any] = {**style_of(1), "linestyle": "-", "zorder": 3}
 _SHOWN_WORST = 3
-_ROUNDING = 1e-9
 _SAID = 2
 _POSITIONS = ("x", "y", "z")
 
@@ -97,7 +96,7 @@ def verdict_box(replay: Source[ReplayRecord]) -> Box:
     rivals = _rivals(record)
     wrong = record.contradiction or ()
     sentences = [*beside_rivals(record), *_beside_stated(record)]
-    better = {name: group.total[_MODEL] < group.total[rival] for name, (group, rival) in rivals.items()}
+    better = {name: bool(less(*group.total[[_MODEL, rival]])) for name, (group, rival) in rivals.items()}
     moving = [name for name, (group, rival) in rivals.items() if group.total[rival] > 0]
     if not moving:
         return Box("REPLAY", sentence(f"{_name(record)} cannot be judged: the flight shows no motion"), sentences)
@@ -172,7 +171,7 @@ def _sentence(record: ErrorsByHorizon, name: str, group: SignalErrorGroup, rival
     words, (model, other) = _SIGNALS[name][0].capitalize(), group.total[[_MODEL, rival]]
     if other == 0:
         return f"{words}: “{_WORDS[record.prediction[rival]]}” has no error, for the flight shows no motion."
-    if model < other:
+    if less(model, other):
         much = f"over all horizons its errors are {whole_percent(float(1 - model / other))} smaller"
     else:
         much = f"over all horizons its errors are {number(float(model / other), 3)} times as large"
@@ -181,7 +180,7 @@ def _sentence(record: ErrorsByHorizon, name: str, group: SignalErrorGroup, rival
 
 def _where(record: ErrorsByHorizon, group: SignalErrorGroup, rival: int) -> str:
     """Say at which horizons the model is better: at the longest stretches of them, where they are many."""
-    better = group.mae[_MODEL] < (1 - _ROUNDING) * group.mae[rival]
+    better = less(group.mae[_MODEL], group.mae[rival])
     longest = sorted(sorted(runs(better), key=lambda run: run[0] - run[1])[:_SAID])
     horizon = [_seconds(value) for value in record.horizon_s]
     stretches = [f"{horizon[a]} to {horizon[b]}" if a < b else horizon[a] for a, b in longest]
@@ -234,7 +233,7 @@ def errors_table(record: ErrorsByHorizon, index: int) -> Table:
         words, unit, scale = _SIGNALS[name]
         for row in _shown(record):
             values = [*(scale * group.mae[row, chosen]), scale * group.total[row]]
-            worse = row == _MODEL and group.total[_MODEL] >= group.total[rival]
+            worse = row == _MODEL and not less(*group.total[[_MODEL, rival]])
             cells = [number(float(value), 3) for value in values]
             rows.append(
                 [
