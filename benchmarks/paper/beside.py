@@ -21,7 +21,7 @@ from benchmarks.paper.printed import (
 )
 from cpfls_cli.artifacts.scores import MODEL, TRAINING, JudgedGroup
 from cpfls_cli.artifacts.sweep import SettingRuns
-from cpfls_cli.pages.model import SQUARED_TORQUE, TORQUE
+from cpfls_cli.pages.identification import SQUARED_TORQUE, TORQUE
 from cpfls_cli.pages.sweep import joined_sweeps
 from cpfls_cli.report.content import Block, Cell, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent

@@ -15,7 +15,7 @@ from benchmarks.paper.printed import LEAST_TORQUE, TABLE_4, TABLE_5, PrintedColu
 from benchmarks.paper.search_claims import AS_GOOD, paired_ratio
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns, SweepRecord, spread
-from cpfls_cli.pages.model import SQUARED_TORQUE, TORQUE
+from cpfls_cli.pages.identification import SQUARED_TORQUE, TORQUE
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.sweep import joined_sweeps
 from cpfls_cli.report.canvas import GREY, plot, style_of

@@ -23,6 +23,7 @@ from cpfls_cli.artifacts.gap_flights import (
     FlightsGroup,
     NotExcitedGroup,
 )
+from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, LearnedGroup, learned_in
 from cpfls_cli.artifacts.model import VehicleGroup
 from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
 
@@ -244,7 +245,7 @@ class DiagnosisRecord(Record):
         "cpfls/diagnosis",
         "which physical effect a model misses, judged on flights that the fit did not see",
         "diagnose, gap",
-        ("disagreement", "held-out-1"),
+        ("disagreement", "flight-1", "held-out-1", "model-flight-1"),
     )
 
     verdict: str = dataset("verdict", "NAMED, PARTIAL, AMBIGUOUS, UNEXPLAINED, FLIGHTS_DIFFER, NO_GAP or NOT_EXCITED")
@@ -283,6 +284,7 @@ class DiagnosisRecord(Record):
         gaps=True,
         default=None,
     )
+    learned: LearnedGroup | None = group("learned", default=None)
 
     @classmethod
     def of(
@@ -339,6 +341,22 @@ class DiagnosisRecord(Record):
             difference=diagnosis.differences,
             shares=np.array([diagnosis.shares.get(kind, np.nan) for kind in KINDS]),
         )
+
+    @property
+    def model_learned_from(self) -> tuple[LearnedFlight, ...]:
+        """Flights that the model with the gap learned from."""
+        return learned_in(self.origin.inputs, self.learned, MODEL_FLIGHT)
+
+    @property
+    def learned_from(self) -> tuple[LearnedFlight, ...]:
+        """Flights that the effects were found in; of one flight alone a part, where its rest was held out."""
+        inputs = self.origin.inputs
+        files = [file for role, file in inputs.items() if role.startswith("flight-")]
+        lengths = np.diff([*self.flights.each.first, len(self.flights.signals.time)]).tolist()
+        training = lengths[: self.flights.each.role.count(TRAINING)]
+        halved = len(files) == 1 and not any(role.startswith("held-out") for role in inputs)
+        whole = [sum(lengths)] if halved else training
+        return tuple(map(LearnedFlight, files, training, whole))
 
     @property
     def effects_of_motion(self) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.gap_effects import StretchGroup, above_noise, gap_summary
 from cpfls_cli.artifacts.gap_flights import AuditGroup, FlightsGroup, NotExcitedGroup
+from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, LearnedGroup, learned_in
 from cpfls_cli.artifacts.model import VehicleGroup
 from cpfls_cli.artifacts.replay import PlaybackGroup
 from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
@@ -155,7 +156,7 @@ class DisagreementRecord(Record):
         "cpfls/disagreement",
         "where a model and flights disagree, with the flights",
         "compare, gap",
-        ("flight-1", "model"),
+        ("flight-1", "model", "model-flight-1"),
     )
 
     gap: GapGroup = group("gap")
@@ -170,6 +171,7 @@ class DisagreementRecord(Record):
     warning: tuple[str, ...] = dataset("warning", "what to know about the flights", "warning")
     base: VehicleGroup = group("base")
     flights: FlightsGroup = group("")
+    learned: LearnedGroup | None = group("learned", default=None)
 
     @classmethod
     def of(
@@ -204,6 +206,11 @@ class DisagreementRecord(Record):
             base=VehicleGroup.of(base),
             flights=FlightsGroup.of(recordings, ["given"] * len(recordings)),
         )
+
+    @property
+    def model_learned_from(self) -> tuple[LearnedFlight, ...]:
+        """Flights that the model learned from, which are not those that it is compared with."""
+        return learned_in(self.origin.inputs, self.learned, MODEL_FLIGHT)
 
     def is_base(self, stated: VehicleSettings) -> bool:
         """Tell whether it was made with the vehicle of a config and no effects, which `cpfls diagnose` starts from."""

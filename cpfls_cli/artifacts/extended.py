@@ -11,8 +11,10 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gap_effects import GapChangeGroup, NamedEffectsGroup, PlaybackChangeGroup, effect_summary
 from cpfls_cli.artifacts.gap_flights import AuditGroup
 from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
+from cpfls_cli.artifacts.replay import trust_by_playback
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, record
 from cpfls_cli.inertia import six_parameters
+from cpfls_cli.validation.trust import capped
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.extended import Refit
@@ -116,10 +118,16 @@ class ExtendedRecord(ModelRecord):
         return self.vehicle.repair
 
     @property
+    def trust(self) -> str:
+        """What playback on flights held out says of it, as far as they do not contradict themselves."""
+        return capped(trust_by_playback(self.playback), self.audit.contradiction or ())
+
+    @property
     def summary(self) -> dict[str, Any]:
         """The refit for machines."""
         return {
             "effects": [effect_summary(effect) for effect in self.effects.named],
             "gap_before": self.gap.summary_before,
             "gap_after": self.gap.summary_after,
+            **self.provenance,
         }

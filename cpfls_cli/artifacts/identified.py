@@ -22,10 +22,12 @@ from cpfls_cli.artifacts.evidence import (
     evidence_groups,
     group_of,
 )
+from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.model import InertiaFunctionsGroup, ModelRecord, VehicleGroup
 from cpfls_cli.artifacts.scores import MODEL, TRAINING, JudgedGroup
 from cpfls_cli.artifacts.spec import BODY, EULER, Format, dataset, group, record
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
+from cpfls_cli.validation.trust import Trust
 
 if TYPE_CHECKING:
     # What evaluates a model loads compiled kernels, which nobody waits for who only reads one.
@@ -173,6 +175,7 @@ class IdentifiedRecord(ModelRecord):
         learned: IntArray,
         evidence: Validation | None,
         vehicle: VehicleSettings,
+        parts: LearnedGroup,
     ) -> Self:
         """Arrange an identification and the evidence on it.
 
@@ -186,12 +189,15 @@ class IdentifiedRecord(ModelRecord):
             None where it was not gathered.
         vehicle : VehicleSettings
             As stated: what was identified is its inertia.
+        parts : LearnedGroup
+            How much of each flight trained.
         """
         from cpfls_cli.playback.model import VehicleModel
 
         baselines = {baseline.name: baseline.parameters for baseline in result.baselines}
         return cls(
             vehicle=IdentifiedVehicleGroup.of(VehicleModel(vehicle=vehicle, fuzzy=result.model)),
+            learned=parts,
             model=ChosenGroup(
                 weights=result.front.chromosomes[result.front.chosen],
                 base=base,
@@ -220,7 +226,10 @@ class IdentifiedRecord(ModelRecord):
     @cached_property
     def study(self) -> Study:
         """The study that it was identified with."""
-        return _study(self.origin.config, self.FORMAT.name)
+        from cpfls_cli.config.load import parse_config, validate
+
+        source = f"{self.FORMAT.name}: /config"
+        return validate(parse_config(self.origin.config, source), source)
 
     @property
     def functions(self) -> InertiaFunctionsGroup:
@@ -280,9 +289,9 @@ class IdentifiedRecord(ModelRecord):
         return self.same_everywhere and full and self.solve.condition_number <= WELL_CONDITIONED
 
     @property
-    def verdict_label(self) -> str | None:
-        """How far to trust it, as `Verdict` names it; None where that was not judged."""
-        return None if self.verdict is None else self.verdict.label
+    def trust(self) -> str:
+        """How far to trust it by its verdict, a word of `Trust`; of a file by a newer program possibly another."""
+        return (self.verdict and self.verdict.label) or Trust.NOT_JUDGED
 
     @property
     def validated(self) -> bool:
@@ -323,6 +332,7 @@ class IdentifiedRecord(ModelRecord):
             "held_out": {part: self._held_out_summary(part) for part in judged.held_out},
             "findings": list(self.findings),
             "verdict": None if self.verdict is None or self.verdict.label is None else self.verdict.summary,
+            **self.provenance,
         }
 
     def _held_out_summary(self, part: str) -> dict[str, Any]:
@@ -333,10 +343,3 @@ class IdentifiedRecord(ModelRecord):
             "outside": int(judged.outside[judged.parts.index(part)]),
             "baselines": {name: judged.summary_of(name, part) for name in judged.baselines},
         }
-
-
-def _study(config: str, path: object) -> Study:
-    from cpfls_cli.config.load import parse_config, validate
-
-    source = f"{path}: /config"
-    return validate(parse_config(config, source), source)

@@ -83,10 +83,6 @@ def check_outputs(job: Job, *paths: Path, replaceable: bool = False) -> None:
     ----------
     replaceable : bool
         Whether they may be replaced without --force.
-
-    Raises
-    ------
-    InputError
     """
     for path in paths:
         check_output(path, job.force or replaceable, job.inputs)

@@ -9,9 +9,11 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.gap_flights import AuditGroup
-from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, InputFile, Record, dataset, group, record
+from cpfls_cli.artifacts.learned import LearnedFlight, LearnedGroup, learned_in
+from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
+from cpfls_cli.validation.trust import Trust
 
 if TYPE_CHECKING:
     # Reading a record does not need the compiled loops that evaluate a model.
@@ -413,6 +415,7 @@ class ModelRecord(Record):
     )
 
     vehicle: VehicleGroup = group("vehicle")
+    learned: LearnedGroup | None = group("learned", default=None)
 
     def vehicle_model(self) -> VehicleModel:
         """Rebuild the model.
@@ -425,17 +428,26 @@ class ModelRecord(Record):
         return self.vehicle.vehicle_model()
 
     @property
-    def learned(self) -> dict[str, InputFile]:
-        """Flights that it was found in, by hash."""
-        roles = self.origin.inputs.items()
-        return {file.sha256: file for role, file in roles if role == "flight" or role.startswith("flight-")}
+    def learned_from(self) -> tuple[LearnedFlight, ...]:
+        """Flights that it was found in, those of what it was built on among them."""
+        # What is not written yet knows no files.
+        return () if self.header is None else learned_in(self.header.inputs, self.learned, "flight")
 
     @property
-    def verdict_label(self) -> str | None:
-        """How far to trust it, as its kind is judged; None where that was not judged."""
-        return None
+    def trust(self) -> str:
+        """How far to trust it, a word of `Trust`; of a file by a newer program possibly another."""
+        return Trust.NOT_JUDGED
 
     @property
     def stopped(self) -> str:
         """Why the search for it ended before its end; empty where it did not."""
         return ""
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """How far to trust it and what it learned from, for machines."""
+        flights = [
+            {"name": flight.file.name, "sha256": flight.file.sha256, "samples": flight.samples, "of": flight.of}
+            for flight in self.learned_from
+        ]
+        return {"trust": str(self.trust), "learned_from": flights}

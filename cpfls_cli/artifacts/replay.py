@@ -9,6 +9,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.spec import BODY, WORLD, Format, Record, dataset, group, record
+from cpfls_cli.rounding import less
+from cpfls_cli.validation.trust import Trust
 
 if TYPE_CHECKING:
     from cpfls_cli.playback.flight import LoggedFlight
@@ -22,6 +24,9 @@ VEHICLE = "vehicle"
 
 USUAL = "usual"
 """What is between samples where nobody says: measured speeds are straight lines, commands stay."""
+
+CONTROL_HORIZON = 0.1
+"""Horizon in s to which a controller of the attitude relies on its model."""
 
 _DRAWN_RUNS = 12
 _MODEL = 0
@@ -50,7 +55,7 @@ class SignalErrorGroup:
     def rival(self) -> int:
         """What a model has to beat: the better over all horizons of the two predictions that know no model."""
         nothing, stays = 1, 2
-        return stays if self.total[stays] < self.total[nothing] else nothing
+        return stays if less(self.total[stays], self.total[nothing]) else nothing
 
     def summary(self, prediction: int) -> dict[str, Any]:
         """One prediction for machines."""
@@ -237,8 +242,24 @@ def better_to(errors: ErrorsByHorizon, signal: str) -> float:
     if group is None:
         return float("nan")
     summed = np.cumsum(group.mae[:3], axis=1)
-    less = np.flatnonzero(summed[_MODEL] < summed[1:].min(axis=0))
-    return float(errors.horizon_s[less[-1]]) if len(less) else 0.0
+    better = np.flatnonzero(less(summed[_MODEL], summed[1:].min(axis=0)))
+    return float(errors.horizon_s[better[-1]]) if len(better) else 0.0
+
+
+def trust_by_playback(held_out: PlaybackGroup | None) -> Trust:
+    """Judge a model by its playback along flights that it was not found in.
+
+    Good for simulation where errors of rates, attitude, velocity and position, as far as the flights know them, add
+    up to less over the horizon than those of what knows no model; for control where those of the rates do, over
+    0.1 s at least.
+    """
+    if held_out is None:
+        return Trust.NOT_JUDGED
+    last, known = float(held_out.horizon_s[-1]), held_out.errors
+    reached = {signal: better_to(held_out, signal) for signal, group in known.items() if group is not None}
+    if known["velocity"] is not None and all(horizon >= last for horizon in reached.values()):
+        return Trust.SIMULATION
+    return Trust.CONTROL if reached["body_rate"] >= min(CONTROL_HORIZON, last) else Trust.DO_NOT_USE
 
 
 def contradictions_of(flights: Sequence[LoggedFlight]) -> tuple[str, ...] | None:

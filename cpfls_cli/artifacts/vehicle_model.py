@@ -9,18 +9,17 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
-from cpfls_cli.artifacts.parameters import Parameter, parameters_of
-from cpfls_cli.artifacts.replay import HeldOutGroup, better_to
+from cpfls_cli.artifacts.parameters import parameters_of
+from cpfls_cli.artifacts.replay import HeldOutGroup, trust_by_playback
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, record, rows_of
+from cpfls_cli.validation.trust import Trust, capped
 
 if TYPE_CHECKING:
     # Reading a record does not need the compiled loops that play a vehicle back.
     from cpfls_cli.playback.structure import Choice
     from cpfls_cli.playback.vehicle import FoundVehicle
-
-CONTROL_HORIZON = 0.1
-"""Horizon in s to which a controller of the attitude relies on its model."""
 
 
 @record
@@ -130,12 +129,14 @@ class VehicleRecord(ModelRecord):
         held_out: HeldOutGroup | None,
         warnings: Sequence[str],
         contradictions: Sequence[str] | None = None,
+        learned: LearnedGroup | None = None,
         *,
         commanded: bool,
     ) -> Self:
         """Arrange a vehicle that was found, and how well it predicts flights that it was not found in."""
         return cls(
             vehicle=VehicleGroup.of(replace(found.model, commanded=commanded)),
+            learned=learned,
             found=columns_of(
                 FoundNumbersGroup,
                 found.numbers,
@@ -161,8 +162,8 @@ class VehicleRecord(ModelRecord):
         )
 
     @property
-    def verdict_label(self) -> str:
-        """What playback on flights held out says of it; see `verdict`."""
+    def trust(self) -> str:
+        """What playback on flights held out says of it."""
         return self.verdict
 
     @property
@@ -171,22 +172,9 @@ class VehicleRecord(ModelRecord):
         return "" if self.complete else "interrupted"
 
     @property
-    def verdict(self) -> str:
-        """What playback on flights held out says of it.
-
-        Good for simulation where errors of rates, attitude, velocity and position, as far as the flights know them, add
-        up to less over the horizon than those of what knows no model; for control where those of the rates do, over
-        0.1 s at least. For nothing where the flights contradict themselves, however well it repeats them.
-        """
-        if self.contradiction:
-            return "do-not-use"
-        if self.held_out is None:
-            return "not-judged"
-        last, known = float(self.held_out.horizon_s[-1]), self.held_out.errors
-        reached = {signal: better_to(self.held_out, signal) for signal, group in known.items() if group is not None}
-        if known["velocity"] is not None and all(horizon >= last for horizon in reached.values()):
-            return "good-for-simulation"
-        return "good-for-control" if reached["body_rate"] >= min(CONTROL_HORIZON, last) else "do-not-use"
+    def verdict(self) -> Trust:
+        """What playback on flights held out says of it, as far as they do not contradict themselves."""
+        return capped(trust_by_playback(self.held_out), self.contradiction or ())
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -195,7 +183,8 @@ class VehicleRecord(ModelRecord):
         return {
             **self.vehicle.summary,
             "verdict": self.verdict,
-            "parameters": {each.key: _but_key(each) for each in parameters_of(self)},
+            **self.provenance,
+            "parameters": {row.pop("key"): row for row in (each._asdict() for each in parameters_of(self))},
             "numbers": numbers,
             "differences": {}
             if self.difference is None
@@ -209,7 +198,3 @@ class VehicleRecord(ModelRecord):
             "contradictions": list(self.contradiction or ()),
             "warnings": list(self.warning),
         }
-
-
-def _but_key(parameter: Parameter) -> dict[str, Any]:
-    return {name: value for name, value in parameter._asdict().items() if name != "key"}

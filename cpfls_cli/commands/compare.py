@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish
+from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.config.unknown import require_known
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
-from cpfls_cli.flights.inputs import numbered_roles
-from cpfls_cli.flights.recordings import Flights, read_flights
-from cpfls_cli.flights.same_vehicle import read_model
+from cpfls_cli.flights.inputs import known_by, numbered_roles
+from cpfls_cli.flights.recordings import Recordings, read_flights
+from cpfls_cli.flights.same_vehicle import learned_by, read_model
 from cpfls_cli.gap.compare import compare
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.pages.disagreement import answer
 from cpfls_cli.pages.source import source_of
+from cpfls_cli.pages.trust import KnownBy, seen_warnings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.outcome import Outcome, nothing_written
 
@@ -36,25 +39,37 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     model : Path or None
         Identified, with effects, or of a whole vehicle; None for the rigid body of the vehicle.
     """
-    inputs = begin(job, numbered_roles("flight", flights) | ({} if model is None else {"model": model}))
+    roles = numbered_roles("flight", flights)
+    inputs = begin(job, roles | ({} if model is None else {"model": model}))
     check_ignored(job.study)
     require_known(job.study, "compare", whole=model is not None and holds(model, VehicleRecord))
-    given, base = _with_model(read_flights(flights, job.study), model, job.study)
+    read, learned = read_flights(flights, job.study), learned_by(model)
+    base = VehicleModel(vehicle=job.study.vehicle) if model is None else read_model(model, job.study)
+    given = replace(read, recordings=tuple(of_vehicle(read.recordings, base)))
     if job.dry_run:
         return nothing_written(job)
-    record = finish(job, compared(job.study, given, base, progress_of(job.progress)), inputs)
+    given = with_seen(given, model, learned, known_by(roles, inputs))
+    record = compared(job.study, given, base, progress_of(job.progress))
+    record = finish_disagreement(job, record, learned, inputs)
     return Outcome(record.summary, tuple(answer(source_of(job, record))))
 
 
-def _with_model(given: Flights, path: Path | None, study: Study) -> tuple[Flights, VehicleModel]:
-    """Read a model; flights become those of its vehicle."""
-    model = VehicleModel(vehicle=study.vehicle) if path is None else read_model(path, study)
-    recordings = tuple(of_vehicle(given.recordings, model))
-    return replace(given, recordings=recordings), model
+def with_seen(given: Recordings, model: Path | None, learned: Sequence[LearnedFlight], judged: KnownBy) -> Recordings:
+    """Say of flights which of them the model that is held against them learned from."""
+    seen = () if model is None else seen_warnings(model.name, learned, judged)
+    return replace(given, warnings=(*seen, *given.warnings))
+
+
+def finish_disagreement(
+    job: Job, record: DisagreementRecord, learned: Sequence[LearnedFlight], inputs: Mapping[str, InputFile]
+) -> DisagreementRecord:
+    """Write a disagreement, with the flights that its model learned from as inputs."""
+    of_model, parts = as_inputs(MODEL_FLIGHT, learned)
+    return finish(job, replace(record, learned=parts), {**inputs, **of_model})
 
 
 def compared(
-    study: Study, given: Flights, model: VehicleModel, progress: Callable[[float, str], None]
+    study: Study, given: Recordings, model: VehicleModel, progress: Callable[[float, str], None]
 ) -> DisagreementRecord:
     """Compare a model with flights.
 
@@ -68,12 +83,7 @@ def compared(
 
 
 def check_ignored(study: Study) -> None:
-    """Refuse names in `gap.ignore` that no effect has.
-
-    Raises
-    ------
-    ConfigError
-    """
+    """Refuse names in `gap.ignore` that no effect has."""
     for name in study.gap.ignore:
         if name not in CATALOGUE:
             near = get_close_matches(name, CATALOGUE, n=1, cutoff=0.4)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,8 @@ from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.gap_effects import effect_summary, estimate_summary
 from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.learned import MODEL_FLIGHT, as_inputs
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.commands.compare import check_ignored, progress_of
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.errors import InputError
@@ -23,6 +26,7 @@ from cpfls_cli.pages.diagnosis import answer
 from cpfls_cli.pages.effects import closest_sentence
 from cpfls_cli.pages.first_screen import counted_notes, next_steps, verdict_box
 from cpfls_cli.pages.source import Source, source_of
+from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Block, Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
@@ -53,13 +57,31 @@ def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
     warnings = (*compared.warning, *held.warnings)
     progress = progress_of(job.progress)
     diagnosis, record = diagnosed(job.study, split, warnings, compared.base.vehicle_model(), progress)
-    record = finish(job, record, inputs)
-    learned = [file for role, file in compared.origin.inputs.items() if role.startswith("flight")]
-    twice = seen_twice(learned, [file for role, file in inputs.items() if role.startswith("held-out")])
-    notes: list[Block] = [Text(note, "warning") for note in twice]
+    record = finish_diagnosis(job, record, compared, inputs)
+    notes: list[Block] = list(seen_notes(record))
     notes += folded_notes(record.warning, f"`cpfls report CONFIG {job.output.name} -o report.html` lists them")
     answered = whole_answer(source_of(job, record), diagnosis)
     return Outcome(whole_summary(record, diagnosis), (*answered, *notes))
+
+
+def finish_diagnosis(
+    job: Job, record: DiagnosisRecord, compared: DisagreementRecord, inputs: Mapping[str, InputFile]
+) -> DiagnosisRecord:
+    """Write a diagnosis, with the flights of the disagreement and those that its model learned from as inputs."""
+    flights = {role: file for role, file in compared.origin.inputs.items() if role.startswith("flight")}
+    of_model, parts = as_inputs(MODEL_FLIGHT, compared.model_learned_from)
+    return finish(job, replace(record, learned=parts), {**inputs, **flights, **of_model})
+
+
+def seen_notes(record: DiagnosisRecord) -> Iterator[Text]:
+    """Warn of flights that stand for two, and of those held out that the effects or their model were found in."""
+    inputs = record.origin.inputs
+    held_out = [file for role, file in inputs.items() if role.startswith("held-out")]
+    twice = seen_twice([file for role, file in inputs.items() if role.startswith("flight")], held_out)
+    model = inputs["disagreement"].name
+    hashes = [(file.name, (file.sha256,)) for file in held_out]
+    seen = seen_warnings(f"the model of {model}", record.model_learned_from, hashes)
+    return (Text(note, "warning") for note in (*twice, *seen))
 
 
 def diagnosed(

@@ -77,16 +77,7 @@ def _summary(job: Job, form: str, sheet: Sheet, made: Exported, sizes: dict[str,
 
 
 def _form_of(output: Path) -> str:
-    """Choose a form by the suffix of a file.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    InputError
-    """
+    """Choose a form by the suffix of a file."""
     for form, ending in ENDINGS.items():
         if output.suffix == ending:
             return form
@@ -104,10 +95,6 @@ def _prefix_of(output: Path, form: str, name: str | None) -> str:
     ----------
     name : str or None
         What was asked for.
-
-    Raises
-    ------
-    InputError
     """
     if name is None:
         return identifier(output.stem)
@@ -117,16 +104,15 @@ def _prefix_of(output: Path, form: str, name: str | None) -> str:
 
 
 def _outputs_of(output: Path, form: str) -> list[Path]:
-    """Name the files to be written, the one that needs the others last.
-
-    Raises
-    ------
-    InputError
-    """
+    """Name the files to be written, the one that needs the others last."""
     ending = ENDINGS[form]
     if output.suffix != ending:
         raise InputError(f"{output}: --format {form} writes a file that ends in {ending}; name it so")
-    if ending == ".py" and not _importable(output.stem):
+    stem = output.stem
+    importable = (
+        stem.isidentifier() and not keyword.iskeyword(stem) and stem not in {*_IMPORTED, *sys.stdlib_module_names}
+    )
+    if ending == ".py" and not importable:
         raise InputError(
             f"{output}: Python cannot import a module of this name; use letters, digits and _, no digit first, none of "
             f"its own words or modules, not {', '.join(_IMPORTED[:-1])} or {_IMPORTED[-1]}, such as "
@@ -137,7 +123,3 @@ def _outputs_of(output: Path, form: str) -> list[Path]:
     if not re.fullmatch(r"[A-Za-z0-9_.+-]+", output.stem):
         raise InputError(f"{output}: C includes its header by name; use letters, digits and any of _ . + - in it")
     return [output.with_suffix(FORMS[form].also), output]
-
-
-def _importable(stem: str) -> bool:
-    return stem.isidentifier() and not keyword.iskeyword(stem) and stem not in {*_IMPORTED, *sys.stdlib_module_names}

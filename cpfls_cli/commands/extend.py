@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
@@ -10,14 +11,17 @@ from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.gap_effects import PlaybackChangeGroup
 from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING
 from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.learned import LearnedFlight, as_inputs, joined_flights
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.flights.same_vehicle import read_base, read_of_vehicle
+from cpfls_cli.flights.same_vehicle import learned_by, read_base, read_of_vehicle
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
 from cpfls_cli.gap.playback import errors_by_horizon, left_out, played_pairs
 from cpfls_cli.gap.whole_vehicle import require_body, whole_vehicle
-from cpfls_cli.pages.extended import answer, warnings
+from cpfls_cli.pages.extended import warnings
+from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.outcome import Outcome, nothing_written
@@ -49,9 +53,29 @@ def run(job: Job, diagnosis: Path, model: Path | None) -> Outcome:
         return nothing_written(job)
     training, held = (diagnosed.flights.recordings(job.study, role) for role in (TRAINING, HELD_OUT))
     record = extended(job.study, training, held, diagnosed, base)
-    record = finish(job, record, inputs)
+    own = None if model is None else learned_by(model)
+    record = finish_extended(job, record, diagnosed, inputs, own)
     summary = {**record.summary, "warnings": warnings(record)}
     return Outcome(summary, tuple(answer(source_of(job, record))))
+
+
+def finish_extended(
+    job: Job,
+    record: ExtendedRecord,
+    diagnosis: DiagnosisRecord,
+    inputs: Mapping[str, InputFile],
+    of_base: Sequence[LearnedFlight] | None = None,
+) -> ExtendedRecord:
+    """Write an extended model, with the flights that its effects and its base learned from as inputs.
+
+    Parameters
+    ----------
+    of_base : sequence of LearnedFlight or None
+        None where the base is the model of the diagnosis.
+    """
+    known = diagnosis.model_learned_from if of_base is None else of_base
+    flights, parts = as_inputs("flight", joined_flights(diagnosis.learned_from, known))
+    return finish(job, replace(record, learned=parts), {**inputs, **flights})
 
 
 def named_effects(diagnosis: DiagnosisRecord) -> Sequence[NamedEffect]:
@@ -74,10 +98,6 @@ def require_named(verdict: str, effects: Sequence[NamedEffect]) -> None:
     ----------
     effects : sequence of NamedEffect
         Those that it names.
-
-    Raises
-    ------
-    ComputationError
     """
     if verdict not in _EXTENDS or not effects:
         closest = " (those that it calls closest are not it)" if verdict == GapVerdict.UNEXPLAINED else ""

@@ -10,17 +10,25 @@ from pathlib import Path
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.job import Job, finish, input_file, take_inputs
+from cpfls_cli.artifacts.job import Job, input_file, take_inputs
+from cpfls_cli.artifacts.learned import LearnedFlight
 from cpfls_cli.artifacts.output import check_folder, filled_folder, refuse_inputs, write_text
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.commands import report
-from cpfls_cli.commands.compare import check_ignored, compared, progress_of
-from cpfls_cli.commands.diagnose import diagnosed, folded_notes, whole_answer, whole_summary
-from cpfls_cli.commands.extend import extended
+from cpfls_cli.commands.compare import check_ignored, compared, finish_disagreement, progress_of, with_seen
+from cpfls_cli.commands.diagnose import (
+    diagnosed,
+    finish_diagnosis,
+    folded_notes,
+    seen_notes,
+    whole_answer,
+    whole_summary,
+)
+from cpfls_cli.commands.extend import extended, finish_extended
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.flights.inputs import numbered_roles
-from cpfls_cli.flights.recordings import Flights, FlightSplit, read_flights, seen_twice, split_flights
-from cpfls_cli.flights.same_vehicle import read_base
+from cpfls_cli.flights.inputs import known_by, numbered_roles
+from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, split_flights
+from cpfls_cli.flights.same_vehicle import learned_by, read_base
 from cpfls_cli.gap.naming.results import Diagnosis
 from cpfls_cli.pages.disagreement import where
 from cpfls_cli.pages.extended import model_with, warnings
@@ -37,9 +45,10 @@ FILES = ("disagreement.h5", "diagnosis.h5", "extended.h5", "report.html", "gap.j
 class _Given:
     """What the workflow starts from."""
 
-    flights: Flights
+    flights: Recordings
     split: FlightSplit
     base: VehicleModel
+    learned: tuple[LearnedFlight, ...]
     inputs: Mapping[str, InputFile]
 
     def inputs_of(self, role: str) -> dict[str, InputFile]:
@@ -86,7 +95,8 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path
         text = json.dumps(as_json(summary), indent=1, allow_nan=False)
         write_text(folder / "gap.json", text + "\n")
         job.progress(0.97, 1, "report")
-        report.run(replace(job, output=folder / "report.html", progress=_quiet), written)
+        # Without a bar of its own: the bar is that of the whole.
+        report.run(replace(job, output=folder / "report.html", progress=lambda *_: None), written)
     job.progress(1, 1)
     return Outcome(summary, tuple(_blocks(job, given, answers)))
 
@@ -103,7 +113,9 @@ def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: P
     given, held = read.recordings[: len(flights)], read.recordings[len(flights) :]
     split = split_flights(given, held, job.study.gap)
     base = read_base(model, job.study)
-    return _Given(Flights(given, read.warnings), split, base, inputs)
+    learned, judged = learned_by(model), known_by(numbered_roles("flight", flights), inputs)
+    whole = with_seen(Recordings(given, read.warnings), model, learned, judged)
+    return _Given(whole, split, base, learned, inputs)
 
 
 def _answers(job: Job, given: _Given) -> _Answers:
@@ -122,20 +134,20 @@ def _written(job: Job, given: _Given, answers: _Answers, folder: Path) -> tuple[
     """Write the artifacts, each made from the one before, and give them back with the headers that say so."""
     paths = [folder / name for name in FILES[:3]]
     jobs = [replace(job, output=path) for path in paths]
-    first = finish(jobs[0], answers.disagreement, given.inputs_of("flight") | given.inputs_of("model"))
+    compared_with = given.inputs_of("flight") | given.inputs_of("model")
+    first = finish_disagreement(jobs[0], answers.disagreement, given.learned, compared_with)
     inputs = {"disagreement": input_file(paths[0]), **given.inputs_of("held-out")}
-    second = finish(jobs[1], answers.diagnosed, inputs)
+    second = finish_diagnosis(jobs[1], answers.diagnosed, first, inputs)
     if answers.extended is None:
         return replace(answers, disagreement=first, diagnosed=second), paths[:2]
-    third = finish(jobs[2], answers.extended, {"diagnosis": input_file(paths[1])})
+    third = finish_extended(jobs[2], answers.extended, second, {"diagnosis": input_file(paths[1])})
     return replace(answers, disagreement=first, diagnosed=second, extended=third), paths
 
 
 def _blocks(job: Job, given: _Given, answers: _Answers) -> Iterator[Block]:
     disagreement = source_of(replace(job, output=job.output / FILES[0]), answers.disagreement)
     diagnosis = source_of(replace(job, output=job.output / FILES[1]), answers.diagnosed)
-    twice = seen_twice(given.inputs_of("flight").values(), given.inputs_of("held-out").values())
-    yield from (Text(note, "warning") for note in twice)
+    yield from seen_notes(answers.diagnosed)
     yield from whole_answer(diagnosis, answers.diagnosis)
     yield from where(disagreement)
     if answers.extended is None:
@@ -144,7 +156,3 @@ def _blocks(job: Job, given: _Given, answers: _Answers) -> Iterator[Block]:
         yield from (Text(warning, "warning") for warning in warnings(answers.extended))
         yield Text(model_with(str(job.output / "extended.h5"), answers.extended))
     yield from folded_notes(given.flights.warnings, f"{job.output / 'report.html'} lists them")
-
-
-def _quiet(done: float, total: int, note: str = "") -> None:
-    """Show nothing: the bar is that of the whole."""

@@ -11,6 +11,7 @@ from signal import SIGINT
 
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job, finish
+from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.commands.stopped import stopped, without_model
 from cpfls_cli.config.study import Study, generator, settings_of
@@ -19,7 +20,7 @@ from cpfls_cli.errors import ComputationError, ConfigError
 from cpfls_cli.flights.flight_source import check_file
 from cpfls_cli.flights.inputs import choosing_source, held_out_parts, input_roles
 from cpfls_cli.flights.same_vehicle import other_vehicles
-from cpfls_cli.flights.training import TrainingData, read_training
+from cpfls_cli.flights.training import TrainingData, flight_roles, read_training
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.excitation import swings
 from cpfls_cli.identification.findings import short_flight
@@ -79,7 +80,8 @@ def run(
     with search.kept():
         evidence, signal = _evidence(job, result, data, held_out, wrong, watch.signal)
         base, vehicle = job.study.identification.base, job.study.vehicle
-        record = finish(job, IdentifiedRecord.of(result, base, data.indices, evidence, vehicle), inputs)
+        parts = LearnedGroup.parts(flight_roles(flights), data.parts)
+        record = finish(job, IdentifiedRecord.of(result, base, data.indices, evidence, vehicle, parts), inputs)
     search.end(result.stop_reason)
     seconds = round(time.perf_counter() - clock, 3)
     summary = {**record.summary, "not_positive_definite": result.indefinite, "seconds": seconds}
@@ -183,7 +185,7 @@ def _evidence(
     try:
         with settings_of("identification", job.study):
             tell = partial(job.progress, total, total)
-            found = examine(data.training, data.learned, held_out, settings, result, rng, tell)
-            return replace(found, verdict=contradicted(found.verdict, wrong)), None
+            evidence = examine(data.training, data.learned, held_out, settings, result, rng, tell)
+            return replace(evidence, verdict=contradicted(evidence.verdict, wrong)), None
     except KeyboardInterrupt as interrupt:
         return None, next(iter(interrupt.args), SIGINT)

@@ -48,6 +48,8 @@ from cpfls_cli.trajectory.planning import Trajectory
 from cpfls_cli.weak_form.windows import common_windows
 
 _PERIOD = 0.02
+"""Most time between samples that a search looks at, s."""
+
 _SAMPLES_IN_A_WINDOW = 20
 _WAYPOINT_STEP_S = 0.1
 _OPEN = (GapVerdict.NOT_EXCITED, GapVerdict.NO_GAP)
@@ -95,18 +97,19 @@ def run(job: Job, diagnosis: Path | None = None, plot: bool = False) -> Outcome:
     figures = figure_paths(job, figure_names(held=False) if plot else ())
     check_outputs(job, waypoints, *figures)
     with settings_of("trajectory", study):
-        room = room_of(study.trajectory, study.vehicle, study.gap.ground_height_m, _period(study))
+        period = min(_PERIOD, study.gap.window_s / _SAMPLES_IN_A_WINDOW)
+        room = room_of(study.trajectory, study.vehicle, study.gap.ground_height_m, period)
     case = _named(study, room) if diagnosis is None else _left_open(study, diagnosis)
     if job.dry_run:
         return nothing_written(job)
     asked = goal(case.questions, case.flights, room, case.logging)
-    found = next_flight(asked, generator(study, "next-flight"), job.progress)
-    planned = room.planned(found.path, study.trajectory.sample_time_s)
+    flight = next_flight(asked, generator(study, "next-flight"), job.progress)
+    planned = room.planned(flight.path, study.trajectory.sample_time_s)
     demand = flyability(vars(planned), study.vehicle, study.trajectory.tilt_max_rad)
     problems = demand_sentences(demand, planned)
     if problems:
         raise ComputationError("\n".join([*problems, f"{job.output}: no path was written; lower trajectory.limits"]))
-    questions, notes = _told(study, asked, found, planned)
+    questions, notes = _told(study, asked, flight, planned)
     record = finish(job, TrajectoryRecord.of(planned, questions), inputs)
     write_text(waypoints, waypoint_lines(planned))
     source = source_of(job, record)
@@ -125,11 +128,6 @@ def waypoint_lines(planned: Trajectory) -> str:
     rows = np.concatenate(columns, axis=1)[::step]
     head = "time_s,x_m,y_m,z_m,yaw_rad,vx_m_s,vy_m_s,vz_m_s"
     return "\n".join([head, *(",".join(f"{value:.4f}" for value in row) for row in rows)]) + "\n"
-
-
-def _period(study: Study) -> float:
-    """Time between samples that a search looks at, s."""
-    return min(_PERIOD, study.gap.window_s / _SAMPLES_IN_A_WINDOW)
 
 
 def _effects(study: Study) -> list[Effect]:
@@ -224,11 +222,11 @@ def _open_effects(
     return [], unseen
 
 
-def _told(study: Study, asked: Goal, found: NextFlight, planned: Trajectory) -> tuple[QuestionGroup, list[str]]:
+def _told(study: Study, asked: Goal, flight: NextFlight, planned: Trajectory) -> tuple[QuestionGroup, list[str]]:
     """Judge the path that was found, as planned and as flown, beside other flights."""
     room, logging = asked.room, asked.logging
     answers = asked.answers(planned_signals(planned, room, logging))
-    others = [asked.answers(planned_signals(room.planned(path), room, logging)) for path in found.random]
+    others = [asked.answers(planned_signals(room.planned(path), room, logging)) for path in flight.random]
     again = asked.answers(None, again=2)
     known = any(evidence.rows for evidence in asked.known)
     flown, notes = _flown(study, asked, planned)

@@ -14,9 +14,10 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish_parts
+from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.artifacts.store import count_rows, holds, read_header, read_record
+from cpfls_cli.artifacts.store import count_rows, read_header, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
@@ -27,7 +28,8 @@ from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.flight_source import Stretch, Stretches, check_file, flight_source, flight_stretches
+from cpfls_cli.flights.flight_source import FlightStretch, FlightStretches, check_file, flight_source, flight_stretches
+from cpfls_cli.flights.inputs import hashes_of
 from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles, read_model, rebuilt
 from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_balance
 from cpfls_cli.gap.whole_vehicle import of_vehicle
@@ -36,6 +38,7 @@ from cpfls_cli.logs.formats import is_log
 from cpfls_cli.pages.model import trust_notes
 from cpfls_cli.pages.prediction import answer
 from cpfls_cli.pages.sensors import contradicted
+from cpfls_cli.pages.trust import NOT_SEEN, seen_words
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.report.content import Text
@@ -46,7 +49,7 @@ if TYPE_CHECKING:
     from cpfls_cli.validation.bootstrap import Draws
 
 
-_Predicted = Callable[[Stretch], PredictionRecord]
+_Predicted = Callable[[FlightStretch], PredictionRecord]
 
 
 def run(job: Job, model: Path, flight: Path) -> Outcome:
@@ -58,53 +61,61 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
         Identified, one with effects, or of a whole vehicle.
     """
     inputs = begin(job, {"model": model, "flight": flight})
-    require_known(job.study, "predict", whole=holds(model, VehicleRecord))
-    whole = not holds(model, IdentifiedRecord)
-    found, wrong = Findings(), contradictions(check_file(flight, job.study, driven=whole))
+    record = read_record(model, ModelRecord)
+    require_known(job.study, "predict", whole=isinstance(record, VehicleRecord))
+    identified = record if isinstance(record, IdentifiedRecord) else None
+    findings, wrong = Findings(), contradictions(check_file(flight, job.study, driven=identified is None))
+    seen = seen_words(record, hashes_of(flight, inputs["flight"]))
     said = [Text(contradicted(each), "warning") for each in wrong]
-    if whole:
+    said += [] if seen == NOT_SEEN else [Text(f"{model.name} along {flight.name}: {seen}")]
+    if identified is None:
         predicted, stretches = _of_vehicle(model, flight, job.study), flight_stretches(flight, job.study)
         if job.dry_run:
             predicted(next(iter(stretches)))
             return nothing_written(job)
-        finish_parts(job, _by_stretches(predicted, stretches, found, job.progress), len(stretches), inputs)
+        finish_parts(job, _by_stretches(predicted, stretches, findings, job.progress), len(stretches), inputs)
         about = (Text(f"{stretches.name}: {warning}", "warning") for warning in stretches.warnings)
-        return Outcome(found.summary | {"contradictions": list(wrong)}, (*said, *about, *answer(found)))
-    identified = read_record(model, IdentifiedRecord)
+        notes = (*trust_notes(record, model), *about)
+        return Outcome(findings.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(findings)))
     functions = rebuilt(model, identified).fuzzy
     assert isinstance(functions, InertiaFunctions), "what is identified"
     torque = count_rows(flight, FlightRecord.spec(), FlightRecord.path("torque")) is not None
     flown = flight_source(flight, torque=torque)
     if job.dry_run:
         return nothing_written(job)
-    finish_parts(job, _along(functions, identified.draws(), flown, torque, found, job.progress), len(flown), inputs)
+    finish_parts(job, _along(functions, identified.draws(), flown, torque, findings, job.progress), len(flown), inputs)
     others = (*model_of_another(model, job.study), *other_vehicles([flight], job.study))
     notes = (*trust_notes(identified, model), *(Text(note, "warning") for note in others))
-    return Outcome(found.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(found, identified)))
+    return Outcome(findings.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(findings, identified)))
 
 
 def _along(
-    model: InertiaFunctions, draws: Draws | None, flown: TorqueSource, torque: bool, found: Findings, progress: Progress
+    model: InertiaFunctions,
+    draws: Draws | None,
+    flown: TorqueSource,
+    torque: bool,
+    findings: Findings,
+    progress: Progress,
 ) -> Iterator[PredictionRecord]:
     """Predict part by part, and take note of what is found."""
     for data in flown.chunks():
         for some in (data[start : start + PART] for start in range(0, len(data), PART)):
             part = PredictionRecord.of(model, some.time, some.motion, some.torque if torque else None, draws)
-            found.add(part)
-            progress(found.samples, len(flown))
+            findings.add(part)
+            progress(findings.samples, len(flown))
             yield part
 
 
 def _by_stretches(
-    predicted: _Predicted, stretches: Stretches, found: Findings, progress: Progress
+    predicted: _Predicted, stretches: FlightStretches, findings: Findings, progress: Progress
 ) -> Iterator[PredictionRecord]:
     """Predict stretch by stretch, and take note of what is found."""
     for stretch in stretches:
         own = predicted(stretch).part(stretch.own)
         for start in range(0, len(own.time), PART):
             part = own.part(slice(start, start + PART))
-            found.add(part)
-            progress(found.samples, len(stretches))
+            findings.add(part)
+            progress(findings.samples, len(stretches))
             yield part
 
 
@@ -116,7 +127,7 @@ def _of_vehicle(path: Path, flight: Path, study: Study) -> _Predicted:
     """
     model, told = read_model(path, study), _tells_torque(flight, study)
 
-    def predicted(stretch: Stretch) -> PredictionRecord:
+    def predicted(stretch: FlightStretch) -> PredictionRecord:
         (recording,) = of_vehicle([Recording(flight.name, stretch.signals)], model)
         if recording.signals.attitude is None:
             raise InputError(f"{flight}: lacks the attitude; a prediction is in Euler coordinates")

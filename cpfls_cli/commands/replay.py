@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.replay import ReplayRecord
-from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.config.unknown import require_known
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.inputs import numbered_roles
+from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.playback import flights_to_play, played, repairs_of
 from cpfls_cli.flights.recordings import seen_twice
-from cpfls_cli.flights.same_vehicle import is_vehicle, read_model
+from cpfls_cli.flights.same_vehicle import is_vehicle, learned_by, read_model
 from cpfls_cli.pages.replay import answer
 from cpfls_cli.pages.source import source_of
+from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.replay import Played, ReplayOptions, replay
@@ -36,7 +35,8 @@ def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) 
     """
     require_known(job.study, "replay", whole=not is_vehicle(model))
     of_model = {} if is_vehicle(model) else {"model": model}
-    inputs = begin(job, of_model | numbered_roles("flight", flights))
+    roles = numbered_roles("flight", flights)
+    inputs = begin(job, of_model | roles)
     to_play = read_model(model, job.study)
     given = flights_to_play(flights, job.study, options.hold)
     pairs = [played(to_play, flight, job.study.vehicle) for flight in given]
@@ -47,21 +47,13 @@ def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) 
         return nothing_written(job)
     errors = replay(pairs, horizon, options.every, lambda done: job.progress(done, 1))
     warnings = [
-        *seen_twice((file for role, file in inputs.items() if role not in of_model), ()),
-        *(_learned_from(model, inputs) if of_model else ()),
+        *seen_twice((inputs[role] for role in roles), ()),
+        *seen_warnings(model.name, learned_by(model), known_by(roles, inputs)),
         *(warning for flight in given for warning in flight.warnings),
         *_warnings(model.name, to_play, pairs),
     ]
     record = finish(job, ReplayRecord.of(model.name, options, given, pairs, errors, warnings), inputs)
     return Outcome(record.summary, tuple(answer(source_of(job, record))))
-
-
-def _learned_from(model: Path, inputs: Mapping[str, InputFile]) -> Iterator[str]:
-    """Name the flights that a model has learned from."""
-    learned = {file.sha256 for role, file in read_header(model).inputs.items() if role.startswith("flight")}
-    for role, file in inputs.items():
-        if role.startswith("flight") and file.sha256 in learned:
-            yield f"{file.name}: {model.name} has learned from it, so it shows nothing of flights not seen"
 
 
 def _warnings(name: str, model: VehicleModel, pairs: Sequence[Played]) -> Iterator[str]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.store import Outline, findings_of, read_outline
+from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.store import Outline, findings_of, read_outline, read_record
+from cpfls_cli.pages.trust import trust_facts
 from cpfls_cli.report.content import Block, Facts, Table, Text
 from cpfls_cli.report.outcome import Outcome
 
@@ -25,18 +28,21 @@ def info(path: Path) -> Outcome:
         "inputs": {role: vars(source) for role, source in header.inputs.items()},
         "datasets": datasets,
     }
-    return Outcome(summary, description(artifact))
+    if artifact.spec.format != ModelRecord.FORMAT.name:
+        return Outcome(summary, description(artifact))
+    model = read_record(path, ModelRecord)
+    return Outcome(summary | model.provenance, description(artifact, trust_facts(model)))
 
 
-def description(artifact: Outline) -> tuple[Block, ...]:
-    """Tell where an artifact comes from and what it holds, dataset by dataset."""
+def description(artifact: Outline, more: Sequence[tuple[str, str]] = ()) -> tuple[Block, ...]:
+    """Tell where an artifact comes from, more facts on it, and what it holds, dataset by dataset."""
     header = artifact.header
     origin = [("made by", f"cpfls {header.version}, seed {header.seed}")]
     origin += [(role, f"{source.name} (sha256 {source.sha256[:12]})") for role, source in header.inputs.items()]
     rows = [_dataset_row(name, _describe_dataset(artifact, name)) for name in artifact.shapes]
     columns = ("Dataset", "Shape", "Unit", "What it holds")
     table = Table("datasets", "", columns, rows, frozenset(range(len(columns))), frozenset({3}))
-    return Text(f"{artifact.spec.format}: {artifact.spec.description}"), Facts(origin), table
+    return Text(f"{artifact.spec.format}: {artifact.spec.description}"), Facts([*origin, *more]), table
 
 
 def _describe_dataset(artifact: Outline, name: str) -> dict[str, Any]:

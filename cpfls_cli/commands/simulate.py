@@ -61,7 +61,9 @@ def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None 
         whole = holds(model, VehicleRecord)
         job = replace(job, study=_with_mode(job.study, "closed-loop" if whole else "computed-torque"))
     if job.study.simulation.mode == "computed-torque":
-        return tracking.run(job, trajectory, _required(model))
+        if model is None:
+            raise InputError("simulation.mode = computed-torque: controls the attitude with a model; add --model MODEL")
+        return tracking.run(job, trajectory, model)
     closed = job.study.simulation.mode == "closed-loop"
     if model is not None and not closed:
         raise InputError(
@@ -86,12 +88,6 @@ def _with_mode(study: Study, usual: Mode) -> Study:
         return study
     with settings_of("simulation", study):
         return study.model_copy(update={"simulation": replace(study.simulation, mode=usual)})
-
-
-def _required(model: Path | None) -> Path:
-    if model is None:
-        raise InputError("simulation.mode = computed-torque: controls the attitude with a model; add --model MODEL")
-    return model
 
 
 def _plan(trajectory: Path, closed: bool) -> tuple[Array, dict[str, Array]]:

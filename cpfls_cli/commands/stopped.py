@@ -53,7 +53,7 @@ def stopped(
 
 
 def without_model(reason: StopReason, signal: int | None) -> CpflsError | None:
-    """Say that a search was stopped before it had a model to write.
+    """Say that a search was stopped before it had a model to write; None for a search that came to its end.
 
     Parameters
     ----------
@@ -61,11 +61,6 @@ def without_model(reason: StopReason, signal: int | None) -> CpflsError | None:
         Why the search ended.
     signal : int or None
         Number of the signal that stopped it.
-
-    Returns
-    -------
-    CpflsError or None
-        None for a search that came to its end.
     """
     if is_end(reason):
         return None

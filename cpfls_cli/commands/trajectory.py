@@ -134,12 +134,7 @@ def option_overrides(
 
 
 def require_no_room(box: str | None, height: float | None) -> None:
-    """Refuse room for a path that is not planned for it.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse room for a path that is not planned for it."""
     for option, value in (("--box", box), ("--height", height)):
         if value is not None:
             raise InputError(
@@ -277,7 +272,8 @@ def _remedy(study: Study, settings: TrajectorySettings) -> str:
     if settings.held:
         alone = " ".join(f"{torque:.3g}" for torque in single_axis_torque(study.vehicle))
         return f"set trajectory.rotation.torque_max_n_m (about one axis at a time the rotors give up to {alone} N m)"
-    if _turns(settings) and not _still_too_much(study, _without_turn(settings)):
+    turns = bool(settings.yaw_turn) or any(point.yaw_rad for point in settings.waypoints)
+    if turns and not _too_much_without_turn(study, settings):
         by_points = any(point.yaw_rad is not None for point in settings.waypoints)
         key = "waypoints: their yaw_rad" if by_points else f"yaw_turn_rad = {settings.yaw_turn:.4g}"
         return f"it is the turn in yaw: lower trajectory.{key}, or take longer over it"
@@ -285,20 +281,14 @@ def _remedy(study: Study, settings: TrajectorySettings) -> str:
     return slower if settings.tilt_max_rad is None else f"{slower}, raise trajectory.tilt_max_rad"
 
 
-def _turns(settings: TrajectorySettings) -> bool:
-    return bool(settings.yaw_turn) or any(point.yaw_rad for point in settings.waypoints)
-
-
-def _without_turn(settings: TrajectorySettings) -> TrajectorySettings:
+def _too_much_without_turn(study: Study, settings: TrajectorySettings) -> bool:
     points = tuple(replace(point, yaw_rad=None) for point in settings.waypoints)
-    return replace(settings, yaw_turn_rad=0.0, waypoints=points)
+    still = replace(settings, yaw_turn_rad=0.0, waypoints=points)
 
-
-def _still_too_much(study: Study, settings: TrajectorySettings) -> bool:
     def at(sample_time: float) -> Trajectory:
-        return plan(replace(settings, sample_time_s=sample_time), study.vehicle.gravity_m_s2)
+        return plan(replace(still, sample_time_s=sample_time), study.vehicle.gravity_m_s2)
 
-    _, problems = _demand(study, settings, at(settings.sample_time_s), at)
+    _, problems = _demand(study, still, at(still.sample_time_s), at)
     return bool(problems)
 
 

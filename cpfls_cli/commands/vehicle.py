@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from cpfls_cli.artifacts.job import Job, check_outputs, finish
+from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.output import refuse_own, write_text
 from cpfls_cli.artifacts.parameters import vehicle_section
 from cpfls_cli.artifacts.replay import HeldOutGroup, contradictions_of
@@ -21,8 +22,8 @@ from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.playback import flights_to_play, played
 from cpfls_cli.flights.recordings import seen_twice
+from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.source import source_of
-from cpfls_cli.pages.vehicle_model import answer
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.parameters import MASS, blocks_of
 from cpfls_cli.playback.replay import replay
@@ -94,13 +95,14 @@ def run(
     if kept is None:
         checkpoint.remove()
     with checkpoint.kept():
-        found, signal = _found(job, training, checkpoint, kept or {})
-        judged = _judged(found, rest, job) if rest else None
+        vehicle, signal = _found(job, training, checkpoint, kept or {})
+        judged = _judged(vehicle, rest, job) if rest else None
         warnings = [*twice, *(warning for flight in read for warning in flight.warnings)]
         commanded = any(flight.parts[0].commanded for flight in training)
-        record = finish(
-            job, VehicleRecord.of(found, judged, warnings, contradictions_of(read), commanded=commanded), inputs
-        )
+        samples = [sum(map(len, flight.parts)) for flight in training]
+        parts = LearnedGroup.parts(learned, [(own, own) for own in samples])
+        found_vehicle = VehicleRecord.of(vehicle, judged, warnings, contradictions_of(read), parts, commanded=commanded)
+        record = finish(job, found_vehicle, inputs)
     written: tuple[Text, ...] = ()
     if record.complete:
         # Of a search that goes on, the numbers are not those that are found; nothing is then in the way of --resume.
@@ -152,15 +154,15 @@ def _found(
     along = [flight.playback for flight in flights]
     with settings_of("playback", study), watch.deferring():
         try:
-            found = find_vehicle(study.vehicle, along, study.playback, generator(study, "vehicle"), progress, kept)
+            vehicle = find_vehicle(study.vehicle, along, study.playback, generator(study, "vehicle"), progress, kept)
         except SearchStoppedError as error:
             raise (without_model("interrupted", watch.signal) or error) from None
-    return found, watch.signal
+    return vehicle, watch.signal
 
 
-def _judged(found: FoundVehicle, flights: Sequence[LoggedFlight], job: Job) -> HeldOutGroup:
+def _judged(vehicle: FoundVehicle, flights: Sequence[LoggedFlight], job: Job) -> HeldOutGroup:
     """Play a vehicle back along flights that it was not found in, from every sample."""
-    models = {"": found.model, **found.others}
+    models = {"": vehicle.model, **vehicle.others}
     pairs = [played(models[flight.group], flight, job.study.vehicle) for flight in flights]
     errors = replay(
         pairs, _horizon(job, flights[0]), 1, lambda done: job.progress(done, 1, "plays back the flights held out")
@@ -172,11 +174,11 @@ def _grouped(
     flights: Sequence[LoggedFlight], paths: Sequence[Path], groups: Sequence[GroupSettings]
 ) -> tuple[LoggedFlight, ...]:
     """Say of each flight in which configuration the vehicle flew it: the first whose names match."""
-    found = []
+    grouped = []
     for flight, path in zip(flights, paths, strict=True):
         own = (group.name for group in groups if any(fnmatch(path.name, name) for name in group.flights))
-        found.append(replace(flight, group=next(own, "")))
-    return tuple(found)
+        grouped.append(replace(flight, group=next(own, "")))
+    return tuple(grouped)
 
 
 def _check_groups(groups: Sequence[GroupSettings], training: Sequence[LoggedFlight]) -> None:

@@ -13,7 +13,6 @@ from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.spec import InputFile, rows_of
 from cpfls_cli.artifacts.store import read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
@@ -22,10 +21,10 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Missing, Off, sized
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.flights.same_vehicle import rebuilt
-from cpfls_cli.pages.export import identified_evidence, identified_warnings, identified_worth
-from cpfls_cli.pages.extended import worth_in_words
-from cpfls_cli.pages.vehicle_model import worth_in_words as vehicle_worth
+from cpfls_cli.pages.export import identified_evidence, identified_warnings
+from cpfls_cli.pages.model import worth_in_words
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.validation.trust import Trust
 
 
 def sheet_of(path: Path, name: str, file: InputFile, *, force: bool) -> Sheet:
@@ -43,13 +42,15 @@ def sheet_of(path: Path, name: str, file: InputFile, *, force: bool) -> Sheet:
     InputError
         If it is no good model, or one that needs `force`.
     """
-    sheet = _bare_sheet(path, read_record(path, ModelRecord))
+    record = read_record(path, ModelRecord)
+    sheet = _bare_sheet(path, record)
     if isinstance(sheet.model.fuzzy, InertiaFunctions):
         _require_usable(sheet.model.fuzzy, path)
     if not (sheet.complete or force):
         raise InputError(
-            f"{path}: the search for this model did not come to its end ({sheet.stopped or 'unknown'}); "
-            "`cpfls identify ... --resume` goes on, --force exports the model as it is, marked as incomplete"
+            f"{path}: the search for this model did not come to its end ({sheet.stopped}); "
+            f"`cpfls {record.FORMAT.made_by} ... --resume` goes on, --force exports the model as it is, marked as "
+            "incomplete"
         )
     if sheet.verdict == "do-not-use" and not force:
         raise InputError(f"{path}: its verdict is do-not-use; --force exports it all the same, marked so")
@@ -62,18 +63,18 @@ def study_of(sheet: Sheet) -> Study:
     return validate(parse_config(sheet.origin.config, source), source)
 
 
-def identified_sheet(record: IdentifiedRecord, model: VehicleModel) -> Sheet:
-    """Put an identified model on a sheet that has no name yet."""
+def bare_sheet(record: ModelRecord, model: VehicleModel) -> Sheet:
+    """Put a model on a sheet that has no name yet."""
     return Sheet(
         "",
         model,
-        tuple(identified_worth(record)),
+        tuple(worth_in_words(record)),
         record.origin,
         "",
         "",
-        verdict=record.verdict_label,
-        stopped=None if record.complete else record.stop_reason,
-        evidence=identified_evidence(record),
+        verdict=None if record.trust == Trust.NOT_JUDGED else record.trust,
+        stopped=record.stopped or None,
+        evidence=identified_evidence(record) if isinstance(record, IdentifiedRecord) else {},
     )
 
 
@@ -93,15 +94,12 @@ def _bare_sheet(path: Path, record: ModelRecord) -> Sheet:
     beside = model.beside_table
     held = tuple(each for each in model.effects if each.name not in beside)
     still = replace(model, effects=held, wind=(0.0, 0.0, 0.0))
+    sheet = bare_sheet(record, still)
     if isinstance(record, IdentifiedRecord):
-        return replace(identified_sheet(record, still), warnings=tuple(identified_warnings(record, path)))
+        return replace(sheet, warnings=tuple(identified_warnings(record, path)))
     outside = tuple(_missing(record, (*model.filters, *model.along)))
-    if isinstance(record, ExtendedRecord):
-        worth, floor = tuple(worth_in_words(record)), tuple(record.gap.floor.tolist())
-        return Sheet("", still, worth, record.origin, "", "", outside=outside, wind=model.wind, floor=floor)
-    assert isinstance(record, VehicleRecord), "the third kind"
-    worth = tuple(vehicle_worth(record))
-    return Sheet("", still, worth, record.origin, "", "", record.verdict, outside=outside, wind=model.wind)
+    floor = tuple(record.gap.floor.tolist()) if isinstance(record, ExtendedRecord) else sheet.floor
+    return replace(sheet, outside=outside, wind=model.wind, floor=floor)
 
 
 def _missing(record: ModelRecord, effects: tuple[ModelEffect, ...]) -> Iterator[Missing]:

@@ -69,6 +69,8 @@ def run(model: Path, flight: Path, options: Options, *, force: bool, dry_run: bo
     horizon = max(1, round(options.horizon_s / along.motion.period))
     # With its logged rotor speeds, but without the faults of sensors that a model knows of.
     repaired = playback_flight(logged.name, [read.repaired(part) for part in logged.parts], logged.hold)
-    found = verified(options.form, made, repaired, (along, player), horizon, options.windows)
-    blocks = verification_answer(options.form, made.told, logged, found)
-    return Outcome(verification_summary(options.form, made.missing, found), tuple(blocks), int(not found.agrees))
+    verification = verified(options.form, made, repaired, (along, player), horizon, options.windows)
+    blocks = verification_answer(options.form, made.told, logged, verification)
+    return Outcome(
+        verification_summary(options.form, made.missing, verification), tuple(blocks), int(not verification.agrees)
+    )

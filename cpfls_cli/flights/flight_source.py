@@ -148,7 +148,7 @@ def part_of(source: TorqueSource, samples: slice) -> TorqueSource:
     return source[samples]
 
 
-class Stretch(NamedTuple):
+class FlightStretch(NamedTuple):
     """Consecutive samples of a flight, with those before and after that they are evaluated with.
 
     Attributes
@@ -166,7 +166,7 @@ class Stretch(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Stretches:
+class FlightStretches:
     """The longest part of a flight in which all is known, cut into stretches for the evaluation of effects.
 
     Attributes
@@ -199,7 +199,7 @@ class Stretches:
         """Count the samples."""
         return int(self.known.stop - self.known.start)
 
-    def __iter__(self) -> Iterator[Stretch]:
+    def __iter__(self) -> Iterator[FlightStretch]:
         """Read one stretch after the other.
 
         Raises
@@ -215,10 +215,10 @@ class Stretches:
             signals, _ = signals_of(ReadFlight(self.name, known, self.units, ()), known, self.study)
             if self.full and signals.voltage is not None:
                 signals = replace(signals, voltage=signals.voltage / self.full)
-            yield Stretch(signals, known, slice(start - low, end - low))
+            yield FlightStretch(signals, known, slice(start - low, end - low))
 
 
-def flight_stretches(path: Path, study: Study) -> Stretches:
+def flight_stretches(path: Path, study: Study) -> FlightStretches:
     """Open a flight or import a log, and cut it into stretches; one of more than `IN_MEMORY` samples stays in its file.
 
     Raises
@@ -250,7 +250,7 @@ def flight_stretches(path: Path, study: Study) -> Stretches:
     doubts = doubts_on_voltage({"voltage": battery}, flight.units)
     notes = (*notes, *doubts, *([full_battery(full)] if full and not doubts else []))
     overlap = round(_OVERLAP_S / max(float(np.median(np.diff(clock[best], append=np.inf))), 1e-6))
-    return Stretches(path.name, rows, flight.units, best, overlap, full, (*flight.warnings, *notes), study)
+    return FlightStretches(path.name, rows, flight.units, best, overlap, full, (*flight.warnings, *notes), study)
 
 
 def check_file(path: Path, study: Study, *, driven: bool = False) -> tuple[Finding, ...]:

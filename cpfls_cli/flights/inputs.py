@@ -8,11 +8,13 @@ from pathlib import Path
 
 from cpfls_cli.artifacts.scores import TRAINING
 from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.flights.flight_source import flight_source
 from cpfls_cli.flights.training import flight_roles
 from cpfls_cli.identification.data import TorqueSource, joined
+from cpfls_cli.logs.formats import is_log
 
 
 def input_roles(
@@ -38,18 +40,32 @@ def numbered_roles(role: str, flights: Sequence[Path]) -> dict[str, Path]:
     return {f"{role}-{number}": path for number, path in enumerate(flights, start=1)}
 
 
+def hashes_of(path: Path, file: InputFile) -> tuple[str, ...]:
+    """Give the hashes that a flight is known by: that of its file, and that of the log that it was imported from."""
+    log = None if is_log(path) else read_header(path).inputs.get("log")
+    return (file.sha256,) if log is None else (file.sha256, log.sha256)
+
+
+def known_by(paths: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> list[tuple[str, tuple[str, ...]]]:
+    """List flights once each: file name, and the hashes that it is known by.
+
+    Parameters
+    ----------
+    paths : mapping of str to Path
+        By role.
+    inputs : mapping of str to InputFile
+        Of the command, by role.
+    """
+    return list(dict.fromkeys((inputs[role].name, hashes_of(path, inputs[role])) for role, path in paths.items()))
+
+
 def choosing_source(flights: Sequence[Path], inputs: Mapping[str, InputFile]) -> TorqueSource | None:
-    """Open the flights to choose on.
+    """Open the flights to choose on; None where there are none.
 
     Parameters
     ----------
     inputs : mapping of str to InputFile
         All inputs of the command by role.
-
-    Returns
-    -------
-    TorqueSource or None
-        None where there are none.
 
     Raises
     ------
@@ -103,10 +119,6 @@ def held_out_parts(
     for role, path in numbered_roles("validate", validate).items():
         if inputs[role].sha256 in learned:
             raise InputError(f"--validate {path}: is the flight that trains; validate on another one")
-        parts[_free_name(path.name, {TRAINING, *parts})] = flight_source(path)
+        names = chain([path.name], (f"{path.name} ({number})" for number in count(2)))
+        parts[next(name for name in names if name not in {TRAINING, *parts})] = flight_source(path)
     return parts
-
-
-def _free_name(name: str, taken: set[str]) -> str:
-    numbered = (f"{name} ({number})" for number in count(2))
-    return next(candidate for candidate in chain([name], numbered) if candidate not in taken)

@@ -85,17 +85,17 @@ def _parts(path: Path, study: Study) -> list[ImportedFlight]:
     first = imported(path, longest)
     # A delay that is estimated is estimated once, on the longest part.
     others = _importing(longest, delay_s=first.report.delay_s)
-    found, left = [first], _around(first, study.import_.crop_s or (0.0, np.inf))
-    while left and len(found) < _MOST_PARTS:
+    parts, left = [first], _around(first, study.import_.crop_s or (0.0, np.inf))
+    while left and len(parts) < _MOST_PARTS:
         begin, end = left.pop(0)
         try:
             part = imported(path, _importing(others, crop_s=(begin, end)))
         except CpflsError:
             # Too little is left there to be a flight.
             continue
-        found.append(part)
+        parts.append(part)
         left += _around(part, (begin, end))
-    return sorted(found, key=lambda part: part.report.span_s[0])
+    return sorted(parts, key=lambda part: part.report.span_s[0])
 
 
 def _importing(study: Study, **changes: Any) -> Study:

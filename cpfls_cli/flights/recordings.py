@@ -40,8 +40,8 @@ _FULL = 1.5
 
 
 @dataclass(frozen=True)
-class Flights:
-    """Flights and what to know about them."""
+class Recordings:
+    """Flights as signals on one clock each, and what to know about them."""
 
     recordings: tuple[Recording, ...]
     warnings: tuple[str, ...]
@@ -65,7 +65,7 @@ class ReadFlight:
     warnings: tuple[str, ...]
 
 
-def read_flights(paths: Sequence[Path], study: Study) -> Flights:
+def read_flights(paths: Sequence[Path], study: Study) -> Recordings:
     """Read flights, and import those that are logs.
 
     Parameters
@@ -82,7 +82,7 @@ def read_flights(paths: Sequence[Path], study: Study) -> Flights:
     made = [_recording(flight, study) for flight in flights]
     recordings, notes = with_voltage([recording for recording, _ in made], flights)
     warnings = [f"{flight.name}: {w}" for flight, (_, about) in zip(flights, made, strict=True) for w in about]
-    return Flights(tuple(recordings), (*warnings, *notes))
+    return Recordings(tuple(recordings), (*warnings, *notes))
 
 
 def read_flight(path: Path, study: Study) -> ReadFlight:
@@ -93,11 +93,10 @@ def read_flight(path: Path, study: Study) -> ReadFlight:
     InputError
         If it is of another vehicle.
     """
-    return _log(path, study) if is_log(path) else _artifact(path, study)
-
-
-def _log(path: Path, study: Study) -> ReadFlight:
-    return read_import(path.name, [imported(path, study)], study)
+    if is_log(path):
+        return read_import(path.name, [imported(path, study)], study)
+    record = read_record(path, FlightRecord)
+    return ReadFlight(path.name, record.signals, units_of(path, record.origin, study), ())
 
 
 def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> ReadFlight:
@@ -118,11 +117,6 @@ def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> Rea
         own["time"] = own["time"] + part.report.span_s[0]
     joined = {each: np.concatenate([own[each] for own in signals]) for each in shared}
     return ReadFlight(name, joined, _units(study), ())
-
-
-def _artifact(path: Path, study: Study) -> ReadFlight:
-    record = read_record(path, FlightRecord)
-    return ReadFlight(path.name, record.signals, units_of(path, record.origin, study), ())
 
 
 def units_of(path: Path, made: Header, study: Study) -> Mapping[str, str]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.learned import LearnedFlight
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.spec import Header, Record
@@ -75,6 +76,11 @@ def read_model(path: Path, study: Study) -> VehicleModel:
     if is_vehicle(path):
         return VehicleModel(vehicle=study.vehicle)
     return rebuilt(path, read_of_vehicle(path, ModelRecord, study))
+
+
+def learned_by(path: Path | None) -> tuple[LearnedFlight, ...]:
+    """List the flights that a model learned from: none by the vehicle of the config."""
+    return () if path is None or is_vehicle(path) else read_record(path, ModelRecord).learned_from
 
 
 def read_base(path: Path | None, study: Study) -> VehicleModel:

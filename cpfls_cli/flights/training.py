@@ -49,6 +49,13 @@ class SplitFlights:
         )
 
     @property
+    def parts(self) -> tuple[tuple[int, int], ...]:
+        """Of each flight, the leading samples that train, and all samples."""
+        return tuple(
+            (split.training.stop, len(flight)) for flight, split in zip(self.flights, self.splits, strict=True)
+        )
+
+    @property
     def rests(self) -> dict[str, TorqueSource]:
         """The parts that are held out, by name."""
         several = len(self.paths) > 1
@@ -73,12 +80,15 @@ class TrainingData:
         What of the flights is held out, by name.
     indices : array of int, shape (learned samples,)
         Of the learned samples among all samples of the flights, one flight after the other; ascending.
+    parts : tuple of (int, int)
+        Of each flight, the leading samples that train, and all samples.
     """
 
     training: TorqueSource
     learned: TorqueSource
     rests: Mapping[str, TorqueSource]
     indices: IntArray
+    parts: tuple[tuple[int, int], ...]
 
 
 def flight_roles(flights: Sequence[Path]) -> dict[str, Path]:
@@ -129,10 +139,10 @@ def read_training(
     split = split_training(flights, study, inputs)
     training, candidates = split.training, split.training_indices
     if selection is None:
-        return TrainingData(training, training, split.rests, candidates)
+        return TrainingData(training, training, split.rests, candidates, split.parts)
     indices = _selected(_hashed(flights, inputs), selection, candidates)
     learned = gathered(training, np.searchsorted(candidates, indices))
-    return TrainingData(training, learned, split.rests, indices)
+    return TrainingData(training, learned, split.rests, indices, split.parts)
 
 
 def _hashed(flights: Sequence[Path], inputs: Mapping[str, InputFile] | None) -> dict[Path, str]:

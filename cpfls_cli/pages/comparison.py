@@ -10,8 +10,9 @@ import numpy as np
 
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING
-from cpfls_cli.pages.model import SHORT_VERDICTS, TORQUE
+from cpfls_cli.pages.identification import TORQUE
 from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.pages.uncertainty import compared_curves_figure
 from cpfls_cli.report.canvas import GREY, legend_over, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
@@ -79,13 +80,7 @@ class JudgedOn:
 
 
 def comparison_section(sources: Sources) -> Section | None:
-    """Compare the models with each other.
-
-    Returns
-    -------
-    Section or None
-        None for fewer than two models.
-    """
+    """Compare the models with each other; None for fewer than two models."""
     models = sources.models
     if len(models) < 2:
         return None
@@ -191,9 +186,8 @@ def _cell(text: str, error: float, least: float) -> Cell:
 
 def _words(model: _Model) -> tuple[str, ...]:
     record = model.record
-    label = record.verdict_label or UNKNOWN
     size = (count(record.solve.parameters), number(record.solve.condition_number, 4))
-    return (model.label, SHORT_VERDICTS.get(label, label), *size)
+    return (model.label, trust_words(record.trust).short, *size)
 
 
 def _bodies(part: JudgedOn) -> list[tuple[str, _Model, str]]:

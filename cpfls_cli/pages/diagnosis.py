@@ -23,7 +23,6 @@ from cpfls_cli.pages.effects import (
     share_words,
     titles,
 )
-from cpfls_cli.pages.extended import verdict_box as extended_box
 from cpfls_cli.pages.first_screen import first_screen, model_words, notes_on_flights
 from cpfls_cli.pages.gap import (
     AXES,
@@ -37,6 +36,7 @@ from cpfls_cli.pages.gap import (
     leaves_view,
     marked,
 )
+from cpfls_cli.pages.model import trust_box
 from cpfls_cli.pages.replay import beside_rivals, playback_figure
 from cpfls_cli.pages.sensors import sensor_warnings, sensors_answer, unseen_answer
 from cpfls_cli.pages.source import Source, Sources
@@ -70,7 +70,7 @@ def gap_blocks(sources: Sources) -> Iterator[Block]:
         yield from (replace(each, text=sentence(each.text)) for each in sensor_warnings(diagnosis.record.audit))
     for extended in sources.extensions:
         if sources.by_hash(extended.made_from("diagnosis")) is None:
-            yield extended_box(extended)
+            yield trust_box(extended)
     answered = {diagnosis.made_from("disagreement") for diagnosis in sources.diagnoses}
     for disagreement in sources.disagreements:
         if disagreement.sha256 not in answered:

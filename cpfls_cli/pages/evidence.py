@@ -11,7 +11,8 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.evidence import PeriodGroup, PhysicsGroup, StepsGroup, StructuresGroup
 from cpfls_cli.artifacts.identified import IdentifiedRecord, RidgeGroup
 from cpfls_cli.artifacts.scores import AXES, MODEL
-from cpfls_cli.pages.model import TORQUE, verdict
+from cpfls_cli.pages.identification import TORQUE
+from cpfls_cli.pages.model import trust_box
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, HELD, legend_above, legend_over, plain_ticks, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Facts, Heading, Plot, Table, Text
@@ -39,7 +40,7 @@ def validation_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[B
     """Show the verdict on a model and what it rests on."""
     record = model.record
     yield Heading(model.label)
-    yield from verdict(model)
+    yield trust_box(model)
     yield _scores(model, index)
     if record.period is not None:
         yield _period(record, record.period, index)

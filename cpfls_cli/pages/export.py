@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.scores import MODEL
 from cpfls_cli.export.holding import Missing
 from cpfls_cli.export.registry import TARGETS
 from cpfls_cli.export.verify import AGREES, Verification
@@ -17,7 +16,6 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.report.content import Block, Table, Text
 from cpfls_cli.report.numbers import number
 
-_SIGNS = {1: "for", -1: "against"}
 _SCORE_UNITS = {"mse": "(N m)^2", "max_error": "N m", "relative_error": "1", "r2": "1", "vaf": "1", "r2_body": "1"}
 _SIGNALS = (
     ("position", "m", 1.0),
@@ -36,24 +34,6 @@ def export_answer(
         yield Text(f"{file}: {verb} ({size} bytes)")
     yield from map(Text, told)
     yield from (Text(warning, "warning") for warning in warnings)
-
-
-def identified_worth(record: IdentifiedRecord) -> Iterator[str]:
-    """Say what an identified model is worth that is used elsewhere."""
-    verdict, judged = record.verdict, record.judged
-    if verdict is None or verdict.label is None:
-        yield "Verdict: none; the model holds no validation."
-    else:
-        yield f"Verdict: {verdict.label}. {verdict.region or ''}".rstrip()
-        for reason, speaks in verdict.reasons:
-            yield f"- {_SIGNS.get(speaks, 'note')}: {reason}"
-    for part in judged.parts if MODEL in judged.models else ():
-        worst, r2 = judged.worst(MODEL, part)[0], judged.worst_r2(MODEL, part)
-        error = f"largest error {worst:.3g} of the largest torque"
-        yield f"Judged on {part} ({judged.samples_of(part)} samples), worst axis: {error}, R2 {r2:.4f}"
-    for finding in record.findings:
-        yield f"Finding: {finding}"
-    yield "Rotors, mass and all forces are those of the config."
 
 
 def identified_evidence(record: IdentifiedRecord) -> dict[str, Any]:

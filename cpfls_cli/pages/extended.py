@@ -1,4 +1,4 @@
-"""The page of an extended model: the effects in it, and what the gap becomes with them."""
+"""How an extended model was found: the effects in it, and what the gap becomes with them."""
 
 from __future__ import annotations
 
@@ -10,25 +10,29 @@ from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.effects import coefficients_table, effect_sentence, intervals_figure, parameters_table, titles
 from cpfls_cli.pages.gap import gap_sizes_figure, gap_table
-from cpfls_cli.pages.replay import beside_rivals, playback_figure
+from cpfls_cli.pages.replay import beside_rivals, playback_figure, playback_words
 from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.report.content import Block, Box, Facts, Heading, Section, Table, Text
+from cpfls_cli.report.content import Block, Facts, Heading, Section, Table, Text
 from cpfls_cli.report.numbers import joined, number, sentence
 
 
-def answer(extended: Source[ExtendedRecord]) -> Iterator[Block]:
-    """Say what a model was extended by, what its gap becomes, and about which axes it gets worse."""
-    yield verdict_box(extended)
+def details(extended: Source[ExtendedRecord]) -> Iterator[Block]:
+    """Say what the gap of an extended model becomes, and about which axes it gets worse."""
     yield _gap_table(extended, 1)
     yield from _playback_text(extended.record)
     yield from (Text(warning, "warning") for warning in warnings(extended.record))
 
 
-def verdict_box(extended: Source[ExtendedRecord]) -> Box:
-    """Say what a model was extended by, and how its largest gap changes."""
-    record = extended.record
-    effects = [effect_sentence(effect) for effect in record.effects.named]
-    return Box("EXTENDED MODEL", model_with(extended.label, record), [*effects, _shrunk(record)])
+def title(record: ExtendedRecord) -> str:
+    """Say what an extended model is."""
+    return f"the model with {_by(record)}."
+
+
+def grounds(record: ExtendedRecord) -> Iterator[str]:
+    """Say how far to trust an extended model, what it was extended by, and how its largest gap changes."""
+    yield from playback_words(record.trust, record.playback, record.audit.contradiction)
+    yield from (effect_sentence(effect) for effect in record.effects.named)
+    yield _shrunk(record)
 
 
 def _shrunk(record: ExtendedRecord) -> str:
@@ -36,10 +40,11 @@ def _shrunk(record: ExtendedRecord) -> str:
     return f"On held-out flights its largest gap is {number(after, 2)} noise floors; it was {number(before, 2)}."
 
 
-def worth_in_words(record: ExtendedRecord) -> Iterator[str]:
+def worth(record: ExtendedRecord) -> Iterator[str]:
     """Say what a model that is used elsewhere is worth, and what has to be repaired in the signals that it is given."""
+    yield next(playback_words(record.trust, record.playback, record.audit.contradiction))
     yield _shrunk(record)
-    yield from (f"{sentence(warning)}" for warning in warnings(record))
+    yield from (sentence(warning) for warning in warnings(record))
     yield from (
         f"Not in the model, to be repaired in the signals that it is given: {fault}"
         for fault in (*record.audit.settled, *record.audit.faults)
@@ -48,7 +53,7 @@ def worth_in_words(record: ExtendedRecord) -> Iterator[str]:
 
 def model_with(label: str, record: ExtendedRecord) -> str:
     """Say which effects the model of a file has in it."""
-    return f"{label}: the model with {_by(record)}."
+    return f"{label}: {title(record)}"
 
 
 def warnings(record: ExtendedRecord) -> list[str]:
@@ -66,13 +71,7 @@ def _by(record: ExtendedRecord) -> str:
 
 
 def extension_section(sources: Sources) -> Section | None:
-    """Show the extended models; what stands in their diagnosis is not shown again.
-
-    Returns
-    -------
-    Section or None
-        None where none was given.
-    """
+    """Show the extended models; what stands in their diagnosis is not shown again; None where none was given."""
     return section_of_each(
         "extension",
         "The extended model",

@@ -197,14 +197,14 @@ def _rival_title(rival: Alternative) -> str:
 
 def _where(record: DiagnosisRecord) -> str:
     """Say in which channels the gap is, when it is largest, and how much of the time it is there."""
-    found = record.largest_gap
-    if found is None:
+    largest = record.largest_gap
+    if largest is None:
         return "Nowhere above the noise."
-    first, *others = found.channels
-    when = f", most from {found.start_s:.1f} to {found.end_s:.1f} s of {found.flight}" if found.flight else ""
+    first, *others = largest.channels
+    when = f", most from {largest.start_s:.1f} to {largest.end_s:.1f} s of {largest.flight}" if largest.flight else ""
     also = f"; also {joined(others)}" if others else ""
     return sentence(
-        f"{channel_words(first)}, above the noise {share_words(found.share_of_time)} of the time{when}{also}"
+        f"{channel_words(first)}, above the noise {share_words(largest.share_of_time)} of the time{when}{also}"
     )
 
 

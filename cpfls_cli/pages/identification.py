@@ -1,4 +1,4 @@
-"""How models were identified: their errors, the baselines by axis, the search and its Pareto front."""
+"""How a model was identified: its errors beside its baselines, what it is worth, the search and its Pareto front."""
 
 from __future__ import annotations
 
@@ -9,15 +9,38 @@ import numpy as np
 
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup
-from cpfls_cli.pages.model import MODELS, SQUARED_TORQUE, TORQUE
+from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.report.canvas import legend_above, plain_ticks, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import count, number, percent, r_squared
+from cpfls_cli.report.numbers import ROUNDING, count, number, percent, r_squared, sentence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+TORQUE, SQUARED_TORQUE = "N\N{NO-BREAK SPACE}m", "(N\N{NO-BREAK SPACE}m)²"
+"""Units that are not torn apart at the end of a line."""
+
+MODELS = {
+    MODEL: "model",
+    RIGID_BODY: "rigid body",
+    "constant-inertia": "constant inertia",
+    "torque-zero": "no torque",
+    "uniform-partitions": "no search: uniform partitions",
+}
+"""The judged models in words."""
+
+_SPEAKS = {1: "For it", -1: "Against it"}
+_SIGNS = {1: "for", -1: "against"}
+_SCORES = (
+    "Judged on",
+    "Model",
+    f"MSE, {SQUARED_TORQUE}",
+    f"Largest error, {TORQUE}",
+    "Relative error",
+    *(f"R² {axis}" for axis in AXES),
+)
 _ROWS = (
     "system",
     "training points",
@@ -38,13 +61,130 @@ _MEASURES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
 )
 
 
-def identification_section(sources: Sources) -> Section | None:
-    """Show the models beside each other, and their baselines.
+def title(record: IdentifiedRecord) -> str:
+    """Say what an identified model is."""
+    return f"an identified model {'on a rigid body' if record.on_rigid_body else 'without a rigid body'}."
 
-    Returns
-    -------
-    Section or None
-        None where no model was given.
+
+def grounds(record: IdentifiedRecord) -> Iterator[str]:
+    """Say how far to trust an identified model, where, and why; or how to find out."""
+    if not record.validated:
+        yield (
+            "It holds its scores only: no bands, no residuals, no verdict. To add them, identify it again with "
+            "identification.validation.enabled: true: cpfls identify CONFIG FLIGHT... -o MODEL --set "
+            "identification.validation.enabled=true."
+        )
+        return
+    yield sentence(trust_words(record.trust).sentence)
+    if record.verdict is not None:
+        yield from [sentence(f"Region: {record.verdict.region}")] if record.verdict.region else []
+        for reason, speaks in record.verdict.reasons:
+            yield f"{_SPEAKS.get(speaks, 'To know')}: {sentence(reason)}"
+
+
+def details(model: Source[IdentifiedRecord]) -> Iterator[Block]:
+    """Say what was found, how good it is beside its baselines, and what to distrust."""
+    yield from solution(model)
+    yield scores_table(model, 1)
+    yield from (Text(finding, "warning") for finding in model.record.findings)
+
+
+def worth(record: IdentifiedRecord) -> Iterator[str]:
+    """Say what an identified model is worth that is used elsewhere."""
+    verdict, judged = record.verdict, record.judged
+    if verdict is None or verdict.label is None:
+        yield "Verdict: none; the model holds no validation."
+    else:
+        yield f"Verdict: {verdict.label}. {verdict.region or ''}".rstrip()
+        for reason, speaks in verdict.reasons:
+            yield f"- {_SIGNS.get(speaks, 'note')}: {reason}"
+    for part in judged.parts if MODEL in judged.models else ():
+        worst, r2 = judged.worst(MODEL, part)[0], judged.worst_r2(MODEL, part)
+        error = f"largest error {worst:.3g} of the largest torque"
+        yield f"Judged on {part} ({judged.samples_of(part)} samples), worst axis: {error}, R2 {r2:.4f}"
+    for finding in record.findings:
+        yield f"Finding: {finding}"
+    yield "Rotors, mass and all forces are those of the config."
+
+
+def solution(model: Source[IdentifiedRecord]) -> Iterator[Text]:
+    """Say how many parameters were found from how much, how the search ended, and the rigid body beside them."""
+    record = model.record
+    solve, evaluations = record.solve, record.history.evaluations
+    yield Text(
+        f"{solve.parameters} parameters from {len(record.training_indices)} samples; rank {solve.rank}, condition "
+        f"number {number(solve.condition_number, 5)}; {evaluations[-1]} evaluations"
+    )
+    if record.stop_reason == "converged":
+        stall = model.config["identification"]["stall_generations"]
+        yield Text(
+            f"converged after generation {len(evaluations) - 1}: no objective improved enough "
+            f"(identification.stall_generations = {stall})"
+        )
+    held_out = record.front.held_out
+    if held_out is not None:
+        yield Text(
+            f"chosen among {len(held_out)} on the flights kept for it, mean squared error "
+            f"{number(float(np.min(held_out)), 3)}"
+        )
+    pairs = zip(INERTIA_PARAMETERS, record.baselines.rigid_body, strict=True)
+    moments = " ".join(f"{name} {number(float(value))}" for name, value in pairs)
+    yield Text(f"rigid body that fits best, kg m²: {moments}")
+
+
+def scores_table(model: Source[IdentifiedRecord], index: int) -> Table:
+    """Show the errors of a model and its baselines on every part of the data.
+
+    Parameters
+    ----------
+    index : int
+        Number of the model on the page, from 1.
+    """
+    caption = (
+        f"{model.label} beside the rigid body with six inertia parameters, a constant inertia and no torque at all, "
+        "and where there is something to search for, the same structure without a search. MSE: mean over the axes. "
+        "Relative error: largest error over largest torque, worst axis. R²: share of the variance of the body torque "
+        "explained."
+    )
+    judged = model.record.judged
+    rows = [_row(judged, part, name) for part in judged.parts for name in judged.models]
+    return Table(f"headline-{index}", caption, _SCORES, rows, frozenset({0, 1}))
+
+
+def _row(judged: JudgedGroup, part: str, name: str) -> list[str | Cell]:
+    relative, axis = judged.worst(name, part)
+    return [
+        part if name == MODEL else "",
+        MODELS.get(name, name),
+        number(float(np.mean(judged.of_axes("mse", name, part))), 3),
+        number(float(np.max(judged.of_axes("max_error", name, part))), 3),
+        f"{percent(relative)} ({axis})" if relative > ROUNDING else percent(relative),
+        *(
+            Cell(r_squared(value), "warning" if value < 0 else "plain")
+            for value in judged.of_axes("r2_body", name, part)
+        ),
+    ]
+
+
+def verdict_line(model: Source[IdentifiedRecord]) -> Text:
+    """Say in one line how far to trust a model, and whether its search came to its end."""
+    record = model.record
+    incomplete = (
+        ""
+        if record.complete
+        else f" The search is incomplete ({record.stop_reason or 'stopped'}): this is the best so far, and --resume "
+        "goes on."
+    )
+    if record.verdict is None or record.verdict.label is None:
+        reason = "no verdict, because the evidence was not gathered (identification.validation.enabled)"
+        return Text(f"{model.label}: {reason}.{incomplete}", "warning" if incomplete else "note")
+    words = trust_words(record.trust)
+    where = f" Region: {record.verdict.region.rstrip('.')}." if record.verdict.region else ""
+    return Text(f"{model.label}: {words.sentence}.{where}{incomplete}", "warning" if incomplete else words.tone)
+
+
+def identification_section(sources: Sources) -> Section | None:
+    """Show the models beside each other, and their baselines; None where no model was given.
 
     References
     ----------
@@ -114,13 +254,7 @@ def _rows(judged: JudgedGroup, part: str, name: str) -> Iterator[list[str | Cell
 
 
 def search_section(sources: Sources) -> Section | None:
-    """Show how the models were found.
-
-    Returns
-    -------
-    Section or None
-        None where no model was given.
-    """
+    """Show how the models were found; None where no model was given."""
     return section_of_each("search", "Search", sources.models, _search)
 
 

@@ -1,161 +1,73 @@
-"""What is said of a model wherever it is spoken of: what was found, how good it is, and how far to trust it."""
+"""The page of a model, whoever found it: how far to trust it, what it is, how it was found and what it learned from."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, JudgedGroup
+from cpfls_cli.artifacts.model import EffectsGroup, InertiaFunctionsGroup, ModelRecord, ResponseGroup, RotorsGroup
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.pages.source import Source
-from cpfls_cli.report.content import Block, Box, Cell, Table, Text, Tone
-from cpfls_cli.report.numbers import ROUNDING, number, percent, r_squared, sentence
-
-TORQUE, SQUARED_TORQUE = "N\N{NO-BREAK SPACE}m", "(N\N{NO-BREAK SPACE}m)²"
-"""Units that are not torn apart at the end of a line."""
-
-MODELS = {
-    MODEL: "model",
-    RIGID_BODY: "rigid body",
-    "constant-inertia": "constant inertia",
-    "torque-zero": "no torque",
-    "uniform-partitions": "no search: uniform partitions",
-}
-"""The judged models in words."""
-
-SHORT_VERDICTS = {
-    "good-for-control": "good for control",
-    "good-inside-region": "good inside its region",
-    "not-better-than-rigid-body": "no better than a rigid body",
-    "do-not-use": "do not use",
-}
-"""Labels of a verdict for a cell of a table."""
-
-_VERDICTS: dict[str, tuple[str, Tone]] = {
-    "good-for-control": ("Good for control", "good"),
-    "good-inside-region": ("Good inside the region that training visited, and only there", "note"),
-    "not-better-than-rigid-body": ("Not better than the rigid body", "warning"),
-    "do-not-use": ("Do not use it", "warning"),
-}
-_SPEAKS = {1: "For it", -1: "Against it"}
-_SCORES = (
-    "Judged on",
-    "Model",
-    f"MSE, {SQUARED_TORQUE}",
-    f"Largest error, {TORQUE}",
-    "Relative error",
-    *(f"R² {axis}" for axis in AXES),
-)
+from cpfls_cli.pages import extended, identification, vehicle_model
+from cpfls_cli.pages.effects import effect_title, unit_words
+from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.trust import trust_facts, trust_words
+from cpfls_cli.report.content import Block, Box, Facts, Heading, Section, Table, Text
+from cpfls_cli.report.numbers import joined, number, plain, whole_percent
+from cpfls_cli.validation.trust import Trust
 
 
-def answer(model: Source[IdentifiedRecord]) -> Iterator[Block]:
-    """Say what was found, how good it is beside its baselines, how far to trust it and where, and what to distrust."""
-    yield from solution(model)
-    yield scores_table(model, 1)
-    yield from verdict(model)
-    yield from (Text(finding, "warning") for finding in model.record.findings)
+class _Kind(NamedTuple):
+    """How the page of a model goes on by who found it: what it is, what its trust rests on, what was found.
 
-
-def solution(model: Source[IdentifiedRecord]) -> Iterator[Text]:
-    """Say how many parameters were found from how much, how the search ended, and the rigid body beside them."""
-    record = model.record
-    solve, evaluations = record.solve, record.history.evaluations
-    yield Text(
-        f"{solve.parameters} parameters from {len(record.training_indices)} samples; rank {solve.rank}, condition "
-        f"number {number(solve.condition_number, 5)}; {evaluations[-1]} evaluations"
-    )
-    if record.stop_reason == "converged":
-        stall = model.config["identification"]["stall_generations"]
-        yield Text(
-            f"converged after generation {len(evaluations) - 1}: no objective improved enough "
-            f"(identification.stall_generations = {stall})"
-        )
-    held_out = record.front.held_out
-    if held_out is not None:
-        yield Text(
-            f"chosen among {len(held_out)} on the flights kept for it, mean squared error "
-            f"{number(float(np.min(held_out)), 3)}"
-        )
-    pairs = zip(INERTIA_PARAMETERS, record.baselines.rigid_body, strict=True)
-    moments = " ".join(f"{name} {number(float(value))}" for name, value in pairs)
-    yield Text(f"rigid body that fits best, kg m²: {moments}")
-
-
-def scores_table(model: Source[IdentifiedRecord], index: int) -> Table:
-    """Show the errors of a model and its baselines on every part of the data.
-
-    Parameters
+    Attributes
     ----------
-    index : int
-        Number of the model on the page, from 1.
+    title, grounds : callable
+        Of a record: what the model is, and the sentences behind the word of trust.
+    details : callable
+        Of a source: what stands below the box.
+    worth : callable
+        Of a record: what it is worth that is used elsewhere.
     """
-    caption = (
-        f"{model.label} beside the rigid body with six inertia parameters, a constant inertia and no torque at all, "
-        "and where there is something to search for, the same structure without a search. MSE: mean over the axes. "
-        "Relative error: largest error over largest torque, worst axis. R²: share of the variance of the body torque "
-        "explained."
-    )
-    judged = model.record.judged
-    rows = [_row(judged, part, name) for part in judged.parts for name in judged.models]
-    return Table(f"headline-{index}", caption, _SCORES, rows, frozenset({0, 1}))
+
+    title: Callable[[Any], str]
+    grounds: Callable[[Any], Iterator[str]]
+    details: Callable[[Source[Any]], Iterator[Block]]
+    worth: Callable[[Any], Iterator[str]]
 
 
-def _row(judged: JudgedGroup, part: str, name: str) -> list[str | Cell]:
-    relative, axis = judged.worst(name, part)
-    return [
-        part if name == MODEL else "",
-        MODELS.get(name, name),
-        number(float(np.mean(judged.of_axes("mse", name, part))), 3),
-        number(float(np.max(judged.of_axes("max_error", name, part))), 3),
-        f"{percent(relative)} ({axis})" if relative > ROUNDING else percent(relative),
-        *(
-            Cell(r_squared(value), "warning" if value < 0 else "plain")
-            for value in judged.of_axes("r2_body", name, part)
-        ),
-    ]
+_KINDS: dict[str, _Kind] = {
+    IdentifiedRecord.FORMAT.kind: _Kind(
+        identification.title, identification.grounds, identification.details, identification.worth
+    ),
+    ExtendedRecord.FORMAT.kind: _Kind(extended.title, extended.grounds, extended.details, extended.worth),
+    VehicleRecord.FORMAT.kind: _Kind(
+        vehicle_model.title, vehicle_model.grounds, vehicle_model.details, vehicle_model.worth
+    ),
+}
 
 
-def verdict(model: Source[IdentifiedRecord]) -> Iterator[Block]:
-    """Say how far to trust a model, where, and why; or how to find out."""
+def answer(model: Source[Any]) -> Iterator[Block]:
+    """Say how far to trust a model and why, what was found and how well it does, and what to distrust."""
+    yield trust_box(model)
+    yield from _KINDS[model.record.FORMAT.kind].details(model)
+
+
+def trust_box(model: Source[Any]) -> Box:
+    """Say how far to trust a model, and why."""
     record = model.record
-    if record.verdict is not None and record.verdict.label is not None:
-        words, tone = _verdict_words(record.verdict.label)
-        region = [sentence(f"Region: {record.verdict.region}")] if record.verdict.region else []
-        reasons = [f"{_SPEAKS.get(speaks, 'To know')}: {sentence(reason)}" for reason, speaks in record.verdict.reasons]
-        yield Box("VERDICT", words, [*region, *reasons], tone)
-    elif not record.validated:
-        yield Text(
-            f"{model.label} holds its scores only: no bands, no residuals, no verdict. To add them, identify it again "
-            "with identification.validation.enabled: true: cpfls identify CONFIG FLIGHT... -o MODEL --set "
-            "identification.validation.enabled=true.",
-            "note",
-        )
+    kind, words = _KINDS[record.FORMAT.kind], trust_words(record.trust)
+    return Box(words.short.upper(), f"{model.label}: {kind.title(record)}", list(kind.grounds(record)), words.tone)
 
 
-def verdict_line(model: Source[IdentifiedRecord]) -> Text:
-    """Say in one line how far to trust a model, and whether its search came to its end."""
-    record = model.record
-    incomplete = (
-        ""
-        if record.complete
-        else f" The search is incomplete ({record.stop_reason or 'stopped'}): this is the best so far, and --resume "
-        "goes on."
-    )
-    if record.verdict is None or record.verdict.label is None:
-        reason = "no verdict, because the evidence was not gathered (identification.validation.enabled)"
-        return Text(f"{model.label}: {reason}.{incomplete}", "warning" if incomplete else "note")
-    words, tone = _verdict_words(record.verdict.label)
-    where = f" Region: {record.verdict.region.rstrip('.')}." if record.verdict.region else ""
-    return Text(f"{model.label}: {words}.{where}{incomplete}", "warning" if incomplete else tone)
-
-
-def _verdict_words(label: str) -> tuple[str, Tone]:
-    return _VERDICTS.get(label, (label, "note"))
-
-
-def trust_notes(model: IdentifiedRecord, path: object) -> Iterator[Text]:
+def trust_notes(record: ModelRecord, path: object) -> Iterator[Text]:
     """Say what speaks against the use of a model: its search was stopped, it was judged unfit, or not judged at all.
 
     Parameters
@@ -163,12 +75,114 @@ def trust_notes(model: IdentifiedRecord, path: object) -> Iterator[Text]:
     path : Path
         As the model is called in the sentences.
     """
-    if not model.complete:
-        yield Text(f"{path}: is incomplete: its search was stopped; `cpfls identify --resume` goes on", "warning")
-    if model.verdict is None or model.verdict.label is None:
+    if record.stopped:
+        again = f"`cpfls {record.FORMAT.made_by} --resume` goes on"
+        yield Text(f"{path}: is incomplete: its search was stopped; {again}", "warning")
+    if record.trust == Trust.DO_NOT_USE:
+        verdict = record.verdict if isinstance(record, IdentifiedRecord) else None
+        why = next(_KINDS[record.FORMAT.kind].grounds(record))
+        said = why if verdict is None else f"its verdict is: do not use; {verdict.reasons[0][0]}"
+        yield Text(f"{path}: {said}", "warning")
+    elif record.trust == Trust.NOT_JUDGED and isinstance(record, IdentifiedRecord):
         yield Text(
             f"{path}: has no verdict and no bands; `cpfls identify` with identification.validation.enabled adds them",
             "warning",
         )
-    elif model.verdict.label == "do-not-use":
-        yield Text(f"{path}: its verdict is: do not use; {model.verdict.reasons[0][0]}", "warning")
+
+
+def worth_in_words(record: ModelRecord) -> Iterator[str]:
+    """Say what a model that is used elsewhere is worth."""
+    return _KINDS[record.FORMAT.kind].worth(record)
+
+
+def model_section(sources: Sources) -> Section | None:
+    """Say what each model is, part by part; None where none was given."""
+    models: list[Source[Any]] = [source for source in sources.all if isinstance(source.record, ModelRecord)]
+    return section_of_each("model", "What the model is", models, partial(_section, len(models) > 1))
+
+
+def _section(several: bool, model: Source[Any], index: int) -> Iterator[Block]:
+    yield from [Heading(model.label)] if several else []
+    yield Facts(facts(model.record))
+    if model.record.vehicle.effect.name:
+        yield _effects_table(f"model-effects-{index}", model.record.vehicle.effect)
+
+
+def facts(record: ModelRecord) -> list[tuple[str, str]]:
+    """Say how far to trust a model, what it learned from, and what it is made of."""
+    vehicle, repair = record.vehicle, record.vehicle.repair
+    moments = zip(INERTIA_PARAMETERS, vehicle.inertia.tolist(), strict=True)
+    rigid = " ".join(f"{name} {number(value)}" for name, value in moments if value)
+    rows = [
+        *trust_facts(record),
+        ("Mass", f"{plain(vehicle.mass)} kg"),
+        ("Inertia, kg m²", rigid if vehicle.inertia_functions is None else _functions(vehicle.inertia_functions)),
+        ("Rotors", _rotors(vehicle.rotor)),
+        ("Their response", _response(vehicle.response)),
+        ("Effects", joined(map(_effect, vehicle.effect.name)) if vehicle.effect.name else "none"),
+    ]
+    if vehicle.remainder is not None:
+        size = vehicle.remainder.coefficients.size
+        rows.append(("Learned, without a name", f"{size} coefficients over the direction of the airflow"))
+    if vehicle.wind is not None:
+        rows.append(("Steady wind of its flights, m/s", " ".join(number(value, 3) for value in vehicle.wind)))
+    if repair is not None and (repair.settled or repair.faults):
+        rows.append(("Taken out of the sensors first", " ".join((*repair.settled, *repair.faults))))
+    return rows
+
+
+def _functions(inertia: InertiaFunctionsGroup) -> str:
+    kind = {"cpfls": "continuous periodic fuzzy system", "fls": "classic TSK fuzzy system"}[inertia.structure]
+    body = " ".join(
+        f"{name} {number(value)}"
+        for name, value in zip(INERTIA_PARAMETERS, inertia.rigid_body.tolist(), strict=True)
+        if value
+    )
+    under = f"on a rigid body {body}" if body else "alone"
+    visited = whole_percent(float(np.mean(inertia.visited)))
+    return (
+        f"functions of roll and pitch, a {kind} of {len(inertia.coefficients)} coefficients {under}; {visited} of all "
+        "roll and pitch was visited"
+    )
+
+
+def _rotors(rotors: RotorsGroup) -> str:
+    square = "w²" if not rotors.thrust_linear else f"w² + {number(rotors.thrust_linear, 3)} w_h w"
+    return (
+        f"{len(rotors.spin)}; thrust {_range(rotors.thrust_factor)} N s² and drag {_range(rotors.drag_factor)} N m s² "
+        f"times {square}, to {plain(rotors.speed_max)} rad/s"
+    )
+
+
+def _range(values: Array) -> str:
+    low, high = number(float(values.min()), 4), number(float(values.max()), 4)
+    return low if low == high else f"{low} to {high}"
+
+
+def _response(response: ResponseGroup) -> str:
+    parts = [("delay", response.delay), ("lag", response.lag)]
+    told = [f"{name} {number(1e3 * seconds, 3)} ms" for name, seconds in parts if seconds]
+    slow = [("roll and pitch", response.slow_roll_pitch), ("yaw", response.slow_yaw)]
+    told += [
+        f"{whole_percent(abs(share))} of the torque of {axes} {'back' if share > 0 else 'gone'} within "
+        f"{number(response.slow, 3)} s"
+        for axes, share in slow
+        if share
+    ]
+    return f"{joined(told)}, behind {'commands alone' if response.commanded else 'any speed'}" if told else "at once"
+
+
+def _effect(name: str) -> str:
+    return "numbers refitted" if CATALOGUE[name].kind == "parameter" else effect_title(name)
+
+
+def _effects_table(name: str, group: EffectsGroup) -> Table:
+    rows = []
+    for effect in group.effects():
+        known = {each.name: each for each in effect.known.numbers}
+        for index, (label, value) in enumerate(effect.values.items()):
+            words = f"{label}: {known[label].meaning}" if label in known else label
+            unit = unit_words(known[label].unit) if label in known else ""
+            rows.append([_effect(effect.name) if index == 0 else "", words, number(value), unit])
+    header = ("Effect", "Number", "Value", "Unit")
+    return Table(name, "The numbers of its effects.", header, rows, frozenset({0, 1, 3}), frozenset({1}))

@@ -17,6 +17,7 @@ from cpfls_cli.pages.extended import extension_section
 from cpfls_cli.pages.flight import flight_section, vehicle_section
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
 from cpfls_cli.pages.identification import identification_section, search_section
+from cpfls_cli.pages.model import model_section
 from cpfls_cli.pages.prediction import prediction_section
 from cpfls_cli.pages.provenance import missing, provenance_section
 from cpfls_cli.pages.replay import replay_section
@@ -57,6 +58,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | None]] = (
     summary_section,
     comparison_section,
     models_section,
+    model_section,
     _of_each("diagnosis", "Before and after", DiagnosisRecord, diagnosis_blocks),
     extension_section,
     found_vehicle_section,

@@ -12,8 +12,8 @@ from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.artifacts.spec import Record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.trust import seen_words
 from cpfls_cli.pages.uncertainty import MISFIT_WORDS, OUTSIDE_WORDS
 from cpfls_cli.report.canvas import BASELINE, band, legend_above, line, plot, runs, stacked, style_of
 from cpfls_cli.report.content import Block, Heading, Plot, Section, Text
@@ -30,7 +30,7 @@ _AGAINST = {
 _INERTIA_PANELS = (("D22", "D33"), ("D13", "D23"))
 
 
-def answer(found: Findings, model: Record | None = None) -> Iterator[Text]:
+def answer(findings: Findings, model: Record | None = None) -> Iterator[Text]:
     """Say how well a model explains a flight, and where it cannot be trusted.
 
     Parameters
@@ -38,33 +38,33 @@ def answer(found: Findings, model: Record | None = None) -> Iterator[Text]:
     model : Record or None
         That predicted; None where it is not at hand.
     """
-    if found.held_against is None:
-        yield Text(f"{found.samples} samples, {found.outside} outside the region that the training data visited")
+    if findings.held_against is None:
+        yield Text(f"{findings.samples} samples, {findings.outside} outside the region that the training data visited")
     else:
-        against = _AGAINST[found.held_against]
-        yield Text(f"{found.samples} samples; torque of the whole vehicle, held against {against}")
-    score = found.score
+        against = _AGAINST[findings.held_against]
+        yield Text(f"{findings.samples} samples; torque of the whole vehicle, held against {against}")
+    score = findings.score
     if score is None:
         yield Text("the flight holds no torque, so there is no error to show")
     else:
         error = f"MSE {score.mse.mean():.4g} (N m)^2, relative error {score.worst_relative_error:.3%} (worst axis)"
         r2 = " ".join(f"{value:.4f}" for value in score.r2_body)
-        without = f" (without {found.vertical} samples near a vertical pitch)" if found.vertical else ""
+        without = f" (without {findings.vertical} samples near a vertical pitch)" if findings.vertical else ""
         yield from (Text(error), Text(f"R2 of body torque, roll pitch yaw: {r2}{without}"))
-    yield from _errors_of_vehicle(found)
-    yield from trust_along(found.outside, found.not_positive_definite, found.samples, model)
+    yield from _errors_of_vehicle(findings)
+    yield from trust_along(findings.outside, findings.not_positive_definite, findings.samples, model)
 
 
-def _errors_of_vehicle(found: Findings) -> Iterator[Text]:
+def _errors_of_vehicle(findings: Findings) -> Iterator[Text]:
     """Say how far torque and force of a whole vehicle are off at a sample, and what that does not tell."""
-    if found.held_against is None:
+    if findings.held_against is None:
         return
-    rows = (("torque about", "N m", found.body_torque_rms), ("force along", "N", found.force_rms))
+    rows = (("torque about", "N m", findings.body_torque_rms), ("force along", "N", findings.force_rms))
     for name, unit, rms in rows:
         if rms is not None:
             values = " ".join(number(value, 3) for value in rms.tolist())
             yield Text(f"rms error of the {name} x, y, z of the body: {values} {unit}")
-    if found.force_rms is None:
+    if findings.force_rms is None:
         yield Text("the flight knows neither acceleration nor velocity, so there is no force to hold the model against")
     yield Text("a torque that is right at each sample may still predict nothing; `cpfls replay` says what it predicts")
 
@@ -98,12 +98,7 @@ def _outside_words(model: Record | None) -> str:
 
 
 def prediction_section(sources: Sources) -> Section | None:
-    """Show the predictions.
-
-    Returns
-    -------
-    Section or None
-        None where no prediction was given.
+    """Show the predictions; None where no prediction was given.
 
     References
     ----------
@@ -120,7 +115,7 @@ def prediction_section(sources: Sources) -> Section | None:
 def _prediction(prediction: Source[PredictionRecord], index: int, sources: Sources) -> Iterator[Block]:
     model = sources.by_hash(prediction.made_from("model"))
     yield Heading(prediction.label)
-    yield Text(_seen(prediction, model))
+    yield Text(_seen(prediction, model, sources))
     yield from answer(prediction.record.findings, None if model is None else model.record)
     if prediction.record.error is not None:
         yield error_figure(f"figure-7-error-{index}", prediction)
@@ -130,21 +125,14 @@ def _prediction(prediction: Source[PredictionRecord], index: int, sources: Sourc
     yield inertia_figure(f"inertia-matrix-{index}", prediction)
 
 
-def _seen(prediction: Source[PredictionRecord], model: Source | None) -> str:
+def _seen(prediction: Source[PredictionRecord], model: Source | None, sources: Sources) -> str:
     """Tell whether the model has seen the flight before."""
     names = _model_and_flight(prediction)
     if model is None:
         return f"{names}. The model was not given, so it is not known here whether it learned from this flight."
-    if isinstance(model.record, VehicleRecord):
-        learned = {file.sha256 for role, file in model.header.inputs.items() if role.startswith("flight")}
-        if prediction.made_from("flight") in learned:
-            return f"{names}: one of the flights that it was found in."
-    elif model.made_from("flight") == prediction.made_from("flight"):
-        samples = len(prediction.record.time)
-        training = int(model.record.judged.samples[0])
-        part = "" if training == samples else f" (its first {training} of {samples} samples; the rest was held out)"
-        return f"{names}: the flight that it learned from{part}."
-    return f"{names}: a flight that it did not learn from."
+    flight = sources.by_hash(prediction.made_from("flight"))
+    hashes = (prediction.made_from("flight"), flight and flight.made_from("log"))
+    return f"{names}: {seen_words(model.record, [sha256 for sha256 in hashes if sha256])}."
 
 
 def _model_and_flight(prediction: Source[PredictionRecord]) -> str:

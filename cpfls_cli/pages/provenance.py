@@ -108,7 +108,13 @@ def _commands(sources: Sources) -> list[str]:
         Lines for a shell; what cannot be known stands in comments.
     """
     paths = _paths(sources)
-    foreign = [f"# needs {shlex.quote(file.name)}, sha256 {file.sha256}" for file in _foreign(sources)]
+    # What the commands read and the report does not hold.
+    needed = {file.sha256: file for source in sources.all for file in _read(source)}
+    foreign = [
+        f"# needs {shlex.quote(file.name)}, sha256 {sha256}"
+        for sha256, file in needed.items()
+        if sources.by_hash(sha256) is None
+    ]
     folders = sorted({path.rsplit("/", 1)[0] for path in paths.values() if "/" in path})
     lines = [line for source in _in_order(sources.all) for line in _lines(source, paths)]
     return [*foreign, *(f"mkdir -p {folder}" for folder in folders), *lines]
@@ -123,9 +129,15 @@ def _paths(sources: Sources) -> dict[str, str]:
     return {sha256: name if count[name] == 1 else f"{sha256[:HASH_SHOWN]}/{name}" for sha256, name in names.items()}
 
 
-def _foreign(sources: Sources) -> list[InputFile]:
-    files = {file.sha256: file for source in sources.all for file in source.header.inputs.values()}
-    return [file for sha256, file in files.items() if sources.by_hash(sha256) is None]
+def _read(source: Source) -> list[InputFile]:
+    """List the inputs that are arguments or options of a command; others were handed on with one of these."""
+    inputs, command = source.header.inputs, _command(source)
+    roles = () if command is None else (*command.arguments, *command.options)
+    return [inputs[name] for role in roles for name in _of_role(inputs, role)]
+
+
+def _command(source: Source) -> _Command | None:
+    return _IMPORT if "log" in source.header.inputs else _COMMANDS.get(type(source.record))
 
 
 def _in_order(given: Sequence[Source]) -> Iterator[Source]:
@@ -140,8 +152,7 @@ def _in_order(given: Sequence[Source]) -> Iterator[Source]:
 
 
 def _lines(source: Source, paths: dict[str, str]) -> Iterator[str]:
-    inputs = source.header.inputs
-    command = _IMPORT if "log" in inputs else _COMMANDS.get(type(source.record))
+    inputs, command = source.header.inputs, _command(source)
     output = shlex.quote(paths[source.sha256])
     if command is None:
         yield f"# {output}: no command is known that makes it"
@@ -150,16 +161,13 @@ def _lines(source: Source, paths: dict[str, str]) -> Iterator[str]:
         yield f"# the search for {output} was stopped before its end; this one goes on to it"
     words = ["cpfls", command.name, _config_name(source)]
     for role in command.arguments:
-        words += _files(inputs, role, paths) or _without_file(source.record, role)
+        # Of a replay of the vehicle of the config a word stands in the place of the model.
+        of_config = [VEHICLE] if isinstance(source.record, ReplayRecord) and role == "model" else []
+        words += _files(inputs, role, paths) or of_config
     for role in command.options:
         for file in _files(inputs, role, paths):
             words += [f"--{role}", file]
     yield " ".join([*words, *_asked(source.record), "-o", output])
-
-
-def _without_file(record: Record, role: str) -> list[str]:
-    """Give the word that stands in the place of a file."""
-    return [VEHICLE] if isinstance(record, ReplayRecord) and role == "model" else []
 
 
 def _asked(record: Record) -> list[str]:
@@ -171,14 +179,13 @@ def _asked(record: Record) -> list[str]:
 
 
 def _files(inputs: Mapping[str, InputFile], role: str, paths: dict[str, str]) -> list[str]:
-    """Find the files of a role, which are numbered where there are several."""
-    of_role = {name: file for name, file in inputs.items() if name == role or _numbered(name, role)}
-    order = sorted(of_role, key=lambda name: int(name.removeprefix(role).strip("-") or 1))
-    return [shlex.quote(paths.get(of_role[name].sha256, of_role[name].name)) for name in order]
+    return [shlex.quote(paths.get(inputs[name].sha256, inputs[name].name)) for name in _of_role(inputs, role)]
 
 
-def _numbered(name: str, role: str) -> bool:
-    return name.startswith(f"{role}-") and name.removeprefix(f"{role}-").isdigit()
+def _of_role(inputs: Mapping[str, InputFile], role: str) -> list[str]:
+    """List the inputs of a role, which have numbers where there are several."""
+    numbers = {name: name.removeprefix(role).removeprefix("-") or "1" for name in inputs if name.startswith(role)}
+    return sorted((name for name, number in numbers.items() if number.isdigit()), key=lambda name: int(numbers[name]))
 
 
 _Lack = tuple[type[Record], str, str]

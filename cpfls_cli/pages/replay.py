@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.replay import VEHICLE, DrawnGroup, ErrorsByHorizon, ReplayRecord, SignalErrorGroup
+from cpfls_cli.artifacts.replay import (
+    VEHICLE,
+    ErrorsByHorizon,
+    HeldOutGroup,
+    PlaybackGroup,
+    ReplayRecord,
+    SignalErrorGroup,
+    better_to,
+)
 from cpfls_cli.pages.gap import AXES, MEASURED, keep_in_view
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source, Sources, section_of_each
@@ -27,7 +35,8 @@ from cpfls_cli.report.canvas import (
 )
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import joined, number, sentence, whole_percent
-from cpfls_cli.rounding import tied
+from cpfls_cli.rounding import less, tied
+from cpfls_cli.validation.trust import Trust
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,7 +64,6 @@ _STYLES: tuple[dict[str, Any], ...] = (
 )
 _PLAYED: dict[str, Any] = {**style_of(1), "linestyle": "-", "zorder": 3}
 _SHOWN_WORST = 3
-_ROUNDING = 1e-9
 _SAID = 2
 _POSITIONS = ("x", "y", "z")
 
@@ -88,7 +96,7 @@ def verdict_box(replay: Source[ReplayRecord]) -> Box:
     rivals = _rivals(record)
     wrong = record.contradiction or ()
     sentences = [*beside_rivals(record), *_beside_stated(record)]
-    better = {name: group.total[_MODEL] < group.total[rival] for name, (group, rival) in rivals.items()}
+    better = {name: bool(less(*group.total[[_MODEL, rival]])) for name, (group, rival) in rivals.items()}
     moving = [name for name, (group, rival) in rivals.items() if group.total[rival] > 0]
     if not moving:
         return Box("REPLAY", sentence(f"{_name(record)} cannot be judged: the flight shows no motion"), sentences)
@@ -106,6 +114,49 @@ def beside_rivals(errors: ErrorsByHorizon) -> list[str]:
     return [_sentence(errors, name, group, rival) for name, (group, rival) in _rivals(errors).items()]
 
 
+def playback_words(trust: str, held: PlaybackGroup | None, contradictions: Sequence[str] | None) -> Iterator[str]:
+    """Say what a model is good for, to which horizon, and where; by playback along flights held out alone.
+
+    Parameters
+    ----------
+    trust : str
+        See `trust_by_playback`.
+    held : PlaybackGroup or None
+        None where no flight was held out.
+    contradictions : sequence of str or None
+        What no verdict can stand beside.
+    """
+    if contradictions:
+        first, *others = contradictions
+        yield f"Do not use it. {contradicted(first)}"
+        yield from map(sentence, others)
+    elif held is None:
+        yield "No flight was held out, so what it is good for is open; --held-out FLIGHT says it."
+    elif trust == Trust.SIMULATION:
+        reached = min(better_to(held, "body_rate"), better_to(held, "velocity"))
+        yield f"Good for simulation and for control to {number(reached, 2)} s{_region(held)}."
+    elif trust == Trust.CONTROL:
+        reached = better_to(held, "body_rate")
+        yield f"Good for control of the attitude: it predicts body rates to {number(reached, 2)} s{_region(held)}."
+    else:
+        yield "Do not use it: held out, its errors of the body rate add up to more than those of what knows no model."
+
+
+def _region(held: PlaybackGroup) -> str:
+    """Say at which speeds and rates it is better than what knows no model."""
+    region = held.better if isinstance(held, HeldOutGroup) else None
+    if region is None:
+        return ""
+    spans = [("speeds", region.speed, "m/s"), ("rates", region.rate, "rad/s")]
+    known = joined(
+        f"{name} of {number(span[0], 2)} to {number(span[1], 2)} {unit}"
+        for name, span, unit in spans
+        if span is not None
+    )
+    share = whole_percent(region.share)
+    return f", at {known}, where most of the windows lie in which its body rates are better ({share} of all)"
+
+
 def _name(record: ErrorsByHorizon) -> str:
     return "the vehicle of the config" if record.played == VEHICLE else record.played
 
@@ -120,7 +171,7 @@ def _sentence(record: ErrorsByHorizon, name: str, group: SignalErrorGroup, rival
     words, (model, other) = _SIGNALS[name][0].capitalize(), group.total[[_MODEL, rival]]
     if other == 0:
         return f"{words}: “{_WORDS[record.prediction[rival]]}” has no error, for the flight shows no motion."
-    if model < other:
+    if less(model, other):
         much = f"over all horizons its errors are {whole_percent(float(1 - model / other))} smaller"
     else:
         much = f"over all horizons its errors are {number(float(model / other), 3)} times as large"
@@ -129,7 +180,7 @@ def _sentence(record: ErrorsByHorizon, name: str, group: SignalErrorGroup, rival
 
 def _where(record: ErrorsByHorizon, group: SignalErrorGroup, rival: int) -> str:
     """Say at which horizons the model is better: at the longest stretches of them, where they are many."""
-    better = group.mae[_MODEL] < (1 - _ROUNDING) * group.mae[rival]
+    better = less(group.mae[_MODEL], group.mae[rival])
     longest = sorted(sorted(runs(better), key=lambda run: run[0] - run[1])[:_SAID])
     horizon = [_seconds(value) for value in record.horizon_s]
     stretches = [f"{horizon[a]} to {horizon[b]}" if a < b else horizon[a] for a, b in longest]
@@ -168,26 +219,21 @@ def _first_lost(record: ReplayRecord) -> str:
     return f"in {flight} from {begin:.2f} s after {after:.3g} s"
 
 
-def _chosen_horizons(record: ErrorsByHorizon) -> list[int]:
-    """Choose the first horizon, a fifth of the longest, and the longest."""
-    last = len(record.horizon_s) - 1
-    return sorted({0, max((last + 1) // 5 - 1, 0), last})
-
-
 def _shown(record: ErrorsByHorizon) -> list[int]:
     """List the predictions that are shown: the stated vehicle once."""
     return [row for row in range(len(record.prediction)) if row != _STATED or record.played != VEHICLE]
 
 
 def errors_table(record: ErrorsByHorizon, index: int) -> Table:
-    """Show the errors of all predictions after some horizons, and their sums."""
-    chosen = _chosen_horizons(record)
+    """Show the errors of all predictions after the first horizon, a fifth of the longest, the longest; and sums."""
+    last = len(record.horizon_s) - 1
+    chosen = sorted({0, max((last + 1) // 5 - 1, 0), last})
     rows: list[list[str | Cell]] = []
     for name, (group, rival) in _rivals(record).items():
         words, unit, scale = _SIGNALS[name]
         for row in _shown(record):
             values = [*(scale * group.mae[row, chosen]), scale * group.total[row]]
-            worse = row == _MODEL and group.total[_MODEL] >= group.total[rival]
+            worse = row == _MODEL and not less(*group.total[[_MODEL, rival]])
             cells = [number(float(value), 3) for value in values]
             rows.append(
                 [
@@ -224,13 +270,7 @@ def _worst_table(record: ReplayRecord, index: int) -> Table:
 
 
 def replay_section(sources: Sources) -> Section | None:
-    """Show how models predict the motion of flights.
-
-    Returns
-    -------
-    Section or None
-        None where no replay was given.
-    """
+    """Show how models predict the motion of flights; None where no replay was given."""
     return section_of_each("replay", "Played back along flights", sources.replays, partial(_section, sources))
 
 
@@ -245,11 +285,10 @@ def told_at(replay: ReplayRecord, sources: Sources) -> str | None:
 
 def _same_errors(first: ErrorsByHorizon, second: ErrorsByHorizon) -> bool:
     groups = zip(first.errors.values(), second.errors.values(), strict=True)
-    return all(a is b if a is None or b is None else _same(a.mae, b.mae) for a, b in groups)
-
-
-def _same(first: Array, second: Array) -> bool:
-    return first.shape == second.shape and bool(tied(first, second).all())
+    return all(
+        a is b if a is None or b is None else a.mae.shape == b.mae.shape and bool(tied(a.mae, b.mae).all())
+        for a, b in groups
+    )
 
 
 def _section(sources: Sources, replay: Source[ReplayRecord], index: int) -> Iterator[Block]:
@@ -356,7 +395,8 @@ def drawn_figure(name: str, record: ReplayRecord) -> Plot:
     flight = record.flight.name[window.flight[drawn.window[0]]]
     times = window.start[drawn.window][:, None] + np.concatenate([[0.0], record.horizon_s])
     panels_of: list[tuple[str, Array, Array]] = [
-        (f"rate about {axis}, rad/s", *_rates(drawn, index)) for index, axis in enumerate(AXES)
+        (f"rate about {axis}, rad/s", drawn.measured[:, :, index], drawn.model[:, :, index])
+        for index, axis in enumerate(AXES)
     ]
     if drawn.measured_position is not None and drawn.model_position is not None:
         measured_position, model_position = drawn.measured_position, drawn.model_position
@@ -382,10 +422,6 @@ def drawn_figure(name: str, record: ReplayRecord) -> Plot:
         "stretches half are better and half are worse."
     )
     return plot(name, caption, "A flight beside its playback over time", 0.8 + 1.25 * len(panels_of), draw)
-
-
-def _rates(drawn: DrawnGroup, axis: int) -> tuple[Array, Array]:
-    return drawn.measured[:, :, axis], drawn.model[:, :, axis]
 
 
 def where_figure(name: str, record: ReplayRecord) -> Plot:

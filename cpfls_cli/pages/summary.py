@@ -8,11 +8,12 @@ from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
 from cpfls_cli.pages.diagnosis import gap_blocks
-from cpfls_cli.pages.model import scores_table, solution, verdict_line
+from cpfls_cli.pages.identification import scores_table, solution, verdict_line
+from cpfls_cli.pages.model import trust_box
 from cpfls_cli.pages.provenance import missing
 from cpfls_cli.pages.replay import told_at, verdict_box
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.vehicle_model import found_box
+from cpfls_cli.pages.trust import learned_words
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Text, Tone
 from cpfls_cli.report.numbers import ROUNDING, percent, plain, sentence
 
@@ -22,27 +23,23 @@ def summary_section(sources: Sources) -> Section:
     blocks: list[Block] = [verdict_line(model) for model in sources.models]
     blocks += [Text(note, "note") for note in sources.settings.notes]
     blocks += gap_blocks(sources)
-    blocks += [found_box(vehicle) for vehicle in sources.vehicles]
+    blocks += [trust_box(vehicle) for vehicle in sources.vehicles]
     blocks += [verdict_box(replay) for replay in sources.replays if told_at(replay.record, sources) is None]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)
     if not sources.models and not sources.only_gap:
         blocks.append(Text("No model was given, so there is nothing to judge yet.", "note"))
     for flight in sources.flights:
-        blocks += _flight_warnings(flight)
+        quality = flight.record.quality
+        said = () if quality is None else quality.warning or ()
+        blocks += [Text(f"{flight.label}: {warning}.", "warning") for warning in said]
     if len(sources.models) < 2:
         blocks += _missing(sources)
     return Section("summary", "Summary", blocks)
 
 
 def models_section(sources: Sources) -> Section | None:
-    """Summarise each model; one alone stands in the summary itself.
-
-    Returns
-    -------
-    Section or None
-        None for fewer than two models.
-    """
+    """Summarise each model; one alone stands in the summary itself; None for fewer than two models."""
     if len(sources.models) < 2:
         return None
     blocks = [block for index, model in enumerate(sources.models, start=1) for block in _model(model, sources, index)]
@@ -51,12 +48,6 @@ def models_section(sources: Sources) -> Section | None:
 
 def _missing(sources: Sources) -> list[Text]:
     return [Text(sentence, "note") for sentence in missing(sources).values()]
-
-
-def _flight_warnings(flight: Source[FlightRecord]) -> Iterator[Block]:
-    quality = flight.record.quality
-    for warning in (quality.warning or ()) if quality is not None else ():
-        yield Text(f"{flight.label}: {warning}.", "warning")
 
 
 def _model(model: Source[IdentifiedRecord], sources: Sources, index: int) -> Iterator[Block]:
@@ -80,11 +71,9 @@ def _model(model: Source[IdentifiedRecord], sources: Sources, index: int) -> Ite
 def _facts(model: Source[IdentifiedRecord]) -> list[tuple[str, str]]:
     record = model.record
     learned, training = len(record.training_indices), record.judged.samples_of(TRAINING)
-    file = record.origin.inputs.get("flight")
-    flight = f"{file.name} (sha256 {file.sha256[:12]})" if file else "unknown"
     chosen = f", chosen in {model.input_name('selection')}" if model.made_from("selection") else ""
     return [
-        ("Learned from", f"{flight}: {learned} of {training} training samples{chosen}"),
+        ("Learned from", f"{learned_words(record)}: {learned} of {training} training samples{chosen}"),
         ("Structure", _structure(model)),
         ("Parameters", _parameters(record)),
         ("Search", _search(model)),
@@ -160,16 +149,13 @@ def _noise_free(flight: Source[FlightRecord]) -> bool:
 def _comparison(judged: JudgedGroup, part: str, winners: Sequence[Winner]) -> str:
     ours, axis = judged.worst(MODEL, part)
     rigid, rigid_axis = judged.worst(RIGID_BODY, part)
+    where = {TRAINING: "In training", "held-out rest": "On the held-out rest"}.get(part, f"On {part}")
     reached = (
-        f"{_where(part)} ({judged.samples_of(part)} samples) the largest error of the model is {percent(ours)} of the "
+        f"{where} ({judged.samples_of(part)} samples) the largest error of the model is {percent(ours)} of the "
         f"largest torque ({axis}, the worst axis); the rigid body with six inertia parameters: {percent(rigid)}"
     )
     other_axis = f" ({rigid_axis})" if rigid > ROUNDING and rigid_axis != axis else ""
     return f"{reached}{other_axis}. {_who_is_better(winners)}"
-
-
-def _where(part: str) -> str:
-    return {TRAINING: "In training", "held-out rest": "On the held-out rest"}.get(part, f"On {part}")
 
 
 def _who_is_better(winners: Sequence[Winner]) -> str:

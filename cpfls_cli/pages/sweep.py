@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.sweep import SettingRuns, SweepRecord, spread
-from cpfls_cli.pages.model import SQUARED_TORQUE, TORQUE
+from cpfls_cli.pages.identification import SQUARED_TORQUE, TORQUE
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import plain_ticks, plot, style_of
 from cpfls_cli.report.content import Block, Plot, Section, Table, Text

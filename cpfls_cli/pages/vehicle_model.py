@@ -1,4 +1,4 @@
-"""The page of a vehicle found in flights: its numbers, what was tried, and what has no name."""
+"""How a vehicle was found in flights: its numbers, what was tried, and what has no name."""
 
 from __future__ import annotations
 
@@ -22,16 +22,14 @@ from cpfls_cli.artifacts.parameters import (
     too_heavy,
     vehicle_section,
 )
-from cpfls_cli.artifacts.replay import HeldOutGroup, better_to
 from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
-from cpfls_cli.pages.replay import beside_rivals, errors_table, horizon_figure
-from cpfls_cli.pages.sensors import contradicted
+from cpfls_cli.pages.replay import beside_rivals, errors_table, horizon_figure, playback_words
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, style_of
-from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Listing, Plot, Section, Table, Text, Tone
-from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent, sentence, whole_percent
+from cpfls_cli.report.content import Block, Cell, Facts, Heading, Listing, Plot, Section, Table, Text
+from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,18 +40,6 @@ _NAMES = {
     "greedy": "one by one",
     "everything": "all blocks",
     "nothing": "stated vehicle",
-}
-_LABELS = {
-    "good-for-simulation": "GOOD FOR SIMULATION AND CONTROL",
-    "good-for-control": "GOOD FOR CONTROL",
-    "do-not-use": "DO NOT USE",
-    "not-judged": "NOT JUDGED",
-}
-_TONES: dict[str, Tone] = {
-    "good-for-simulation": "good",
-    "good-for-control": "good",
-    "do-not-use": "warning",
-    "not-judged": "note",
 }
 _REMAINDER, _ROTORS = "remainder", "rotors"
 _AXES = ("x", "y", "z")
@@ -86,33 +72,38 @@ _FAR = 3.0
 """Factor from the stated number from which on a found one is called effective, and no property of a part."""
 
 
-def answer(found: Source[VehicleRecord]) -> Iterator[Block]:
-    """Say what was found, how well it predicts what it was not fitted to, and what to be careful with."""
-    yield found_box(found)
-    if found.record.held_out is not None:
-        yield errors_table(found.record.held_out, 1)
-    yield from _differences_table(found.record, 1)
-    yield from _constants(found.record, 1)
-    yield from _numbers_table(found, 1)
-    yield _section_to_paste(found.record)
-    yield from (Text(warning, "warning") for warning in warnings(found.record))
+def title(record: VehicleRecord) -> str:
+    """Say what a vehicle found in flights is."""
+    return f"a vehicle with {len(record.found.name)} numbers found in its flights."
 
 
-def found_box(found: Source[VehicleRecord]) -> Box:
-    """Say what was found, and how well it predicts what it was not fitted to."""
-    record = found.record
+def grounds(record: VehicleRecord) -> Iterator[str]:
+    """Say what a vehicle is good for, and how well it predicts what it was not fitted to."""
+    yield from playback_words(record.trust, record.held_out, record.contradiction)
+    yield from () if record.held_out is None else beside_rivals(record.held_out)
     errors = dict(zip(record.structure.name, record.structure.error, strict=True))
-    title = f"{found.label}: a vehicle with {len(record.found.name)} numbers found in its flights."
-    judged = (
+    alone = "the constants" if _guessed(record) else "the stated vehicle"
+    yield (
         f"On parts of the flights kept aside in turn its error is {number(errors['chosen'], 3)}; with all blocks "
         f"{number(errors['everything'], 3)}, with blocks added one by one {number(errors['greedy'], 3)}, with "
-        f"{'the constants alone' if _guessed(record) else 'the stated vehicle'} {number(errors['nothing'], 3)}; rates "
-        "that stay have about 1.1."
+        f"{'the constants alone' if _guessed(record) else alone} {number(errors['nothing'], 3)}; rates that stay have "
+        "about 1.1."
     )
-    blocks = _chosen_blocks(record)
-    alone = "the constants" if _guessed(record) else "the stated vehicle"
-    holds = f"It holds {joined(blocks)}." if blocks else f"It holds nothing but {alone}."
-    return Box(_LABELS[record.verdict], title, [*_verdict(record), judged, holds], _TONES[record.verdict])
+    chosen = record.structure.blocks[record.structure.name.index("chosen")].split()
+    blocks = joined(block.replace("_", " ") for block in chosen)
+    yield f"It holds {blocks}." if blocks else f"It holds nothing but {alone}."
+
+
+def details(vehicle: Source[VehicleRecord]) -> Iterator[Block]:
+    """Say how well a vehicle predicts what it was not fitted to, its numbers, and what to be careful with."""
+    record = vehicle.record
+    if record.held_out is not None:
+        yield errors_table(record.held_out, 1)
+    yield from _differences_table(record, 1)
+    yield from _constants(record, 1)
+    yield from _numbers_table(vehicle, 1)
+    yield _section_to_paste(record)
+    yield from (Text(warning, "warning") for warning in warnings(record))
 
 
 def _guessed(record: VehicleRecord) -> bool:
@@ -120,56 +111,14 @@ def _guessed(record: VehicleRecord) -> bool:
     return bool(record.structure.numbers[record.structure.name.index("nothing")])
 
 
-def _verdict(record: VehicleRecord) -> Iterator[str]:
-    """Say what the vehicle is good for, to which horizon, and where; by playback alone."""
-    held = record.held_out
-    if record.contradiction:
-        first, *others = record.contradiction
-        yield f"Do not use it. {contradicted(first)}"
-        yield from map(sentence, others)
-        yield from () if held is None else beside_rivals(held)
-        return
-    if held is None:
-        yield "No flight was held out, so what it is good for is open; --held-out FLIGHT says it."
-        return
-    turning, moving = better_to(held, "body_rate"), better_to(held, "velocity")
-    if record.verdict == "good-for-simulation":
-        yield f"Good for simulation and for control to {number(min(turning, moving), 2)} s{_where(held)}."
-    elif record.verdict == "good-for-control":
-        yield f"Good for control of the attitude: it predicts body rates to {number(turning, 2)} s{_where(held)}."
-    else:
-        yield "Do not use it: held out, its errors of the body rate add up to more than those of what knows no model."
-    yield from beside_rivals(held)
-
-
-def worth_in_words(record: VehicleRecord) -> Iterator[str]:
+def worth(record: VehicleRecord) -> Iterator[str]:
     """Say what a vehicle that is used elsewhere is worth, and how far off it is itself."""
-    yield next(_verdict(record))
+    yield next(playback_words(record.trust, record.held_out, record.contradiction))
     held = record.held_out
     if held is not None:
         last = {name: group.mae[0, -1] for name, group in held.errors.items() if group is not None}
         ends = joined(f"{number(last[name] * scale, 3)} {unit}" for name, unit, scale in _ENDS if name in last)
         yield f"Held out, it ends {ends} off what was measured after {held.horizon_s[-1]:.3g} s, mean."
-
-
-def _where(held: HeldOutGroup) -> str:
-    """Say at which speeds and rates it is better than what knows no model."""
-    region = held.better
-    if region is None:
-        return ""
-    spans = [("speeds", region.speed, "m/s"), ("rates", region.rate, "rad/s")]
-    known = joined(
-        f"{name} of {number(span[0], 2)} to {number(span[1], 2)} {unit}"
-        for name, span, unit in spans
-        if span is not None
-    )
-    share = whole_percent(region.share)
-    return f", at {known}, where most of the windows lie in which its body rates are better ({share} of all)"
-
-
-def _chosen_blocks(record: VehicleRecord) -> list[str]:
-    chosen = record.structure.blocks[record.structure.name.index("chosen")]
-    return [block.replace("_", " ") for block in chosen.split()]
 
 
 def warnings(record: VehicleRecord) -> list[str]:
@@ -196,7 +145,8 @@ def warnings(record: VehicleRecord) -> list[str]:
         for row in rows_of(record.trade)
         if not (_is_learned(row["first"]) and _is_learned(row["second"]))
     )
-    far = [row["name"] for row in rows_of(found) if _far(row["value"], row["stated"])]
+    stated = [row for row in rows_of(found) if np.isfinite(row["stated"]) and row["stated"] > 0]
+    far = [row["name"] for row in stated if not 1 / _FAR < row["value"] / row["stated"] < _FAR]
     if far:
         said.append(
             f"{joined(far)}: more than {_FAR:g} times off what is stated; an effective number that predicts, not a "
@@ -212,10 +162,6 @@ def warnings(record: VehicleRecord) -> list[str]:
 def _is_learned(name: str) -> bool:
     """Tell whether a number belongs to a remainder: to that of the torque, or of the force."""
     return name.startswith(_REMAINDER)
-
-
-def _far(value: float, stated: float) -> bool:
-    return bool(np.isfinite(stated) and stated > 0 and not 1 / _FAR < value / stated < _FAR)
 
 
 def _numbers_table(found: Source[VehicleRecord], index: int) -> Iterator[Table]:

@@ -78,7 +78,7 @@ class SweepSamples:
 
     def _chosen(self, split: SplitFlights, study: Study, variant: Variant) -> tuple[TrainingData, float]:
         training, settings, rng = split.training, study.reduction, generator(study, "reduce")
-        everything = TrainingData(training, training, split.rests, split.training_indices)
+        everything = TrainingData(training, training, split.rests, split.training_indices, split.parts)
         with settings_of("reduction", study):
             surveyed = survey(uniform_regressor(training, study), settings.rank_tolerance)
             if not variant.reduced:
@@ -88,7 +88,9 @@ class SweepSamples:
                 return everything, surveyed.condition_number
             selection = reduce_streamed(surveyed, settings, rng, self._shown(variant.name))
         chosen, condition = np.sort(selection.indices), selection.condition_number
-        data = TrainingData(training, gathered(training, chosen), split.rests, split.training_indices[chosen])
+        data = TrainingData(
+            training, gathered(training, chosen), split.rests, split.training_indices[chosen], split.parts
+        )
         return data, condition if np.isfinite(condition) else float("nan")
 
 

@@ -1,5 +1,8 @@
 """Prediction by horizon: measured torques replayed through models from many points of a flight."""
 
+# Not by `playback.player`: that counts every pitch on the near side of the vertical, where a full rotation spends less
+# than half of its time, and takes one midpoint step a sample, which ends 1.1e-4 rad off where these end 4.8e-5 rad off
+# (an exact flight at 100 Hz, 0.5 s).
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping

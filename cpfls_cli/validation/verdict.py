@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -13,8 +12,7 @@ from cpfls_cli.dynamics.rigid_body import why_unphysical
 from cpfls_cli.identification.findings import AXES
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
 from cpfls_cli.validation.reasons import AGAINST, DEFINITE_SHARE, FOR, NEITHER, Reason, numbers, reasons
-
-Label = Literal["good-for-control", "good-inside-region", "not-better-than-rigid-body", "do-not-use"]
+from cpfls_cli.validation.trust import Trust, capped
 
 
 @dataclass(frozen=True)
@@ -23,8 +21,7 @@ class Verdict:
 
     Attributes
     ----------
-    label : str
-        ``good-for-control``, ``good-inside-region``, ``not-better-than-rigid-body`` or ``do-not-use``.
+    label : Trust
     region : str
         Attitudes that the verdict is about.
     reason : tuple of str
@@ -33,7 +30,7 @@ class Verdict:
         For each reason: 1 for the model, -1 against it, 0 neither.
     """
 
-    label: Label
+    label: Trust
     region: str
     reason: tuple[str, ...]
     speaks: tuple[int, ...]
@@ -82,7 +79,9 @@ def contradicted(found: Verdict, contradictions: Sequence[str]) -> Verdict:
         return found
     wrong = tuple(f"the log contradicts itself: {each}" for each in contradictions)
     against = (AGAINST,) * len(wrong)
-    return replace(found, label="do-not-use", reason=(*wrong, *found.reason), speaks=(*against, *found.speaks))
+    return replace(
+        found, label=capped(found.label, wrong), reason=(*wrong, *found.reason), speaks=(*against, *found.speaks)
+    )
 
 
 def good_axes(grounds: Grounds, predictor: str) -> BoolArray:
@@ -96,16 +95,16 @@ def confirmed_axes(grounds: Grounds, predictor: str) -> BoolArray:
     return np.asarray((grounds.r2(predictor) >= grounds.r2_min) & grounds.predicts(predictor))
 
 
-def _decided(grounds: Grounds) -> tuple[Label, Reason]:
+def _decided(grounds: Grounds) -> tuple[Trust, Reason]:
     if grounds.impossible:
-        return "do-not-use", Reason(_no_body(grounds), AGAINST)
+        return Trust.DO_NOT_USE, Reason(_no_body(grounds), AGAINST)
     if not _better(grounds):
         return _beside_rigid_body(grounds)
     why = _not_good_enough(grounds)
     if why is not None:
-        return "do-not-use", Reason(f"better than the rigid body, but {why}", AGAINST)
+        return Trust.DO_NOT_USE, Reason(f"better than the rigid body, but {why}", AGAINST)
     confirmed = bool(np.all(confirmed_axes(grounds, MODEL)))
-    label: Label = "good-for-control" if grounds.everywhere and confirmed else "good-inside-region"
+    label = Trust.CONTROL if grounds.everywhere and confirmed else Trust.INSIDE
     text = "better than the rigid body on held-out data, and good enough for control"
     return label, Reason(f"{text}: {_r2_in_words(grounds, MODEL)}", FOR)
 
@@ -143,19 +142,21 @@ def _r2_in_words(grounds: Grounds, predictor: str) -> str:
     return text if np.all(confirmed) else f"{text}; about {_names(~confirmed)} nothing confirms it"
 
 
-def _beside_rigid_body(grounds: Grounds) -> tuple[Label, Reason]:
+def _beside_rigid_body(grounds: Grounds) -> tuple[Trust, Reason]:
     r2 = grounds.r2(RIGID_BODY)
     explains = f"R2 of body torque {numbers(r2)}"
     why = why_unphysical(grounds.identification.rigid_body)
     if np.any((r2 <= 0) & ~grounds.hardly_excited):
         text = f"neither the model nor the rigid body explains more of the torque than a constant does: {explains}"
-        return "do-not-use", Reason(text, AGAINST)
+        return Trust.DO_NOT_USE, Reason(text, AGAINST)
     if why is not None:
-        return "do-not-use", Reason(f"the model is not shown to be better than the rigid body, and that {why}", AGAINST)
+        return Trust.DO_NOT_USE, Reason(
+            f"the model is not shown to be better than the rigid body, and that {why}", AGAINST
+        )
     if not grounds.held_out:
         text = "nothing was held out, so nothing shows that the model is better than the rigid body, which is simpler"
-        return "not-better-than-rigid-body", Reason(f"{text} (rigid body in training: {explains})", AGAINST)
-    return "not-better-than-rigid-body", _rigid_body_instead(grounds)
+        return Trust.RIGID_BODY, Reason(f"{text} (rigid body in training: {explains})", AGAINST)
+    return Trust.RIGID_BODY, _rigid_body_instead(grounds)
 
 
 def _rigid_body_instead(grounds: Grounds) -> Reason:

@@ -10,7 +10,7 @@ from cpfls_cli.artifacts.evidence import VerdictGroup
 from cpfls_cli.artifacts.identified import ChosenGroup, IdentifiedRecord, IdentifiedVehicleGroup, SearchGroup
 from cpfls_cli.artifacts.scores import JudgedGroup
 from cpfls_cli.artifacts.spec import Header, InputFile
-from cpfls_cli.commands.vehicle_sheets import identified_sheet
+from cpfls_cli.commands.vehicle_sheets import bare_sheet
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.export import Sheet, expected
@@ -129,7 +129,7 @@ def sheet_of(model: InertiaFunctions, **changes) -> Sheet:
         **dict.fromkeys(("solve", "rules", "front", "history", "baselines", "training_indices")),
     )
     vehicle = VehicleModel(vehicle=VEHICLE, fuzzy=model)
-    return replace(identified_sheet(record, vehicle), name=given["name"], file=given["file"], sha256="a" * 64)
+    return replace(bare_sheet(record, vehicle), name=given["name"], file=given["file"], sha256="a" * 64)
 
 
 def verdict_of(label: str, region: str, *reasons: tuple[str, int]) -> VerdictGroup:

@@ -135,7 +135,7 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     with undrawn():
         page = cpfls("report", config, found.output, "-o", tmp_path / "page.html", "--json")
     told = json.loads(page.stdout)
-    assert told["sections"] == ["summary", "found-vehicle", "vehicle", "provenance"]
+    assert told["sections"] == ["summary", "model", "found-vehicle", "vehicle", "provenance"]
     text = (tmp_path / "page.html").read_text()
     assert "A vehicle found in flights" in text
     assert "Not shown, because" not in text

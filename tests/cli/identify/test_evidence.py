@@ -21,6 +21,12 @@ WORDS = {
     "not-better-than-rigid-body": "Not better than the rigid body",
     "do-not-use": "Do not use it",
 }
+SHORT = {
+    "good-for-control": "good for control",
+    "good-inside-region": "good inside its region",
+    "not-better-than-rigid-body": "no better than a rigid body",
+    "do-not-use": "do not use",
+}
 SIGNS = {1: "For it", -1: "Against it", 0: "To know"}
 
 
@@ -56,7 +62,9 @@ def test_one_period_away_where_inputs_go_all_the_way_round(cpfls, study, pipelin
 def test_the_verdict_is_printed_with_its_reasons(validated):
     _, text, summary = validated
     verdict = summary["verdict"]
-    assert f"\nVERDICT: {WORDS[verdict['label']]}\n  Region: {verdict['region']}.\n" in text
+    assert text.startswith(f"{SHORT[verdict['label']].upper()}: ")
+    assert f"\n  {WORDS[verdict['label']]}.\n  Region: {verdict['region']}.\n" in text
+    assert summary["trust"] == verdict["label"]
     for reason in verdict["reasons"]:
         assert f"\n  {SIGNS[reason['speaks']]}: {sentence(reason['text'])}\n" in text
 

@@ -94,6 +94,6 @@ def test_a_verdict_may_lack_any_of_its_datasets():
     assert VerdictGroup(label="do-not-use").summary == {"label": "do-not-use", "region": "", "reasons": []}
     assert VerdictGroup(reason=("a", "b")).reasons == [("a", 0), ("b", 0)]
     assert VerdictGroup(reason=("a", "b"), speaks=np.array([1.0, -1.0])).reasons == [("a", 1), ("b", -1)]
-    assert record(verdict=VerdictGroup(region="all")).verdict_label is None
+    assert record(verdict=VerdictGroup(region="all")).trust == "not-judged"
     assert record(verdict=VerdictGroup(region="all")).validated
     assert not record().validated

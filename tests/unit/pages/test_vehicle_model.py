@@ -9,8 +9,9 @@ from cpfls_cli.artifacts.parameters import parameters_of, vehicle_section
 from cpfls_cli.artifacts.vehicle_model import FoundNumbersGroup, TradesGroup
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.scales import hover_speed
+from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.source import Sources
-from cpfls_cli.pages.vehicle_model import answer, found_vehicle_section, remainder_curves, warnings
+from cpfls_cli.pages.vehicle_model import found_vehicle_section, remainder_curves, warnings
 from cpfls_cli.report.content import Plot, Table
 from tests.builders.forms import source_of_record
 from tests.builders.vehicle_models import record_of, remainder, whole

@@ -1,0 +1,97 @@
+"""Which flights a model learned from, and how much of each: one answer for every command and page that judges it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from cpfls_cli.arrays import IntArray
+from cpfls_cli.artifacts.spec import InputFile, dataset, record
+
+MODEL_FLIGHT = "model-flight"
+"""Role of a flight that the model of a comparison or diagnosis learned from; of those compared it is ``flight``."""
+
+
+class LearnedFlight(NamedTuple):
+    """A flight that a model learned from.
+
+    Attributes
+    ----------
+    samples, of : int or None
+        Leading samples that it learned from, of all that were used; None where an old file does not say.
+    """
+
+    file: InputFile
+    samples: int | None = None
+    of: int | None = None
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing of it is known to have been left out."""
+        return self.samples == self.of
+
+
+@record
+class LearnedGroup:
+    """How much of each flight a model learned from."""
+
+    role: tuple[str, ...] = dataset("role", "which of /inputs the flight is", "learned")
+    samples: IntArray = dataset("samples", "leading samples of it that were learned from", "learned")
+    of: IntArray = dataset("of", "samples of it that were used: learned from or held out", "learned")
+
+    @classmethod
+    def parts(cls, roles: Iterable[str], parts: Sequence[tuple[int, int]]) -> Self:
+        """Say of each flight how many samples were learned from, and of how many."""
+        samples, of = np.array(parts, dtype=np.int64).reshape(-1, 2).T
+        return cls(role=tuple(roles), samples=samples, of=of)
+
+    def flights(self, inputs: Mapping[str, InputFile]) -> tuple[LearnedFlight, ...]:
+        """List the flights, each with its file among the inputs of the artifact."""
+        rows = zip(self.role, self.samples.tolist(), self.of.tolist(), strict=True)
+        return tuple(LearnedFlight(inputs[role], samples, of) for role, samples, of in rows if role in inputs)
+
+
+def as_inputs(role: str, flights: Sequence[LearnedFlight]) -> tuple[dict[str, InputFile], LearnedGroup | None]:
+    """Make flights that were learned from inputs of another artifact, with numbers behind their role.
+
+    Returns
+    -------
+    inputs : dict of str to InputFile
+        By role.
+    learned : LearnedGroup or None
+        None where there are none, or an old file does not say how much of them was learned from.
+    """
+    inputs = {f"{role}-{number}": flight.file for number, flight in enumerate(flights, start=1)}
+    parts = [(flight.samples, flight.of) for flight in flights if flight.samples is not None and flight.of is not None]
+    known = bool(parts) and len(parts) == len(flights)
+    return inputs, LearnedGroup.parts(inputs, parts) if known else None
+
+
+def joined_flights(*groups: Iterable[LearnedFlight]) -> tuple[LearnedFlight, ...]:
+    """List flights once each; of one that stands in several groups what was learned from most."""
+    kept: dict[str, LearnedFlight] = {}
+    for flight in (flight for group in groups for flight in group):
+        known = kept.get(flight.file.sha256)
+        if known is None or (known.samples or 0) < (flight.samples or 0):
+            kept[flight.file.sha256] = flight
+    return tuple(kept.values())
+
+
+def learned_in(inputs: Mapping[str, InputFile], parts: LearnedGroup | None, role: str) -> tuple[LearnedFlight, ...]:
+    """List the flights in a role, with how much of them was learned from where a file says so."""
+    told = () if parts is None else parts.flights(inputs)
+    files = [file for name, file in inputs.items() if name == role or name.startswith(f"{role}-")]
+    return told or tuple(map(LearnedFlight, files))
+
+
+def part_learned(learned: Iterable[LearnedFlight], hashes: Collection[str]) -> LearnedFlight | None:
+    """Find what was learned from a flight; None where nothing was.
+
+    Parameters
+    ----------
+    hashes : collection of str
+        SHA-256 of its file, and of the log that it was imported from where that is known.
+    """
+    return next((flight for flight in learned if flight.file.sha256 in hashes), None)

@@ -1,0 +1,97 @@
+"""How far to trust a model, in words: one table of them, and whether it has seen a flight that it is judged on."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+from cpfls_cli.artifacts.learned import LearnedFlight, part_learned
+from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.report.content import Tone
+from cpfls_cli.report.numbers import joined
+from cpfls_cli.validation.trust import Trust
+
+
+class Words(NamedTuple):
+    """A word of trust as people read it: in a cell of a table or, in capitals, before a box; and as a sentence."""
+
+    short: str
+    sentence: str
+    tone: Tone
+
+
+_WORDS: dict[str, Words] = {
+    Trust.SIMULATION: Words("good for simulation and control", "Good for simulation and control", "good"),
+    Trust.CONTROL: Words("good for control", "Good for control", "good"),
+    Trust.INSIDE: Words(
+        "good inside its region", "Good inside the region that training visited, and only there", "note"
+    ),
+    Trust.NOT_JUDGED: Words("not judged", "Not judged", "note"),
+    Trust.RIGID_BODY: Words("no better than a rigid body", "Not better than the rigid body", "warning"),
+    Trust.DO_NOT_USE: Words("do not use", "Do not use it", "warning"),
+}
+
+KnownBy = Iterable[tuple[str, Collection[str]]]
+"""Flights by file name, each with the hashes of its file and of its log."""
+
+NOT_SEEN = "a flight that it did not learn from"
+
+
+def trust_words(trust: str) -> Words:
+    """Put a word of trust as people read it; one that a newer program wrote stands as it is."""
+    return _WORDS.get(trust, Words(trust, trust, "note"))
+
+
+def trust_facts(model: ModelRecord) -> list[tuple[str, str]]:
+    """Say in a word how far to trust a model, and which flights it learned from."""
+    return [("How far to trust it", trust_words(model.trust).sentence), ("Learned from", learned_words(model))]
+
+
+def learned_words(model: ModelRecord) -> str:
+    """Name the flights that a model learned from, each with the part of it."""
+    flights = [_with_part(flight) for flight in model.learned_from]
+    return joined(flights) if flights else "the file does not say"
+
+
+def _with_part(flight: LearnedFlight) -> str:
+    part = "" if flight.samples is None else f", {_part(flight) if not flight.whole else f'{flight.of} samples'}"
+    return f"{flight.file.name} (sha256 {flight.file.sha256[:12]}{part})"
+
+
+def seen_words(model: ModelRecord, hashes: Collection[str]) -> str:
+    """Say what part of a flight a model learned from, or that it did not.
+
+    Parameters
+    ----------
+    hashes : collection of str
+        SHA-256 of the flight, and of the log that it was imported from where that is known.
+    """
+    learned = model.learned_from
+    flight = part_learned(learned, hashes)
+    if flight is None:
+        chosen_on = (file.sha256 for role, file in model.origin.inputs.items() if role.startswith("choose-on"))
+        return "a flight that it was chosen on" if any(sha256 in hashes for sha256 in chosen_on) else NOT_SEEN
+    which = "the flight" if len(learned) == 1 else "one of the flights"
+    part = "" if flight.whole else f" ({_part(flight)}; the rest was held out)"
+    return f"{which} that it learned from{part}"
+
+
+def seen_warnings(model: str, learned: Sequence[LearnedFlight], judged: KnownBy) -> Iterator[str]:
+    """Warn of flights that judge a model and that it has learned from.
+
+    Parameters
+    ----------
+    model : str
+        What it is called.
+    judged : iterable of (str, collection of str)
+        File name and hashes, as for `seen_words`, of each flight.
+    """
+    for name, hashes in judged:
+        flight = part_learned(learned, hashes)
+        if flight is not None:
+            what, it = ("it", "it") if flight.whole else (_part(flight), "that")
+            yield f"{name}: {model} has learned from {what}, so {it} shows nothing of flights not seen"
+
+
+def _part(flight: LearnedFlight) -> str:
+    return f"its first {flight.samples} of {flight.of} samples"

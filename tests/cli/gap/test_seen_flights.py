@@ -1,0 +1,82 @@
+"""Which flights a model with effects learned from: in its file, and said wherever it is judged."""
+
+import h5py
+import pytest
+
+from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.store import read_record
+from tests.builders.command_line import undrawn
+
+
+@pytest.fixture(scope="module")
+def two_models(cpfls, gap_config, pipeline, with_attitude, tmp_path_factory):
+    """What is put into an identified model from the first two thirds of one flight."""
+    folder = tmp_path_factory.mktemp("seen") / "gap"
+    with undrawn():
+        result = cpfls("gap", gap_config, with_attitude[0], "--model", pipeline.model, "-o", folder)
+    assert result.exit_code == 0, result.stderr
+    return folder / "extended.h5"
+
+
+def learned(path):
+    flights = read_record(path, ModelRecord).learned_from
+    return [(flight.file.name, flight.samples, flight.of) for flight in flights]
+
+
+def test_the_file_says_what_the_effects_and_what_the_base_learned_from(extended, two_models, pipeline):
+    assert learned(extended) == [("flight_1.csv", 2400, 2400), ("flight_2.csv", 2400, 2400)]
+    (base,) = learned(pipeline.model)
+    assert learned(two_models) == [("flight_4.csv", 1600, 2400), base]
+
+
+def test_stages_hand_the_flights_on(cpfls, gap_config, two_models, tmp_path):
+    """Another model to extend brings its own flights."""
+    diagnosis = two_models.with_name("diagnosis.h5")
+    again = tmp_path / "again.h5"
+    assert cpfls("extend", gap_config, diagnosis, "-o", again).exit_code == 0
+    assert learned(again) == learned(two_models)
+
+
+def test_a_file_of_before_says_it_of_whole_flights(extended, tmp_path):
+    old = tmp_path / "old.h5"
+    old.write_bytes(extended.read_bytes())
+    with h5py.File(old, "r+") as file:
+        del file["learned"]
+    with h5py.File(old) as file:
+        assert sorted(file["inputs"]) == ["diagnosis", "flight-1", "flight-2"]
+
+
+def test_predict_says_that_it_has_seen_the_flight(cpfls, gap_config, two_models, with_attitude, tmp_path):
+    flight = tmp_path / "flight.h5"
+    assert cpfls("import", gap_config, with_attitude[0], "-o", flight).exit_code == 0
+    seen = "one of the flights that it learned from (its first 1600 of 2400 samples; the rest was held out)"
+    for path in (with_attitude[0], flight):
+        result = cpfls("predict", gap_config, two_models, path, "-o", tmp_path / "p.h5", "--force")
+        assert f"extended.h5 along {path.name}: {seen}" in result.stdout.splitlines()
+    page = tmp_path / "page.md"
+    assert cpfls("report", gap_config, two_models, flight, tmp_path / "p.h5", "-o", page).exit_code == 0
+    assert f"extended.h5 along flight.h5: {seen}." in page.read_text()
+    result = cpfls("predict", gap_config, two_models, with_attitude[1], "-o", tmp_path / "new.h5")
+    assert "learned from" not in result.stdout
+
+
+def test_replay_and_compare_warn_of_flights_seen(
+    cpfls, gap_config, two_models, extended, shifted, with_attitude, tmp_path
+):
+    fast = ("--every", "400")
+    result = cpfls("replay", gap_config, extended, shifted[1], shifted[2], "-o", tmp_path / "r.h5", *fast)
+    whole = "flight_2.csv: extended.h5 has learned from it, so it shows nothing of flights not seen"
+    assert whole in result.stderr
+    assert "flight_3.csv: extended.h5" not in result.stderr
+    result = cpfls("compare", gap_config, *with_attitude, "--model", two_models, "-o", tmp_path / "d.h5", "--json")
+    part = "flight_4.csv: extended.h5 has learned from its first 1600 of 2400 samples, so that shows nothing"
+    assert part in result.stdout
+    assert "flight_5.csv: extended.h5" not in result.stdout
+
+
+def test_only_what_the_command_reads_is_asked_for(cpfls, gap_config, extended, tmp_path):
+    page = tmp_path / "page.md"
+    assert cpfls("report", gap_config, extended, "-o", page).exit_code == 0
+    needs = [line for line in page.read_text().splitlines() if line.startswith("# needs")]
+    assert len(needs) == 1
+    assert needs[0].startswith("# needs diagnosis.h5, sha256 ")
