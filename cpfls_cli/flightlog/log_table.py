@@ -157,8 +157,8 @@ def _doubt_of_time(name: str, unit: str, fitting: Sequence[str], step: float) ->
 
 def _time_rank(name: str) -> int:
     lower = name.lower().strip()
-    if lower in _TIME_NAMES.split():
-        return lower not in _TIME_NAMES.split()[:2]
+    if lower in _TIME_NAMES:
+        return lower not in _TIME_NAMES[:2]
     return 2 if "time" in lower or "stamp" in lower else 3
 
 

@@ -110,7 +110,7 @@ def _signals(
     upward = np.array([0.0, 0.0, vehicle.gravity_m_s2])
     felt = np.einsum("tji,tj->ti", signals.rotation, motion["acceleration"] + upward)
     dropped = {name: None for name in _OPTIONAL if name not in logging.signals}
-    return replace(signals, **{"specific_force": felt} | dropped)  # type: ignore[arg-type]  # names of fields
+    return replace(signals, **{"specific_force": felt} | dropped)
 
 
 def expected_floor(
