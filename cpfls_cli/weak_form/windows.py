@@ -63,6 +63,15 @@ class Windows:
         sign = 1.0 - 2.0 * (np.arange(len(self.weight)) % 2)
         return Windows(sign * self.weight, sign * self.slope, self.hop, self.period)
 
+    def less(self, longer: Windows) -> Windows:
+        """Take what windows twice as long or longer see, with the same middle, from what these see: a band is left."""
+        weight, slope = -longer.weight, -longer.slope
+        first = (len(weight) - len(self.weight)) // 2
+        inside = slice(first, first + len(self.weight))
+        weight[inside] += self.weight
+        slope[inside] += self.slope
+        return Windows(weight, slope, self.hop, self.period)
+
     def _apply(self, values: Array, kernel: Array) -> Array:
         views = sliding_window_view(values, len(kernel), axis=0)[:: self.hop]
         return np.asarray(views @ kernel)

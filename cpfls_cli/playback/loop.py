@@ -1,0 +1,136 @@
+"""How far a closed loop can mislead a fit: bounds on the torque that a turn of the body takes.
+
+A vehicle under an autopilot answers what disturbs it. Where its torque cancels a gust, more torque is seen than
+rotation, and a fit of rotation on torque finds a body that is too heavy; where a gust turns the vehicle before it is
+answered, more rotation is seen than torque, and a fit of torque on rotation finds one that is too light. The two
+regressions enclose the body, band by band of frequency; where no gust blows and the model is right, they agree in all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.blocks import contiguous, half_width, jackknife_error
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.weak_form.windows import windows
+
+_BANDS = ((0.15, 0.4), (0.3, 0.8), (0.6, 1.6))
+"""Windows in s; the longer average taken from the shorter leaves a band: about 2 to 6, 1 to 3, 0.5 to 1.5 Hz.
+
+Together they span what an autopilot answers late and what it answers in time, whatever its bandwidth.
+"""
+_OVERLAP = 0.75
+_FEWEST_SAMPLES = 8
+"""Of the shorter window: fewer do not follow its curve."""
+_BLOCK_S = 4.0
+"""Longer than what rotors and rotation remember of each other."""
+_FEWEST_BLOCKS = 4
+"""Below which their scatter says nothing."""
+_ANY = 10.0
+"""Factor either way from which on a body can be any."""
+_TINY = np.finfo(float).tiny
+_MOST_NOISE = 0.1
+"""Of the power of a band that may be noise of the sensors: with more, what is left is the noise's error."""
+
+
+class LoopBounds(NamedTuple):
+    """Bounds on moments of inertia, in those of a model, from how its torque and the rotation go together.
+
+    Attributes
+    ----------
+    low, high : array, shape (3,)
+        Factors, body axes; 1 between them where the model is that of the body. NaN where the flights do not tell.
+    explained : array, shape (3,)
+        Least share of the rotation in a band that the torque explains, the noise of sensors not counted.
+    """
+
+    low: Array
+    high: Array
+    explained: Array
+
+
+def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopBounds:
+    """Bound the moments of inertia that the flights of a closed loop allow, beside those of a model.
+
+    With ``t`` the model's torque and ``h`` the torque that its inertia takes along the motion, both in a band,
+    ``<t, h> / <h, h>`` and ``<t, t> / <t, h>`` are the factors by which torque on rotation and rotation on torque want
+    the inertia changed. A disturbance that the torque opposes and that turns the vehicle its own way leaves the true
+    factor between them.
+
+    Parameters
+    ----------
+    model : VehicleModel
+    flights : sequence of PlaybackFlight
+        With rotor speeds.
+
+    Returns
+    -------
+    LoopBounds
+        The widest of all bands in which motion stands above noise, with 95 % of the scatter over blocks.
+
+    References
+    ----------
+    Frisch 1934 (bounds by regression both ways); Forssell and Ljung 1999 (closed-loop identification revisited).
+    """
+    low, high, explained = np.full(3, np.nan), np.full(3, np.nan), np.full(3, np.nan)
+    for band in _BANDS:
+        sums = np.array([block for flight in flights for block in _sums(model, flight, *band)])
+        if len(sums) < _FEWEST_BLOCKS:
+            continue
+        total = sums.sum(axis=0)
+        seen = (total[:, 3:] < _MOST_NOISE * total[:, [0, 2]]).all(axis=1)
+        lighter, heavier = np.where(seen, _factors(total), np.nan)
+        half = half_width(jackknife_error(np.log(_factors(total - sums))), len(sums))
+        low, high = np.fmin(low, lighter * np.exp(-half[0])), np.fmax(high, heavier * np.exp(half[1]))
+        explained = np.fmin(explained, lighter / heavier)
+    return LoopBounds(np.maximum(low, 1 / _ANY), np.minimum(high, _ANY), explained)
+
+
+def _factors(sums: Array) -> Array:
+    """Divide sums of products to the factors that torque on rotation and rotation on torque want, shape (2, ..., 3).
+
+    A torque that goes against the rotation leaves any body.
+    """
+    torque, both, turning, noise_of_torque, noise_of_turning = np.moveaxis(sums, -1, 0)
+    # Blocks without motion hold noise alone, and less of it than is taken off.
+    torque, turning = np.maximum(torque - noise_of_torque, _TINY), np.maximum(turning - noise_of_turning, _TINY)
+    both = np.maximum(both, _TINY)
+    return np.clip([both / turning, torque / both], 1 / _ANY, _ANY)
+
+
+def _sums(model: VehicleModel, flight: PlaybackFlight, short_s: float, long_s: float) -> Iterator[Array]:
+    """Sum products of torque and of what the rotation takes over blocks of windows, shape (axis, 5).
+
+    The last two are noise: white noise is as large in windows of alternating sign, where motion vanishes.
+    """
+    period = flight.motion.period
+    if short_s < _FEWEST_SAMPLES * period:
+        return
+    band = windows(period, short_s, _OVERLAP).less(windows(period, long_s, _OVERLAP))
+    noise = band.alternating()
+    for stretch in flight.stretches:
+        count = band.count(stretch.stop - stretch.start)
+        if not count:
+            continue
+        rate = flight.motion.rate[stretch]
+        momentum = rate @ model.body.inertia
+        torque = _torque(model, flight, stretch)
+        turning = band.derivative(momentum) + band.average(np.cross(rate, momentum))
+        seen, unseen = band.average(torque), noise.average(torque)
+        products = np.stack([seen**2, seen * turning, turning**2, unseen**2, noise.derivative(momentum) ** 2], axis=2)
+        blocks = max(1, round(count * band.hop * period / _BLOCK_S))
+        number = contiguous(count, blocks)
+        yield from (products[number == block].sum(axis=0) for block in range(blocks))
+
+
+def _torque(model: VehicleModel, flight: PlaybackFlight, stretch: slice) -> Array:
+    """Evaluate the torque of rotors and effects at the samples of a stretch, shape (time, 3), N m."""
+    motion = flight.motion
+    air = np.einsum("tji,tj->ti", motion.rotation[stretch], motion.velocity[stretch] - np.array(model.wind))
+    rotor = model.rotor_terms_at(flight.speed[stretch], motion.period, flight.hold)
+    return model.wrench(air, motion.rate[stretch], rotor)[:, :3]

@@ -1,0 +1,158 @@
+"""Flights of a quadrotor under its autopilot in gusts, by dynamics of their own: nothing of the package flies them."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import lfilter
+
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.kernels import Motion
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+
+STEP_S, EVERY = 2e-3, 5
+GRAVITY, UP = 9.81, np.array([0.0, 0.0, 9.81])
+CALM, GUSTS, STORM = (0.0, 0.0, 0.0), (3.4, 5.1, 2.0), (8.0, 8.0, 4.0)
+"""Angular acceleration by gusts, rad/s^2: none, what real flights of a nano-drone show, and twice that."""
+
+MEMORY_S = np.array([0.31, 1.18, 0.5])
+SPINS = np.array([-1, 1, -1, 1])
+
+
+class Truth(NamedTuple):
+    """What flies: rotors as an X, front right first, in SI."""
+
+    mass: float
+    inertia: tuple[float, float, float]
+    arm: float
+    thrust_factor: float
+    drag_factor: float
+    lag_s: float
+    damping: float
+    drag: float
+    gyro_noise: float = 0.01
+    speed_noise: float = 0.001
+
+    @property
+    def places(self):
+        """Hubs, shape (4, 2), m."""
+        return self.arm / np.sqrt(2) * np.array([(1, -1), (-1, -1), (-1, 1), (1, 1)])
+
+    @property
+    def mixer(self):
+        """Thrust and torque of unit squared speeds, shape (4, 4)."""
+        x, y = self.places.T
+        force = np.full(4, self.thrust_factor)
+        return np.array([force, force * y, -force * x, -SPINS * self.drag_factor])
+
+    @property
+    def vehicle(self):
+        """The same as a section `vehicle`."""
+        rotors = tuple(
+            RotorSettings(
+                position_m=(float(x), float(y), 0.0),
+                spin=int(spin),
+                thrust_factor_n_s2=self.thrust_factor,
+                drag_factor_n_m_s2=self.drag_factor,
+            )
+            for (x, y), spin in zip(self.places, SPINS, strict=True)
+        )
+        inertia = (*self.inertia, 0.0, 0.0, 0.0)
+        return VehicleSettings(mass_kg=self.mass, inertia_kg_m2=inertia, rotors=rotors, rotor_speed_max_rad_s=1e4)
+
+
+SMALL = Truth(0.045, (3.7e-5, 4.2e-5, 6.6e-5), 0.0325, 2.0e-8, 1.2e-10, 0.02, 3e-6, 0.02)
+LARGE = Truth(1.5, (0.018, 0.02, 0.034), 0.17, 8.5e-6, 1.36e-7, 0.03, 3e-3, 0.3)
+
+
+class Flight(NamedTuple):
+    """What is flown: a vehicle in gusts on a path; each number of a path, and of a draw of gusts, is another one."""
+
+    truth: Truth
+    gusts: tuple[float, float, float] = CALM
+    path: int = 0
+    draw: int = 0
+    bandwidth: float = 12.0
+
+
+def gusty_flights(flights, seconds=30.0):
+    """Fly all flights at once, as long as each other; the bandwidth of the attitude loop is in rad/s."""
+    samples = round(seconds / STEP_S)
+    rngs = [np.random.default_rng([flight.path, flight.draw]) for flight in flights]
+    path = np.stack([_path(np.random.default_rng([1000, flight.path]), samples) for flight in flights], axis=1)
+    pushes = [_memory(rng, samples, MEMORY_S) * flight.gusts for rng, flight in zip(rngs, flights, strict=True)]
+    shoves = [_memory(rng, samples, np.ones(3)) * 0.06 * max(f.gusts) for rng, f in zip(rngs, flights, strict=True)]
+    noise = [f.truth.gyro_noise * rng.standard_normal((samples, 3)) for rng, f in zip(rngs, flights, strict=True)]
+    logs = _flown(flights, path, *(np.stack(each, axis=1) for each in (pushes, shoves, noise)))
+    for number, (rng, flight) in enumerate(zip(rngs, flights, strict=True)):
+        *motion, speed = (np.ascontiguousarray(log[:, number]) for log in logs)
+        speed += flight.truth.speed_noise * speed.mean() * rng.standard_normal(speed.shape)
+        yield PlaybackFlight(
+            name=f"gusty-{number}",
+            motion=Motion(*motion, STEP_S * EVERY),
+            speed=speed,
+            hold="linear",
+            stretches=(slice(0, len(speed)),),
+        )
+
+
+def _memory(rng, samples, memory_s):
+    """Draw an Ornstein-Uhlenbeck process of unit size, shape (samples, 3)."""
+    keep = np.exp(-STEP_S / memory_s)
+    drawn = rng.standard_normal((samples, 3)) * np.sqrt(1 - keep**2)
+    return np.stack([lfilter([1.0], [1.0, -k], column) for k, column in zip(keep, drawn.T, strict=True)], axis=1)
+
+
+def _path(rng, samples):
+    """Draw position, velocity and acceleration of a path of sines, shape (samples, 9)."""
+    turns = 2 * np.pi * np.linspace(0.08, 0.8, 9)
+    size = rng.uniform(0.5, 1.0, (3, 9)) * 0.035 / (turns / 2 / np.pi) ** 1.2 * np.array([[1.0], [1.0], [0.5]])
+    phase = np.arange(samples)[:, None, None] * STEP_S * turns + rng.uniform(0, 2 * np.pi, (3, 9))
+    sine, cosine = size * np.sin(phase), size * np.cos(phase)
+    return np.hstack([sine.sum(axis=2), (turns * cosine).sum(axis=2), -(turns**2 * sine).sum(axis=2)])
+
+
+def _skew(vector):
+    """Arrange vectors as matrices of the cross product, shape (flights, 3, 3)."""
+    matrix = np.zeros((len(vector), 3, 3))
+    matrix[:, 2, 1], matrix[:, 0, 2], matrix[:, 1, 0] = vector.T
+    return matrix - matrix.transpose(0, 2, 1)
+
+
+def _flown(flights, path, pushes, shoves, noise):
+    """Integrate all flights side by side; give position, velocity, rotation, measured rate and speed as logged."""
+    truths, bandwidth = [flight.truth for flight in flights], np.array([[flight.bandwidth] for flight in flights])
+    mass, lag, damping, drag = (
+        np.array([[getattr(truth, name)] for truth in truths]) for name in ("mass", "lag_s", "damping", "drag")
+    )
+    inertia, mixer = np.array([truth.inertia for truth in truths]), np.array([truth.mixer for truth in truths])
+    unmix, hover = np.linalg.inv(mixer), np.array([[t.mass * GRAVITY / 4 / t.thrust_factor] for t in truths])
+    outer, loop = np.minimum(2.0, bandwidth / 6), bandwidth * np.array([1.0, 1.0, 0.4])
+    position, velocity = path[0, :, :3], path[0, :, 3:6]
+    turn, rate, speed = np.tile(np.eye(3), (len(flights), 1, 1)), np.zeros_like(position), np.tile(np.sqrt(hover), 4)
+    logs = []
+    for now in range(len(path)):
+        measured = rate + noise[now]
+        wanted = path[now, :, 6:] + outer**2 * (path[now, :, :3] - position)
+        wanted = np.clip(wanted + 1.6 * outer * (path[now, :, 3:6] - velocity), -6.0, 6.0) + UP
+        up = wanted / np.sqrt((wanted**2).sum(axis=1, keepdims=True))
+        # The heading is kept, so the vehicle leans about an axis of the level plane.
+        lean = _skew(up) @ turn[:, :, 2, None]
+        error = -(turn.transpose(0, 2, 1) @ lean)[:, :, 0]
+        error[:, 2] = -turn[:, 1, 0]
+        torque = inertia * (loop**2 * error - 1.4 * loop * measured)
+        thrust = mass * (wanted * turn[:, :, 2]).sum(axis=1, keepdims=True)
+        squared = (unmix @ np.concatenate([thrust, torque], axis=1)[:, :, None])[:, :, 0]
+        if now % EVERY == 0:
+            logs.append([position, velocity, turn, measured, speed])
+        speed = speed + STEP_S / lag * (np.sqrt(np.clip(squared, 0.05 * hover, 4 * hover)) - speed)
+        wrench = (mixer @ (speed**2)[:, :, None])[:, :, 0]
+        gyroscopic = (_skew(rate) @ (inertia * rate)[:, :, None])[:, :, 0]
+        spin_up = (wrench[:, 1:] - damping * rate - gyroscopic) / inertia + pushes[now]
+        force = -drag * (velocity[:, None] @ turn)[:, 0] * [1.0, 1.0, 0.0] + wrench[:, :1] * [0.0, 0.0, 1.0]
+        faster = (turn @ force[:, :, None])[:, :, 0] / mass + shoves[now] - UP
+        position, velocity = position + STEP_S * velocity, velocity + STEP_S * faster
+        angle = STEP_S * (rate + 0.5 * STEP_S * spin_up)
+        small = _skew(angle)
+        turn = turn @ (np.eye(3) + small + 0.5 * small @ small + small @ small @ small / 6)
+        rate = rate + STEP_S * spin_up
+    return [np.array(each) for each in zip(*logs, strict=True)]

@@ -1,0 +1,71 @@
+"""Bounds on the inertia of a vehicle whose autopilot answers gusts: the truth lies between them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.playback.loop import loop_bounds
+from cpfls_cli.playback.model import VehicleModel
+from tests.builders.gusty_flights import CALM, GUSTS, LARGE, SMALL, STORM, Flight, gusty_flights
+
+TRUTHS = {"45 g": SMALL, "1.5 kg": LARGE}
+BANDWIDTHS = (6.0, 12.0, 25.0)
+SETS = [(name, gusts, bandwidth) for name in TRUTHS for gusts in (CALM, GUSTS, STORM) for bandwidth in BANDWIDTHS]
+
+
+@pytest.fixture(scope="module")
+def flights():
+    """Two flights of 20 s of each set, by vehicle, gusts and bandwidth of the attitude loop in rad/s."""
+    flown = gusty_flights(
+        [
+            Flight(TRUTHS[key[0]], key[1], path=2 * place + k, bandwidth=key[2])
+            for place, key in enumerate(SETS)
+            for k in (0, 1)
+        ],
+        seconds=20.0,
+    )
+    pairs = iter(flown)
+    return {key: [next(pairs), next(pairs)] for key in SETS}
+
+
+@pytest.fixture(scope="module")
+def bounds(flights):
+    """Bounds beside the true model."""
+    return {key: loop_bounds(VehicleModel(vehicle=TRUTHS[key[0]].vehicle), flown) for key, flown in flights.items()}
+
+
+def test_in_still_air_bounds_meet_at_the_truth(bounds):
+    """About roll and pitch, which are excited; noise of gyroscope and rotor speeds is in the flights."""
+    for (_, gusts, *_), found in bounds.items():
+        if gusts == CALM:
+            assert found.low[:2] == pytest.approx(1.0, abs=0.1)
+            assert found.high[:2] == pytest.approx(1.0, abs=0.1)
+            assert found.explained[:2].min() > 0.95
+
+
+def test_in_gusts_the_truth_lies_between_the_bounds(bounds):
+    """About every axis of every set; half a per cent is what numerical integration of the flights leaves."""
+    for (_, gusts, *_), found in bounds.items():
+        if gusts != CALM:
+            assert (np.fmin(found.low, 1.0) <= 1.005).all()
+            assert (np.fmax(found.high, 1.0) >= 0.995).all()
+            assert (found.low < 1.005).all()
+            assert (found.high > 0.995).all()
+
+
+def test_gusts_of_real_flights_leave_inertia_open_by_more_than_a_factor_of_two(bounds):
+    for (_, gusts, bandwidth), found in bounds.items():
+        if gusts == GUSTS and bandwidth < 20:
+            assert (found.high[:2] / found.low[:2]).min() > 2
+            assert found.explained[:2].max() < 0.9
+
+
+def test_a_body_that_is_found_too_heavy_is_bounded_by_its_truth(flights):
+    """Three times the inertia: still air says so to a few per cent, gusts leave it possible."""
+    heavy = replace(SMALL.vehicle, inertia_kg_m2=tuple(3 * value for value in SMALL.vehicle.inertia_kg_m2))
+    still, gusty = (loop_bounds(VehicleModel(vehicle=heavy), flights["45 g", gusts, 12.0]) for gusts in (CALM, GUSTS))
+    assert still.low[:2] == pytest.approx(1 / 3, rel=0.1)
+    assert still.high[:2] == pytest.approx(1 / 3, rel=0.1)
+    assert (gusty.low < 1 / 3).all()
+    assert (gusty.high > 1 / 3).all()
