@@ -105,6 +105,8 @@ def _reason(record: VehicleRecord, row: dict[str, Any]) -> str:
     ]
     if row["determined"]:
         return ""
+    if record.loop.shown and name != _FOUND_AS[THRUST]:
+        return "these flights show the loop, not the vehicle"
     if name in OF_TURNING and too_heavy(record):
         return too_heavy(record)
     if others:

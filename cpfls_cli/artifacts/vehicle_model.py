@@ -95,6 +95,18 @@ class DifferencesGroup:
 
 
 @record
+class LoopGroup:
+    """How far an autopilot that answers what disturbs the vehicle may have misled the fit, about each body axis."""
+
+    low: Array = dataset("low", "factor on the moment of inertia", "axis", frame=BODY, gaps=True)
+    high: Array = dataset("high", "factor on the moment of inertia", "axis", frame=BODY, gaps=True)
+    explained: Array = dataset(
+        "explained", "share of the rotation in a band that torque explains, the least", "axis", frame=BODY, gaps=True
+    )
+    shown: bool = dataset("shown", "1 where so little is explained that the numbers may be those of the loop")
+
+
+@record
 class VehicleRecord(ModelRecord):
     """The artifact `cpfls/model` of a vehicle found in flights."""
 
@@ -105,6 +117,7 @@ class VehicleRecord(ModelRecord):
     found: FoundNumbersGroup = group("found")
     trade: TradesGroup = group("trade")
     structure: StructuresTriedGroup = group("structure")
+    loop: LoopGroup = group("loop")
     held_out: HeldOutGroup | None = group("held_out", default=None)
     share: SharesGroup = group("share")
     airspeed: float = dataset(
@@ -145,6 +158,7 @@ class VehicleRecord(ModelRecord):
             ),
             trade=columns_of(TradesGroup, found.trades),
             structure=StructuresTriedGroup.of(found.choice),
+            loop=LoopGroup(**found.loop._asdict(), shown=found.loop.shows_loop),
             held_out=held_out,
             share=SharesGroup(
                 name=tuple(share.name for share in found.shares),
@@ -173,8 +187,8 @@ class VehicleRecord(ModelRecord):
 
     @property
     def verdict(self) -> Trust:
-        """What playback on flights held out says of it, as far as they do not contradict themselves."""
-        return capped(trust_by_playback(self.held_out), self.contradiction or ())
+        """What playback on flights held out says of it, where they neither contradict themselves nor show the loop."""
+        return capped(trust_by_playback(self.held_out), self.contradiction or (), loop=self.loop.shown)
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -190,6 +204,13 @@ class VehicleRecord(ModelRecord):
             if self.difference is None
             else {row.pop("name"): row for row in rows_of(self.difference)},
             "trades": [list(row.values()) for row in rows_of(self.trade)],
+            "loop": {
+                "shown": self.loop.shown,
+                **{
+                    name: [float(value) if np.isfinite(value) else None for value in getattr(self.loop, name)]
+                    for name in ("low", "high", "explained")
+                },
+            },
             "structures": rows_of(self.structure),
             "held_out": None if self.held_out is None else self.held_out.summary,
             "shares": {row.pop("name"): row for row in rows_of(self.share)},

@@ -27,6 +27,9 @@ _WORDS: dict[str, Words] = {
         "good inside its region", "Good inside the region that training visited, and only there", "note"
     ),
     Trust.NOT_JUDGED: Words("not judged", "Not judged", "note"),
+    Trust.LOOP: Words(
+        "not judged: the flights show the loop", "Not judged: these flights show the loop, not the vehicle", "warning"
+    ),
     Trust.RIGID_BODY: Words("no better than a rigid body", "Not better than the rigid body", "warning"),
     Trust.DO_NOT_USE: Words("do not use", "Do not use it", "warning"),
 }

@@ -25,11 +25,13 @@ from cpfls_cli.artifacts.parameters import (
 from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
+from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.replay import beside_rivals, errors_table, horizon_figure, playback_words
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Facts, Heading, Listing, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent
+from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent, whole_percent
+from cpfls_cli.validation.trust import Trust
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,7 +81,7 @@ def title(record: VehicleRecord) -> str:
 
 def grounds(record: VehicleRecord) -> Iterator[str]:
     """Say what a vehicle is good for, and how well it predicts what it was not fitted to."""
-    yield from playback_words(record.trust, record.held_out, record.contradiction)
+    yield from _judged_words(record)
     yield from () if record.held_out is None else beside_rivals(record.held_out)
     errors = dict(zip(record.structure.name, record.structure.error, strict=True))
     alone = "the constants" if _guessed(record) else "the stated vehicle"
@@ -113,12 +115,39 @@ def _guessed(record: VehicleRecord) -> bool:
 
 def worth(record: VehicleRecord) -> Iterator[str]:
     """Say what a vehicle that is used elsewhere is worth, and how far off it is itself."""
-    yield next(playback_words(record.trust, record.held_out, record.contradiction))
+    yield next(_judged_words(record))
     held = record.held_out
     if held is not None:
         last = {name: group.mae[0, -1] for name, group in held.errors.items() if group is not None}
         ends = joined(f"{number(last[name] * scale, 3)} {unit}" for name, unit, scale in _ENDS if name in last)
         yield f"Held out, it ends {ends} off what was measured after {held.horizon_s[-1]:.3g} s, mean."
+
+
+def _judged_words(record: VehicleRecord) -> Iterator[str]:
+    if record.trust == Trust.LOOP:
+        return iter([loop_words(record)])
+    return playback_words(record.trust, record.held_out, record.contradiction)
+
+
+def loop_words(record: VehicleRecord) -> str:
+    """Say how far the loop may have misled the fit, and what to fly."""
+    loop = record.loop
+    shares = joined(
+        f"{whole_percent(float(share))} of the {axis} acceleration"
+        for share, axis in zip(loop.explained[:2], ("roll", "pitch"), strict=True)
+        if np.isfinite(share)
+    )
+    times = joined(
+        f"{name} {number(float(low), 2)} to {number(float(high), 2)} times"
+        for name, low, high in zip(INERTIA_PARAMETERS[:2], loop.low, loop.high, strict=False)
+        if np.isfinite(low)
+    )
+    return (
+        f"These flights show the loop, not the vehicle: torque explains {shares}. An autopilot that answers gusts, or "
+        f"an effect that is missing here, makes a body look heavier or lighter than it is: {times} what was found. "
+        "What follows is a forecast of vehicle and autopilot together. Fly in still air, with faster and larger turns "
+        "of roll and pitch, until torque explains 90 %."
+    )
 
 
 def warnings(record: VehicleRecord) -> list[str]:
@@ -129,13 +158,18 @@ def warnings(record: VehicleRecord) -> list[str]:
     bound = [row["name"] for row in named if row["at_bound"] and row["value"] != 0]
     none = [row["name"] for row in named if row["at_bound"] and row["value"] == 0]
     heavy = too_heavy(record)
-    open_ = [row["name"] for row in named if not row["determined"] and not (heavy and row["name"] in OF_TURNING)]
+    told = OF_TURNING if heavy else ()
+    open_ = [
+        row["name"] for row in named if not row["determined"] and row["name"] not in told and not record.loop.shown
+    ]
     if bound:
         said.append(f"{joined(bound)}: on a bound of what is tried, so the flights ask for more; not a physical number")
     if none:
         said.append(f"{joined(none)}: 0, the least that it can be; the flights show none of it")
     if open_:
         said.append(f"{joined(open_)}: not determined, the flights say too little of it")
+    if record.loop.shown and record.trust != Trust.LOOP:
+        said.append(loop_words(record))
     if heavy:
         said.append(f"inertia and drag factor: {heavy}")
     # Numbers of the remainder have no meaning of their own, together or apart.

@@ -31,6 +31,8 @@ _BLOCK_S = 4.0
 """Longer than what rotors and rotation remember of each other."""
 _FEWEST_BLOCKS = 4
 """Below which their scatter says nothing."""
+_EXPLAINED = 0.9
+"""Share from which on both regressions agree to a tenth: less than a fifth of the usual gain margin of 6 dB."""
 _ANY = 10.0
 """Factor either way from which on a body can be any."""
 _TINY = np.finfo(float).tiny
@@ -52,6 +54,11 @@ class LoopBounds(NamedTuple):
     low: Array
     high: Array
     explained: Array
+
+    @property
+    def shows_loop(self) -> bool:
+        """Whether so much of roll or pitch is left unexplained that numbers may be those of the loop."""
+        return bool((self.explained[:2] < _EXPLAINED).any())
 
 
 def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopBounds:
@@ -132,5 +139,5 @@ def _torque(model: VehicleModel, flight: PlaybackFlight, stretch: slice) -> Arra
     """Evaluate the torque of rotors and effects at the samples of a stretch, shape (time, 3), N m."""
     motion = flight.motion
     air = np.einsum("tji,tj->ti", motion.rotation[stretch], motion.velocity[stretch] - np.array(model.wind))
-    rotor = model.rotor_terms_at(flight.speed[stretch], motion.period, flight.hold)
-    return model.wrench(air, motion.rate[stretch], rotor)[:, :3]
+    rotor = model.response.terms_at_samples(flight.speed[stretch], motion.period, flight.hold)
+    return model.table.wrench(air, motion.rate[stretch], rotor)[:, :3]

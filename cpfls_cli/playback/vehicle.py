@@ -11,10 +11,11 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width, jackknife_error
-from cpfls_cli.inertia import beyond_any_body
+from cpfls_cli.inertia import INERTIA_PARAMETERS, beyond_any_body
 from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import OF_A_WEIGHT, Group, JointNumbers
+from cpfls_cli.playback.loop import LoopBounds, loop_bounds
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import Physical, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
@@ -119,6 +120,8 @@ class FoundVehicle:
         Other configurations, by name of the group.
     differences : tuple of Difference
         What they have that the vehicle of the config has not.
+    loop : LoopBounds
+        How far the loop may have misled the fit.
     """
 
     model: VehicleModel
@@ -132,6 +135,7 @@ class FoundVehicle:
     guessed: tuple[str, ...]
     others: Mapping[str, VehicleModel]
     differences: tuple[Difference, ...]
+    loop: LoopBounds
 
 
 def find_vehicle(
@@ -151,9 +155,11 @@ def find_vehicle(
     groups = tuple(Group(group.name, group.differs or OF_A_WEIGHT) for group in settings.groups if group.name in flown)
     fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fits[0], groups)
     spread, model = uncertainty(fitted, windows), fitted.model
+    loop = loop_bounds(model, own)
+    numbers = (*sensed, *bodily(begun, tuple(found_numbers(fitted, spread))))
     return FoundVehicle(
         model,
-        (*sensed, *bodily(begun, tuple(found_numbers(fitted, spread)))),
+        tuple(beside_loop(numbers, loop)),
         *_shares(model, own),
         tuple(_trades(fitted, spread)),
         choice,
@@ -162,6 +168,7 @@ def find_vehicle(
         tuple(sorted(set(vehicle.unknown) - set(begun.unknown) - {number.name for number in sensed})),
         {group.name: fitted.free.at(fitted.values, group.name).model for group in groups},
         tuple(differences(fitted, spread)) if groups else (),
+        loop,
     )
 
 
@@ -283,6 +290,28 @@ def bodily(vehicle: VehicleSettings, numbers: Sequence[FoundNumber]) -> Iterator
     heavy = beyond_any_body(vehicle.mass_kg, hubs, {number.name: number.value for number in numbers})
     for number in numbers:
         yield number._replace(determined=False) if heavy and number.name.startswith(_OF_TURNING) else number
+
+
+def beside_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterator[FoundNumber]:
+    """Widen the intervals of inertia and drag factor by what the loop leaves open.
+
+    About yaw torque and inertia are known by their ratio: what makes Izz larger makes the drag factor smaller. Where
+    the flights show the loop nothing is determined but what carries the weight, for every effect answers with it.
+
+    Parameters
+    ----------
+    loop : LoopBounds
+        In moments of inertia of the model whose numbers these are.
+    """
+    low, high = np.fmin(loop.low, 1.0), np.fmax(loop.high, 1.0)
+    factors = {f"inertia.{name}": ends for name, *ends in zip(INERTIA_PARAMETERS[:3], low, high, strict=True)}
+    factors["drag_factor"] = [1 / high[2], 1 / low[2]]
+    for number in numbers:
+        below, above = (float(factor) for factor in factors.get(number.name, (1.0, 1.0)))
+        ends = number.low * below, number.high * above
+        known = ends[1] <= _KNOWN * ends[0] if number.name in factors else True
+        told = known and (number.name == "thrust_factor" or not loop.shows_loop)
+        yield number._replace(low=ends[0], high=ends[1], determined=number.determined and told)
 
 
 def _half_intervals(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:

@@ -13,10 +13,16 @@ class Trust(StrEnum):
     CONTROL = "good-for-control"
     INSIDE = "good-inside-region"
     NOT_JUDGED = "not-judged"
+    LOOP = "shows-the-loop"
     RIGID_BODY = "not-better-than-rigid-body"
     DO_NOT_USE = "do-not-use"
 
 
-def capped(trust: Trust, contradictions: Sequence[str]) -> Trust:
-    """Take back the word on a model whose flights contradict themselves: it repeats what is wrong with them."""
-    return Trust.DO_NOT_USE if contradictions else trust
+def capped(trust: Trust, contradictions: Sequence[str], *, loop: bool = False) -> Trust:
+    """Take back the word on a model whose flights contradict themselves: it repeats what is wrong with them.
+
+    Where they show the loop, a good forecast is one of vehicle and autopilot together, and says nothing of the vehicle.
+    """
+    if contradictions:
+        return Trust.DO_NOT_USE
+    return Trust.LOOP if loop and trust in (Trust.SIMULATION, Trust.CONTROL) else trust

@@ -10,6 +10,7 @@ from cpfls_cli.artifacts.model import VehicleGroup
 from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.vehicle_model import (
     FoundNumbersGroup,
+    LoopGroup,
     SharesGroup,
     StructuresTriedGroup,
     TradesGroup,
@@ -119,6 +120,7 @@ def record_of(model, config="seed: 1\n"):
             numbers=np.array([4, 4, 4, 9, 0, 4, 0], dtype=np.int64),
             condition_number=np.full(len(names), 30.0),
         ),
+        loop=LoopGroup(low=0.99 * np.ones(3), high=1.01 * np.ones(3), explained=0.98 * np.ones(3), shown=False),
         share=SharesGroup(name=("rotors",), torque=np.ones((1, 3)), force=np.ones((1, 3))),
         airspeed=4.0,
         evaluated=2,
