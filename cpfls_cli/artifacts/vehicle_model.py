@@ -18,6 +18,7 @@ from cpfls_cli.validation.trust import Trust, capped
 
 if TYPE_CHECKING:
     # Reading a record does not need the compiled loops that play a vehicle back.
+    from cpfls_cli.playback.loop import LoopBounds
     from cpfls_cli.playback.structure import Choice
     from cpfls_cli.playback.vehicle import FoundVehicle
 
@@ -105,6 +106,11 @@ class LoopGroup:
     )
     shown: bool = dataset("shown", "1 where so little is explained that the numbers may be those of the loop")
 
+    @classmethod
+    def of(cls, bounds: LoopBounds) -> Self:
+        """Arrange bounds."""
+        return cls(**bounds._asdict(), shown=bounds.shows_loop)
+
 
 @record
 class VehicleRecord(ModelRecord):
@@ -158,7 +164,7 @@ class VehicleRecord(ModelRecord):
             ),
             trade=columns_of(TradesGroup, found.trades),
             structure=StructuresTriedGroup.of(found.choice),
-            loop=LoopGroup(**found.loop._asdict(), shown=found.loop.shows_loop),
+            loop=LoopGroup.of(found.loop),
             held_out=held_out,
             share=SharesGroup(
                 name=tuple(share.name for share in found.shares),

@@ -10,7 +10,7 @@ from cpfls_cli.artifacts.formats import RECORDS, record_of_format
 from cpfls_cli.artifacts.store import file_sha256, read_any
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import resolved
-from cpfls_cli.pages import diagnosis, disagreement, extended, vehicle_model
+from cpfls_cli.pages import diagnosis, disagreement, model
 from cpfls_cli.pages.source import Source
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.report.content import Table, Text
@@ -19,7 +19,7 @@ from tests.builders import gap_artifacts, vehicle_models
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
 
 FROM_COMMANDS = ("trajectory", "flight", "selection", "model", "prediction", "replay", "sweep")
-FROM_NUMBERS = {"disagreement": disagreement, "diagnosis": diagnosis, "extended": extended}
+FROM_NUMBERS = {"disagreement": disagreement, "diagnosis": diagnosis, "extended": model}
 FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS, "vehicle")
 # What a plan asks of the vehicle between its samples is not in its artifact.
 ON_PAGES = tuple(name for name in FORMATS if name != "trajectory")
@@ -65,7 +65,7 @@ def answered(told):
             return told[name].source, told[name].outcome.blocks
         if name == "vehicle":
             source = source_of(vehicle_models.record_of(vehicle_models.whole()), f"{name}.h5")
-            return source, tuple(vehicle_model.answer(source))
+            return source, tuple(model.answer(source))
         made = getattr(gap_artifacts, name)()
         source = source_of(
             record_of_format(made.spec.format, made.spec.kind).of_data(made.header, made.data), f"{name}.h5"
