@@ -68,7 +68,7 @@ def trust_box(model: Source[Any]) -> Box:
 
 
 def trust_notes(record: ModelRecord, path: object) -> Iterator[Text]:
-    """Say what speaks against the use of a model: its search was stopped, it was judged unfit, or not judged at all.
+    """Say what speaks against the use of a model: its search was stopped, it was judged unfit, or could not be judged.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def trust_notes(record: ModelRecord, path: object) -> Iterator[Text]:
     if record.stopped:
         again = f"`cpfls {record.FORMAT.made_by} --resume` goes on"
         yield Text(f"{path}: is incomplete: its search was stopped; {again}", "warning")
-    if record.trust == Trust.DO_NOT_USE:
+    if record.trust in (Trust.DO_NOT_USE, Trust.LOOP):
         verdict = record.verdict if isinstance(record, IdentifiedRecord) else None
         why = next(_KINDS[record.FORMAT.kind].grounds(record))
         said = why if verdict is None else f"its verdict is: do not use; {verdict.reasons[0][0]}"

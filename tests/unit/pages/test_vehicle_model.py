@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.parameters import parameters_of, vehicle_section
-from cpfls_cli.artifacts.vehicle_model import FoundNumbersGroup, TradesGroup
+from cpfls_cli.artifacts.vehicle_model import FoundNumbersGroup, LoopGroup, TradesGroup
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.source import Sources
 from cpfls_cli.pages.vehicle_model import found_vehicle_section, remainder_curves, warnings
 from cpfls_cli.report.content import Plot, Table
+from cpfls_cli.validation.trust import Trust, capped
 from tests.builders.forms import source_of_record
 from tests.builders.vehicle_models import record_of, remainder, whole
 
@@ -82,3 +83,25 @@ def test_an_inertia_that_no_body_has_is_no_constant_however_narrow_its_interval(
     assert any("inertia.Ixx 0.03 where" in line for line in warnings(record)) is told
     # What was stated stays where the flights do not tell better.
     assert vehicle_section(record)["inertia_kg_m2"][0] == pytest.approx(0.004 if told else record.vehicle.inertia[0])
+
+
+def test_flights_that_show_the_loop_are_said_first_and_leave_no_good_word():
+    record = record_of(whole())
+    loop = LoopGroup(
+        low=np.array([0.21, 0.23, np.nan]),
+        high=np.array([2.6, 2.4, np.nan]),
+        explained=np.array([0.45, 0.47, np.nan]),
+        shown=True,
+    )
+    numbers = replace(record.found, determined=np.zeros(2, dtype=bool))
+    (row,) = [
+        each for each in parameters_of(replace(record, loop=loop, found=numbers)) if each.key == "inertia_kg_m2.0"
+    ]
+    assert row.reason == "these flights show the loop, not the vehicle"
+    said = next(line for line in warnings(replace(record, loop=loop, found=numbers)) if "loop" in line)
+    assert "torque explains 45 % of the roll acceleration and 47 % of the pitch acceleration" in said
+    assert "Ixx 0.21 to 2.6 times and Iyy 0.23 to 2.4 times what was found" in said
+    for trust in (Trust.SIMULATION, Trust.CONTROL):
+        assert capped(trust, (), loop=True) == Trust.LOOP
+    assert capped(Trust.DO_NOT_USE, (), loop=True) == Trust.DO_NOT_USE
+    assert capped(Trust.SIMULATION, ("rates are mirrored",), loop=True) == Trust.DO_NOT_USE

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from cpfls_cli.config.load import validate
+from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.vehicle import FoundNumber, bodily, find_vehicle
+from cpfls_cli.playback.vehicle import FoundNumber, beside_loop, bodily, find_vehicle
 from tests.builders.playback_flights import MIDDLING, STATED, TRUE_BLOCKS, flown, truth
 
 TRUE = truth()
@@ -97,3 +98,29 @@ def test_with_a_moment_of_inertia_that_no_body_has_nothing_that_turns_it_is_dete
     ]
     determined = [number.determined for number in bodily(TRUE.vehicle, numbers)]
     assert determined == [True, known, known, known, True]
+
+
+LOOP = LoopBounds(np.array([0.8, 0.5, np.nan]), np.array([1.1, 1.6, np.nan]), np.array([0.95, 0.6, np.nan]))
+
+
+def test_intervals_hold_what_the_loop_leaves_open():
+    names = ("thrust_factor", "drag_factor", "inertia.Ixx", "inertia.Iyy", "inertia.Izz", "rotor_drag.k_d")
+    numbers = [FoundNumber(name, "", 1.0, 0.9, 1.1, np.nan, True, False) for name in names]
+    still = replace_explained(LOOP, 0.95)
+    wide = {number.name: number for number in beside_loop(numbers, still)}
+    assert (wide["inertia.Ixx"].low, wide["inertia.Ixx"].high) == pytest.approx((0.72, 1.21))
+    assert (wide["inertia.Iyy"].low, wide["inertia.Iyy"].high) == pytest.approx((0.45, 1.76))
+    # Of yaw the flights say nothing by which a fit could have been misled.
+    assert (wide["drag_factor"].low, wide["inertia.Izz"].high) == pytest.approx((0.9, 1.1))
+    assert {name for name, number in wide.items() if not number.determined} == {"inertia.Iyy"}
+
+
+def test_flights_that_show_the_loop_determine_what_carries_the_weight_alone():
+    names = ("thrust_factor", "drag_factor", "inertia.Ixx", "lag.time_constant_s", "rotor_drag.k_d")
+    numbers = [FoundNumber(name, "", 1.0, 0.9, 1.1, np.nan, True, False) for name in names]
+    assert LOOP.shows_loop
+    assert [number.name for number in beside_loop(numbers, LOOP) if number.determined] == ["thrust_factor"]
+
+
+def replace_explained(bounds, share):
+    return bounds._replace(explained=np.full(3, share))

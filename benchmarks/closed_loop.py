@@ -1,0 +1,67 @@
+"""Flights in gusts under an autopilot: bounds by regression both ways, and how often the truth lies between them.
+
+    python benchmarks/closed_loop.py [DRAWS]
+
+Two vehicles of 45 g and 1.5 kg, three levels of gusts, three bandwidths of the attitude loop; two flights of 30 s a
+draw, noise of gyroscope and rotor speeds among it. The model is the true one, so 1 has to lie between the bounds.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.shared.measure import pin_threads, table
+
+pin_threads()
+
+import numpy as np
+
+from cpfls_cli.playback.loop import loop_bounds
+from cpfls_cli.playback.model import VehicleModel
+from tests.builders.gusty_flights import CALM, GUSTS, LARGE, SMALL, STORM, Flight, gusty_flights
+
+DRAWS = 20
+VEHICLES = {"45 g": SMALL, "1.5 kg": LARGE}
+BANDWIDTHS = (6.0, 12.0, 25.0)
+ROUNDING = 0.005
+"""Of the integration of the flights, whose steps are 2 ms."""
+
+
+def main(draws: int) -> None:
+    rows = []
+    for name, truth in VEHICLES.items():
+        for gusts in (CALM, GUSTS, STORM):
+            for bandwidth in BANDWIDTHS:
+                flights = [
+                    Flight(truth, gusts, path=2 * draw + k, draw=draw, bandwidth=bandwidth)
+                    for draw in range(draws)
+                    for k in (0, 1)
+                ]
+                flown = list(gusty_flights(flights))
+                model = VehicleModel(vehicle=truth.vehicle)
+                found = [loop_bounds(model, flown[2 * draw : 2 * draw + 2]) for draw in range(draws)]
+                low, high = (np.array([getattr(each, end) for each in found]) for end in ("low", "high"))
+                inside = (low <= 1 + ROUNDING) & (high >= 1 - ROUNDING)
+                seen = np.isfinite(low)
+                explained = np.nanmedian([each.explained for each in found], axis=0)
+                ends = [f"{np.nanmedian(low[:, k]):.2f} to {np.nanmedian(high[:, k]):.2f}" for k in range(3)]
+                rows.append(
+                    [
+                        name,
+                        ", ".join(f"{gust:g}" for gust in gusts),
+                        f"{bandwidth:g}",
+                        *ends,
+                        f"{explained[0]:.2f}, {explained[1]:.2f}",
+                        f"{int(inside[seen].sum())} of {int(seen.sum())}",
+                        f"{sum(each.shows_loop for each in found)} of {draws}",
+                    ]
+                )
+    header = ["vehicle", "gusts, rad/s²", "loop, rad/s", "Ixx", "Iyy", "Izz", "explained", "truth inside", "loop shown"]
+    print(table(header, rows))
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else DRAWS)
