@@ -146,7 +146,7 @@ def test_the_compiled_loops_of_playback(airflow):
     velocity = np.vstack([airflow.air, airflow.air[:1]])
     errors, period = np.zeros((samples, 1, 4, 3)), 1e-7
     body = model.body._replace(gravity=0.0)
-    motion = playback.Motion(still, velocity, level, still, period)
+    motion = playback.MeasuredMotion(still, velocity, level, still, period)
     playback.errors_of_runs(motion, body, used, weights, np.arange(samples), True, errors)
     torque = errors[:, 0, 3, 0] / period * model.body.inertia[0, 0]
     # Rolling for half a step turns the airflow, by next to nothing.

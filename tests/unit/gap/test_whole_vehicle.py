@@ -58,7 +58,7 @@ def test_torque_force_and_inertia_are_those_of_the_effects():
     assert whole.beside_table == ()
     steady = np.zeros((len(flown), 17))
     steady[:, 0], steady[:, 1:5], steady[:, 5:9] = 1.0, flown.rotor_speed, flown.rotor_speed**2
-    found = whole.wrench(flown.air_velocity, flown.body_rate, steady)
+    found = whole.table.wrench(flown.air_velocity, flown.body_rate, steady)
     moved = actuated(flown, extended.chosen)
     wanted = moved.wrench + sum(columns_of(*pair).direct @ each for *pair, each in _columns(extended, moved))
     wanted += columns_of(nuisance(), flown).direct @ coupling(numbers)

@@ -6,7 +6,7 @@ import pytest
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.pages import diagnosis, disagreement, extended
+from cpfls_cli.pages import diagnosis, disagreement, model
 from cpfls_cli.report.content import Text
 from tests.builders import gap_artifacts as made
 from tests.builders.forms import in_all_forms, phrases, source_of_record, words
@@ -35,8 +35,8 @@ BROKEN = made.texts("rotor 2 looks saturated")
                 named=({"name": "gyro_bias", "kind": "sensor"},), **made.audit([FAULT]) | {"audit/warning": BROKEN}
             ),
         ),
-        (ExtendedRecord, extended, made.extended()),
-        (ExtendedRecord, extended, made.extended(**GREW)),
+        (ExtendedRecord, model, made.extended()),
+        (ExtendedRecord, model, made.extended(**GREW)),
     ],
 )
 def test_every_form_says_what_the_command_says(kind, page, artifact):
