@@ -12,7 +12,8 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record
 
 if TYPE_CHECKING:
-    from cpfls_cli.control import Plan, Scores
+    from cpfls_cli.control.controllers import Plan
+    from cpfls_cli.control.track import Scores
     from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
     from cpfls_cli.flightlog.results import ImportedFlight
     from cpfls_cli.regressor.motion import Motion

@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.evolution import Evaluation, EvolutionSettings, History, ended, evolve, start, step
-from cpfls_cli.evolution.state import stalled
+from cpfls_cli.evolution.archive import Evaluation
+from cpfls_cli.evolution.engine import evolve, start, step
+from cpfls_cli.evolution.settings import EvolutionSettings
+from cpfls_cli.evolution.state import History, ended, stalled
 
 
 def course(*best):

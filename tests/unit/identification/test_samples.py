@@ -14,8 +14,9 @@ from cpfls_cli.identification.cross_validation import contiguous_blocks, with_fo
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import IdentificationSettings, RidgeSettings
-from cpfls_cli.regressor import Regressor, data_ranges, model_structure, torque_sensitivity, uniform_breakpoints
 from cpfls_cli.regressor.motion import RIGID
+from cpfls_cli.regressor.regressor import Regressor, data_ranges, torque_sensitivity, uniform_breakpoints
+from cpfls_cli.regressor.structure import model_structure
 from tests.builders.flights import no_torque, random_flight
 
 SETTINGS = IdentificationSettings(consequents="seesaw", products="additive", membership_functions=(1, 2, 3, 4, 3, 2))
