@@ -10,7 +10,7 @@ from statistics import median
 import pytest
 
 import cpfls_cli
-from cpfls_cli.artifacts.formats import RECORDS
+from cpfls_cli.artifacts.formats import records
 
 PACKAGE = Path(cpfls_cli.__file__).parent
 TESTS = Path(__file__).parents[1]
@@ -117,7 +117,7 @@ def test_package_files_only_re_export(path):
 # Shows and checks artifacts of all formats alike, dataset by dataset.
 OF_ALL_FORMATS = {"commands/show.py"}
 GENERIC = {"Artifact", "read_artifact", "write_artifact"}
-PATHS = {spec.path for record in RECORDS for spec in record.spec().datasets if "/" in spec.path}
+PATHS = {spec.path for record in records() for spec in record.spec().datasets if "/" in spec.path}
 GROUPS = tuple(f"{group}/" for group in sorted({path.split("/")[0] for path in PATHS}))
 
 
