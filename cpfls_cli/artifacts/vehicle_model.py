@@ -194,6 +194,8 @@ class VehicleRecord(ModelRecord):
         numbers = {row.pop("name"): row for row in rows_of(self.found)}
         return {
             **self.vehicle.summary,
+            # Its effects were chosen among those that the table of weights holds.
+            "not_held": [],
             "verdict": self.verdict,
             "parameters": {each.key: _but_key(each) for each in parameters_of(self)},
             "numbers": numbers,

@@ -10,6 +10,7 @@ from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.gap_effects import PlaybackChangeGroup
 from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING
 from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.rebuilt import audit
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.same_vehicle import read_base, read_of_vehicle
@@ -105,7 +106,7 @@ def extended(
     ComputationError
         If the diagnosis names nothing, or the gap on the held-out flights does not shrink.
     """
-    extension = extend(training, held, named_effects(diagnosis), diagnosis.audit.audit(), study.gap, base.fuzzy)
+    extension = extend(training, held, named_effects(diagnosis), audit(diagnosis.audit), study.gap, base.fuzzy)
     whole, given = (whole_vehicle(each, study.vehicle) for each in (extension.model, plain(base.fuzzy)))
     require_body(extension.model, study.vehicle)
     played = played_pairs(held, whole, given)

@@ -14,7 +14,7 @@ from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.spec import InputFile, rows_of
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
-from cpfls_cli.config.load import parse_config, validate
+from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.visited import CELLS
@@ -58,8 +58,7 @@ def sheet_of(path: Path, name: str, file: InputFile, *, force: bool) -> Sheet:
 
 def study_of(sheet: Sheet) -> Study:
     """Give the study that a model was made with."""
-    source = f"{sheet.file}: /config"
-    return validate(parse_config(sheet.origin.config, source), source)
+    return stored_study(sheet.origin.config, sheet.file)
 
 
 def identified_sheet(record: IdentifiedRecord, model: VehicleModel) -> Sheet:

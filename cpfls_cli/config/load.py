@@ -80,6 +80,18 @@ def read_config(path: Path) -> dict[str, Any]:
     return parse_config(text, str(path))
 
 
+def stored_study(config: str, path: object) -> Study:
+    """Read the study that an artifact was made with; the path is for messages.
+
+    Raises
+    ------
+    ConfigError
+        If it is none that this program knows.
+    """
+    source = f"{path}: /config"
+    return validate(parse_config(config, source), source)
+
+
 def parse_config(text: str, source: str) -> dict[str, Any]:
     """Read the text of a config as plain data.
 

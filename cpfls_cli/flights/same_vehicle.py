@@ -9,10 +9,11 @@ from typing import TypeVar
 
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.artifacts.store import read_header, read_record
-from cpfls_cli.config.load import parse_config, validate
+from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.config.unknown import KEYS
 from cpfls_cli.errors import ConfigError, InputError
@@ -100,7 +101,7 @@ def rebuilt(path: Path, record: ModelRecord) -> VehicleModel:
         If this program does not know an effect, or numbers do not fit each other.
     """
     try:
-        return record.vehicle_model()
+        return vehicle_model(record.vehicle)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
@@ -156,8 +157,7 @@ def _difference_of(path: Path, study: Study) -> str:
 
 
 def _vehicle_of(path: Path, header: Header) -> VehicleSettings:
-    source = f"{path}: /config"
-    return validate(parse_config(header.config, source), source).vehicle
+    return stored_study(header.config, path).vehicle
 
 
 def _different(given: VehicleSettings, wanted: VehicleSettings) -> str:

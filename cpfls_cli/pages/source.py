@@ -5,26 +5,29 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Self
+from typing import TYPE_CHECKING, Any, Generic, Self
 
 from typing_extensions import TypeVar
 
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
-from cpfls_cli.artifacts.disagreement import DisagreementRecord
-from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job
-from cpfls_cli.artifacts.prediction import PredictionRecord
-from cpfls_cli.artifacts.replay import ReplayRecord
-from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import Record
-from cpfls_cli.artifacts.sweep import SweepRecord
-from cpfls_cli.artifacts.trajectory import TrajectoryRecord
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import ReportSettings, resolved
 from cpfls_cli.report.content import HASH_SHOWN, Block, Origin, Section
 from cpfls_cli.vehicle.settings import VehicleSettings
+
+if TYPE_CHECKING:
+    # A page loads the records that it is about, not all others.
+    from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
+    from cpfls_cli.artifacts.disagreement import DisagreementRecord
+    from cpfls_cli.artifacts.extended import ExtendedRecord
+    from cpfls_cli.artifacts.flight import FlightRecord
+    from cpfls_cli.artifacts.identified import IdentifiedRecord
+    from cpfls_cli.artifacts.prediction import PredictionRecord
+    from cpfls_cli.artifacts.replay import ReplayRecord
+    from cpfls_cli.artifacts.selection import SelectionRecord
+    from cpfls_cli.artifacts.sweep import SweepRecord
+    from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+    from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
 R = TypeVar("R", bound=Record, default=Any)
 
@@ -90,57 +93,57 @@ class Sources:
     @property
     def trajectories(self) -> list[Source[TrajectoryRecord]]:
         """Planned paths."""
-        return self._of(TrajectoryRecord)
+        return self._of("cpfls/trajectory")
 
     @property
     def flights(self) -> list[Source[FlightRecord]]:
         """Flights, simulated or imported."""
-        return self._of(FlightRecord)
+        return self._of("cpfls/flight")
 
     @property
     def selections(self) -> list[Source[SelectionRecord]]:
         """Reduced training sets."""
-        return self._of(SelectionRecord)
+        return self._of("cpfls/selection")
 
     @property
     def models(self) -> list[Source[IdentifiedRecord]]:
         """Identified models."""
-        return self._of(IdentifiedRecord)
+        return self._of("cpfls/model", "identified")
 
     @property
     def sweeps(self) -> list[Source[SweepRecord]]:
         """Replicates of searches."""
-        return self._of(SweepRecord)
+        return self._of("cpfls/sweep")
 
     @property
     def predictions(self) -> list[Source[PredictionRecord]]:
         """Predictions of models along flights."""
-        return self._of(PredictionRecord)
+        return self._of("cpfls/prediction")
 
     @property
     def replays(self) -> list[Source[ReplayRecord]]:
         """Models played back along flights."""
-        return self._of(ReplayRecord)
+        return self._of("cpfls/replay")
 
     @property
     def disagreements(self) -> list[Source[DisagreementRecord]]:
         """Where models and flights disagree."""
-        return self._of(DisagreementRecord)
+        return self._of("cpfls/disagreement")
 
     @property
     def diagnoses(self) -> list[Source[DiagnosisRecord]]:
         """What models miss."""
-        return self._of(DiagnosisRecord)
+        return self._of("cpfls/diagnosis")
 
     @property
     def vehicles(self) -> list[Source[VehicleRecord]]:
         """Vehicles found in flights."""
-        return self._of(VehicleRecord)
+        return self._of("cpfls/model", "vehicle")
 
     @property
     def extensions(self) -> list[Source[ExtendedRecord]]:
         """Models with the effects that they missed."""
-        return self._of(ExtendedRecord)
+        return self._of("cpfls/model", "extended")
 
     @property
     def gap(self) -> list[Source[Any]]:
@@ -166,8 +169,10 @@ class Sources:
         """Look up an artifact by its hash."""
         return next((source for source in self.all if source.sha256 == sha256), None)
 
-    def _of(self, kind: type[R]) -> list[Source[R]]:
-        return [source for source in self.all if isinstance(source.record, kind)]
+    def _of(self, name: str, kind: str = "") -> list[Source[Any]]:
+        """List the artifacts of a format."""
+        formats = ((source, source.record.FORMAT) for source in self.all)
+        return [source for source, own in formats if (own.name, own.kind) == (name, kind)]
 
 
 def unique_labels(names: Sequence[str], hashes: Sequence[str]) -> list[str]:

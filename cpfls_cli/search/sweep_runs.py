@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from cpfls_cli.artifacts.checkpoint import StoppedSearch
 from cpfls_cli.artifacts.job import Job, header_of
 from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.store import write_record
@@ -17,7 +16,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.identification.identify import Identification, identify
 from cpfls_cli.identification.search import NothingFoundError, SearchStep, StopReason, is_end
 from cpfls_cli.inertia import six_parameters
-from cpfls_cli.search.checkpoint import Checkpoint, Leftover, differences
+from cpfls_cli.search.checkpoint import Checkpoint, Leftover, StoppedSearch, differences
 from cpfls_cli.search.resumable import Resumable, SearchOptions, Watch
 from cpfls_cli.search.sweep_plan import SweepPlan
 

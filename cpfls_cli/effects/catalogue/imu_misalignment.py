@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Coefficient, Effect
@@ -15,6 +14,13 @@ from cpfls_cli.effects.hooks import ReadingError, SensorLog, SensorTest, TrueMot
 def _log(signals: Mapping[str, Array], _motion: TrueMotion, values: Mapping[str, float]) -> dict[str, Array]:
     rate = signals["body_rate"]
     return {"body_rate": np.asarray(rate - np.cross(np.array(list(values.values())), rate))}
+
+
+def _turned(values: Array) -> ReadingError:
+    # Loaded where it is needed: who reads a model waits for nothing of scipy.
+    from scipy.spatial.transform import Rotation
+
+    return ReadingError(matrix=Rotation.from_rotvec(-values).as_matrix())
 
 
 EFFECT = Effect(
@@ -44,7 +50,7 @@ EFFECT = Effect(
         number=lambda axis, value: f"{np.degrees(value):+.2f} deg about {axis}",
         found="The gyroscope sits turned against the attitude: {}.",
         nothing="The gyroscope sits straight against the attitude.",
-        error=lambda values: ReadingError(matrix=Rotation.from_rotvec(-values).as_matrix()),
+        error=_turned,
         integrated=True,
     ),
 )
