@@ -13,7 +13,8 @@ from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.rebuilt import audit
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.flights.same_vehicle import read_base, read_of_vehicle
+from cpfls_cli.flights.models import read_base
+from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
 from cpfls_cli.gap.playback import errors_by_horizon, left_out, played_pairs

@@ -19,8 +19,8 @@ from cpfls_cli.commands.diagnose import diagnosed, folded_notes, whole_answer, w
 from cpfls_cli.commands.extend import extended
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.inputs import numbered_roles
+from cpfls_cli.flights.models import read_base
 from cpfls_cli.flights.recordings import Flights, FlightSplit, read_flights, seen_twice, split_flights
-from cpfls_cli.flights.same_vehicle import read_base
 from cpfls_cli.gap.naming.results import Diagnosis
 from cpfls_cli.pages.disagreement import where
 from cpfls_cli.pages.extended import model_with, warnings

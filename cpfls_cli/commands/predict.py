@@ -28,7 +28,8 @@ from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradien
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.flight_source import Stretch, Stretches, check_file, flight_source, flight_stretches
-from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles, read_model, rebuilt
+from cpfls_cli.flights.models import read_model, rebuilt
+from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles
 from cpfls_cli.gap.extended import inertial_force, inertial_torque
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.identification.data import TorqueSource

@@ -30,7 +30,8 @@ from cpfls_cli.dynamics.equations_of_motion import RigidBody, TorqueModel, model
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import body_torque, inertia_matrix, inertia_tensor
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.flights.same_vehicle import read_of_vehicle, rebuilt
+from cpfls_cli.flights.models import rebuilt
+from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.pages.model import trust_notes
 from cpfls_cli.pages.source import source_of

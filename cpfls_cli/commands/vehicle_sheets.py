@@ -21,7 +21,7 @@ from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Missing, Off, sized
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.flights.same_vehicle import rebuilt
+from cpfls_cli.flights.models import rebuilt
 from cpfls_cli.pages.export import identified_evidence, identified_warnings, identified_worth
 from cpfls_cli.pages.extended import worth_in_words
 from cpfls_cli.pages.vehicle_model import worth_in_words as vehicle_worth

@@ -14,7 +14,7 @@ from cpfls_cli.artifacts.store import read_artifact, read_record, write_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.same_vehicle import rebuilt
+from cpfls_cli.flights.models import rebuilt
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from tests.builders import exported_models
 from tests.builders.vehicle_models import HEXA, QUAD, record_of, remainder, whole
