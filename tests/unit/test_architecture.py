@@ -41,18 +41,13 @@ def own_imports_in_functions(path):
 
 
 # These load what they are asked for: a command, what an object of the Python interface does, Dask, what is drawn.
-BY_NEED = {"cli", "library"}
-BY_NEED_MODULES = {"workers/employ.py", "report/canvas.py"}
+BY_NEED = {"cli", "library", "workers/employ.py", "report/canvas.py"}
 
 
 def test_layers_hold_as_imported():
-    """What a module needs it imports where the import contracts see it; `artifacts/formats.py` loads records by need."""
-    modules = [
-        path
-        for path in sorted(PACKAGE.rglob("*.py"))
-        if path.relative_to(PACKAGE).parts[0] not in BY_NEED
-        and path.relative_to(PACKAGE).as_posix() not in BY_NEED_MODULES
-    ]
+    """What a module needs it imports where the import contracts see it; `artifacts/formats.py` loads by need."""
+    names = {path.relative_to(PACKAGE).as_posix(): path for path in sorted(PACKAGE.rglob("*.py"))}
+    modules = [path for name, path in names.items() if {name, name.split("/")[0]}.isdisjoint(BY_NEED)]
     assert [entry for path in modules for entry in own_imports_in_functions(path)] == []
 
 
