@@ -280,13 +280,7 @@ class NamedEffectsGroup:
         )
 
     def effects(self) -> tuple[NamedEffect, ...]:
-        """Rebuild the effects, to evaluate them.
-
-        Raises
-        ------
-        InputError
-            If this program does not know one of them.
-        """
+        """Rebuild the effects, to evaluate them."""
         for name in self.effect.name:
             effect(name)
         return self.listed

@@ -21,13 +21,7 @@ from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 
 def vehicle_model(group: VehicleGroup) -> VehicleModel:
-    """Rebuild the model of a vehicle.
-
-    Raises
-    ------
-    InputError
-        If this program does not know one of its effects, or its numbers do not fit each other.
-    """
+    """Rebuild the model of a vehicle."""
     remainder = group.remainder
     return VehicleModel(
         vehicle=group.vehicle(),

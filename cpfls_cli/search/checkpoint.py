@@ -79,12 +79,7 @@ class Leftover:
         return self.path.with_suffix("")
 
     def require_permission(self, *, force: bool) -> None:
-        """Refuse to give up what is left, unless that is allowed, and what is not left by this program in any case.
-
-        Raises
-        ------
-        InputError
-        """
+        """Refuse to give up what is left, unless that is allowed, and what is not left by this program in any case."""
         self.require_own()
         if self.path.exists() and not force:
             raise InputError(
@@ -93,12 +88,7 @@ class Leftover:
             )
 
     def require_own(self) -> None:
-        """Refuse a file of the user that happens to have the name of what is left.
-
-        Raises
-        ------
-        InputError
-        """
+        """Refuse a file of the user that happens to have the name of what is left."""
         if self.path.exists() and not (self.path.is_file() and is_hdf5(self.path)):
             raise InputError(
                 f"{self.path}: has the name of what a stopped {self.WORK} leaves, and is none of it; move it away, or "
@@ -125,13 +115,7 @@ class Leftover:
             raise
 
     def _read(self, wanted: type[R]) -> R:
-        """Read what is left.
-
-        Raises
-        ------
-        InputError
-            If there is nothing, or if it is damaged.
-        """
+        """Read what is left."""
         if not self.path.exists():
             written = self._written()
             if written is not None and written.complete:
@@ -177,23 +161,11 @@ class Checkpoint(Leftover):
     OUTPUT: ClassVar = IdentifiedRecord
 
     def write(self, state: EvolutionState) -> None:
-        """Replace what was there by this state, or leave it as it was.
-
-        Raises
-        ------
-        OutputError
-            If it cannot be written.
-        """
+        """Replace what was there by this state, or leave it as it was."""
         write_record(self.path, CheckpointRecord.of_state(state).with_header(self.header))
 
     def add(self, unfinished: Unfinished) -> None:
-        """Add what was evaluated of the next generation, so that it need not be done again.
-
-        Raises
-        ------
-        OutputError
-            If it cannot be written; what was there is left as it was.
-        """
+        """Add what was evaluated of the next generation, so that it need not be done again."""
         if self.path.exists():
             record = read_record(self.path, CheckpointRecord).with_unfinished(unfinished)
         else:
@@ -201,13 +173,7 @@ class Checkpoint(Leftover):
         write_record(self.path, record.with_header(self.header))
 
     def read(self) -> StoppedSearch:
-        """Take up what was left.
-
-        Raises
-        ------
-        InputError
-            If there is none, if it is damaged, or if it is of another search.
-        """
+        """Take up what was left."""
         record = self._read(CheckpointRecord)
         with self._damaged():
             stopped = _stopped_search(record)

@@ -53,12 +53,7 @@ class SearchOptions:
         return employ(evaluate, count=self.workers, scheduler=self.scheduler)
 
     def require_workers(self) -> None:
-        """Refuse more processes than this machine can run, and a scheduler beside them or without an address.
-
-        Raises
-        ------
-        InputError
-        """
+        """Refuse more processes than this machine can run, and a scheduler beside them or without an address."""
         if self.scheduler is not None and self.workers > 1:
             raise InputError("--scheduler: knows its own workers; leave --workers out")
         if self.scheduler is not None:
@@ -167,11 +162,6 @@ def begin_search(
     ----------
     inputs : mapping of str to Path
         By role.
-
-    Raises
-    ------
-    InputError
-        As `begin`; also if there is a checkpoint and neither --resume nor --force, or none that can be resumed.
     """
     options.require_workers()
     files = take_inputs(job, inputs)
@@ -192,11 +182,6 @@ def resumable(output: Path, header: Header, *, resume: bool, force: bool) -> Res
         Config, seed and inputs of the search.
     force : bool
         Allow a checkpoint to be given up.
-
-    Raises
-    ------
-    InputError
-        If there is a checkpoint and neither is asked for, or none that can be resumed.
     """
     checkpoint = Checkpoint.beside(output, header)
     if resume:

@@ -45,11 +45,6 @@ class PartialSweep(Leftover):
         -------
         SweepRecord or None
             None for a sweep that starts.
-
-        Raises
-        ------
-        InputError
-            If there is something and neither is asked for, or nothing that can be resumed.
         """
         Checkpoint.beside(self.output, self.header).require_own()
         if not resume:
@@ -61,13 +56,7 @@ class PartialSweep(Leftover):
         return stopped
 
     def runs(self, plan: SweepPlan, stopped: SweepRecord | None) -> RunGroup:
-        """Take the runs that are finished, and keep them from here on.
-
-        Raises
-        ------
-        InputError
-            If they are not runs of this plan.
-        """
+        """Take the runs that are finished, and keep them from here on."""
         runs = plan.no_runs if stopped is None else stopped.run
         if stopped is not None:
             self._require_same_plan(plan, stopped)
@@ -75,13 +64,7 @@ class PartialSweep(Leftover):
         return runs
 
     def write(self, plan: SweepPlan, runs: RunGroup) -> None:
-        """Replace what was there by these finished runs, or leave it as it was.
-
-        Raises
-        ------
-        OutputError
-            If it cannot be written.
-        """
+        """Replace what was there by these finished runs, or leave it as it was."""
         write_record(self.path, plan.record(runs).with_header(self.header))
 
     def _require_same_plan(self, plan: SweepPlan, stopped: SweepRecord) -> None:

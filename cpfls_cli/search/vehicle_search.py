@@ -30,23 +30,11 @@ class VehicleCheckpoint(Leftover):
     OUTPUT: ClassVar = VehicleRecord
 
     def write(self, judged: Sequence[Judged]) -> None:
-        """Replace what was there by these structures, or leave it as it was.
-
-        Raises
-        ------
-        OutputError
-            If it cannot be written.
-        """
+        """Replace what was there by these structures, or leave it as it was."""
         write_record(self.path, VehicleCheckpointRecord.of(judged).with_header(self.header))
 
     def read(self) -> Kept:
-        """Take up what was left.
-
-        Raises
-        ------
-        InputError
-            If there is none, if it is damaged, or if it is of another search.
-        """
+        """Take up what was left."""
         record = self._read(VehicleCheckpointRecord)
         with self._damaged():
             kept = kept_of(record)
@@ -86,11 +74,6 @@ def begin_vehicle_search(
     checkpoint : VehicleCheckpoint
     kept : mapping of Structure to sequence of Solution, or None
         Where to go on; None to start.
-
-    Raises
-    ------
-    InputError
-        As `begin_search`.
     """
     files = take_inputs(job, inputs)
     checkpoint = VehicleCheckpoint.beside(job.output, header_of(job.study, files))
