@@ -13,7 +13,7 @@ from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.diagnose import considered
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
-from cpfls_cli.gap.naming.scoring import REFUSED, candidates_of, layout, normal_equations, score
+from cpfls_cli.gap.naming.scoring import REFUSED, candidates_of, scoring_matrix, normal_equations, score
 from cpfls_cli.weak_form.windows import common_windows
 
 
@@ -78,7 +78,7 @@ def _gains(flights, chosen, effects, settings):
     floor = best_floor(hypothesis)
     names = {candidate.effect.name for candidate in chosen}
     tried = [c for c in candidates_of([e for e in effects if e.name not in names]) if hypothesis.can(c)]
-    arranged = layout(hypothesis, tried, floor)
+    arranged = scoring_matrix(hypothesis, tried, floor)
     normal = normal_equations(arranged, hypothesis.residual, floor, block_index(hypothesis, settings))
     scored, _ = score(arranged, normal.beside(arranged.base), hypothesis)
     # The score is asked only which columns the bounds leave.

@@ -107,7 +107,7 @@ def _factors(sums: Array) -> Array:
     # Blocks without motion hold noise alone, and less of it than is taken off.
     torque, turning = np.maximum(torque - noise_of_torque, _TINY), np.maximum(turning - noise_of_turning, _TINY)
     both = np.maximum(both, _TINY)
-    return np.clip([both / turning, torque / both], 1 / _ANY, _ANY)
+    return np.asarray(np.clip([both / turning, torque / both], 1 / _ANY, _ANY))
 
 
 def _sums(model: VehicleModel, flight: PlaybackFlight, short_s: float, long_s: float) -> Iterator[Array]:

@@ -1,9 +1,9 @@
 """Weak form: averages over smooth windows, with derivatives moved onto the window by integration by parts."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -58,19 +58,19 @@ class Windows:
         """Average the time derivative as `average` does, ``-int phi' x dt``; nothing is differentiated."""
         return -self._apply(values, self.slope)
 
-    def alternating(self) -> "Windows":
+    def alternating(self) -> Self:
         """Turn the sign of every other sample: white noise stays as large as it was, and what is smooth vanishes."""
         sign = 1.0 - 2.0 * (np.arange(len(self.weight)) % 2)
-        return Windows(sign * self.weight, sign * self.slope, self.hop, self.period)
+        return replace(self, weight=sign * self.weight, slope=sign * self.slope)
 
-    def less(self, longer: Windows) -> Windows:
+    def less(self, longer: Self) -> Self:
         """Take what windows twice as long or longer see, with the same middle, from what these see: a band is left."""
         weight, slope = -longer.weight, -longer.slope
         first = (len(weight) - len(self.weight)) // 2
         inside = slice(first, first + len(self.weight))
         weight[inside] += self.weight
         slope[inside] += self.slope
-        return Windows(weight, slope, self.hop, self.period)
+        return replace(self, weight=weight, slope=slope)
 
     def _apply(self, values: Array, kernel: Array) -> Array:
         views = sliding_window_view(values, len(kernel), axis=0)[:: self.hop]

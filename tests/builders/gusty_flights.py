@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.kernels import Motion
+from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 STEP_S, EVERY = 2e-3, 5
@@ -88,7 +88,7 @@ def gusty_flights(flights, seconds=30.0):
         speed += flight.truth.speed_noise * speed.mean() * rng.standard_normal(speed.shape)
         yield PlaybackFlight(
             name=f"gusty-{number}",
-            motion=Motion(*motion, STEP_S * EVERY),
+            motion=MeasuredMotion(*motion, STEP_S * EVERY),
             speed=speed,
             hold="linear",
             stretches=(slice(0, len(speed)),),

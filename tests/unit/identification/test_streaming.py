@@ -9,7 +9,7 @@ from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.data import Flights, TorqueData, gathered, joined, sample_times
 from cpfls_cli.identification.excitation import axis_evidence
 from cpfls_cli.identification.identify import identify, model_evaluator
-from cpfls_cli.identification.judge import score, score_of
+from cpfls_cli.identification.judge import score_of
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import Regressor, data_ranges
@@ -137,7 +137,7 @@ def test_scores_do_not_depend_on_chunks(monkeypatch, chunk):
     def predict(motion):
         return rigid_columns(motion) @ np.array([0.6, 0.9, 1.1, 0.0, 0.05, 0.0])
 
-    whole = score(source, predict(source.motion))
+    whole = score_of(source, predict)
     error = source.torque - predict(source.motion)
     np.testing.assert_allclose(whole.mse, np.mean(error**2, axis=0), rtol=1e-12)
     np.testing.assert_allclose(whole.r2, 1 - np.mean(error**2, axis=0) / np.var(source.torque, axis=0), rtol=1e-12)
