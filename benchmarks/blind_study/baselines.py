@@ -13,7 +13,7 @@ from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.diagnose import considered
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
-from cpfls_cli.gap.naming.scoring import REFUSED, candidates_of, scoring_matrix, normal_equations, score
+from cpfls_cli.gap.naming.scoring import REFUSED, candidates_of, normal_equations, score, scoring_matrix
 from cpfls_cli.weak_form.windows import common_windows
 
 

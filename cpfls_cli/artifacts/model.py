@@ -268,7 +268,7 @@ class VehicleGroup:
             remainder=None if model.remainder is None else RemainderGroup.of(model.remainder),
             wind=np.array(model.wind) if any(model.wind) else None,
             # What is written was identified.
-            inertia_functions=functions and InertiaFunctionsGroup.of(functions),
+            inertia_functions=None if functions is None else InertiaFunctionsGroup.of(functions),
             repair=None if model.repairs is None else AuditGroup.of(model.repairs),
         )
 

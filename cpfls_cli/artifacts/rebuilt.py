@@ -28,7 +28,7 @@ def vehicle_model(group: VehicleGroup) -> VehicleModel:
         vehicle=group.vehicle(),
         response=group.response.response(),
         thrust_linear=group.rotor.thrust_linear,
-        effects=_effects(group.effect),
+        effects=model_effects(group.effect),
         remainder=None
         if remainder is None
         else Remainder(
@@ -38,18 +38,20 @@ def vehicle_model(group: VehicleGroup) -> VehicleModel:
             coefficients=remainder.coefficients,
         ),
         wind=(0.0, 0.0, 0.0) if group.wind is None else tuple(group.wind.tolist()),
-        fuzzy=None if group.inertia_functions is None else _inertia_functions(group.inertia_functions),
+        fuzzy=None if group.inertia_functions is None else inertia_functions(group.inertia_functions),
         commanded=group.response.commanded,
         hold=None if group.response.hold == USUAL else group.response.hold,  # type: ignore[arg-type]
         repairs=None if group.repair is None else audit(group.repair),
     )
 
 
-def _effects(group: EffectsGroup) -> tuple[ModelEffect, ...]:
+def model_effects(group: EffectsGroup) -> tuple[ModelEffect, ...]:
+    """Rebuild the effects of the catalogue in a model."""
     return tuple(ModelEffect(effect(name).name, group.shape_of(name), group.linear_of(name)) for name in group.name)
 
 
-def _inertia_functions(group: InertiaFunctionsGroup) -> InertiaFunctions:
+def inertia_functions(group: InertiaFunctionsGroup) -> InertiaFunctions:
+    """Rebuild an inertia over attitude."""
     try:
         structure = model_structure(
             StructureSettings(

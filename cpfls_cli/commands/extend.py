@@ -12,7 +12,7 @@ from cpfls_cli.artifacts.gap_effects import PlaybackChangeGroup
 from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.learned import LearnedFlight, as_inputs, joined_flights
-from cpfls_cli.artifacts.rebuilt import audit
+from cpfls_cli.artifacts.rebuilt import audit, vehicle_model
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
@@ -49,7 +49,7 @@ def run(job: Job, diagnosis: Path, model: Path | None) -> Outcome:
     """
     inputs = begin(job, {"diagnosis": diagnosis} | ({} if model is None else {"model": model}))
     diagnosed = read_of_vehicle(diagnosis, DiagnosisRecord, job.study)
-    base = diagnosed.base.vehicle_model() if model is None else read_base(model, job.study)
+    base = vehicle_model(diagnosed.base) if model is None else read_base(model, job.study)
     named_effects(diagnosed)
     if job.dry_run:
         return nothing_written(job)

@@ -12,6 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.model import EffectsGroup, InertiaFunctionsGroup, ModelRecord, ResponseGroup, RotorsGroup
+from cpfls_cli.artifacts.rebuilt import model_effects
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.inertia import INERTIA_PARAMETERS
@@ -178,7 +179,7 @@ def _effect(name: str) -> str:
 
 def _effects_table(name: str, group: EffectsGroup) -> Table:
     rows = []
-    for effect in group.effects():
+    for effect in model_effects(group):
         known = {each.name: each for each in effect.known.numbers}
         for index, (label, value) in enumerate(effect.values.items()):
             words = f"{label}: {known[label].meaning}" if label in known else label

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic
+from typing import TYPE_CHECKING, Any, ClassVar, Generic
 
 from typing_extensions import TypeVar
 
@@ -17,7 +17,17 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
     # A page loads the records that it is about, not all others.
-    pass
+    from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
+    from cpfls_cli.artifacts.disagreement import DisagreementRecord
+    from cpfls_cli.artifacts.extended import ExtendedRecord
+    from cpfls_cli.artifacts.flight import FlightRecord
+    from cpfls_cli.artifacts.identified import IdentifiedRecord
+    from cpfls_cli.artifacts.prediction import PredictionRecord
+    from cpfls_cli.artifacts.replay import ReplayRecord
+    from cpfls_cli.artifacts.selection import SelectionRecord
+    from cpfls_cli.artifacts.sweep import SweepRecord
+    from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+    from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
 R = TypeVar("R", bound=Record, default=Any)
 
@@ -67,17 +77,17 @@ class Sources:
     vehicle: VehicleSettings
     settings: ReportSettings
 
-    trajectories = _OfFormat["TrajectoryRecord"]("cpfls/trajectory")
-    flights = _OfFormat["FlightRecord"]("cpfls/flight")
-    selections = _OfFormat["SelectionRecord"]("cpfls/selection")
-    models = _OfFormat["IdentifiedRecord"]("cpfls/model", "identified")
-    sweeps = _OfFormat["SweepRecord"]("cpfls/sweep")
-    predictions = _OfFormat["PredictionRecord"]("cpfls/prediction")
-    replays = _OfFormat["ReplayRecord"]("cpfls/replay")
-    disagreements = _OfFormat["DisagreementRecord"]("cpfls/disagreement")
-    diagnoses = _OfFormat["DiagnosisRecord"]("cpfls/diagnosis")
-    vehicles = _OfFormat["VehicleRecord"]("cpfls/model", "vehicle")
-    extensions = _OfFormat["ExtendedRecord"]("cpfls/model", "extended")
+    trajectories: ClassVar[_OfFormat[TrajectoryRecord]] = _OfFormat("cpfls/trajectory")
+    flights: ClassVar[_OfFormat[FlightRecord]] = _OfFormat("cpfls/flight")
+    selections: ClassVar[_OfFormat[SelectionRecord]] = _OfFormat("cpfls/selection")
+    models: ClassVar[_OfFormat[IdentifiedRecord]] = _OfFormat("cpfls/model", "identified")
+    sweeps: ClassVar[_OfFormat[SweepRecord]] = _OfFormat("cpfls/sweep")
+    predictions: ClassVar[_OfFormat[PredictionRecord]] = _OfFormat("cpfls/prediction")
+    replays: ClassVar[_OfFormat[ReplayRecord]] = _OfFormat("cpfls/replay")
+    disagreements: ClassVar[_OfFormat[DisagreementRecord]] = _OfFormat("cpfls/disagreement")
+    diagnoses: ClassVar[_OfFormat[DiagnosisRecord]] = _OfFormat("cpfls/diagnosis")
+    vehicles: ClassVar[_OfFormat[VehicleRecord]] = _OfFormat("cpfls/model", "vehicle")
+    extensions: ClassVar[_OfFormat[ExtendedRecord]] = _OfFormat("cpfls/model", "extended")
 
     @property
     def gap(self) -> list[Source[Any]]:
