@@ -52,7 +52,7 @@ from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.search import search
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.regressor import Motion
+from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.report.canvas import GREY, plot
 
 OUTPUT = Path(__file__).resolve().parents[1] / "docs" / "attitude-inertia.svg"

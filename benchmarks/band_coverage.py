@@ -43,7 +43,7 @@ from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.samples import Ready
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
-from cpfls_cli.regressor import Motion
+from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.validation.bands import band, inertia_band
 from cpfls_cli.validation.bootstrap import POWER, BlockScores, bootstrap, missed_torque
 from cpfls_cli.validation.timeline import time_blocks

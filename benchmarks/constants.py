@@ -36,7 +36,7 @@ from cpfls_cli.playback.parameters import MASS
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Structure
 from cpfls_cli.playback.vehicle import FoundNumber, carrying_weight, differences, find_vehicle, found_numbers
-from cpfls_cli.vehicle import VehicleSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.playback_flights import (
     ADDED_AT,
     ADDED_KG,

@@ -32,7 +32,9 @@ from cpfls_cli.identification.evaluator import Evaluator, Problem, refine
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
-from cpfls_cli.regressor import Motion, StructureSettings, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from tests.builders import reference_evaluator as reference
 from tests.builders.reference_evaluator import ReferenceEvaluator
 

@@ -27,7 +27,10 @@ from pymoo.indicators.hv import HV
 from pymoo.optimize import minimize
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.evolution import Evaluation, EvolutionSettings, pareto_front, start, step
+from cpfls_cli.evolution.archive import Evaluation
+from cpfls_cli.evolution.engine import start, step
+from cpfls_cli.evolution.ranking import pareto_front
+from cpfls_cli.evolution.settings import EvolutionSettings
 from cpfls_cli.identification.settings import PRESETS
 
 EVALUATIONS = 5000

@@ -26,13 +26,16 @@ pin_threads()
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.evolution import Evaluation, EvolutionSettings, evolve
-from cpfls_cli.excitation import condition_number, optimised_rotation
+from cpfls_cli.evolution.archive import Evaluation
+from cpfls_cli.evolution.engine import evolve
+from cpfls_cli.evolution.settings import EvolutionSettings
+from cpfls_cli.excitation.objective import condition_number
+from cpfls_cli.excitation.optimise import optimised_rotation
 from cpfls_cli.excitation.variables import path_of, variables_of
-from cpfls_cli.regressor import StructureSettings, model_structure
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.trajectory.rotation import RotationLimits, RotationMotion, RotationPath, full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
-from cpfls_cli.vehicle import VehicleSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 STRUCTURES = {
     "seesaw, 5 functions": StructureSettings(consequents="seesaw", products="additive", membership_functions=5),

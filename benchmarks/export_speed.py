@@ -23,9 +23,11 @@ import numpy as np
 
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.visited import CELLS
-from cpfls_cli.export import c_source
-from cpfls_cli.fuzzy import InputRange
-from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
+from cpfls_cli.export.source import c_source
+from cpfls_cli.fuzzy.inputs import InputRange
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import uniform_breakpoints
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from tests.builders.exported_models import sheet_of
 
 BATCH, PASSES, SINGLES = 4096, 50, 50

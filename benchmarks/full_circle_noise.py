@@ -38,7 +38,7 @@ from benchmarks.shared.full_circle import (
 from cpfls_cli.identification.data import TorqueData, joined
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.regressor import Motion
+from cpfls_cli.regressor.motion import Motion
 
 NOISE = (0.0, 0.01, 0.05)
 SHARPNESS = {"rigid": None, "broad ring (sharpness 1)": 1.0, "narrow ring (sharpness 6)": 6.0}

@@ -36,7 +36,8 @@ from anfis_toolbox import ANFISRegressor
 from scipy.interpolate import LSQBivariateSpline, RBFInterpolator
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.fuzzy import PeriodicSettings, breakpoints, fit_periodic, uniform_weights
+from cpfls_cli.fuzzy.membership import breakpoints, uniform_weights
+from cpfls_cli.fuzzy.periodic_fit import PeriodicSettings, fit_periodic
 from cpfls_cli.fuzzy.periodic_system import PeriodicStructure
 
 Predict = Callable[[Array], Array]

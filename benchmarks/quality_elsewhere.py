@@ -27,7 +27,7 @@ from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.regressor import Motion
+from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.trajectory.planning import plan
 
 CONFIG = Path(__file__).resolve().parents[1] / "configs" / "paper-gentle.yaml"

@@ -31,7 +31,9 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.reduction.settings import CriterionName, ReductionSettings
 from cpfls_cli.reduction.survey import Survey, survey
 from cpfls_cli.reduction.training_set import Pool, choose, draw_pool, pool_of
-from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.structure import model_structure
 
 NOISE = 0.01
 POOLS = (2000, 20000)

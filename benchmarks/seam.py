@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 
 from benchmarks.shared.full_circle import INERTIA, random_states, torque_data, uniform_model
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.regressor import Motion
+from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.report.canvas import GREY, legend_above, line, plain_ticks, plot, stacked, style_of
 
 OUTPUT = Path(__file__).resolve().parents[1] / "docs" / "seam.svg"

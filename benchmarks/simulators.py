@@ -26,9 +26,9 @@ pin_threads()
 import numpy as np
 
 from cpfls_cli.config.load import load_study
-from cpfls_cli.export import c_source, python_source
 from cpfls_cli.export.course import Course
 from cpfls_cli.export.registry import TARGETS, exported
+from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.export.verify import verified
 from cpfls_cli.flights.playback import flights_to_play
 from cpfls_cli.playback.model import VehicleModel

@@ -30,7 +30,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.load import load_study
-from cpfls_cli.evolution import pareto_front
+from cpfls_cli.evolution.ranking import pareto_front
 from cpfls_cli.flights.training import read_training
 from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.evaluator import Evaluator

@@ -38,7 +38,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.regressor import Motion
+from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.trajectory.planning import plan
 
 UNSEEN = {"path": "straight", "direction": (1.0, -0.6, 0.2), "displacement_m": 50.0, "yaw_turn_rad": -2 * np.pi}

@@ -24,7 +24,8 @@ import numpy as np
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
 from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.workers import Workforce, employ
+from cpfls_cli.workers.employ import employ
+from cpfls_cli.workers.workforce import Workforce
 
 GENERATION = 60
 

@@ -20,6 +20,7 @@ from benchmarks.paper.printed import (
 )
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.rebuilt import inertia_functions
 from cpfls_cli.artifacts.scores import MODEL, TRAINING
 from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns
@@ -454,7 +455,7 @@ def _jump(model: Source[IdentifiedRecord]) -> float:
 
     rng = np.random.default_rng(0)
     attitude, rate, acceleration = rng.uniform(-1.0, 1.0, (3, _SEAM_STATES, 3))
-    functions, worst = model.record.functions.inertia(), 0.0
+    functions, worst = inertia_functions(model.record.functions), 0.0
     for angle in (0, 1):
         before, after = attitude.copy(), attitude.copy()
         before[:, angle], after[:, angle] = 2.0 * np.pi - _SEAM_STEP, _SEAM_STEP

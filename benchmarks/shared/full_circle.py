@@ -12,7 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
-from cpfls_cli.excitation import optimised_rotation
+from cpfls_cli.excitation.optimise import optimised_rotation
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import TorqueData, TorqueSource
 from cpfls_cli.identification.evaluator import Evaluator
@@ -20,10 +20,11 @@ from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import score_of
 from cpfls_cli.identification.search import choose, search
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.regressor import Motion, StructureSettings
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.structure import StructureSettings
 from cpfls_cli.trajectory.rotation import RotationPath, full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
-from cpfls_cli.vehicle import VehicleSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 CONFIG = Path(__file__).resolve().parents[2] / "configs" / "full-circle.yaml"
 PAPER = StructureSettings(consequents="seesaw", products="additive", membership_functions=5)

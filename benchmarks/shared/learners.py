@@ -20,7 +20,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.identification.cross_validation import contiguous_blocks
 from cpfls_cli.identification.data import TorqueData, axis_scale
 from cpfls_cli.identification.judge import fit_baselines
-from cpfls_cli.regressor import Motion
+from cpfls_cli.regressor.motion import Motion
 
 if TYPE_CHECKING:
     from sklearn.gaussian_process import GaussianProcessRegressor

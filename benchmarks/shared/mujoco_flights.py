@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.vehicle import RotorSettings, VehicleSettings
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.builders.playback_flights import KINDS, MIDDLING, Autopilot, Plan, logged, planned
 
 VEHICLE = VehicleSettings(

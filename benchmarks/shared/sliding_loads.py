@@ -18,7 +18,7 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.regressor import Motion
+from cpfls_cli.regressor.motion import Motion
 
 MASS_KG = 6.0
 """Of the paper's vehicle, without loads."""

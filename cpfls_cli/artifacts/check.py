@@ -284,12 +284,7 @@ def _read_header(file: h5py.File) -> Header:
 
 
 def require_all(path: Path, stored: Stored) -> None:
-    """Refuse an artifact that lacks what every one of its format holds.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse an artifact that lacks what every one of its format holds."""
     record = record_of_format(stored.spec.format, stored.spec.kind)
     assert record is not None, "its format is known"
     missing = record.lacking(stored.data)
@@ -298,12 +293,7 @@ def require_all(path: Path, stored: Stored) -> None:
 
 
 def refuse(path: Path, findings: Sequence[str]) -> None:
-    """Refuse a file in which something was found.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse a file in which something was found."""
     if findings:
         raise InputError("\n".join(f"{path}: {finding}" for finding in findings))
 

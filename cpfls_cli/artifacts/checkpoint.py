@@ -4,39 +4,22 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
+from cpfls_cli.evolution.engine import EvolutionState, History
 
 if TYPE_CHECKING:
-    # What searches loads compiled kernels, which nobody waits for who only reads an artifact.
-    from cpfls_cli.evolution.archive import Evaluation
-    from cpfls_cli.evolution.engine import EvolutionState
+    # `search/checkpoint.py` and `search/vehicle_search.py` make of it again what a search goes on from.
     from cpfls_cli.identification.search import Unfinished
-    from cpfls_cli.playback.structure import Judged, Kept
+    from cpfls_cli.playback.structure import Judged
 
 _BEFORE_ALL = -1
 _NO_GENERATOR = "null"
-
-
-@dataclass(frozen=True)
-class StoppedSearch:
-    """What a stopped search leaves behind.
-
-    Attributes
-    ----------
-    state : EvolutionState or None
-        After its last generation; None if not even the initial population was evaluated.
-    unfinished : Unfinished
-        What was evaluated of the generation after it.
-    """
-
-    state: EvolutionState | None
-    unfinished: Unfinished
 
 
 @record
@@ -140,8 +123,6 @@ class CheckpointRecord(Record):
     @classmethod
     def of_nothing(cls, unfinished: Unfinished) -> Self:
         """Arrange a search that has not evaluated its whole initial population, only this part of it."""
-        from cpfls_cli.evolution.engine import History
-
         none, objectives = unfinished.submitted[:0], unfinished.evaluation.objectives[:0]
         empty = cls(
             generation=_BEFORE_ALL,
@@ -159,42 +140,14 @@ class CheckpointRecord(Record):
         stored = _stored(unfinished.submitted, evaluation.genes, evaluation.objectives)
         return replace(self, unfinished=UnfinishedGroup(**stored))
 
-    def stopped_search(self) -> StoppedSearch:
-        """Rebuild what the search left, equal to what was stored down to the last bit."""
-        from cpfls_cli.identification.search import Unfinished
-
-        unfinished = Unfinished(*_evaluated(self.unfinished))
-        return StoppedSearch(self._state() if self.generation > _BEFORE_ALL else None, unfinished)
-
-    def _state(self) -> EvolutionState:
-        from cpfls_cli.evolution.archive import Archive
-        from cpfls_cli.evolution.engine import EvolutionState, History
-
-        rng = np.random.default_rng()
-        rng.bit_generator.state = json.loads(self.generator)
-        return EvolutionState(
-            self.generation,
-            _genes(self.population.genes),
-            self.population.objectives,
-            self.population.subpopulation,
-            Archive.of(*_evaluated(self.archive)),
-            History(**vars(self.history)),
-            rng,
-        )
+    @property
+    def begun(self) -> bool:
+        """Whether the initial population was evaluated whole."""
+        return self.generation > _BEFORE_ALL
 
 
 def _stored(submitted: IntArray, genes: IntArray, objectives: Array) -> dict[str, Any]:
     return {"submitted": submitted.astype(np.uint16), "genes": genes.astype(np.uint16), "objectives": objectives}
-
-
-def _evaluated(stored: ArchiveGroup | UnfinishedGroup) -> tuple[IntArray, Evaluation]:
-    from cpfls_cli.evolution.archive import Evaluation
-
-    return _genes(stored.submitted), Evaluation(_genes(stored.genes), stored.objectives)
-
-
-def _genes(stored: Any) -> IntArray:
-    return np.asarray(stored, dtype=np.int64)
 
 
 @record
@@ -236,18 +189,3 @@ class VehicleCheckpointRecord(Record):
             values=np.concatenate([fitted.values for fitted in fits]),
             hessian=np.concatenate([fitted.hessian.ravel() for fitted in fits]),
         )
-
-    def kept(self) -> Kept:
-        """Rebuild what the search left, equal to what was stored down to the last bit."""
-        from cpfls_cli.playback.structure import Rules, Solution, Structure
-
-        counts = np.repeat(self.structure.numbers, self.loss.shape[1])
-        values = iter(np.split(self.values, np.cumsum(counts)[:-1]))
-        hessians = iter(np.split(self.hessian, np.cumsum(counts**2)[:-1]))
-        names = zip(self.structure.blocks, self.structure.rules.tolist(), self.loss.tolist(), strict=True)
-        return {
-            Structure(tuple(blocks.split()), Rules(*rules)): [
-                Solution(found := next(values), loss, next(hessians).reshape(2 * (len(found),))) for loss in losses
-            ]
-            for blocks, rules, losses in names
-        }

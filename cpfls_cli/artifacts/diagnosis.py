@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.artifacts.audit import AuditGroup
 from cpfls_cli.artifacts.gap_effects import (
     GapChangeGroup,
     NamedEffectsGroup,
@@ -19,20 +20,19 @@ from cpfls_cli.artifacts.gap_effects import (
 from cpfls_cli.artifacts.gap_flights import (
     HELD_OUT,
     TRAINING,
-    AuditGroup,
     FlightsGroup,
     NotExcitedGroup,
 )
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, LearnedGroup, learned_in
 from cpfls_cli.artifacts.model import VehicleGroup
 from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
+from cpfls_cli.gap.naming.results import Alternative, Unexplained
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.before_after import BeforeAfter
     from cpfls_cli.gap.diagnose import DiagnosisRun
     from cpfls_cli.gap.extended import ExtendedModel
     from cpfls_cli.gap.naming.held_out import HeldOut
-    from cpfls_cli.gap.naming.results import Alternative, Unexplained
     from cpfls_cli.playback.model import VehicleModel
     from cpfls_cli.weak_form.windows import Recording
 
@@ -69,8 +69,6 @@ class AlternativeGroup:
 
     def rows(self) -> list[Alternative]:
         """List effects that could be named instead."""
-        from cpfls_cli.gap.naming.results import Alternative
-
         return [Alternative(**row) for row in rows_of(self)]
 
 
@@ -94,8 +92,6 @@ class UnexplainedGroup:
 
     def unexplained(self) -> list[Unexplained]:
         """Rebuild what is not explained."""
-        from cpfls_cli.gap.naming.results import Unexplained
-
         rows = rows_of(self)
         for row in rows:
             frequency = row.pop("frequency")

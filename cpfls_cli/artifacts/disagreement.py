@@ -8,17 +8,21 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.artifacts.audit import AuditGroup
 from cpfls_cli.artifacts.gap_effects import StretchGroup, above_noise, gap_summary
-from cpfls_cli.artifacts.gap_flights import AuditGroup, FlightsGroup, NotExcitedGroup
+from cpfls_cli.artifacts.gap_flights import FlightsGroup, NotExcitedGroup
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, LearnedGroup, learned_in
 from cpfls_cli.artifacts.model import VehicleGroup
+from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.replay import PlaybackGroup
 from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.replay import PREDICTIONS
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.compare import Disagreement, WorstChannel
     from cpfls_cli.gap.residual.dependence import Dependence
-    from cpfls_cli.playback.model import VehicleModel
     from cpfls_cli.vehicle.settings import VehicleSettings
     from cpfls_cli.weak_form.windows import Recording
 
@@ -47,8 +51,6 @@ class GapGroup:
     @classmethod
     def of(cls, disagreement: Disagreement) -> Self:
         """Arrange the gap of each channel."""
-        from cpfls_cli.gap.balance.weak_flight import CHANNELS
-
         return cls(
             channel=CHANNELS,
             rms=disagreement.rms,
@@ -186,8 +188,6 @@ class DisagreementRecord(Record):
         base : VehicleModel
             That was compared.
         """
-        from cpfls_cli.playback.replay import PREDICTIONS
-
         return cls(
             gap=GapGroup.of(disagreement),
             residual=ResidualGroup(
@@ -214,9 +214,7 @@ class DisagreementRecord(Record):
 
     def is_base(self, stated: VehicleSettings) -> bool:
         """Tell whether it was made with the vehicle of a config and no effects, which `cpfls diagnose` starts from."""
-        from cpfls_cli.playback.model import VehicleModel
-
-        model, rigid = self.base.vehicle_model(), VehicleGroup.of(VehicleModel(vehicle=stated))
+        model, rigid = vehicle_model(self.base), VehicleGroup.of(VehicleModel(vehicle=stated))
         return model.is_rigid_body and model.vehicle == rigid.vehicle()
 
     @property

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.audit import AuditGroup
 from cpfls_cli.artifacts.gap_effects import GapChangeGroup, NamedEffectsGroup, PlaybackChangeGroup, effect_summary
-from cpfls_cli.artifacts.gap_flights import AuditGroup
 from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
 from cpfls_cli.artifacts.replay import trust_by_playback
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, record

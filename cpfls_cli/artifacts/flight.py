@@ -10,12 +10,14 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record
+from cpfls_cli.dynamics.rigid_body import not_positive_definite
+from cpfls_cli.regressor.motion import Motion
 
 if TYPE_CHECKING:
-    from cpfls_cli.control import Plan, Scores
+    from cpfls_cli.control.controllers import Plan
+    from cpfls_cli.control.track import Scores
     from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
     from cpfls_cli.flightlog.results import ImportedFlight
-    from cpfls_cli.regressor.motion import Motion
     from cpfls_cli.simulation.model import SimulatedEffects
 
 MOTION = ("attitude", "attitude_rate", "attitude_acceleration")
@@ -182,8 +184,6 @@ class TrackingGroup:
         attitude : array, shape (time, 3), rad
             Of the flight under the model's controller.
         """
-        from cpfls_cli.dynamics.rigid_body import not_positive_definite
-
         return cls(
             controller=tuple(controllers),
             time=plan.time[:: plan.parts],
@@ -380,8 +380,6 @@ class FlightRecord(Record):
     @property
     def motion(self) -> Motion:
         """Euler angles and their derivatives, of a flight that was read with all of `MOTION`."""
-        from cpfls_cli.regressor.motion import Motion
-
         assert self.attitude is not None, "the flight has no attitude"
         assert self.attitude_rate is not None, "the flight has no Euler rates"
         assert self.attitude_acceleration is not None, "the flight has no Euler accelerations"

@@ -5,38 +5,27 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from textwrap import fill
 
-from cpfls_cli.artifacts.checkpoint import CheckpointRecord, VehicleCheckpointRecord
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
-from cpfls_cli.artifacts.disagreement import DisagreementRecord
-from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.prediction import PredictionRecord
-from cpfls_cli.artifacts.replay import ReplayRecord
-from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import ArtifactSpec, DatasetSpec, Record
-from cpfls_cli.artifacts.sweep import SweepRecord
-from cpfls_cli.artifacts.trajectory import TrajectoryRecord
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
-RECORDS: tuple[type[Record], ...] = (
-    TrajectoryRecord,
-    FlightRecord,
-    SelectionRecord,
-    IdentifiedRecord,
-    CheckpointRecord,
-    SweepRecord,
-    PredictionRecord,
-    ReplayRecord,
-    DisagreementRecord,
-    DiagnosisRecord,
-    ExtendedRecord,
-    VehicleRecord,
-    VehicleCheckpointRecord,
-)
-"""Every artifact format."""
+_RECORDS = {
+    ("cpfls/trajectory", ""): "trajectory.TrajectoryRecord",
+    ("cpfls/flight", ""): "flight.FlightRecord",
+    ("cpfls/selection", ""): "selection.SelectionRecord",
+    ("cpfls/model", "identified"): "identified.IdentifiedRecord",
+    ("cpfls/checkpoint", ""): "checkpoint.CheckpointRecord",
+    ("cpfls/sweep", ""): "sweep.SweepRecord",
+    ("cpfls/prediction", ""): "prediction.PredictionRecord",
+    ("cpfls/replay", ""): "replay.ReplayRecord",
+    ("cpfls/disagreement", ""): "disagreement.DisagreementRecord",
+    ("cpfls/diagnosis", ""): "diagnosis.DiagnosisRecord",
+    ("cpfls/model", "extended"): "extended.ExtendedRecord",
+    ("cpfls/model", "vehicle"): "vehicle_model.VehicleRecord",
+    ("cpfls/vehicle-checkpoint", ""): "checkpoint.VehicleCheckpointRecord",
+}
+"""Every artifact format by its name and kind, and where its record is: it is loaded when a file of it is met."""
 
 # Of a line of docs.
 _WIDTH = 120
@@ -44,19 +33,23 @@ _HEAD = "| dataset | dimensions | units | frame | required | description |\n|---
 
 
 def record_of_format(name: str, kind: str = "") -> type[Record] | None:
-    """Look up a format by the values of the root attributes ``format`` and ``kind``."""
-    return next((each for each in RECORDS if (each.FORMAT.name, each.FORMAT.kind) == (name, kind)), None)
+    """Look up a format by the values of the root attributes ``format`` and ``kind``, and load its record."""
+    place = _RECORDS.get((name, kind))
+    if place is None:
+        return None
+    module, record = place.split(".")
+    found: type[Record] = getattr(import_module(f"cpfls_cli.artifacts.{module}"), record)
+    return found
+
+
+def records() -> list[type[Record]]:
+    """Load the records of all formats."""
+    return [record for format_and_kind in _RECORDS if (record := record_of_format(*format_and_kind)) is not None]
 
 
 def format_tables() -> str:
-    """Describe every artifact format as a table of its datasets.
-
-    Returns
-    -------
-    str
-        Markdown, one section for each format.
-    """
-    return "\n".join(_section(record.spec()) for record in RECORDS)
+    """Describe every artifact format as Markdown, one section with the table of its datasets each."""
+    return "\n".join(_section(record.spec()) for record in records())
 
 
 def _section(spec: ArtifactSpec) -> str:

@@ -10,11 +10,14 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.replay import PlaybackGroup
 from cpfls_cli.artifacts.spec import BODY, columns_of, dataset, group, record, rows_of
-from cpfls_cli.gap.settings import CLEAR
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS, effect
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
+from cpfls_cli.gap.naming.results import Estimate, NamedEffect
+from cpfls_cli.gap.settings import CLEAR, WORSE
+from cpfls_cli.playback.replay import NOTHING_MOVES, RATE_STAYS
 
 if TYPE_CHECKING:
-    # Reading a record does not need the numerics that fit a gap.
-    from cpfls_cli.gap.naming.results import Estimate, GapSize, NamedEffect
+    from cpfls_cli.gap.naming.results import GapSize
     from cpfls_cli.gap.residual.views import GapStretch
     from cpfls_cli.playback.replay import Played, Replay
 
@@ -37,6 +40,16 @@ def above_noise(floors: Array) -> BoolArray:
         Gaps in noise floors; NaN where unknown, which is not above noise.
     """
     return np.asarray(floors > CLEAR)
+
+
+def worse_axes(before: Array, after: Array) -> list[int]:
+    """List the axes about which a clear gap grows.
+
+    Parameters
+    ----------
+    before, after : array, shape (6,), floors
+    """
+    return [int(c) for c in np.flatnonzero((before[:3] > CLEAR) & (after[:3] > WORSE * before[:3]))]
 
 
 def gap_summary(value: Array, floors: Array) -> dict[str, Any]:
@@ -102,8 +115,6 @@ class EffectGroup:
     @classmethod
     def of(cls, effects: Sequence[NamedEffect], named: bool) -> Self:
         """Arrange effects that a verdict names, or that are only the closest."""
-        from cpfls_cli.effects.registry import CATALOGUE
-
         kinds = tuple(CATALOGUE[effect.name].kind for effect in effects)
         return columns_of(cls, effects, kind=kinds, named=np.full(len(effects), float(named)))
 
@@ -139,8 +150,6 @@ class CoefficientGroup:
 
     def of_effect(self, effect: str) -> tuple[Estimate, ...]:
         """Rebuild the numbers of one effect."""
-        from cpfls_cli.gap.naming.results import Estimate
-
         rows = [row for row in rows_of(self) if row.pop("effect") == effect]
         ranges = [(row.pop("plausible_low"), row.pop("plausible_high")) for row in rows]
         return tuple(Estimate(**row, plausible=plausible) for row, plausible in zip(rows, ranges, strict=True))
@@ -218,8 +227,6 @@ class ParameterGroup:
         linear : array, shape (parameter,)
             All of them, in the order of the catalogue.
         """
-        from cpfls_cli.effects.registry import VEHICLE_NUMBERS
-
         coefficients = VEHICLE_NUMBERS.coefficients
         estimates = [known.get(coefficient.name) for coefficient in coefficients]
         return cls(
@@ -273,15 +280,7 @@ class NamedEffectsGroup:
         )
 
     def effects(self) -> tuple[NamedEffect, ...]:
-        """Rebuild the effects, to evaluate them.
-
-        Raises
-        ------
-        InputError
-            If this program does not know one of them.
-        """
-        from cpfls_cli.effects.registry import effect
-
+        """Rebuild the effects, to evaluate them."""
         for name in self.effect.name:
             effect(name)
         return self.listed
@@ -311,10 +310,6 @@ class NamedEffectsGroup:
         return tuple(effect for effect, flag in pairs if bool(flag) is named)
 
     def _effect(self, index: int) -> NamedEffect:
-        from cpfls_cli.effects.registry import CATALOGUE
-        from cpfls_cli.gap.balance.weak_flight import Candidate
-        from cpfls_cli.gap.naming.results import NamedEffect
-
         rows, name = self.effect, self.effect.name[index]
         entry, shape = CATALOGUE.get(name), self.shape.of_effect(name)
         linear = self.linear.of_effect(name)
@@ -364,8 +359,6 @@ class GapChangeGroup:
         ----------
         floor : array, shape (6,), N m and N
         """
-        from cpfls_cli.gap.balance.weak_flight import CHANNELS
-
         return cls(
             channel=CHANNELS,
             before=before.value,
@@ -402,8 +395,6 @@ class GapChangeGroup:
     @property
     def worse_axes(self) -> list[int]:
         """Indices of the axes about which a clear gap clearly grows."""
-        from cpfls_cli.gap.extended import worse_axes
-
         return worse_axes(self.before_floors, self.after_floors)
 
     @property
@@ -480,8 +471,6 @@ class PlaybackChangeGroup(PlaybackGroup):
     @classmethod
     def of_pairs(cls, flights: Sequence[Played], replay: Replay) -> Self:
         """Arrange a replay of a model with effects and the model as given, without its windows."""
-        from cpfls_cli.playback.replay import NOTHING_MOVES, RATE_STAYS
-
         return cls.of(flights, replay, (AFTER, NOTHING_MOVES, RATE_STAYS, BEFORE))
 
     @property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -23,19 +22,25 @@ from cpfls_cli.artifacts.evidence import (
     group_of,
 )
 from cpfls_cli.artifacts.learned import LearnedGroup
-from cpfls_cli.artifacts.model import InertiaFunctionsGroup, ModelRecord, VehicleGroup
+from cpfls_cli.artifacts.model import (
+    EffectsGroup,
+    InertiaFunctionsGroup,
+    ModelRecord,
+    ResponseGroup,
+    RotorsGroup,
+    VehicleGroup,
+)
 from cpfls_cli.artifacts.scores import MODEL, TRAINING, JudgedGroup
 from cpfls_cli.artifacts.spec import BODY, EULER, Format, dataset, group, record
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
+from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.validation.trust import Trust
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
-    # What evaluates a model loads compiled kernels, which nobody waits for who only reads one.
-    from cpfls_cli.config.study import Study
+    from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
     from cpfls_cli.identification.identify import Identification
-    from cpfls_cli.validation.bootstrap import Draws
     from cpfls_cli.validation.validate import Validation
-    from cpfls_cli.vehicle.settings import VehicleSettings
 
 WELL_CONDITIONED = 100.0
 """Largest condition number of a model whose coefficients are all known."""
@@ -132,6 +137,19 @@ class IdentifiedVehicleGroup(VehicleGroup):
 
     inertia_functions: InertiaFunctionsGroup = group("inertia_functions")
 
+    @classmethod
+    def identified(cls, vehicle: VehicleSettings, functions: InertiaFunctions) -> Self:
+        """Arrange mass and rotors as stated, and an inertia that was identified."""
+        return cls(
+            mass=vehicle.mass_kg,
+            gravity=vehicle.gravity_m_s2,
+            inertia=six_parameters(vehicle.inertia_kg_m2),
+            rotor=RotorsGroup.of(vehicle, 0.0),
+            response=ResponseGroup.of(RotorResponse(), commanded=False, hold=None),
+            effect=EffectsGroup.of(()),
+            inertia_functions=InertiaFunctionsGroup.of(functions),
+        )
+
 
 @record
 class IdentifiedRecord(ModelRecord):
@@ -192,11 +210,9 @@ class IdentifiedRecord(ModelRecord):
         parts : LearnedGroup
             How much of each flight trained.
         """
-        from cpfls_cli.playback.model import VehicleModel
-
         baselines = {baseline.name: baseline.parameters for baseline in result.baselines}
         return cls(
-            vehicle=IdentifiedVehicleGroup.of(VehicleModel(vehicle=vehicle, fuzzy=result.model)),
+            vehicle=IdentifiedVehicleGroup.identified(vehicle, result.model),
             learned=parts,
             model=ChosenGroup(
                 weights=result.front.chromosomes[result.front.chosen],
@@ -223,27 +239,10 @@ class IdentifiedRecord(ModelRecord):
             **({} if evidence is None else evidence_groups(evidence)),
         )
 
-    @cached_property
-    def study(self) -> Study:
-        """The study that it was identified with."""
-        from cpfls_cli.config.load import parse_config, validate
-
-        source = f"{self.FORMAT.name}: /config"
-        return validate(parse_config(self.origin.config, source), source)
-
     @property
     def functions(self) -> InertiaFunctionsGroup:
         """Its inertia functions."""
         return self.vehicle.inertia_functions
-
-    def draws(self) -> Draws | None:
-        """Give the bootstrap draws behind its bands; None for a model without."""
-        from cpfls_cli.validation.bootstrap import Draws
-
-        if self.uncertainty is None:
-            return None
-        drawn = self.uncertainty
-        return Draws(drawn.coefficients, drawn.rigid_body, drawn.best_rigid_body, drawn.blocks, drawn.block_duration)
 
     @property
     def complete(self) -> bool:
@@ -307,7 +306,6 @@ class IdentifiedRecord(ModelRecord):
         not positive definite.
         """
         judged, solve = self.judged, self.solve
-        stated = six_parameters(self.study.vehicle.inertia_kg_m2)
         return {
             **judged.summary_of(MODEL, TRAINING),
             "condition_number": solve.condition_number,
@@ -325,7 +323,7 @@ class IdentifiedRecord(ModelRecord):
             "fuzzy_part": "off" if self.fuzzy_part_off else "on",
             "inertia_kg_m2": {
                 "found": dict(zip(INERTIA_PARAMETERS, self.baselines.rigid_body.tolist(), strict=True)),
-                "stated": dict(zip(INERTIA_PARAMETERS, stated.tolist(), strict=True)),
+                "stated": dict(zip(INERTIA_PARAMETERS, self.vehicle.inertia.tolist(), strict=True)),
             },
             "not_positive_definite": None,
             "baselines": {name: judged.summary_of(name, TRAINING) for name in judged.baselines},

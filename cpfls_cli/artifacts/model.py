@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.gap_flights import AuditGroup
+from cpfls_cli.artifacts.audit import AuditGroup
 from cpfls_cli.artifacts.learned import LearnedFlight, LearnedGroup, learned_in
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record
-from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
+from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.validation.trust import Trust
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 if TYPE_CHECKING:
-    # Reading a record does not need the compiled loops that evaluate a model.
+    # Reading a record waits for no numerics; `artifacts/rebuilt.py` makes a model of it again.
     from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
     from cpfls_cli.playback.model import ModelEffect, VehicleModel
-    from cpfls_cli.playback.rotors import RotorResponse
     from cpfls_cli.playback.table import Remainder
     from cpfls_cli.regressor.structure import ModelStructure
-    from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
-_USUAL = "usual"
+USUAL = "usual"
+"""What a command is between samples, where the model does not say: as a flight is usually taken."""
 
 
 @record
@@ -57,8 +57,6 @@ class RotorsGroup:
 
     def rotors(self) -> tuple[RotorSettings, ...]:
         """Rebuild them."""
-        from cpfls_cli.vehicle.settings import RotorSettings
-
         columns = (self.position, self.spin, self.thrust_factor, self.drag_factor, self.radius)
         return tuple(
             RotorSettings(
@@ -89,23 +87,20 @@ class ResponseGroup:
     hold: str = dataset("hold", "what a command is between samples: linear, previous, or usual for the flight")
 
     @classmethod
-    def of(cls, model: VehicleModel) -> Self:
-        """Arrange the response of a model."""
-        response = model.response
+    def of(cls, response: RotorResponse, *, commanded: bool, hold: str | None) -> Self:
+        """Arrange a response, whether it lies behind commands, and what those are between samples."""
         return cls(
             delay=response.delay_s,
             lag=response.lag_s,
             slow_roll_pitch=response.slow_roll_pitch,
             slow_yaw=response.slow_yaw,
             slow=response.slow_s,
-            commanded=model.commanded,
-            hold=model.hold or _USUAL,
+            commanded=commanded,
+            hold=hold or USUAL,
         )
 
     def response(self) -> RotorResponse:
         """Rebuild it."""
-        from cpfls_cli.playback.rotors import RotorResponse
-
         return RotorResponse(
             delay_s=self.delay,
             lag_s=self.lag,
@@ -143,24 +138,12 @@ class EffectsGroup:
             shape=np.array([value for _, _, value in shapes], dtype=float),
         )
 
-    def effects(self) -> tuple[ModelEffect, ...]:
-        """Rebuild them.
-
-        Raises
-        ------
-        InputError
-            If this program does not know one of them.
-        """
-        from cpfls_cli.effects.registry import effect
-        from cpfls_cli.playback.model import ModelEffect
-
-        return tuple(ModelEffect(effect(name).name, self._shape_of(name), self.linear_of(name)) for name in self.name)
-
     def linear_of(self, effect: str) -> Array:
         """Give the linear coefficients of an effect, shape (coefficient,)."""
         return np.asarray(self.linear[[name == effect for name in self.linear_effect]])
 
-    def _shape_of(self, effect: str) -> dict[str, float]:
+    def shape_of(self, effect: str) -> dict[str, float]:
+        """Give the shapes of an effect, by name."""
         shapes = zip(self.shape_effect, self.shape_name, self.shape.tolist(), strict=True)
         return {name: value for of, name, value in shapes if of == effect}
 
@@ -191,17 +174,6 @@ class RemainderGroup:
             harmonic_order=remainder.harmonic_order,
             rows=remainder.rows,
             coefficients=remainder.coefficients,
-        )
-
-    def remainder(self) -> Remainder:
-        """Rebuild it."""
-        from cpfls_cli.playback.table import Remainder
-
-        return Remainder(
-            breakpoints=self.breakpoints,
-            harmonic_order=self.harmonic_order,
-            rows=self.rows.astype(np.int64),
-            coefficients=self.coefficients,
         )
 
 
@@ -252,54 +224,6 @@ class InertiaFunctionsGroup:
             visited=model.visited,
         )
 
-    def inertia(self) -> InertiaFunctions:
-        """Rebuild the inertia over attitude.
-
-        Raises
-        ------
-        InputError
-            If the numbers do not fit the structure.
-        """
-        from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-        from cpfls_cli.fuzzy.inputs import InputRange
-        from cpfls_cli.regressor.structure import StructureSettings, model_structure
-
-        try:
-            structure = model_structure(
-                StructureSettings(
-                    structure=self.structure,  # type: ignore[arg-type]  # checked there
-                    input_map=self.input_map,  # type: ignore[arg-type]
-                    consequents=self.consequents,  # type: ignore[arg-type]
-                    harmonic_order=self.harmonic_order,
-                    products=self.products,  # type: ignore[arg-type]
-                    membership_functions=tuple(self.membership_functions.tolist()),
-                )
-            )
-        except SettingError as error:
-            raise InputError(f"vehicle/inertia_functions/{error}") from None
-        names = np.array(self.partition)
-        partitions = tuple(np.asarray(self.breakpoints[names == each.name]) for each in structure.partitions)
-        peaks = [len(each) for each in partitions]
-        wanted = [each.functions for each in structure.partitions]
-        if peaks != wanted or len(self.coefficients) != structure.parameters:
-            raise InputError(
-                f"vehicle/inertia_functions holds {peaks} breakpoints and {len(self.coefficients)} coefficients; its "
-                f"structure asks for {wanted} and {structure.parameters}"
-            )
-        roll, pitch = (InputRange(*map(float, row)) for row in self.input_range)
-        return InertiaFunctions(
-            structure, (roll, pitch), partitions, self.coefficients, self.rigid_body, self.visited.astype(bool)
-        )
-
-
-def _inertia_functions(model: VehicleModel) -> InertiaFunctionsGroup | None:
-    from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-
-    if model.fuzzy is None:
-        return None
-    assert isinstance(model.fuzzy, InertiaFunctions), "what is written was identified"
-    return InertiaFunctionsGroup.of(model.fuzzy)
-
 
 def _parameter_names(structure: ModelStructure) -> Iterator[str]:
     for block in structure.blocks:
@@ -333,24 +257,23 @@ class VehicleGroup:
     @classmethod
     def of(cls, model: VehicleModel) -> Self:
         """Arrange a model."""
-        vehicle = model.vehicle
+        vehicle, functions = model.vehicle, cast("InertiaFunctions | None", model.fuzzy)
         return cls(
             mass=vehicle.mass_kg,
             gravity=vehicle.gravity_m_s2,
             inertia=six_parameters(vehicle.inertia_kg_m2),
             rotor=RotorsGroup.of(vehicle, model.thrust_linear),
-            response=ResponseGroup.of(model),
+            response=ResponseGroup.of(model.response, commanded=model.commanded, hold=model.hold),
             effect=EffectsGroup.of(model.effects),
             remainder=None if model.remainder is None else RemainderGroup.of(model.remainder),
             wind=np.array(model.wind) if any(model.wind) else None,
-            inertia_functions=_inertia_functions(model),
+            # What is written was identified.
+            inertia_functions=None if functions is None else InertiaFunctionsGroup.of(functions),
             repair=None if model.repairs is None else AuditGroup.of(model.repairs),
         )
 
     def vehicle(self) -> VehicleSettings:
         """Rebuild mass, inertia and rotors."""
-        from cpfls_cli.vehicle.settings import VehicleSettings
-
         first, second, third, *products = self.inertia.tolist()
         return VehicleSettings(
             gravity_m_s2=self.gravity,
@@ -358,29 +281,6 @@ class VehicleGroup:
             inertia_kg_m2=(first, second, third, *products) if any(products) else (first, second, third),
             rotors=self.rotor.rotors(),
             rotor_speed_max_rad_s=self.rotor.speed_max,
-        )
-
-    def vehicle_model(self) -> VehicleModel:
-        """Rebuild the model.
-
-        Raises
-        ------
-        InputError
-            If this program does not know one of its effects.
-        """
-        from cpfls_cli.playback.model import VehicleModel
-
-        return VehicleModel(
-            vehicle=self.vehicle(),
-            response=self.response.response(),
-            thrust_linear=self.rotor.thrust_linear,
-            effects=self.effect.effects(),
-            remainder=None if self.remainder is None else self.remainder.remainder(),
-            wind=(0.0, 0.0, 0.0) if self.wind is None else tuple(self.wind.tolist()),
-            fuzzy=None if self.inertia_functions is None else self.inertia_functions.inertia(),
-            commanded=self.response.commanded,
-            hold=None if self.response.hold == _USUAL else self.response.hold,  # type: ignore[arg-type]
-            repairs=None if self.repair is None else self.repair.audit(),
         )
 
     @property
@@ -402,7 +302,6 @@ class VehicleGroup:
             "effects": {name: self.effect.linear_of(name).tolist() for name in self.effect.name},
             "remainder": None if self.remainder is None else self.remainder.rows.tolist(),
             "steady_wind_m_s": [0.0, 0.0, 0.0] if self.wind is None else self.wind.tolist(),
-            "not_held": list(self.vehicle_model().beside_table),
         }
 
 
@@ -416,16 +315,6 @@ class ModelRecord(Record):
 
     vehicle: VehicleGroup = group("vehicle")
     learned: LearnedGroup | None = group("learned", default=None)
-
-    def vehicle_model(self) -> VehicleModel:
-        """Rebuild the model.
-
-        Raises
-        ------
-        InputError
-            If this program does not know one of its effects, or its numbers do not fit each other.
-        """
-        return self.vehicle.vehicle_model()
 
     @property
     def learned_from(self) -> tuple[LearnedFlight, ...]:

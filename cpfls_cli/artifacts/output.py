@@ -45,11 +45,6 @@ def locked(path: Path, title: str) -> Iterator[None]:
     ----------
     title : str
         Of the command, for who finds its output locked.
-
-    Raises
-    ------
-    InputError
-        If another command is writing this output.
     """
     path = Path(os.path.abspath(path))
     lock = path.parent / f".{path.name}.lock"
@@ -111,11 +106,6 @@ def check_output(path: Path, force: bool, inputs: Iterable[Path] = ()) -> None:
         Allow an existing file to be replaced.
     inputs : iterable of Path
         What the command reads: never replaced.
-
-    Raises
-    ------
-    InputError
-        If the file is an input, a link or no file, if it exists, its folder does not, or the folder cannot be written.
     """
     refuse_inputs(path, inputs)
     if os.path.islink(path):
@@ -153,24 +143,14 @@ def _move(temporary: Path, path: Path) -> None:
 
 
 def refuse_inputs(output: Path, inputs: Iterable[Path]) -> None:
-    """Refuse an output that is one of the files that the command reads.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse an output that is one of the files that the command reads."""
     # Unlike a method of a path, this takes a name that the system does not as one of no file.
     if os.path.exists(output) and any(path.exists() and path.samefile(output) for path in inputs):
         raise InputError(f"{output}: is an input of this command; -o must name another file")
 
 
 def refuse_own(path: Path, output: Path) -> None:
-    """Refuse a further output where the command writes its first one, or what it keeps beside that.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse a further output where the command writes its first one, or what it keeps beside that."""
     if os.path.realpath(path) in {os.path.realpath(f"{output}{addition}") for addition in _BESIDE}:
         raise InputError(f"{path}: is what the command writes for -o {output}; name another file")
 
@@ -193,11 +173,6 @@ def atomic_path(path: Path) -> Iterator[Path]:
     ----------
     path : Path
         The file to be written in the end; the caller moves the temporary file there with `os.replace`.
-
-    Raises
-    ------
-    OutputError
-        If the folder does not exist or cannot be written.
     """
     try:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
@@ -256,13 +231,7 @@ class EnduringFile(io.RawIOBase):
         return self._end
 
     def require_written(self) -> None:
-        """Make sure that all has been written.
-
-        Raises
-        ------
-        OSError
-            The first failure.
-        """
+        """Make sure that all has been written."""
         if self._failure is not None:
             raise self._failure
 
@@ -281,13 +250,7 @@ class EnduringFile(io.RawIOBase):
 
 @contextmanager
 def sealed_output(path: Path) -> Iterator[EnduringFile]:
-    """Give a file to write under a temporary name; in the end it gets its seal and is moved in place.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
-    """
+    """Give a file to write under a temporary name; in the end it gets its seal and is moved in place."""
     with atomic_path(path) as temporary, _writing(path), temporary.open("r+b", buffering=0) as raw:
         file = EnduringFile(raw)
         try:
@@ -312,11 +275,6 @@ def write_texts(texts: Mapping[Path, str]) -> None:
     """Write text files under temporary names, then move them in place when all of them are complete.
 
     What is no character, such as a byte of a file name that is not UTF-8, is written as a question mark.
-
-    Raises
-    ------
-    OutputError
-        If one cannot be written; then none is.
     """
     with ExitStack() as stack:
         written = {}
@@ -349,10 +307,6 @@ def check_folder(folder: Path, force: bool, names: Sequence[str]) -> None:
         Allow files in it to be replaced.
     names : sequence of str
         Files that may be written.
-
-    Raises
-    ------
-    InputError
     """
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: is a file; -o names a folder")
@@ -379,11 +333,6 @@ def filled_folder(folder: Path, names: Sequence[str]) -> Iterator[Path]:
         Made where it does not exist; a link to a folder is followed.
     names : sequence of str
         Files that may be written; those of an earlier run that are not written again are removed.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be written.
     """
     folder = folder.resolve()
     try:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cpfls_cli.artifacts.spec import rows_of
+from cpfls_cli.effects.registry import CENTRE_OF_MASS
 from cpfls_cli.inertia import INERTIA_PARAMETERS, beyond_any_body
 
 if TYPE_CHECKING:
@@ -17,17 +18,18 @@ _DIGITS = 6
 THRUST, DRAG = "rotors.thrust_factor_n_s2", "rotors.drag_factor_n_m_s2"
 INERTIA = tuple(f"inertia_kg_m2.{place}" for place in range(6))
 LAG, DELAY, CENTRE = "motor_lag_s", "delay_s", ("com_m.0", "com_m.1")
-_FOUND_AS = {
+FOUND_AS = {
     THRUST: "thrust_factor",
     DRAG: "drag_factor",
     **dict(zip(INERTIA[:3], (f"inertia.{name}" for name in INERTIA_PARAMETERS[:3]), strict=True)),
     **dict(zip(INERTIA[3:], (f"products.{name}" for name in INERTIA_PARAMETERS[3:]), strict=True)),
     LAG: "lag.time_constant_s",
     DELAY: "delay.delay_s",
+    **dict(zip(CENTRE, (f"{CENTRE_OF_MASS.name}.{each.name}" for each in CENTRE_OF_MASS.coefficients), strict=True)),
 }
-"""Numbers of a fit, by the keys under which people look for them; the centre of mass is an effect (`found_as`)."""
+"""Numbers of a fit, by the keys under which people look for them."""
 
-OF_TURNING = frozenset(_FOUND_AS[key] for key in (DRAG, *INERTIA))
+OF_TURNING = frozenset(FOUND_AS[key] for key in (DRAG, *INERTIA))
 """Numbers of a fit that are known only as far as the torques are that turn the vehicle."""
 
 _UNITS = {THRUST: "N s^2", DRAG: "N m s^2", LAG: "s", DELAY: "s", **dict.fromkeys(CENTRE, "m")}
@@ -66,18 +68,11 @@ class Parameter(NamedTuple):
     reason: str
 
 
-def found_as() -> dict[str, str]:
-    """Give the numbers of a fit by the keys under which people look for them."""
-    from cpfls_cli.playback import groups
-
-    return _FOUND_AS | dict(zip(CENTRE, groups.CENTRE, strict=True))
-
-
 def parameters_of(record: VehicleRecord) -> Iterator[Parameter]:
     """List the constants of a vehicle that was found, known or not."""
     found = {row["name"]: row for row in rows_of(record.found)}
     guesses = {key for name in record.guess or () for key in _GUESSES[name]}
-    for key, name in found_as().items():
+    for key, name in FOUND_AS.items():
         unit = _UNITS.get(key, "kg m^2")
         if name in found:
             row = found[name]
@@ -105,7 +100,7 @@ def _reason(record: VehicleRecord, row: dict[str, Any]) -> str:
     ]
     if row["determined"]:
         return ""
-    if record.loop.shown and name != _FOUND_AS[THRUST]:
+    if record.loop.shown and name != FOUND_AS[THRUST]:
         return "these flights show the loop, not the vehicle"
     if name in OF_TURNING and too_heavy(record):
         return too_heavy(record)

@@ -10,11 +10,16 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.spec import BODY, EULER, PART, Format, Record, dataset, record
+from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
+from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
+from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.judge import Score, ScoreSums
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.rotations import body_torque
+from cpfls_cli.validation.bands import inertia_band, torque_band
 
 if TYPE_CHECKING:
     from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-    from cpfls_cli.identification.judge import Score
-    from cpfls_cli.regressor.motion import Motion
     from cpfls_cli.validation.bootstrap import Draws
 
 
@@ -107,10 +112,6 @@ class PredictionRecord(Record):
         draws : Draws or None
             Of the bootstrap; None for a model without bands.
         """
-        from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
-        from cpfls_cli.rotations import body_torque
-        from cpfls_cli.validation.bands import inertia_band, torque_band
-
         torque, inertia = model.torque(motion), model.inertia(motion.attitude)
         inertia_low = inertia_high = torque_low = torque_high = None
         if draws is not None:
@@ -170,8 +171,6 @@ class Findings:
 
     def __init__(self) -> None:
         """Begin with no samples."""
-        from cpfls_cli.identification.judge import ScoreSums
-
         self.samples = self.outside = self.vertical = self.not_positive_definite = 0
         self.held_against: str | None = None
         self._score, self._judged = ScoreSums(), False
@@ -179,11 +178,6 @@ class Findings:
 
     def add(self, part: PredictionRecord) -> None:
         """Add the samples that follow."""
-        from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
-        from cpfls_cli.identification.data import TorqueData
-        from cpfls_cli.regressor.motion import Motion
-        from cpfls_cli.rotations import body_torque
-
         steep = vertical(part.attitude)
         self.held_against = part.held_against
         self.samples += len(part.time)

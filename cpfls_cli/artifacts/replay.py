@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.spec import BODY, WORLD, Format, Record, dataset, group, record
+from cpfls_cli.playback.replay import PREDICTIONS, drawn_runs, where_better
 from cpfls_cli.rounding import less
 from cpfls_cli.validation.trust import Trust
 
@@ -212,8 +213,6 @@ class HeldOutGroup(PlaybackGroup):
     @classmethod
     def judged(cls, flights: Sequence[Played], replay: Replay) -> Self:
         """Arrange a replay without its windows, and where the model is better than what knows no model."""
-        from cpfls_cli.playback.replay import PREDICTIONS, where_better
-
         better = where_better(flights, replay.windows)
         return cls.of(flights, replay, PREDICTIONS, better=None if better is None else RegionGroup(**vars(better)))
 
@@ -348,8 +347,6 @@ class WorstGroup:
         horizon : int
             Samples.
         """
-        from cpfls_cli.playback.replay import drawn_runs
-
         chosen = windows.worst(horizon, WORST)
         runs = [drawn_runs(played[windows.flight[index]], windows.start[[index]], horizon) for index in chosen]
         return cls(
@@ -382,8 +379,6 @@ class DrawnGroup:
         horizon : int
             Samples.
         """
-        from cpfls_cli.playback.replay import drawn_runs
-
         chosen = windows.typical(horizon, _DRAWN_RUNS)
         runs = drawn_runs(played[windows.flight[chosen[0]]], windows.start[chosen], horizon)
         return cls(window=np.array(chosen, dtype=np.int64), **vars(runs))
@@ -441,8 +436,6 @@ class ReplayRecord(Record):
         name : str
             Of the model.
         """
-        from cpfls_cli.playback.replay import PREDICTIONS
-
         errors, windows, period = replay.errors, replay.windows, played[0].flight.motion.period
         groups = {signal: SignalErrorGroup.of(found) for signal, found in errors.items()}
         assert groups["body_rate"] is not None, "every flight has rates"

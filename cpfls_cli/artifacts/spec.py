@@ -257,13 +257,7 @@ class Record:
 
     @classmethod
     def of_data(cls, header: Header, data: Mapping[str, Any]) -> Self:
-        """Build a record from its datasets by path.
-
-        Raises
-        ------
-        LookupError
-            If one that is required is missing; its argument is the path.
-        """
+        """Build a record from its datasets by path."""
         return cls(header=header, **_values(cls, "", data))
 
     @classmethod

@@ -92,11 +92,6 @@ def read_record(path: Path, wanted: type[R], *needed: str) -> R:
         Its format.
     *needed : str
         Fields at the top of the record that this command cannot do without.
-
-    Raises
-    ------
-    InputError
-        If the file is no good artifact of the format, or lacks a field or samples in it; the message names them.
     """
     artifact = read_artifact(path, wanted.spec())
     names = [wanted.path(name) for name in needed]
@@ -111,13 +106,7 @@ def read_record(path: Path, wanted: type[R], *needed: str) -> R:
 
 
 def read_any(path: Path) -> Record:
-    """Read an artifact of any format.
-
-    Raises
-    ------
-    InputError
-        If the file is not a good artifact.
-    """
+    """Read an artifact of any format."""
     artifact = read_artifact(path)
     wanted = record_of_format(artifact.spec.format, artifact.spec.kind)
     assert wanted is not None, "its format is known"
@@ -134,13 +123,7 @@ def _record(path: Path, artifact: Artifact, wanted: type[R]) -> R:
 
 
 def write_record(path: Path, record: Record) -> None:
-    """Write an artifact under a temporary name, then move it in place.
-
-    Raises
-    ------
-    OutputError
-        If the file cannot be written.
-    """
+    """Write an artifact under a temporary name, then move it in place."""
     write_artifact(path, artifact_of(record))
 
 
@@ -156,11 +139,6 @@ def read_artifact(path: Path, *wanted: ArtifactSpec) -> Artifact:
     ----------
     *wanted : ArtifactSpec
         Formats that the caller can use; any if none is named.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, damaged, foreign, of another stage or of a newer schema, or breaks its format.
     """
     with opened(path, *wanted) as stored:
         require_all(path, stored)
@@ -196,13 +174,7 @@ class Outline:
 
 
 def read_outline(path: Path) -> Outline:
-    """Read what an artifact holds, in little memory however large it is.
-
-    Raises
-    ------
-    InputError
-        As `read_artifact`.
-    """
+    """Read what an artifact holds, in little memory however large it is."""
     with opened(path) as stored:
         require_all(path, stored)
         refuse(path, check_artifact(stored))
@@ -216,13 +188,7 @@ def _is_short_text(dataset: h5py.Dataset | Array) -> bool:
 
 
 def findings_of(path: Path) -> tuple[ArtifactSpec, list[str]]:
-    """List what in an artifact breaks its format, in little memory however large it is.
-
-    Raises
-    ------
-    InputError
-        If the file is not an artifact, or damaged.
-    """
+    """List what in an artifact breaks its format, in little memory however large it is."""
     with opened(path) as stored:
         require_all(path, stored)
         return stored.spec, check_artifact(stored)
@@ -253,13 +219,7 @@ def holds(path: Path, wanted: type[Record]) -> bool:
 
 
 def read_header(path: Path) -> Header:
-    """Read where an artifact comes from, and none of its data.
-
-    Raises
-    ------
-    InputError
-        If the file is not a good artifact.
-    """
+    """Read where an artifact comes from, and none of its data."""
     with opened(path) as stored:
         return stored.header
 
@@ -278,13 +238,6 @@ def write_artifact(path: Path, artifact: Artifact) -> None:
     ----------
     artifact : Artifact
         Datasets that its format does not know are refused.
-
-    Raises
-    ------
-    ComputationError
-        If a result breaks its own format, such as a number that is not finite.
-    OutputError
-        If the file cannot be written.
     """
     _refuse_result(path, check_artifact(artifact))
     with sealed_output(path) as output:
@@ -300,11 +253,6 @@ def write_parts(path: Path, parts: Iterable[Record], samples: int) -> None:
         `PART` samples each, but for the last.
     samples : int
         Of all parts.
-
-    Raises
-    ------
-    ComputationError, OutputError
-        As `write_artifact`.
     """
     with sealed_output(path) as output:
         _write(output, map(artifact_of, parts), samples)
@@ -431,11 +379,6 @@ def check_rows(path: Path, spec: ArtifactSpec, names: Sequence[str]) -> None:
     ----------
     names : sequence of str
         Paths of the datasets that are needed; others are not looked at.
-
-    Raises
-    ------
-    InputError
-        If one is missing, or breaks the format.
     """
     with opened(path, spec) as stored:
         missing = [name for name in names if name not in stored.data]
@@ -461,11 +404,6 @@ def read_rows(path: Path, names: Sequence[str], start: int, stop: int, rows: int
     ------
     list of array
         One for each dataset.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read any more.
     """
     with opened(path) as stored:
         datasets = [stored.data[name] for name in names]

@@ -202,6 +202,8 @@ class VehicleRecord(ModelRecord):
         numbers = {row.pop("name"): row for row in rows_of(self.found)}
         return {
             **self.vehicle.summary,
+            # Its effects were chosen among those that the table of weights holds.
+            "not_held": [],
             "verdict": self.verdict,
             **self.provenance,
             "parameters": {row.pop("key"): row for row in (each._asdict() for each in parameters_of(self))},

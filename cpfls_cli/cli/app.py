@@ -5,8 +5,9 @@ from __future__ import annotations
 from contextlib import nullcontext
 from dataclasses import replace
 from enum import StrEnum
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cpfls_cli.artifacts.job import Job
+    from cpfls_cli.config.study import Study
     from cpfls_cli.report.outcome import Outcome
 
 app = typer.Typer(
@@ -184,6 +186,11 @@ def _version(asked: bool) -> None:
         raise typer.Exit
 
 
+def _command(name: str | None = None) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Make a function a command with the options that every command takes."""
+    return lambda function: app.command(name)(with_common(function))
+
+
 @app.callback()
 def _main(
     version: Annotated[
@@ -193,8 +200,7 @@ def _main(
     """Take the options that stand before a command."""
 
 
-@app.command()
-@with_common
+@_command()
 def trajectory(
     config: ConfigArgument,
     output: OutputOption,
@@ -236,25 +242,19 @@ def trajectory(
 ) -> None:
     """Plan a smooth path, full rotations that excite a model, or the flight that settles a diagnosis."""
     with messages_for_errors():
-        from cpfls_cli.commands.trajectory import option_overrides
-
-        asked = option_overrides(waypoints, to_tell, diagnosis, box, height, duration)
+        asked = _of("trajectory").option_overrides(waypoints, to_tell, diagnosis, box, height, duration)
         common = replace(common, overrides=[*(common.overrides or []), *asked])
 
-    def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import next_flight
-        from cpfls_cli.commands import trajectory as command
-
+    def call(command: Any, job: Job) -> Any:
         if job.study.trajectory.path == "next-flight":
-            return next_flight.run(job, diagnosis, plot)
+            return _of("next-flight").run(job, diagnosis, plot)
         command.require_no_room(box, height)
         return command.run(job, waypoints, plot)
 
     _run("trajectory", config, output, common, call)
 
 
-@app.command()
-@with_common
+@_command()
 def simulate(
     config: ConfigArgument,
     trajectory: TrajectoryArgument,
@@ -292,20 +292,13 @@ def simulate(
 ) -> None:
     """Fly a trajectory: exactly, in closed loop with effects that a model lacks, or with a model that controls it."""
     with messages_for_errors():
-        from cpfls_cli.commands.simulate import option_overrides
+        asked = _of("simulate").option_overrides(mode, effect or [])
+        common = replace(common, overrides=[*(common.overrides or []), *asked])
 
-        common = replace(common, overrides=[*(common.overrides or []), *option_overrides(mode, effect or [])])
-
-    def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import simulate as command
-
-        return command.run(job, trajectory, model, mode)
-
-    _run("simulate", config, output, common, call)
+    _run("simulate", config, output, common, lambda command, job: command.run(job, trajectory, model, mode))
 
 
-@app.command()
-@with_common
+@_command()
 def init(
     logs: LogsArgument,
     output: OutputOption,
@@ -321,40 +314,24 @@ def init(
 ) -> None:
     """Look into logs of one vehicle and write a config for them, with the reason of every guess."""
     with messages_for_errors():
-        from cpfls_cli.commands import init as command
-        from cpfls_cli.pages.proposal import Stated
+        _run_without_config(
+            "init", output, common, lambda command, job: command.run(job, logs, command.Stated(mass, arm))
+        )
 
-        _run_without_config("init", output, common, lambda job: command.run(job, logs, Stated(mass, arm)))
 
-
-@app.command("import")
-@with_common
+@_command("import")
 def import_(config: ConfigArgument, log: LogArgument, output: OutputOption, *, common: Common) -> None:
     """Turn a flight log into a flight."""
-
-    def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import import_log as command
-
-        return command.run(job, log)
-
-    _run("import", config, output, common, call)
+    _run("import", config, output, common, lambda command, job: command.run(job, log))
 
 
-@app.command()
-@with_common
+@_command()
 def reduce(config: ConfigArgument, flights: TrainingArgument, output: OutputOption, *, common: Common) -> None:
     """Pick the samples of flights that are worth learning from."""
-
-    def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import reduce as command
-
-        return command.run(job, flights)
-
-    _run("reduce", config, output, common, call)
+    _run("reduce", config, output, common, lambda command, job: command.run(job, flights))
 
 
-@app.command()
-@with_common
+@_command()
 def identify(
     config: ConfigArgument,
     flights: TrainingArgument,
@@ -376,18 +353,14 @@ def identify(
 ) -> None:
     """Identify a model from one or more flights and judge it beside its baselines."""
 
-    def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import identify as command
-        from cpfls_cli.search.resumable import SearchOptions
-
-        options = SearchOptions(resume, time_limit, workers, scheduler)
+    def call(command: Any, job: Job) -> Any:
+        options = command.SearchOptions(resume, time_limit, workers, scheduler)
         return command.run(job, flights, selection, validate or [], options, choose_on or [])
 
     _run("identify", config, output, common, call)
 
 
-@app.command()
-@with_common
+@_command()
 def sweep(
     config: ConfigArgument,
     flights: TrainingArgument,
@@ -403,18 +376,14 @@ def sweep(
 ) -> None:
     """Identify with several settings, and with several seeds each."""
 
-    def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import sweep as command
-        from cpfls_cli.search.resumable import SearchOptions
-
-        options = SearchOptions(resume, time_limit, workers, scheduler)
+    def call(command: Any, job: Job) -> Any:
+        options = command.SearchOptions(resume, time_limit, workers, scheduler)
         return command.run(job, flights, validate or [], options, choose_on or [])
 
     _run("sweep", config, output, common, call)
 
 
-@app.command()
-@with_common
+@_command()
 def vehicle(
     config: ConfigArgument,
     flights: FlightsArgument,
@@ -427,32 +396,22 @@ def vehicle(
 ) -> None:
     """Find a whole vehicle in flights with rotor speeds: rotors, inertia and effects, fitted on what they predict."""
 
-    def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import vehicle as command
-
+    def call(command: Any, job: Job) -> Any:
         copy = None if write_config is None else command.ConfigCopy(config.name, common.data(config), write_config)
         return command.run(job, flights, held_out or [], copy, resume=resume)
 
     _run("vehicle", config, output, common, call)
 
 
-@app.command()
-@with_common
+@_command()
 def predict(
     config: ConfigArgument, model: ModelArgument, flight: FlightArgument, output: OutputOption, *, common: Common
 ) -> None:
     """Predict torque, inertia and Coriolis matrices of a model along a flight."""
-
-    def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import predict as command
-
-        return command.run(job, model, flight)
-
-    _run("predict", config, output, common, call)
+    _run("predict", config, output, common, lambda command, job: command.run(job, model, flight))
 
 
-@app.command()
-@with_common
+@_command()
 def replay(
     config: ConfigArgument,
     model: PlayedArgument,
@@ -466,18 +425,16 @@ def replay(
 ) -> None:
     """Play a model back along flights: how far off its motion is by horizon, beside what it has to beat."""
 
-    def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import replay as command
-        from cpfls_cli.playback.replay import ReplayOptions
-
-        options = ReplayOptions(0.5 if horizon is None else horizon, every, None if hold is None else hold.value)
+    def call(command: Any, job: Job) -> Any:
+        options = command.ReplayOptions(
+            0.5 if horizon is None else horizon, every, None if hold is None else hold.value
+        )
         return command.run(job, model, flights, options)
 
     _run("replay", config, output, common, call)
 
 
-@app.command()
-@with_common
+@_command()
 def report(
     config: ConfigArgument,
     artifacts: ArtifactsArgument,
@@ -490,32 +447,18 @@ def report(
     common: Common,
 ) -> None:
     """Write one self-contained page about artifacts (html, md or json); models that are given together are compared."""
-
-    def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import report as command
-
-        return command.run(job, artifacts, form)
-
-    _run("report", config, output, common, call)
+    _run("report", config, output, common, lambda command, job: command.run(job, artifacts, form))
 
 
-@app.command()
-@with_common
+@_command()
 def compare(
     config: ConfigArgument, flights: FlightsArgument, output: OutputOption, model: ModelOption = None, *, common: Common
 ) -> None:
     """Find where a model and flights disagree."""
-
-    def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import compare as command
-
-        return command.run(job, flights, model)
-
-    _run("compare", config, output, common, call)
+    _run("compare", config, output, common, lambda command, job: command.run(job, flights, model))
 
 
-@app.command()
-@with_common
+@_command()
 def diagnose(
     config: ConfigArgument,
     disagreement: DisagreementArgument,
@@ -525,17 +468,10 @@ def diagnose(
     common: Common,
 ) -> None:
     """Name the physical effect that a model misses."""
-
-    def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import diagnose as command
-
-        return command.run(job, disagreement, held_out or [])
-
-    _run("diagnose", config, output, common, call)
+    _run("diagnose", config, output, common, lambda command, job: command.run(job, disagreement, held_out or []))
 
 
-@app.command()
-@with_common
+@_command()
 def extend(
     config: ConfigArgument,
     diagnosis: DiagnosisArgument,
@@ -545,17 +481,10 @@ def extend(
     common: Common,
 ) -> None:
     """Put the named effects into the model, and show that the gap shrinks."""
-
-    def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import extend as command
-
-        return command.run(job, diagnosis, model)
-
-    _run("extend", config, output, common, call)
+    _run("extend", config, output, common, lambda command, job: command.run(job, diagnosis, model))
 
 
-@app.command()
-@with_common
+@_command()
 def gap(
     config: ConfigArgument,
     flights: FlightsArgument,
@@ -566,17 +495,10 @@ def gap(
     common: Common,
 ) -> None:
     """Compare, diagnose and extend in one go, with a report."""
-
-    def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import gap as command
-
-        return command.run(job, flights, held_out or [], model)
-
-    _run("gap", config, output, common, call)
+    _run("gap", config, output, common, lambda command, job: command.run(job, flights, held_out or [], model))
 
 
-@app.command()
-@with_common
+@_command()
 def export(
     model: ModelArgument,
     output: OutputOption,
@@ -602,13 +524,11 @@ def export(
 ) -> None:
     """Write a model as JSON, C or Python that computes on its own, or as a vehicle for a simulator or a library."""
     with messages_for_errors():
-        from cpfls_cli.commands import export as command
+        chosen = form and form.value
+        _run_without_config("export", output, common, lambda command, job: command.run(job, model, chosen, name))
 
-        _run_without_config("export", output, common, lambda job: command.run(job, model, form and form.value, name))
 
-
-@app.command("verify-export")
-@with_common
+@_command("verify-export")
 def verify_export(
     model: ModelArgument,
     flight: Annotated[
@@ -623,36 +543,28 @@ def verify_export(
 ) -> None:
     """Fly an exported vehicle along a flight, from measured states, and compare it with the playback of its model."""
     with messages_for_errors():
-        from cpfls_cli.commands import verify_export as command
-
+        command = _of("verify-export")
         options = command.Options(
             form.value, 0.5 if horizon is None else horizon, windows, None if hold is None else hold.value
         )
         tell(command.run(model, flight, options, force=common.force, dry_run=common.dry_run), common)
 
 
-@app.command()
-@with_common
+@_command()
 def info(file: FileArgument, *, common: Common) -> None:
     """Show what an artifact holds and where it comes from."""
     with messages_for_errors():
-        from cpfls_cli.commands import show
-
-        tell(show.info(file), common)
+        tell(_of("show").info(file), common)
 
 
-@app.command()
-@with_common
+@_command()
 def check(file: FileArgument, *, common: Common) -> None:
     """Check an artifact against its format; exit code 1 where it does not keep to it."""
     with messages_for_errors():
-        from cpfls_cli.commands import show
-
-        tell(show.check(file), common)
+        tell(_of("show").check(file), common)
 
 
-@app.command("config")
-@with_common
+@_command("config")
 def config_(
     config: Annotated[Path | None, typer.Argument(metavar="[CONFIG]", help="Study config (YAML).")] = None,
     section: Annotated[
@@ -663,13 +575,10 @@ def config_(
 ) -> None:
     """Print the resolved config; without CONFIG, a commented default."""
     with messages_for_errors():
-        from cpfls_cli.commands import config as command
-
-        tell(command.run(config, section or [], common.overrides or [], common.seed), common)
+        tell(_of("config").run(config, section or [], common.overrides or [], common.seed), common)
 
 
-@app.command()
-@with_common
+@_command()
 def effects(
     name: Annotated[
         str | None, typer.Argument(metavar="[NAME]", help="An effect, such as rotor_drag; without it, all are listed.")
@@ -679,44 +588,53 @@ def effects(
 ) -> None:
     """Show the effects that a model can miss, and the flights that tell them apart."""
     with messages_for_errors():
-        from cpfls_cli.commands import effects as command
-
-        tell(command.run(name), common)
+        tell(_of("effects").run(name), common)
 
 
-def _run(title: str, config: Path, output: Path, common: Common, call: Callable[[Job], Outcome]) -> None:
-    """Load the study, run one command with a progress bar, and print what it says."""
+def _of(title: str) -> Any:
+    """Load the module of a command."""
+    return import_module(f"cpfls_cli.commands.{'import_log' if title == 'import' else title.replace('-', '_')}")
+
+
+def _run(title: str, config: Path, output: Path, common: Common, call: Callable[[Any, Job], Outcome]) -> None:
+    """Load the study, run one command, given as its module, with a progress bar, and print what it says."""
     with messages_for_errors():
-        from cpfls_cli.artifacts.job import Job
-        from cpfls_cli.artifacts.output import locked
         from cpfls_cli.config.unknown import require_known
 
-        narration = Narration(title, common.verbose and not common.quiet)
+        narration = _narration(title, common)
         study = common.study(config, sweep=title == "sweep")
         require_known(study, title)
         narration.reads(config)
-        with progress_bar(title, common) as progress:
-            job = Job(
-                study, output, common.force, common.dry_run, progress, narration.reads, deferred_interrupts, [config]
-            )
-            with nullcontext() if common.dry_run else locked(output, title):
-                outcome = call(job)
-        if not common.dry_run:
-            narration.wrote(output)
-        tell(outcome, common)
+        _run_with(study, title, [config], output, common, narration, call)
 
 
-def _run_without_config(title: str, output: Path, common: Common, call: Callable[[Job], Outcome]) -> None:
-    """Run one command that needs no study, with a progress bar, and print what it says."""
-    from cpfls_cli.artifacts.job import Job
-    from cpfls_cli.artifacts.output import locked
+def _run_without_config(title: str, output: Path, common: Common, call: Callable[[Any, Job], Outcome]) -> None:
+    """Run one command that needs no study."""
     from cpfls_cli.config.load import validate
 
-    narration = Narration(title, common.verbose and not common.quiet)
+    _run_with(validate({}, "default"), title, [], output, common, _narration(title, common), call)
+
+
+def _narration(title: str, common: Common) -> Narration:
+    return Narration(title, common.verbose and not common.quiet)
+
+
+def _run_with(
+    study: Study,
+    title: str,
+    inputs: list[Path],
+    output: Path,
+    common: Common,
+    narration: Narration,
+    call: Callable[[Any, Job], Outcome],
+) -> None:
+    from cpfls_cli.artifacts.job import Job
+    from cpfls_cli.artifacts.output import locked
+
     with progress_bar(title, common) as progress:
-        job = Job(validate({}, "default"), output, common.force, common.dry_run, progress, narration.reads)
+        job = Job(study, output, common.force, common.dry_run, progress, narration.reads, deferred_interrupts, inputs)
         with nullcontext() if common.dry_run else locked(output, title):
-            outcome = call(job)
+            outcome = call(_of(title), job)
     if not common.dry_run:
         narration.wrote(output)
     tell(outcome, common)

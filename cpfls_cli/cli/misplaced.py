@@ -37,12 +37,7 @@ def _format(path: Path) -> str | None:
 
 
 def refuse_misplaced_log(path: Path) -> None:
-    """Refuse an artifact or a config in the place of a log.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse an artifact or a config in the place of a log."""
     kind = _kind(path)
     if kind == "artifact":
         raise InputError(f"{path}: is a {_format(path)}, not a log: it needs no import; `cpfls info {path}` shows it")
@@ -61,10 +56,6 @@ def refuse_misplaced_config(command: str, given: Sequence[Path], output: Path | 
         Its arguments, the config first.
     output : Path or None
         Its option ``-o``.
-
-    Raises
-    ------
-    ConfigError
     """
     kind = _kind(given[0])
     if kind not in ("log", "artifact"):

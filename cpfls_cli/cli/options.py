@@ -152,11 +152,6 @@ def seconds(text: str) -> float:
     Returns
     -------
     float, s
-
-    Raises
-    ------
-    typer.BadParameter
-        If it is none, or not more than zero.
     """
     unit = _SECONDS.get(text[-1:])
     try:

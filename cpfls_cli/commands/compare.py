@@ -18,8 +18,8 @@ from cpfls_cli.config.unknown import require_known
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
+from cpfls_cli.flights.models import learned_by, read_model
 from cpfls_cli.flights.recordings import Recordings, read_flights
-from cpfls_cli.flights.same_vehicle import learned_by, read_model
 from cpfls_cli.gap.compare import compare
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.pages.disagreement import answer

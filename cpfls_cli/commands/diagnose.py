@@ -12,6 +12,7 @@ from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.gap_effects import effect_summary, estimate_summary
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, as_inputs
+from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.commands.compare import check_ignored, progress_of
 from cpfls_cli.config.study import Study, generator
@@ -56,7 +57,7 @@ def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
         return nothing_written(job)
     warnings = (*compared.warning, *held.warnings)
     progress = progress_of(job.progress)
-    diagnosis, record = diagnosed(job.study, split, warnings, compared.base.vehicle_model(), progress)
+    diagnosis, record = diagnosed(job.study, split, warnings, vehicle_model(compared.base), progress)
     record = finish_diagnosis(job, record, compared, inputs)
     notes: list[Block] = list(seen_notes(record))
     notes += folded_notes(record.warning, f"`cpfls report CONFIG {job.output.name} -o report.html` lists them")

@@ -12,10 +12,12 @@ from cpfls_cli.artifacts.gap_effects import PlaybackChangeGroup
 from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.learned import LearnedFlight, as_inputs, joined_flights
+from cpfls_cli.artifacts.rebuilt import audit, vehicle_model
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.flights.same_vehicle import learned_by, read_base, read_of_vehicle
+from cpfls_cli.flights.models import learned_by, read_base
+from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
 from cpfls_cli.gap.playback import errors_by_horizon, left_out, played_pairs
@@ -47,7 +49,7 @@ def run(job: Job, diagnosis: Path, model: Path | None) -> Outcome:
     """
     inputs = begin(job, {"diagnosis": diagnosis} | ({} if model is None else {"model": model}))
     diagnosed = read_of_vehicle(diagnosis, DiagnosisRecord, job.study)
-    base = diagnosed.base.vehicle_model() if model is None else read_base(model, job.study)
+    base = vehicle_model(diagnosed.base) if model is None else read_base(model, job.study)
     named_effects(diagnosed)
     if job.dry_run:
         return nothing_written(job)
@@ -125,7 +127,7 @@ def extended(
     ComputationError
         If the diagnosis names nothing, or the gap on the held-out flights does not shrink.
     """
-    extension = extend(training, held, named_effects(diagnosis), diagnosis.audit.audit(), study.gap, base.fuzzy)
+    extension = extend(training, held, named_effects(diagnosis), audit(diagnosis.audit), study.gap, base.fuzzy)
     whole, given = (whole_vehicle(each, study.vehicle) for each in (extension.model, plain(base.fuzzy)))
     require_body(extension.model, study.vehicle)
     played = played_pairs(held, whole, given)

@@ -27,8 +27,8 @@ from cpfls_cli.commands.diagnose import (
 from cpfls_cli.commands.extend import extended, finish_extended
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
+from cpfls_cli.flights.models import learned_by, read_base
 from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, split_flights
-from cpfls_cli.flights.same_vehicle import learned_by, read_base
 from cpfls_cli.gap.naming.results import Diagnosis
 from cpfls_cli.pages.disagreement import where
 from cpfls_cli.pages.extended import model_with, warnings

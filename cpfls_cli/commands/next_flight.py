@@ -13,6 +13,7 @@ from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.gap_flights import TRAINING
 from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
 from cpfls_cli.artifacts.output import write_text
+from cpfls_cli.artifacts.rebuilt import audit, vehicle_model
 from cpfls_cli.artifacts.trajectory import QuestionGroup, TrajectoryRecord
 from cpfls_cli.commands.trajectory import figure_paths
 from cpfls_cli.config.study import Study, generator, settings_of
@@ -173,9 +174,9 @@ _NO_NOISE = (
 def _left_open(study: Study, path: Path) -> Case:
     """Ask what a diagnosis leaves open, or for the effects that the config names with what the diagnosis knows."""
     record = read_of_vehicle(path, DiagnosisRecord, study)
-    base = record.base.vehicle_model().fuzzy
+    base = vehicle_model(record.base).fuzzy
     recordings = record.flights.recordings(study, TRAINING)
-    prepared = Preparation(common_windows(recordings, study.gap), base, study.gap, record.audit.audit())
+    prepared = Preparation(common_windows(recordings, study.gap), base, study.gap, audit(record.audit))
     flights = tuple(prepared.repaired(recordings))
     named = [each for each in record.effects.effects() if each.candidate is not None]
     floor = best_floor(system(flights, [each.candidate for each in named if each.candidate is not None]))

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.evidence import UncertaintyGroup
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish_parts
@@ -30,7 +30,8 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.flight_source import FlightStretch, FlightStretches, check_file, flight_source, flight_stretches
 from cpfls_cli.flights.inputs import hashes_of
-from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles, read_model, rebuilt
+from cpfls_cli.flights.models import read_model, rebuilt
+from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles
 from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_balance
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.identification.data import TorqueSource
@@ -43,11 +44,8 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.validation.bootstrap import Draws
 from cpfls_cli.weak_form.windows import Recording
-
-if TYPE_CHECKING:
-    from cpfls_cli.validation.bootstrap import Draws
-
 
 _Predicted = Callable[[FlightStretch], PredictionRecord]
 
@@ -83,10 +81,18 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
     flown = flight_source(flight, torque=torque)
     if job.dry_run:
         return nothing_written(job)
-    finish_parts(job, _along(functions, identified.draws(), flown, torque, findings, job.progress), len(flown), inputs)
+    draws = _draws(identified.uncertainty)
+    finish_parts(job, _along(functions, draws, flown, torque, findings, job.progress), len(flown), inputs)
     others = (*model_of_another(model, job.study), *other_vehicles([flight], job.study))
     notes = (*trust_notes(identified, model), *(Text(note, "warning") for note in others))
     return Outcome(findings.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(findings, identified)))
+
+
+def _draws(drawn: UncertaintyGroup | None) -> Draws | None:
+    """Give the bootstrap draws behind the bands of a model; None for a model without."""
+    if drawn is None:
+        return None
+    return Draws(drawn.coefficients, drawn.rigid_body, drawn.best_rigid_body, drawn.blocks, drawn.block_duration)
 
 
 def _along(

@@ -10,9 +10,9 @@ from cpfls_cli.artifacts.replay import ReplayRecord
 from cpfls_cli.config.unknown import require_known
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
+from cpfls_cli.flights.models import is_vehicle, learned_by, read_model
 from cpfls_cli.flights.playback import flights_to_play, played, repairs_of
 from cpfls_cli.flights.recordings import seen_twice
-from cpfls_cli.flights.same_vehicle import is_vehicle, learned_by, read_model
 from cpfls_cli.pages.replay import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import seen_warnings

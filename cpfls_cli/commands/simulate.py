@@ -21,7 +21,7 @@ from cpfls_cli.commands import tracking
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.flights.same_vehicle import read_model
+from cpfls_cli.flights.models import read_model
 from cpfls_cli.pages.flight import answer, autopilot_text
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trajectory import violation_sentence

@@ -16,26 +16,22 @@ from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.config.study import Study, generator, settings_of
-from cpfls_cli.control import (
-    AttitudeLoop,
+from cpfls_cli.control.controllers import (
     Controller,
     Plan,
-    Sensing,
     TorqueActuators,
     computed_torque,
-    flown_signals,
     gains,
     plan_of,
     proportional_derivative,
-    scores,
-    start_of,
-    track,
 )
+from cpfls_cli.control.track import AttitudeLoop, Sensing, flown_signals, scores, start_of, track
 from cpfls_cli.dynamics.equations_of_motion import RigidBody, TorqueModel, model_plant, rigid_plant
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import body_torque, inertia_matrix, inertia_tensor
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.flights.same_vehicle import read_of_vehicle, rebuilt
+from cpfls_cli.flights.models import rebuilt
+from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.pages.model import trust_notes
 from cpfls_cli.pages.source import source_of

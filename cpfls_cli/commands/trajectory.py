@@ -16,7 +16,7 @@ from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError, SettingError
-from cpfls_cli.excitation import Excitation, optimised_rotation
+from cpfls_cli.excitation.optimise import Excitation, optimised_rotation
 from cpfls_cli.logs.csv_log import read_csv, row_lines
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trajectory import (

@@ -33,8 +33,8 @@ from cpfls_cli.playback.vehicle import FoundVehicle, find_vehicle
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.numbers import joined
 from cpfls_cli.report.outcome import Outcome, nothing_written
-from cpfls_cli.search.checkpoint import VehicleCheckpoint
-from cpfls_cli.search.resumable import Watch, begin_vehicle_search
+from cpfls_cli.search.resumable import Watch
+from cpfls_cli.search.vehicle_search import VehicleCheckpoint, begin_vehicle_search
 
 _KEPT_EVERY = 10
 """Structures after which the checkpoint is written again: what a killed search has to judge anew at most."""

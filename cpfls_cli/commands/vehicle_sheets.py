@@ -13,14 +13,14 @@ from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.spec import InputFile, rows_of
 from cpfls_cli.artifacts.store import read_record
-from cpfls_cli.config.load import parse_config, validate
+from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Missing, Off, sized
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.flights.same_vehicle import rebuilt
+from cpfls_cli.flights.models import rebuilt
 from cpfls_cli.pages.export import identified_evidence, identified_warnings
 from cpfls_cli.pages.model import worth_in_words
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
@@ -59,8 +59,7 @@ def sheet_of(path: Path, name: str, file: InputFile, *, force: bool) -> Sheet:
 
 def study_of(sheet: Sheet) -> Study:
     """Give the study that a model was made with."""
-    source = f"{sheet.file}: /config"
-    return validate(parse_config(sheet.origin.config, source), source)
+    return stored_study(sheet.origin.config, sheet.file)
 
 
 def bare_sheet(record: ModelRecord, model: VehicleModel) -> Sheet:

@@ -11,8 +11,8 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.export.registry import exported, require_package
 from cpfls_cli.export.text import identifier
 from cpfls_cli.export.verify import verified
+from cpfls_cli.flights.models import read_model
 from cpfls_cli.flights.playback import flights_to_play
-from cpfls_cli.flights.same_vehicle import read_model
 from cpfls_cli.pages.export import verification_answer, verification_summary
 from cpfls_cli.playback.flight import playback_flight
 from cpfls_cli.playback.player import made_ready

@@ -30,11 +30,6 @@ def load_study(path: Path, overrides: Sequence[str] = (), seed: int | None = Non
         Takes the place of the config's seed.
     sweep : bool
         Check the settings of the sweep too.
-
-    Raises
-    ------
-    ConfigError
-        If the file cannot be read, is not YAML, or any key is wrong; all wrong keys are listed.
     """
     data = read_overridden(path, overrides, seed)
     # Nobody's file is of the vehicle that a study begins with: without the section its keys are missing.
@@ -43,13 +38,7 @@ def load_study(path: Path, overrides: Sequence[str] = (), seed: int | None = Non
 
 
 def read_overridden(path: Path, overrides: Sequence[str] = (), seed: int | None = None) -> dict[str, Any]:
-    """Read a config file as plain data, with the keys that the command line overrides.
-
-    Raises
-    ------
-    ConfigError
-        As `read_config`, or if an override is none.
-    """
+    """Read a config file as plain data, with the keys that the command line overrides."""
     data = read_config(path)
     for override in overrides:
         apply_override(data, override)
@@ -59,13 +48,7 @@ def read_overridden(path: Path, overrides: Sequence[str] = (), seed: int | None 
 
 
 def read_config(path: Path) -> dict[str, Any]:
-    """Read a config file as plain data.
-
-    Raises
-    ------
-    ConfigError
-        If the file cannot be read or does not hold a mapping.
-    """
+    """Read a config file as plain data."""
     try:
         with path.open("rb") as stream:
             # No more of what has no end, such as a device; a pipe is as good as a file.
@@ -80,6 +63,12 @@ def read_config(path: Path) -> dict[str, Any]:
     return parse_config(text, str(path))
 
 
+def stored_study(config: str, path: object) -> Study:
+    """Read the study that an artifact was made with; the path is for messages."""
+    source = f"{path}: /config"
+    return validate(parse_config(config, source), source)
+
+
 def parse_config(text: str, source: str) -> dict[str, Any]:
     """Read the text of a config as plain data.
 
@@ -87,11 +76,6 @@ def parse_config(text: str, source: str) -> dict[str, Any]:
     ----------
     source : str
         Name of the file, for messages.
-
-    Raises
-    ------
-    ConfigError
-        If the text is not YAML or does not hold a mapping.
     """
     data = parse_yaml(text, source)
     if data is None:
@@ -112,11 +96,6 @@ def validate(data: dict[str, Any], source: str, *, sweep: bool = False, wrong: S
         Check the settings of the sweep too; only what sweeps needs them to fit the other keys.
     wrong : sequence of str
         What is known to be wrong already.
-
-    Raises
-    ------
-    ConfigError
-        Listing every wrong key with its value, what is wrong, and the nearest valid key.
     """
     _refuse_asked(data, source)
     study, found = check_data(data, source)

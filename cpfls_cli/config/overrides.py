@@ -30,11 +30,6 @@ def apply_override(data: dict[str, Any], override: str) -> None:
         Changed in place. A list that the config leaves out is taken from the default study.
     override : str
         ``section.key=value``; an entry of a list is named by its index, from 0.
-
-    Raises
-    ------
-    ConfigError
-        If the override is malformed, or leads below a single value or past the end of a list.
     """
     key, separator, text = override.partition("=")
     try:
@@ -110,11 +105,6 @@ def variants(study: Study) -> tuple[Variant, ...]:
     -------
     tuple of Variant
         In the order of the config; the study itself where it names no settings.
-
-    Raises
-    ------
-    ConfigError
-        If a setting is wrong; never for a study that was validated with its sweep.
     """
     data, common = resolved(study), study.sweep.set
     if not study.sweep.settings:

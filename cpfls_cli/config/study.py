@@ -81,11 +81,6 @@ def resolved(study: Study, sections: Sequence[str] = ()) -> dict[str, Any]:
     ----------
     sections : sequence of str
         Only these sections or single keys (``section.key``), and the seed; all if empty.
-
-    Raises
-    ------
-    ConfigError
-        If a section or key does not exist.
     """
     data: dict[str, Any] = study.model_dump(mode="json", by_alias=True)
     if not sections:
@@ -125,10 +120,6 @@ def settings_of(section: str, study: Study) -> Iterator[None]:
     ----------
     section : str
         Section of the config whose settings are in use.
-
-    Raises
-    ------
-    ConfigError
     """
     try:
         yield

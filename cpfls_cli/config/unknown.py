@@ -103,11 +103,6 @@ def require_known(study: Study, command: str, *, whole: bool = True) -> None:
     ----------
     whole : bool
         False for a command whose model, known by now, is none of a whole vehicle with numbers of its own.
-
-    Raises
-    ------
-    ConfigError
-        Naming the keys and what finds them.
     """
     unknown = study.vehicle.unknown
     torque = study.import_.torque_source

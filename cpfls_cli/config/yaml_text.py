@@ -74,11 +74,6 @@ def parse_yaml(text: str, source: str) -> Any:
     -------
     object
         Built of dict, list, str, int, float, bool and None.
-
-    Raises
-    ------
-    ConfigError
-        If the text is not YAML or a key stands twice; the message names line and column.
     """
     try:
         return deepcopy(_parsed(text))
@@ -114,11 +109,6 @@ def _written_out(node: yaml.Node, known: dict[int, int]) -> int:
     ----------
     known : dict of int to int
         Counts by identity of the node; 0 for those that are being counted.
-
-    Raises
-    ------
-    yaml.constructor.ConstructorError
-        If there are too many, an anchor holds itself, or a text holds half a character (a lone surrogate).
     """
     if id(node) in known:
         if not known[id(node)]:

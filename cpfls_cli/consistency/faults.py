@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.special import stdtr
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width
+from cpfls_cli.consistency.findings import AuditFinding, FaultNumber
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.hooks import FaultFit, SensorTest
 
@@ -17,51 +17,6 @@ _SIGNIFICANCE = 1e-3
 # Share of the size that matters which must be exceeded significantly: a jackknife over two dozen blocks has heavier
 # tails than Student's t where few of them tell, and what it then calls significant is small.
 _SHARE_EXCEEDED = 0.5
-
-
-class FaultNumber(NamedTuple):
-    """One number of a fault.
-
-    Attributes
-    ----------
-    low, high : float
-        Interval of 95 %, widened by what noise of the gyroscope can have pulled.
-    named : bool
-        Whether it is significant and of practical size.
-    """
-
-    name: str
-    value: float
-    unit: str
-    low: float
-    high: float
-    named: bool
-
-
-@dataclass(frozen=True)
-class AuditFinding:
-    """A fault that was tested.
-
-    Attributes
-    ----------
-    name : str
-        Of the effect.
-    p_value : float
-        Probability that chance takes the most significant coefficient past half of the size that matters, after Holm.
-    named : bool
-        Whether any coefficient is named.
-    """
-
-    name: str
-    coefficients: tuple[FaultNumber, ...]
-    p_value: float
-    named: bool
-    sentence: str
-
-    def named_values(self, names: Sequence[str]) -> Array:
-        """Give the named values of coefficients, 0 for those that are not."""
-        by_name = {each.name: each.value for each in self.coefficients if each.named}
-        return np.array([by_name.get(name, 0.0) for name in names])
 
 
 @dataclass(frozen=True)

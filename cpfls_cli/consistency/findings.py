@@ -1,8 +1,12 @@
 """What a check finds: what is wrong with a log, how much, what mends it, and whether a verdict can stand beside it."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,51 @@ class Finding:
     def of(self, flight: str) -> Self:
         """Say of which flight it is."""
         return replace(self, what=f"{flight}: {self.what}")
+
+
+class FaultNumber(NamedTuple):
+    """One number of a fault.
+
+    Attributes
+    ----------
+    low, high : float
+        Interval of 95 %, widened by what noise of the gyroscope can have pulled.
+    named : bool
+        Whether it is significant and of practical size.
+    """
+
+    name: str
+    value: float
+    unit: str
+    low: float
+    high: float
+    named: bool
+
+
+@dataclass(frozen=True)
+class AuditFinding:
+    """A fault that was tested.
+
+    Attributes
+    ----------
+    name : str
+        Of the effect.
+    p_value : float
+        Probability that chance takes the most significant coefficient past half of the size that matters, after Holm.
+    named : bool
+        Whether any coefficient is named.
+    """
+
+    name: str
+    coefficients: tuple[FaultNumber, ...]
+    p_value: float
+    named: bool
+    sentence: str
+
+    def named_values(self, names: Sequence[str]) -> Array:
+        """Give the named values of coefficients, 0 for those that are not."""
+        by_name = {each.name: each.value for each in self.coefficients if each.named}
+        return np.array([by_name.get(name, 0.0) for name in names])
 
 
 def contradictions(findings: Iterable[Finding]) -> tuple[str, ...]:

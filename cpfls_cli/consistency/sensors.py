@@ -9,8 +9,8 @@ import numpy as np
 from cpfls_cli.consistency.axes import gyroscope_apart
 from cpfls_cli.consistency.channels import least_noise
 from cpfls_cli.consistency.clocks import attitude_on_clock, rotors_on_clock
-from cpfls_cli.consistency.faults import AuditFinding, CheckedFault, findings
-from cpfls_cli.consistency.findings import Finding
+from cpfls_cli.consistency.faults import CheckedFault, findings
+from cpfls_cli.consistency.findings import AuditFinding, Finding
 from cpfls_cli.consistency.gyroscope import GyroFit, fit_gyro, kinematics, scan
 from cpfls_cli.consistency.majority import Settled, settled
 from cpfls_cli.consistency.repairs import ChannelRepair

@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any, TypeVar, cast
 
 import numpy as np
-from scipy.linalg import solveh_banded
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
@@ -284,6 +283,9 @@ def fused(values: Array, rate: Array | None, period: float) -> Array:
     own, slope = _white(values), _white(rate) * period
     if own == 0.0:
         return values
+    # Loaded where it is needed: who reads a model waits for nothing of scipy.
+    from scipy.linalg import solveh_banded
+
     # A step is the mean of the rates at its ends, whose noise is less by the square root of 2.
     stiff = (own / max(slope / np.sqrt(2), 1e-6 * own)) ** 2
     step = 0.5 * period * (rate[1:] + rate[:-1])

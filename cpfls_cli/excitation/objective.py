@@ -11,8 +11,9 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.excitation.variables import design
-from cpfls_cli.regressor import ModelStructure, Motion, Regressor, data_ranges, uniform_breakpoints
-from cpfls_cli.regressor.structure import PITCH, ROLL, Block, InertiaFunction
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.structure import PITCH, ROLL, Block, InertiaFunction, ModelStructure
 from cpfls_cli.trajectory.rotation import RotationLimits, RotationMotion, RotationPath
 
 # Share of the largest eigenvalue below which an eigenvalue of a Gram matrix is rounding error.

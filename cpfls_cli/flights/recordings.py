@@ -15,7 +15,7 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import read_record
-from cpfls_cli.config.load import parse_config, validate
+from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import check
 from cpfls_cli.consistency.findings import Finding
@@ -127,8 +127,7 @@ def units_of(path: Path, made: Header, study: Study) -> Mapping[str, str]:
     InputError
         If the flight is of another vehicle than that of the config.
     """
-    source = f"{path}: /config"
-    made_by = validate(parse_config(made.config, source), source)
+    made_by = stored_study(made.config, path)
     require_same_vehicle(path, made_by.vehicle, study.vehicle)
     return _units(made_by) if "log" in made.inputs else {}
 

@@ -1,4 +1,4 @@
-"""Flights and models of one vehicle: read those of it, and list the keys in which others differ."""
+"""Files of one vehicle: read those of it, and list the keys in which others differ."""
 
 from __future__ import annotations
 
@@ -7,17 +7,12 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TypeVar
 
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.learned import LearnedFlight
-from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.artifacts.store import read_header, read_record
-from cpfls_cli.config.load import parse_config, validate
+from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.config.unknown import KEYS
 from cpfls_cli.errors import ConfigError, InputError
-from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 R = TypeVar("R", bound=Record)
@@ -58,62 +53,6 @@ def read_of_vehicle(path: Path, wanted: type[R], study: Study) -> R:
     made_with = _with_what_was_open(_vehicle_of(path, record.origin), study.vehicle)
     require_same_vehicle(path, made_with, study.vehicle)
     return record
-
-
-def read_model(path: Path, study: Study) -> VehicleModel:
-    """Read any model of the vehicle of a study.
-
-    Parameters
-    ----------
-    path : Path
-        An artifact, or the word `VEHICLE`.
-
-    Raises
-    ------
-    InputError
-        If it is none, or of another vehicle than that of the config.
-    """
-    if is_vehicle(path):
-        return VehicleModel(vehicle=study.vehicle)
-    return rebuilt(path, read_of_vehicle(path, ModelRecord, study))
-
-
-def learned_by(path: Path | None) -> tuple[LearnedFlight, ...]:
-    """List the flights that a model learned from: none by the vehicle of the config."""
-    return () if path is None or is_vehicle(path) else read_record(path, ModelRecord).learned_from
-
-
-def read_base(path: Path | None, study: Study) -> VehicleModel:
-    """Read what effects are sought for: an identified model, or the rigid body of the vehicle where there is none.
-
-    Raises
-    ------
-    InputError
-        If it is no identified model, or one of another vehicle.
-    """
-    rigid = VehicleModel(vehicle=study.vehicle)
-    if path is None:
-        return rigid
-    return replace(rigid, fuzzy=rebuilt(path, read_of_vehicle(path, IdentifiedRecord, study)).fuzzy)
-
-
-def rebuilt(path: Path, record: ModelRecord) -> VehicleModel:
-    """Rebuild the model of a record; the path is for messages.
-
-    Raises
-    ------
-    InputError
-        If this program does not know an effect, or numbers do not fit each other.
-    """
-    try:
-        return record.vehicle_model()
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-
-
-def is_vehicle(path: Path) -> bool:
-    """Tell whether the vehicle of the config is meant; a file of that name has to be given with its folder."""
-    return str(path) == VEHICLE
 
 
 def _with_what_was_open(given: VehicleSettings, wanted: VehicleSettings) -> VehicleSettings:
@@ -162,8 +101,7 @@ def _difference_of(path: Path, study: Study) -> str:
 
 
 def _vehicle_of(path: Path, header: Header) -> VehicleSettings:
-    source = f"{path}: /config"
-    return validate(parse_config(header.config, source), source).vehicle
+    return stored_study(header.config, path).vehicle
 
 
 def _different(given: VehicleSettings, wanted: VehicleSettings) -> str:

@@ -27,7 +27,7 @@ from cpfls_cli.gap.naming.held_out import HeldOut, held_out
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.preparation import Preparation
-from cpfls_cli.gap.settings import CLEAR, VISIBLE, WORSE, GapSettings
+from cpfls_cli.gap.settings import VISIBLE, GapSettings
 from cpfls_cli.weak_form.windows import Recording, common_windows
 
 
@@ -176,16 +176,6 @@ def _require_smaller(unseen: HeldOut) -> None:
     if (after[moved] ** 2).sum() >= (before[moved] ** 2).sum():
         sizes = ", ".join(f"{CHANNELS[c]} {before[c]:.3g} -> {after[c]:.3g} floors" for c in np.flatnonzero(moved))
         raise ComputationError(f"not extended: the gap on the held-out flights does not shrink: {sizes}")
-
-
-def worse_axes(before: Array, after: Array) -> list[int]:
-    """List the axes about which a clear gap grows.
-
-    Parameters
-    ----------
-    before, after : array, shape (6,), floors
-    """
-    return [int(c) for c in np.flatnonzero((before[:3] > CLEAR) & (after[:3] > WORSE * before[:3]))]
 
 
 def _renewed(effects: Sequence[NamedEffect], hypothesis: System, estimates: Estimates) -> list[NamedEffect]:

@@ -297,7 +297,7 @@ class Model:
     @cached_property
     def _whole(self) -> VehicleModel:
         """The model with its rotors, as far as a state and rotor speeds alone give its motion."""
-        from cpfls_cli.flights.same_vehicle import rebuilt
+        from cpfls_cli.flights.models import rebuilt
         from cpfls_cli.playback.model import VehicleModel
 
         if self.artifact is None:

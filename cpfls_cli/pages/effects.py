@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cpfls_cli.artifacts.gap_effects import NamedEffectsGroup
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.pages.gap import AFTER
 from cpfls_cli.report.canvas import plot
@@ -18,7 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    # What effects are called is told of models that are read without a gap.
     from cpfls_cli.arrays import Array
+    from cpfls_cli.artifacts.gap_effects import NamedEffectsGroup
     from cpfls_cli.gap.naming.results import Estimate, NamedEffect
 
 _RELATIVE = "_error"

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.config.load import stored_study
 from cpfls_cli.export.holding import Missing
 from cpfls_cli.export.registry import TARGETS
 from cpfls_cli.export.verify import AGREES, Verification
@@ -67,7 +68,7 @@ def identified_warnings(model: IdentifiedRecord, path: object) -> Iterator[str]:
     if not model.complete:
         yield "the model is incomplete, and marked as such: do not fly with it"
     if model.verdict is None or model.verdict.label is None:
-        off = not model.study.identification.validation.enabled
+        off = not stored_study(model.origin.config, path).identification.validation.enabled
         why = "identification.validation.enabled was off when it was identified" if off else "it was not validated"
         yield f"{path}: holds no verdict: {why}; nothing says how far to trust it; `cpfls identify` it with it on"
     elif model.verdict.label == "do-not-use":

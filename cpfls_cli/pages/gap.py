@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.gap_effects import GapChangeGroup
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, plot, style_of
 from cpfls_cli.report.content import Cell, Plot, Table
@@ -17,6 +16,8 @@ from cpfls_cli.report.numbers import number, plain
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from cpfls_cli.artifacts.gap_effects import GapChangeGroup
 
 AXES = ("x (roll)", "y (pitch)", "z (yaw)")
 

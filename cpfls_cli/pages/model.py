@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
+from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.model import EffectsGroup, InertiaFunctionsGroup, ModelRecord, ResponseGroup, RotorsGroup
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.artifacts.rebuilt import model_effects
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.pages import extended, identification, vehicle_model
 from cpfls_cli.pages.effects import effect_title, unit_words
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.pages.trust import trust_facts, trust_words
@@ -43,27 +42,25 @@ class _Kind(NamedTuple):
     worth: Callable[[Any], Iterator[str]]
 
 
-_KINDS: dict[str, _Kind] = {
-    IdentifiedRecord.FORMAT.kind: _Kind(
-        identification.title, identification.grounds, identification.details, identification.worth
-    ),
-    ExtendedRecord.FORMAT.kind: _Kind(extended.title, extended.grounds, extended.details, extended.worth),
-    VehicleRecord.FORMAT.kind: _Kind(
-        vehicle_model.title, vehicle_model.grounds, vehicle_model.details, vehicle_model.worth
-    ),
-}
+_PAGES = {"identified": "identification", "extended": "extended", "vehicle": "vehicle_model"}
+"""Modules of `pages` by the kind of a model; one is loaded when a model of its kind is met."""
+
+
+def _kind_of(record: ModelRecord) -> _Kind:
+    page = import_module(f"cpfls_cli.pages.{_PAGES[record.FORMAT.kind]}")
+    return _Kind(page.title, page.grounds, page.details, page.worth)
 
 
 def answer(model: Source[Any]) -> Iterator[Block]:
     """Say how far to trust a model and why, what was found and how well it does, and what to distrust."""
     yield trust_box(model)
-    yield from _KINDS[model.record.FORMAT.kind].details(model)
+    yield from _kind_of(model.record).details(model)
 
 
 def trust_box(model: Source[Any]) -> Box:
     """Say how far to trust a model, and why."""
     record = model.record
-    kind, words = _KINDS[record.FORMAT.kind], trust_words(record.trust)
+    kind, words = _kind_of(record), trust_words(record.trust)
     return Box(words.short.upper(), f"{model.label}: {kind.title(record)}", list(kind.grounds(record)), words.tone)
 
 
@@ -80,7 +77,7 @@ def trust_notes(record: ModelRecord, path: object) -> Iterator[Text]:
         yield Text(f"{path}: is incomplete: its search was stopped; {again}", "warning")
     if record.trust in (Trust.DO_NOT_USE, Trust.LOOP):
         verdict = record.verdict if isinstance(record, IdentifiedRecord) else None
-        why = next(_KINDS[record.FORMAT.kind].grounds(record))
+        why = next(_kind_of(record).grounds(record))
         said = why if verdict is None else f"its verdict is: do not use; {verdict.reasons[0][0]}"
         yield Text(f"{path}: {said}", "warning")
     elif record.trust == Trust.NOT_JUDGED and isinstance(record, IdentifiedRecord):
@@ -92,7 +89,7 @@ def trust_notes(record: ModelRecord, path: object) -> Iterator[Text]:
 
 def worth_in_words(record: ModelRecord) -> Iterator[str]:
     """Say what a model that is used elsewhere is worth."""
-    return _KINDS[record.FORMAT.kind].worth(record)
+    return _kind_of(record).worth(record)
 
 
 def model_section(sources: Sources) -> Section | None:
@@ -178,7 +175,7 @@ def _effect(name: str) -> str:
 
 def _effects_table(name: str, group: EffectsGroup) -> Table:
     rows = []
-    for effect in group.effects():
+    for effect in model_effects(group):
         known = {each.name: each for each in effect.known.numbers}
         for index, (label, value) in enumerate(effect.values.items()):
             words = f"{label}: {known[label].meaning}" if label in known else label

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from typing import Any
 
-from cpfls_cli.artifacts.gap_flights import AuditGroup, NotExcitedGroup
+from cpfls_cli.artifacts.audit import AuditGroup
+from cpfls_cli.artifacts.gap_flights import NotExcitedGroup
 from cpfls_cli.pages.effects import effect_title, measured, titles, unit_words
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.content import Block, Box, Heading, Section, Table, Text

@@ -5,26 +5,29 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic
+from typing import TYPE_CHECKING, Any, ClassVar, Generic
 
 from typing_extensions import TypeVar
 
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
-from cpfls_cli.artifacts.disagreement import DisagreementRecord
-from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job
-from cpfls_cli.artifacts.prediction import PredictionRecord
-from cpfls_cli.artifacts.replay import ReplayRecord
-from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import Record
-from cpfls_cli.artifacts.sweep import SweepRecord
-from cpfls_cli.artifacts.trajectory import TrajectoryRecord
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import ReportSettings, resolved
 from cpfls_cli.report.content import HASH_SHOWN, Block, Origin, Section
 from cpfls_cli.vehicle.settings import VehicleSettings
+
+if TYPE_CHECKING:
+    # A page loads the records that it is about, not all others.
+    from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
+    from cpfls_cli.artifacts.disagreement import DisagreementRecord
+    from cpfls_cli.artifacts.extended import ExtendedRecord
+    from cpfls_cli.artifacts.flight import FlightRecord
+    from cpfls_cli.artifacts.identified import IdentifiedRecord
+    from cpfls_cli.artifacts.prediction import PredictionRecord
+    from cpfls_cli.artifacts.replay import ReplayRecord
+    from cpfls_cli.artifacts.selection import SelectionRecord
+    from cpfls_cli.artifacts.sweep import SweepRecord
+    from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+    from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
 R = TypeVar("R", bound=Record, default=Any)
 
@@ -55,14 +58,15 @@ class Source(Origin, Generic[R]):
         return self.record.input_name(role)
 
 
-class _OfKind(Generic[R]):
-    """The artifacts of one kind, as an attribute."""
+class _OfFormat(Generic[R]):
+    """The artifacts of one format, as an attribute."""
 
-    def __init__(self, kind: type[R]) -> None:
-        self.kind = kind
+    def __init__(self, name: str, kind: str = "") -> None:
+        self.format = (name, kind)
 
     def __get__(self, sources: Sources, _: type[Sources]) -> list[Source[R]]:
-        return sources.of_kind(self.kind)
+        formats = ((source, source.record.FORMAT) for source in sources.all)
+        return [source for source, own in formats if (own.name, own.kind) == self.format]
 
 
 @dataclass(frozen=True)
@@ -73,17 +77,17 @@ class Sources:
     vehicle: VehicleSettings
     settings: ReportSettings
 
-    trajectories = _OfKind(TrajectoryRecord)
-    flights = _OfKind(FlightRecord)
-    selections = _OfKind(SelectionRecord)
-    models = _OfKind(IdentifiedRecord)
-    sweeps = _OfKind(SweepRecord)
-    predictions = _OfKind(PredictionRecord)
-    replays = _OfKind(ReplayRecord)
-    disagreements = _OfKind(DisagreementRecord)
-    diagnoses = _OfKind(DiagnosisRecord)
-    vehicles = _OfKind(VehicleRecord)
-    extensions = _OfKind(ExtendedRecord)
+    trajectories: ClassVar[_OfFormat[TrajectoryRecord]] = _OfFormat("cpfls/trajectory")
+    flights: ClassVar[_OfFormat[FlightRecord]] = _OfFormat("cpfls/flight")
+    selections: ClassVar[_OfFormat[SelectionRecord]] = _OfFormat("cpfls/selection")
+    models: ClassVar[_OfFormat[IdentifiedRecord]] = _OfFormat("cpfls/model", "identified")
+    sweeps: ClassVar[_OfFormat[SweepRecord]] = _OfFormat("cpfls/sweep")
+    predictions: ClassVar[_OfFormat[PredictionRecord]] = _OfFormat("cpfls/prediction")
+    replays: ClassVar[_OfFormat[ReplayRecord]] = _OfFormat("cpfls/replay")
+    disagreements: ClassVar[_OfFormat[DisagreementRecord]] = _OfFormat("cpfls/disagreement")
+    diagnoses: ClassVar[_OfFormat[DiagnosisRecord]] = _OfFormat("cpfls/diagnosis")
+    vehicles: ClassVar[_OfFormat[VehicleRecord]] = _OfFormat("cpfls/model", "vehicle")
+    extensions: ClassVar[_OfFormat[ExtendedRecord]] = _OfFormat("cpfls/model", "extended")
 
     @property
     def gap(self) -> list[Source[Any]]:

@@ -22,7 +22,7 @@ from cpfls_cli.vehicle.rotors import RotorViolation
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cpfls_cli.excitation import Excitation
+    from cpfls_cli.excitation.optimise import Excitation
     from cpfls_cli.simulation.inverse import Flyability, TooMuch
 
 _UNITS = ("m/s⁶", "m/s⁵", "m/s⁴", "m/s³", "m/s²", "m/s", "m")

@@ -12,22 +12,25 @@ from cpfls_cli.artifacts.parameters import (
     CENTRE,
     DELAY,
     DRAG,
+    FOUND_AS,
     INERTIA,
     LAG,
     OF_TURNING,
     THRUST,
     Parameter,
-    found_as,
     parameters_of,
     too_heavy,
     vehicle_section,
 )
+from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
+from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.replay import beside_rivals, errors_table, horizon_figure, playback_words
 from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Facts, Heading, Listing, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent, whole_percent
@@ -200,7 +203,7 @@ def _is_learned(name: str) -> bool:
 
 def _numbers_table(found: Source[VehicleRecord], index: int) -> Iterator[Table]:
     """Show what was found beside the constants, if anything was."""
-    numbers, constants = rows_of(found.record.found), found_as().values()
+    numbers, constants = rows_of(found.record.found), FOUND_AS.values()
     rows = [
         [
             row["name"],
@@ -425,10 +428,7 @@ def remainder_curves(record: VehicleRecord) -> tuple[Array, Array, Array]:
         0 ahead, 90 left.
     learned, named : array, shape (73, 6), N m and N
     """
-    from cpfls_cli.effects.scales import hover_speed
-    from cpfls_cli.playback.table import wrench_of
-
-    model = record.vehicle.vehicle_model()
+    model = vehicle_model(record.vehicle)
     direction = np.linspace(-180.0, 180.0, 73)
     angle = np.radians(direction)
     velocity = record.airspeed * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])

@@ -14,8 +14,10 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
-from cpfls_cli.evolution import Evaluation, EvolutionSettings, evolve
+from cpfls_cli.evolution.archive import Evaluation
+from cpfls_cli.evolution.engine import evolve
 from cpfls_cli.evolution.ranking import comparable
+from cpfls_cli.evolution.settings import EvolutionSettings
 from cpfls_cli.playback.fit import Fitted, FitWindows, fit, stays_error, window_errors, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import Group, JointNumbers

@@ -10,29 +10,46 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
-from cpfls_cli.artifacts.checkpoint import CheckpointRecord, StoppedSearch, VehicleCheckpointRecord
+import numpy as np
+
+from cpfls_cli.arrays import IntArray
+from cpfls_cli.artifacts.checkpoint import ArchiveGroup, CheckpointRecord, UnfinishedGroup
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.artifacts.store import format_name, read_any, read_record, write_record
-from cpfls_cli.artifacts.sweep import SweepRecord
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.errors import ComputationError, InputError, OutputError
-from cpfls_cli.evolution.engine import EvolutionState
+from cpfls_cli.evolution.archive import Archive, Evaluation
+from cpfls_cli.evolution.engine import EvolutionState, History
 from cpfls_cli.files import is_hdf5
 from cpfls_cli.identification.search import Unfinished
 
 if TYPE_CHECKING:
-    # A search for a model does not wait for the compiled loops that play a vehicle back.
-    from cpfls_cli.playback.structure import Judged, Kept
+    from cpfls_cli.artifacts.sweep import SweepRecord
+    from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
 R = TypeVar("R", bound=Record)
 
 _SECTION = "identification"
 _GENERATIONS = f"{_SECTION}.generations"
-_OF_VEHICLE = ("vehicle", "import", "playback")
 _LONGEST = 120
 _START_AGAIN = "--force without --resume starts again"
+
+
+@dataclass(frozen=True)
+class StoppedSearch:
+    """What a stopped search leaves behind.
+
+    Attributes
+    ----------
+    state : EvolutionState or None
+        After its last generation; None if not even the initial population was evaluated.
+    unfinished : Unfinished
+        What was evaluated of the generation after it.
+    """
+
+    state: EvolutionState | None
+    unfinished: Unfinished
 
 
 @dataclass(frozen=True)
@@ -62,12 +79,7 @@ class Leftover:
         return self.path.with_suffix("")
 
     def require_permission(self, *, force: bool) -> None:
-        """Refuse to give up what is left, unless that is allowed, and what is not left by this program in any case.
-
-        Raises
-        ------
-        InputError
-        """
+        """Refuse to give up what is left, unless that is allowed, and what is not left by this program in any case."""
         self.require_own()
         if self.path.exists() and not force:
             raise InputError(
@@ -76,12 +88,7 @@ class Leftover:
             )
 
     def require_own(self) -> None:
-        """Refuse a file of the user that happens to have the name of what is left.
-
-        Raises
-        ------
-        InputError
-        """
+        """Refuse a file of the user that happens to have the name of what is left."""
         if self.path.exists() and not (self.path.is_file() and is_hdf5(self.path)):
             raise InputError(
                 f"{self.path}: has the name of what a stopped {self.WORK} leaves, and is none of it; move it away, or "
@@ -108,13 +115,7 @@ class Leftover:
             raise
 
     def _read(self, wanted: type[R]) -> R:
-        """Read what is left.
-
-        Raises
-        ------
-        InputError
-            If there is nothing, or if it is damaged.
-        """
+        """Read what is left."""
         if not self.path.exists():
             written = self._written()
             if written is not None and written.complete:
@@ -160,23 +161,11 @@ class Checkpoint(Leftover):
     OUTPUT: ClassVar = IdentifiedRecord
 
     def write(self, state: EvolutionState) -> None:
-        """Replace what was there by this state, or leave it as it was.
-
-        Raises
-        ------
-        OutputError
-            If it cannot be written.
-        """
+        """Replace what was there by this state, or leave it as it was."""
         write_record(self.path, CheckpointRecord.of_state(state).with_header(self.header))
 
     def add(self, unfinished: Unfinished) -> None:
-        """Add what was evaluated of the next generation, so that it need not be done again.
-
-        Raises
-        ------
-        OutputError
-            If it cannot be written; what was there is left as it was.
-        """
+        """Add what was evaluated of the next generation, so that it need not be done again."""
         if self.path.exists():
             record = read_record(self.path, CheckpointRecord).with_unfinished(unfinished)
         else:
@@ -184,63 +173,53 @@ class Checkpoint(Leftover):
         write_record(self.path, record.with_header(self.header))
 
     def read(self) -> StoppedSearch:
-        """Take up what was left.
-
-        Raises
-        ------
-        InputError
-            If there is none, if it is damaged, or if it is of another search.
-        """
+        """Take up what was left."""
         record = self._read(CheckpointRecord)
         with self._damaged():
-            stopped = record.stopped_search()
+            stopped = _stopped_search(record)
         self._require_same_search(record.origin, 0 if stopped.state is None else stopped.state.index)
         return stopped
 
     def _require_same_search(self, then: Header, generation: int) -> None:
-        old, new = ({key: value for key, value in _keys(h).items() if key != _GENERATIONS} for h in (then, self.header))
+        old, new = (
+            {key: value for key, value in keys_of(h).items() if key != _GENERATIONS} for h in (then, self.header)
+        )
         differing = [*differences(then, self.header, old, new, unimportant="validate")]
-        generations = _keys(self.header)[_GENERATIONS]
+        generations = keys_of(self.header)[_GENERATIONS]
         if generation > generations:
             differing.append(f"{_GENERATIONS} = {generations}, but it has come to generation {generation}")
         self._require_same(differing)
 
 
-@dataclass(frozen=True)
-class VehicleCheckpoint(Leftover):
-    """Where a search for the structure of a vehicle leaves what it has judged."""
-
-    WORK: ClassVar = "search"
-    SUFFIX: ClassVar = ".checkpoint"
-    OUTPUT: ClassVar = VehicleRecord
-
-    def write(self, judged: Sequence[Judged]) -> None:
-        """Replace what was there by these structures, or leave it as it was.
-
-        Raises
-        ------
-        OutputError
-            If it cannot be written.
-        """
-        write_record(self.path, VehicleCheckpointRecord.of(judged).with_header(self.header))
-
-    def read(self) -> Kept:
-        """Take up what was left.
-
-        Raises
-        ------
-        InputError
-            If there is none, if it is damaged, or if it is of another search.
-        """
-        record = self._read(VehicleCheckpointRecord)
-        with self._damaged():
-            kept = record.kept()
-        old, new = (_keys(header, _OF_VEHICLE) for header in (record.origin, self.header))
-        self._require_same(differences(record.origin, self.header, old, new, unimportant="held-out"))
-        return kept
+def _stopped_search(record: CheckpointRecord) -> StoppedSearch:
+    """Rebuild what a search left, equal to what was stored down to the last bit."""
+    unfinished = Unfinished(*_evaluated(record.unfinished))
+    if not record.begun:
+        return StoppedSearch(None, unfinished)
+    rng = np.random.default_rng()
+    rng.bit_generator.state = json.loads(record.generator)
+    population = record.population
+    state = EvolutionState(
+        record.generation,
+        _genes(population.genes),
+        population.objectives,
+        population.subpopulation,
+        Archive.of(*_evaluated(record.archive)),
+        History(**vars(record.history)),
+        rng,
+    )
+    return StoppedSearch(state, unfinished)
 
 
-def _keys(header: Header, sections: Sequence[str] = (_SECTION,)) -> dict[str, Any]:
+def _evaluated(stored: ArchiveGroup | UnfinishedGroup) -> tuple[IntArray, Evaluation]:
+    return _genes(stored.submitted), Evaluation(_genes(stored.genes), stored.objectives)
+
+
+def _genes(stored: Any) -> IntArray:
+    return np.asarray(stored, dtype=np.int64)
+
+
+def keys_of(header: Header, sections: Sequence[str] = (_SECTION,)) -> dict[str, Any]:
     """List the keys that a search depends on, with dots."""
     config = parse_config(header.config, "/config")
     flat = (_flat(section, config[section]) for section in sections)

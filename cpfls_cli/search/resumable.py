@@ -8,20 +8,15 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from cpfls_cli.artifacts.checkpoint import StoppedSearch
 from cpfls_cli.artifacts.job import Interrupted, Job, check_outputs, header_of, take_inputs
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.errors import InputError
 from cpfls_cli.evolution.archive import Evaluate
 from cpfls_cli.identification.search import SearchRun, SearchStep, Stop, StopReason, is_end
-from cpfls_cli.search.checkpoint import Checkpoint, VehicleCheckpoint
+from cpfls_cli.search.checkpoint import Checkpoint, StoppedSearch
 from cpfls_cli.workers.employ import employ, require_address
 from cpfls_cli.workers.workforce import WorkerError, Workforce
-
-if TYPE_CHECKING:
-    from cpfls_cli.playback.structure import Kept
 
 _OF_A_PROCESSOR = 8
 """Processes that a processor may get, of which more than one only share it."""
@@ -58,12 +53,7 @@ class SearchOptions:
         return employ(evaluate, count=self.workers, scheduler=self.scheduler)
 
     def require_workers(self) -> None:
-        """Refuse more processes than this machine can run, and a scheduler beside them or without an address.
-
-        Raises
-        ------
-        InputError
-        """
+        """Refuse more processes than this machine can run, and a scheduler beside them or without an address."""
         if self.scheduler is not None and self.workers > 1:
             raise InputError("--scheduler: knows its own workers; leave --workers out")
         if self.scheduler is not None:
@@ -172,11 +162,6 @@ def begin_search(
     ----------
     inputs : mapping of str to Path
         By role.
-
-    Raises
-    ------
-    InputError
-        As `begin`; also if there is a checkpoint and neither --resume nor --force, or none that can be resumed.
     """
     options.require_workers()
     files = take_inputs(job, inputs)
@@ -197,45 +182,9 @@ def resumable(output: Path, header: Header, *, resume: bool, force: bool) -> Res
         Config, seed and inputs of the search.
     force : bool
         Allow a checkpoint to be given up.
-
-    Raises
-    ------
-    InputError
-        If there is a checkpoint and neither is asked for, or none that can be resumed.
     """
     checkpoint = Checkpoint.beside(output, header)
     if resume:
         return Resumable(checkpoint, checkpoint.read())
     checkpoint.require_permission(force=force)
     return Resumable(checkpoint, None)
-
-
-def begin_vehicle_search(
-    job: Job, inputs: Mapping[str, Path], *, resume: bool
-) -> tuple[dict[str, InputFile], VehicleCheckpoint, Kept | None]:
-    """Check inputs, checkpoint and output of a search for the structure of a vehicle before anything is computed.
-
-    Parameters
-    ----------
-    inputs : mapping of str to Path
-        By role.
-
-    Returns
-    -------
-    files : dict of str to InputFile
-    checkpoint : VehicleCheckpoint
-    kept : mapping of Structure to sequence of Solution, or None
-        Where to go on; None to start.
-
-    Raises
-    ------
-    InputError
-        As `begin_search`.
-    """
-    files = take_inputs(job, inputs)
-    checkpoint = VehicleCheckpoint.beside(job.output, header_of(job.study, files))
-    kept = checkpoint.read() if resume else None
-    if kept is None:
-        checkpoint.require_permission(force=job.force)
-    check_outputs(job, job.output, replaceable=resume and checkpoint.output_may_be_replaced())
-    return files, checkpoint, kept

@@ -51,13 +51,7 @@ class SweepSamples:
         self._data: dict[Any, tuple[TrainingData, float]] = {}
 
     def of(self, variant: Variant) -> tuple[TrainingData, float]:
-        """Choose the samples of a setting, as `cpfls reduce` would, and give their condition number.
-
-        Raises
-        ------
-        ComputationError, ConfigError
-            See `cpfls_cli.reduction`.
-        """
+        """Choose the samples of a setting, as `cpfls reduce` would, and give their condition number."""
         study = variant.study
         cut = (study.identification.training_share, study.identification.embargo_s)
         if cut not in self._splits:
@@ -238,11 +232,6 @@ def sweep_plan(
         By role.
     choose_on : sequence of Path
         That models are chosen on, in settings whose choice is `held-out`.
-
-    Raises
-    ------
-    InputError, ConfigError, ComputationError
-        If a flight is not good, or samples of a setting cannot be chosen.
     """
     samples, settings, kept = SweepSamples(job, flights, inputs), [], choosing_source(choose_on, inputs)
     for variant in variants(job.study):

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from cpfls_cli.artifacts.checkpoint import StoppedSearch
 from cpfls_cli.artifacts.job import Job, header_of
 from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.store import write_record
@@ -17,7 +16,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.identification.identify import Identification, identify
 from cpfls_cli.identification.search import NothingFoundError, SearchStep, StopReason, is_end
 from cpfls_cli.inertia import six_parameters
-from cpfls_cli.search.checkpoint import Checkpoint, Leftover, differences
+from cpfls_cli.search.checkpoint import Checkpoint, Leftover, StoppedSearch, differences
 from cpfls_cli.search.resumable import Resumable, SearchOptions, Watch
 from cpfls_cli.search.sweep_plan import SweepPlan
 
@@ -46,11 +45,6 @@ class PartialSweep(Leftover):
         -------
         SweepRecord or None
             None for a sweep that starts.
-
-        Raises
-        ------
-        InputError
-            If there is something and neither is asked for, or nothing that can be resumed.
         """
         Checkpoint.beside(self.output, self.header).require_own()
         if not resume:
@@ -62,13 +56,7 @@ class PartialSweep(Leftover):
         return stopped
 
     def runs(self, plan: SweepPlan, stopped: SweepRecord | None) -> RunGroup:
-        """Take the runs that are finished, and keep them from here on.
-
-        Raises
-        ------
-        InputError
-            If they are not runs of this plan.
-        """
+        """Take the runs that are finished, and keep them from here on."""
         runs = plan.no_runs if stopped is None else stopped.run
         if stopped is not None:
             self._require_same_plan(plan, stopped)
@@ -76,13 +64,7 @@ class PartialSweep(Leftover):
         return runs
 
     def write(self, plan: SweepPlan, runs: RunGroup) -> None:
-        """Replace what was there by these finished runs, or leave it as it was.
-
-        Raises
-        ------
-        OutputError
-            If it cannot be written.
-        """
+        """Replace what was there by these finished runs, or leave it as it was."""
         write_record(self.path, plan.record(runs).with_header(self.header))
 
     def _require_same_plan(self, plan: SweepPlan, stopped: SweepRecord) -> None:

@@ -7,7 +7,7 @@ from benchmarks.shared.full_circle import INERTIA, torque_data
 from benchmarks.shared.sliding_loads import SlidingLoads
 from cpfls_cli import rotations
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
-from cpfls_cli.regressor import Motion
+from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues
 
 ANGLES = np.eye(3)

@@ -9,7 +9,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.simulation.measured import measure
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.attitude import flat_attitude
-from cpfls_cli.vehicle import RotorSettings, VehicleSettings
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 HUBS = (((0.3, 0.0, 0.05), 1), ((0.0, -0.3, 0.05), -1), ((-0.3, 0.0, 0.05), 1), ((0.0, 0.3, 0.05), -1))
 VEHICLE = VehicleSettings(rotors=tuple(RotorSettings(position_m=hub, spin=spin, radius_m=0.2) for hub, spin in HUBS))

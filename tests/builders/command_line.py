@@ -10,7 +10,7 @@ import pytest
 from typer import testing
 
 from cpfls_cli.cli.app import app
-from cpfls_cli.workers import employ
+from cpfls_cli.workers.employ import employ
 
 # Every call would build all commands anew, which takes longer than most of them run.
 testing._get_command = cache(testing._get_command)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.errors import SettingError
-from cpfls_cli.evolution import Evaluation
+from cpfls_cli.evolution.archive import Evaluation
 
 POISON = 13
 DEADLY_POISON = 113

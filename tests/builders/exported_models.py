@@ -13,10 +13,13 @@ from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.commands.vehicle_sheets import bare_sheet
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.visited import CELLS
-from cpfls_cli.export import Sheet, expected
-from cpfls_cli.fuzzy import InputRange, breakpoints
+from cpfls_cli.export.points import expected
+from cpfls_cli.export.sheet import Sheet
+from cpfls_cli.fuzzy.inputs import InputRange
+from cpfls_cli.fuzzy.membership import breakpoints
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.regressor import Motion, StructureSettings, model_structure
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 MEASURES = ("mse", "max_error", "relative_error", "r2", "r2_body")

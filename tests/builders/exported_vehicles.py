@@ -6,7 +6,9 @@ import subprocess
 import numpy as np
 
 from cpfls_cli.artifacts.spec import Header
-from cpfls_cli.export import Sheet, c_source, json_text, python_source
+from cpfls_cli.export.json_form import json_text
+from cpfls_cli.export.sheet import Sheet
+from cpfls_cli.export.source import c_source, python_source
 from tests.builders.compiled_c import CHECKS, build, written
 
 MAIN = """

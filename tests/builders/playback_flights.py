@@ -19,8 +19,8 @@ from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.table import Remainder, remainder_terms
 from cpfls_cli.rotations import rotation_matrix
-from cpfls_cli.vehicle import RotorSettings, VehicleSettings
 from cpfls_cli.vehicle.rotors import allocation_matrix
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.builders.recorded_flights import columns_of_log
 
 KINDS = ("multisine", "steps", "figure")

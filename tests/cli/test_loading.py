@@ -12,21 +12,36 @@ CODE = """
 import json, sys
 from typer.testing import CliRunner
 from cpfls_cli.cli.app import app
-commands, packages = map(json.loads, sys.argv[1:])
+commands = json.loads(sys.argv[1])
 for words in commands:
     result = CliRunner().invoke(app, words)
     assert result.exit_code == 0, result.output
-print(json.dumps(sorted(set(packages) & set(sys.modules))))
+print(json.dumps(sorted(sys.modules)))
 """
 
 
-def loaded(*commands):
-    """Run commands in a process of their own; give the heavy packages that it has loaded in the end."""
+def modules(*commands):
+    """Run commands in a process of their own; give all modules that it has loaded in the end."""
     words = json.dumps([[str(word) for word in command] for command in commands])
-    arguments = [sys.executable, "-c", CODE, words, json.dumps(sorted(HEAVY))]
-    result = subprocess.run(arguments, capture_output=True, text=True)
+    result = subprocess.run([sys.executable, "-c", CODE, words], capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
-    return json.loads(result.stdout)
+    return json.loads(result.stdout.splitlines()[-1])
+
+
+def loaded(*commands):
+    """Give the heavy packages that commands load."""
+    return sorted(HEAVY & set(modules(*commands)))
+
+
+def of_gap(names):
+    """Pick the modules of the gap but its settings, which the config holds as those of all rooms."""
+    return [name for name in names if name.startswith("cpfls_cli.gap.") and name != "cpfls_cli.gap.settings"]
+
+
+def of_trust(name):
+    """Tell whether a module holds the words of trust, or is the front page of the room that they are in."""
+    rooms = {"cpfls_cli.validation", "cpfls_cli.pages"}
+    return name in rooms or name in {f"{room}.trust" for room in rooms}
 
 
 def test_the_version_and_the_help_load_nothing_heavy():
@@ -79,3 +94,17 @@ def test_a_search_loads_nothing_of_scipy_that_only_logs_need():
     slow = "{'scipy.interpolate', 'scipy.optimize', 'scipy.signal', 'scipy.stats'}"
     code = f"import sys; from cpfls_cli.commands import identify, reduce, sweep; print({slow} & set(sys.modules))"
     assert subprocess.check_output([sys.executable, "-c", code], text=True) == "set()\n"
+
+
+def test_commands_load_no_room_that_they_do_not_work_in(pipeline, study, tmp_path):
+    reduced = modules(("reduce", study, pipeline.flight, "-o", tmp_path / "selection.h5"))
+    assert of_gap(reduced) == []
+    assert "cpfls_cli.playback.model" not in reduced
+    assert of_gap(modules(("identify", study, pipeline.flight, "-o", tmp_path / "model.h5"))) == []
+
+
+def test_what_a_file_holds_is_told_without_the_numerics_that_made_it(pipeline):
+    shown = modules(("info", pipeline.flight), ("check", pipeline.selection), ("info", pipeline.model))
+    # How far to trust a model is told in a word, and words of trust stand in a module of their own.
+    rooms = {name.split(".")[1] for name in shown if name.startswith("cpfls_cli.") and not of_trust(name)}
+    assert rooms.isdisjoint({"gap", "effects", "identification", "validation", "reduction", "weak_form", "pages"})

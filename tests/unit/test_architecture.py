@@ -1,5 +1,6 @@
 """The map names every room of the package, in the order of the import contract, and only modules that exist."""
 
+import ast
 import re
 import tomllib
 from pathlib import Path
@@ -28,3 +29,30 @@ def test_every_module_that_it_names_exists():
     named = set(re.findall(r"`(\w+(?:/\w+)*\.py)`", PAGE))
     assert len(named) > 30
     assert [name for name in sorted(named) if not (PACKAGE / name).exists() and not (ROOT / name).exists()] == []
+
+
+def own_imports_in_functions(path):
+    """Modules of the package that functions of a module import, wherever in them the import stands."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for function in (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)):
+        for node in ast.walk(function):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cpfls_cli"):
+                yield f"{path.relative_to(PACKAGE)}: {function.name}: {node.module}"
+
+
+# These load what they are asked for: a command, what an object of the Python interface does, Dask, what is drawn.
+BY_NEED = {"cli", "library", "workers/employ.py", "report/canvas.py"}
+
+
+def test_layers_hold_as_imported():
+    """What a module needs it imports where the import contracts see it; `artifacts/formats.py` loads by need."""
+    names = {path.relative_to(PACKAGE).as_posix(): path for path in sorted(PACKAGE.rglob("*.py"))}
+    modules = [path for name, path in names.items() if {name, name.split("/")[0]}.isdisjoint(BY_NEED)]
+    assert [entry for path in modules for entry in own_imports_in_functions(path)] == []
+
+
+def test_a_front_page_that_nobody_outside_needs_loads_nothing():
+    needed = {"__init__.py", "fuzzy/__init__.py", "library/__init__.py"}
+    pages = {page.relative_to(PACKAGE).as_posix(): page for page in PACKAGE.rglob("__init__.py")}
+    loading = {name for name, page in pages.items() if len(ast.parse(page.read_text(encoding="utf-8")).body) > 1}
+    assert loading == needed

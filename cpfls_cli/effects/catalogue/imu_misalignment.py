@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Effect, of_axes
 from cpfls_cli.effects.hooks import ReadingError, SensorTest, gyroscope_log
+
+
+def _turned(values: Array) -> ReadingError:
+    # Loaded where it is needed: who reads a model waits for nothing of scipy.
+    from scipy.spatial.transform import Rotation
+
+    return ReadingError(matrix=Rotation.from_rotvec(-values).as_matrix())
+
 
 EFFECT = Effect(
     name="imu_misalignment",
@@ -31,7 +39,7 @@ EFFECT = Effect(
         number=lambda axis, value: f"{np.degrees(value):+.2f} deg about {axis}",
         found="The gyroscope sits turned against the attitude: {}.",
         nothing="The gyroscope sits straight against the attitude.",
-        error=lambda values: ReadingError(matrix=Rotation.from_rotvec(-values).as_matrix()),
+        error=_turned,
         integrated=True,
     ),
 )

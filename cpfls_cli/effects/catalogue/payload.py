@@ -12,6 +12,7 @@ from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, stack, wrench
 from cpfls_cli.effects.hooks import Carrier, Pull
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.swing import felt_acceleration, settled_swing
 from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -20,9 +21,6 @@ _LARGEST_ACROSS = 0.97
 
 
 def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-    # Compiled loops are slow to load, and most commands know the load by name alone.
-    from cpfls_cli.effects.swing import felt_acceleration, settled_swing
-
     length = shape["length_m"]
     swung = settled_swing(signals, length, shape["damping_1_s"], shape["depth_m"])
     across = np.minimum((swung**2).sum(axis=1), _LARGEST_ACROSS)

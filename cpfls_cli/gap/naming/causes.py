@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.consistency.faults import AuditFinding
+from cpfls_cli.consistency.findings import AuditFinding
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS

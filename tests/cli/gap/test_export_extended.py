@@ -11,14 +11,16 @@ import pytest
 
 from cpfls_cli.artifacts.extended import ExtendedRecord, ExtendedVehicleGroup, LeftOutGroup
 from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.store import read_record, write_record
+from cpfls_cli.config.load import stored_study
 from cpfls_cli.playback.model import ModelEffect
 from tests.builders.artifacts import edited
 
 
 def test_an_extended_model_holds_the_vehicle_with_its_effects(extended):
     record = read_record(extended, ExtendedRecord)
-    vehicle = record.vehicle.vehicle_model()
+    vehicle = vehicle_model(record.vehicle)
     effects = {one.name: one.coefficients for one in vehicle.effects}
     # The height, which the thrust alone does not show, is left open.
     assert effects["com_offset"] == pytest.approx([0.008, -0.005, 0.0], rel=0.05)
@@ -47,7 +49,7 @@ def test_it_is_exported(cpfls, extended, tmp_path):
 def test_what_a_table_does_not_hold_is_told_with_numbers_and_size(cpfls, extended, tmp_path):
     record = read_record(extended, ExtendedRecord)
     size, ends = np.array([[0.0, 0.4, 0.0, 0.0, 0.0, 0.0]]), np.array([[0.1, 0.2, 0.3, 0.4]])
-    model = record.vehicle.vehicle_model()
+    model = vehicle_model(record.vehicle)
     sag = ModelEffect("battery_sag", {"exponent": 1.5}, np.zeros(0))
     outside = ExtendedVehicleGroup.of(replace(model, effects=(*model.effects, sag)))
     path, output = tmp_path / "outside.h5", tmp_path / "m.c"
@@ -92,7 +94,7 @@ def test_one_of_before_is_refused(refuse, extended, tmp_path, name, command):
 
 def test_an_identified_model_holds_the_stated_vehicle(pipeline):
     record = read_record(pipeline.model, IdentifiedRecord)
-    assert record.vehicle.vehicle() == record.study.vehicle
+    assert record.vehicle.vehicle() == stored_study(record.origin.config, pipeline.model).vehicle
     assert record.vehicle.effect.name == ()
 
 

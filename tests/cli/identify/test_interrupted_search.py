@@ -84,7 +84,7 @@ def test_interrupted_in_the_last_evaluation_it_is_complete(cpfls, words, whole, 
 
 def test_interrupted_without_a_finite_model(cpfls, words, tmp_path, interrupt_at, monkeypatch):
     def nothing(_, genes):
-        from cpfls_cli.evolution import Evaluation
+        from cpfls_cli.evolution.archive import Evaluation
 
         return Evaluation(genes, np.full((len(genes), 3), np.inf))
 
@@ -101,7 +101,7 @@ def test_interrupted_without_a_finite_model(cpfls, words, tmp_path, interrupt_at
 
 def test_search_that_found_nothing_at_its_end_leaves_nothing(cpfls, words, pipeline, tmp_path, monkeypatch):
     def nothing(_, genes):
-        from cpfls_cli.evolution import Evaluation
+        from cpfls_cli.evolution.archive import Evaluation
 
         return Evaluation(genes, np.full((len(genes), 3), np.inf))
 

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import cpfls_cli
-from cpfls_cli.artifacts.formats import RECORDS
+from cpfls_cli.artifacts.formats import records
 from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.store import Artifact, file_sha256, write_artifact
 from cpfls_cli.errors import InputError
@@ -32,7 +32,7 @@ def made_up(spec):
     return Artifact(spec, Header("0", 1, "seed: 1\n"), data)
 
 
-@pytest.mark.parametrize("record", RECORDS, ids=lambda record: record.FORMAT.name)
+@pytest.mark.parametrize("record", records(), ids=lambda record: record.FORMAT.name)
 def test_every_dataset_of_every_format_has_its_values_dimensions_and_unit(record, tmp_path):
     path, spec = tmp_path / "a.h5", record.spec()
     write_artifact(path, made_up(spec))

@@ -6,7 +6,7 @@ from unittest.mock import patch
 
 import pytest
 
-from cpfls_cli.artifacts.formats import RECORDS, record_of_format
+from cpfls_cli.artifacts.formats import record_of_format, records
 from cpfls_cli.artifacts.store import file_sha256, read_any
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import resolved
@@ -109,6 +109,6 @@ def test_every_format_with_a_page_is_here():
     words = {"identified": "model"}
     formats = {
         words.get(record.FORMAT.kind, record.FORMAT.kind) or record.FORMAT.name.removeprefix("cpfls/")
-        for record in RECORDS
+        for record in records()
     }
     assert formats - {"checkpoint", "vehicle-checkpoint"} == set(FORMATS)

@@ -11,7 +11,7 @@ from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.flightlog.smoothing import derivative
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.vehicle import VehicleSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.recorded_flights import columns_of_log
 
 columns_of = partial(columns_of_log, "real/crazyswarm2_lee")

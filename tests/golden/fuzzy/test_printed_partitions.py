@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.identification.chromosome import decode
-from cpfls_cli.regressor import StructureSettings, model_structure
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 CHROMOSOME = """
     3157 31387 59087 34526   61856 23999 31983 5100    21985 53525 13592 15164

@@ -9,14 +9,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli.reduction.settings import ReductionSettings
-from cpfls_cli.regressor import (
-    Motion,
-    Regressor,
-    StructureSettings,
-    data_ranges,
-    model_structure,
-    uniform_breakpoints,
-)
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings
 from tests.builders.reductions import random_selections, reduce

@@ -1,6 +1,7 @@
 import numpy as np
 
-from cpfls_cli.vehicle import VehicleSettings, allocation_matrix, rotor_demand
+from cpfls_cli.vehicle.rotors import allocation_matrix, rotor_demand
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 # Table 3 of the paper, the vehicle that every default study flies.
 GRAVITY, MASS, ARM, K, B = 9.81, 6.0, 0.3, 121.5e-6, 2.7e-6

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cpfls_cli.artifacts.check import check_artifact
-from cpfls_cli.artifacts.formats import RECORDS
+from cpfls_cli.artifacts.formats import records
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION, Header, InputFile
 from cpfls_cli.artifacts.store import Artifact, file_sha256, read_artifact, write_artifact
 
@@ -22,7 +22,7 @@ names = st.text("abcdefghijklmnopqrstuvwxyz.-_ ", min_size=1, max_size=12)
 
 @st.composite
 def artifacts(draw):
-    record = draw(st.sampled_from(RECORDS))
+    record = draw(st.sampled_from(records()))
     spec = record.spec()
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     labels = {label for dataset in spec.datasets for label in dataset.dimensions if not label.isdigit()}

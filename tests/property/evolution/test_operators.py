@@ -5,8 +5,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from cpfls_cli.evolution import gray_decode, gray_encode
-from cpfls_cli.evolution.operators import linear_ranking_fitness, stochastic_universal_sampling
+from cpfls_cli.evolution.operators import (
+    gray_decode,
+    gray_encode,
+    linear_ranking_fitness,
+    stochastic_universal_sampling,
+)
 
 
 @given(st.data(), st.integers(1, 20))

@@ -7,7 +7,8 @@ import re
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cpfls_cli.export import c_source, json_text, python_source
+from cpfls_cli.export.json_form import json_text
+from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.export.text import checked_identifier, comment_text, identifier, number
 from tests.builders.exported_models import CASES, model_of, sheet_of, verdict_of
 

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from cpfls_cli.export import python_source
+from cpfls_cli.export.source import python_source
 from tests.builders.exported_models import Case, errors, model_of, sheet_of, states, wanted_of
 
 functions = st.integers(1, 15)

@@ -5,8 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cpfls_cli.fuzzy import breakpoints
-from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure
+from cpfls_cli.fuzzy.membership import breakpoints
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Regressor, data_ranges
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 SEESAW = model_structure(StructureSettings(consequents="seesaw", products="additive", membership_functions=5))
 HARMONIC = [

@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import uniform_breakpoints
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.validation.physical import energy_share, physical_sense
 
 SEESAW = {"consequents": "seesaw", "products": "additive", "membership_functions": 5}

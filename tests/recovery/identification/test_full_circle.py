@@ -4,16 +4,17 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
-from cpfls_cli.excitation import optimised_rotation
+from cpfls_cli.excitation.optimise import optimised_rotation
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import identify
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.regressor import Motion, StructureSettings
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.structure import StructureSettings
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.rotation import full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings, TrajectorySettings
-from cpfls_cli.vehicle import VehicleSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 INERTIA = [0.6, 0.8, 1.2]
 DURATION, SAMPLES = 20.0, 800

@@ -8,7 +8,8 @@ from cpfls_cli.identification.data import TorqueData, axis_scale
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.regressor import Regressor, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.structure import model_structure
 from tests.builders.flights import bent_torque, random_motion, rigid_torque
 
 PARAMETERS = np.array([0.6, 0.7, 1.2, 0.03, -0.02, 0.04])

@@ -9,7 +9,9 @@ from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
-from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.validation.bands import band, inertia_band
 from cpfls_cli.validation.bootstrap import BlockScores, bootstrap
 from tests.builders.flights import coloured_noise

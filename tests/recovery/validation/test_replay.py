@@ -12,7 +12,9 @@ from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import uniform_breakpoints
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.validation.replay import replay_steps
 from tests.builders.flights import rigid_torque, rotating_motion
 

@@ -12,7 +12,7 @@ from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.regressor import uniform_breakpoints
+from cpfls_cli.regressor.regressor import uniform_breakpoints
 from cpfls_cli.validation.bootstrap import bootstrap, missed_torque
 from cpfls_cli.validation.curves import curves, round_trip, simulated_torque
 from cpfls_cli.validation.timeline import time_blocks

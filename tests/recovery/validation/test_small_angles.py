@@ -8,7 +8,8 @@ from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
-from cpfls_cli.regressor import Motion, uniform_breakpoints
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import uniform_breakpoints
 from cpfls_cli.validation.bands import inertia_band
 from cpfls_cli.validation.bootstrap import bootstrap
 from tests.builders.flights import bent_torque, coloured_noise

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from cpfls_cli.artifacts.formats import RECORDS, format_tables, record_of_format
+from cpfls_cli.artifacts.formats import format_tables, record_of_format, records
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION
 
 PAGE = (Path(__file__).parents[3] / "docs" / "format.md").read_text()
@@ -20,7 +20,7 @@ def test_page_names_the_schema_version_and_every_root_attribute():
     assert all(f"| `{name}` |" in PAGE for name in ("format", "kind", "cpfls_version", "seed", "config_sha256"))
 
 
-@pytest.mark.parametrize("spec", [record.spec() for record in RECORDS], ids=lambda spec: spec.format)
+@pytest.mark.parametrize("spec", [record.spec() for record in records()], ids=lambda spec: spec.format)
 def test_every_dataset_is_described(spec):
     assert record_of_format(spec.format, spec.kind).spec() is spec
     assert len({dataset.path for dataset in spec.datasets}) == len(spec.datasets)

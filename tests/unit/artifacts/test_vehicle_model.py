@@ -9,11 +9,12 @@ from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
+from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.store import read_artifact, read_record, write_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.same_vehicle import rebuilt
+from cpfls_cli.flights.models import rebuilt
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from tests.builders import exported_models
 from tests.builders.vehicle_models import HEXA, QUAD, record_of, remainder, whole
@@ -32,7 +33,7 @@ def test_the_round_trip_is_exact(model, tmp_path):
     write_record(path, record_of(model))
     assert check_artifact(read_artifact(path)) == []
     record = read_record(path, VehicleRecord)
-    again = record.vehicle.vehicle_model()
+    again = vehicle_model(record.vehicle)
     assert again.vehicle == model.vehicle
     assert (again.response, again.thrust_linear) == (model.response, model.thrust_linear)
     assert [(one.name, one.shape) for one in again.effects] == [(one.name, one.shape) for one in model.effects]
@@ -44,7 +45,7 @@ def test_an_effect_that_nobody_knows_is_refused():
     group = VehicleGroup.of(MODELS["quad"])
     unknown = replace(group, effect=replace(group.effect, name=("rotor_dragg",)))
     with pytest.raises(InputError, match=r"rotor_dragg: no such effect \(did you mean rotor_drag"):
-        unknown.vehicle_model()
+        vehicle_model(unknown)
 
 
 @pytest.mark.parametrize("kind", [IdentifiedRecord, ExtendedRecord, VehicleRecord])

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.artifacts.gap_effects import worse_axes
 from cpfls_cli.commands.extend import require_named
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.gap.extended import worse_axes
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
 
 OFFSET = NamedEffect("com_offset", None, np.array([0.01]), (), 1e-9, 0.998, 1.0, "Off centre.")

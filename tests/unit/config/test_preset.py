@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from cpfls_cli.config.load import validate
 from cpfls_cli.config.study import resolved
 from cpfls_cli.errors import ConfigError
-from cpfls_cli.evolution import EvolutionSettings
+from cpfls_cli.evolution.settings import EvolutionSettings
 from cpfls_cli.identification.settings import PRESETS, IdentificationSettings
 
 METHOD = Path(__file__).parents[3] / "docs/method.md"

@@ -10,7 +10,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.smoothing import low_pass
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rotations import body_rate
-from cpfls_cli.vehicle import VehicleSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 TIME = np.arange(2000) / 250
 

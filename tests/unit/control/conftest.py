@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.control import AttitudeLoop, TorqueActuators, gains, plan_of
+from cpfls_cli.control.controllers import TorqueActuators, gains, plan_of
+from cpfls_cli.control.track import AttitudeLoop
 from cpfls_cli.dynamics.equations_of_motion import rigid_plant
 
 INERTIA = np.array([[0.6, 0.02, -0.03], [0.02, 0.7, 0.01], [-0.03, 0.01, 1.2]])

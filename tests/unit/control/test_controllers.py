@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.control import gains, plan_of
+from cpfls_cli.control.controllers import gains, plan_of
 from cpfls_cli.errors import ComputationError, SettingError
 
 

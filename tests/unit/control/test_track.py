@@ -6,17 +6,8 @@ from scipy.integrate import solve_ivp, trapezoid
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
-from cpfls_cli.control import (
-    Controller,
-    Sensing,
-    TorqueActuators,
-    computed_torque,
-    flown_signals,
-    plan_of,
-    proportional_derivative,
-    scores,
-    track,
-)
+from cpfls_cli.control.controllers import Controller, TorqueActuators, computed_torque, plan_of, proportional_derivative
+from cpfls_cli.control.track import Sensing, flown_signals, scores, track
 from cpfls_cli.dynamics.equations_of_motion import RigidBody, model_plant, rigid_plant
 from cpfls_cli.dynamics.rigid_body import torque
 from cpfls_cli.errors import SettingError

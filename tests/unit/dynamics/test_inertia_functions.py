@@ -7,7 +7,9 @@ from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.visited import visited_cells
 from cpfls_cli.identification.chromosome import decode
-from cpfls_cli.regressor import Motion, StructureSettings, data_ranges, model_structure
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import data_ranges
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 STRUCTURES = {
     "seesaw": {"consequents": "seesaw", "products": "additive", "membership_functions": 5},

@@ -6,7 +6,7 @@ import pytest
 from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial, rotor_terms, state_terms
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.vehicle import VehicleSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 VEHICLE = VehicleSettings()
 POLYNOMIAL = {

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.evolution import Archive, Evaluation
+from cpfls_cli.evolution.archive import Archive, Evaluation
 
 
 class Recorder:

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.evolution import Evaluation, EvolutionSettings, best, evolve, start, step
+from cpfls_cli.evolution.archive import Evaluation
+from cpfls_cli.evolution.engine import best, evolve, start, step
+from cpfls_cli.evolution.settings import EvolutionSettings
 
 # The operators of the paper, after the Sheffield toolbox.
 PAPER = EvolutionSettings(

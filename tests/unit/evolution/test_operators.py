@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.evolution import gray_decode, gray_encode
 from cpfls_cli.evolution.operators import (
+    gray_decode,
+    gray_encode,
     intermediate_recombination,
     linear_ranking_fitness,
     members,

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from scipy.stats import rankdata
 
-from cpfls_cli.evolution import rank
-from cpfls_cli.evolution.ranking import positions
+from cpfls_cli.evolution.ranking import positions, rank
 
 # a, b and c do not dominate one another; d is dominated by b; e by all four.
 HAND_WORKED = np.array([[1.0, 4.0], [2.0, 2.0], [4.0, 1.0], [3.0, 3.0], [4.0, 4.0]])

@@ -1,7 +1,7 @@
 import pytest
 
 from cpfls_cli.errors import SettingError
-from cpfls_cli.evolution import EvolutionSettings
+from cpfls_cli.evolution.settings import EvolutionSettings
 
 
 def test_subpopulations_of_one_are_refused():

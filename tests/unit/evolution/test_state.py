@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.evolution import Evaluation, EvolutionSettings, History, ended, evolve, start, step
-from cpfls_cli.evolution.engine import stalled
+from cpfls_cli.evolution.archive import Evaluation
+from cpfls_cli.evolution.engine import History, ended, evolve, stalled, start, step
+from cpfls_cli.evolution.settings import EvolutionSettings
 
 
 def course(*best):

@@ -2,11 +2,12 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import SettingError
-from cpfls_cli.excitation import condition_number, optimised_rotation
-from cpfls_cli.regressor import StructureSettings, model_structure
+from cpfls_cli.excitation.objective import condition_number
+from cpfls_cli.excitation.optimise import optimised_rotation
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.trajectory.rotation import RotationLimits, full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
-from cpfls_cli.vehicle import VehicleSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 DURATION, STRUCTURE, VEHICLE = 20.0, StructureSettings(), VehicleSettings()
 SMALL = {"starts": 3, "iterations": 20}

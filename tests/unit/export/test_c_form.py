@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import vertical
-from cpfls_cli.export import c_source
-from cpfls_cli.regressor import Motion
+from cpfls_cli.export.source import c_source
+from cpfls_cli.regressor.motion import Motion
 from tests.builders.compiled_c import CHECKS, build, drive, driver, require_gcc, written
 from tests.builders.exported_models import CASES, Case, errors, model_of, sheet_of, states, wanted_of
 

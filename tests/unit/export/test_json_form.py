@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from cpfls_cli.export import json_text
+from cpfls_cli.export.json_form import json_text
 from tests.builders.exported_models import CASES, model_of, sheet_of, states, verdict_of
 
 

@@ -14,13 +14,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cpfls_cli.export import c_source, python_source
 from cpfls_cli.export.json_form import HOW_TO_EVALUATE, HOW_TO_EVALUATE_INERTIA
+from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.fuzzy.membership import Z_FUNCTION, memberships, z_function
 from cpfls_cli.playback import kernels as playback
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.table import Remainder
-from cpfls_cli.regressor import Motion, Regressor, kernels
+from cpfls_cli.regressor import kernels
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Regressor
 from cpfls_cli.regressor.table import mapped_inputs, padded_breakpoints, structure_table
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.compiled_c import evaluate, require_gcc, written

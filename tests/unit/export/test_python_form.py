@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from cpfls_cli.export import python_source
+from cpfls_cli.export.source import python_source
 from tests.builders.exported_models import CASES, errors, model_of, sheet_of, states, wanted_of
 
 SAMPLES = {"paper": 20_000, "default": 20_000}

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.equations_of_motion import identified_turning
-from cpfls_cli.export import c_source, json_text, python_source
+from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.points import reference_points, reference_run, term_sizes
+from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.playback.kernels import MeasuredMotion, errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State, accelerations, step

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.fuzzy import antecedent, basis, breakpoints, feature_count, features, input_range, map_input
+from cpfls_cli.fuzzy.basis import antecedent, basis, feature_count, features
+from cpfls_cli.fuzzy.inputs import input_range, map_input
+from cpfls_cli.fuzzy.membership import breakpoints
 
 WEIGHTS = {1: [], 2: [1.0], 3: [2.0, 3.0], 5: [2.0, 1.0, 3.0, 1.5], 7: [1.0, 2.0, 0.7, 1.5, 3.0, 1.2]}
 KINDS = [

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.fuzzy import PeriodicSettings, antecedent, basis, breakpoints, features, fit_periodic, map_input
-from cpfls_cli.fuzzy.inputs import InputRange
+from cpfls_cli.fuzzy.basis import antecedent, basis, features
+from cpfls_cli.fuzzy.inputs import InputRange, map_input
+from cpfls_cli.fuzzy.membership import breakpoints
+from cpfls_cli.fuzzy.periodic_fit import PeriodicSettings, fit_periodic
 
 STRUCTURES = [
     PeriodicSettings(),

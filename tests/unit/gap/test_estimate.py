@@ -6,8 +6,7 @@ import pytest
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.naming.estimate import effect_sentence
 from cpfls_cli.gap.naming.results import Estimate
-from cpfls_cli.vehicle import VehicleSettings
-from cpfls_cli.vehicle.settings import RotorSettings
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 
 def told(name, vehicle=None, **values):

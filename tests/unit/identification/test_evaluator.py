@@ -10,8 +10,9 @@ from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, encode, un
 from cpfls_cli.identification.evaluator import Problem
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
-from cpfls_cli.regressor import Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.regressor.motion import RIGID
+from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from tests.builders.flights import random_flight, rigid_torque
 
 STRUCTURE = model_structure(StructureSettings(membership_functions=(2, 3, 1, 5, 6, 7)))

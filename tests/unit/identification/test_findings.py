@@ -8,7 +8,7 @@ from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.excitation import axis_evidence
 from cpfls_cli.identification.identify import identify
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.regressor import Motion
+from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.rotations import body_rate, generalised_torque
 
 INERTIA = np.array([0.6, 0.7, 1.2, 0.0, 0.0, 0.0])

@@ -12,7 +12,9 @@ from cpfls_cli.identification.evaluator import Problem, refine, stepped
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.least_squares import SMALLEST_SINGULAR_SHARE
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
-from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Regressor, data_ranges
+from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings
 from tests.builders.reference_evaluator import ReferenceEvaluator

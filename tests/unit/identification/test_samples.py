@@ -14,8 +14,9 @@ from cpfls_cli.identification.cross_validation import contiguous_blocks, with_fo
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import IdentificationSettings, RidgeSettings
-from cpfls_cli.regressor import Regressor, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.regressor.motion import RIGID
+from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.structure import model_structure
 from tests.builders.flights import no_torque, random_flight
 from tests.builders.torque_sensitivity import torque_sensitivity
 

@@ -11,7 +11,8 @@ from cpfls_cli.identification.excitation import axis_evidence
 from cpfls_cli.identification.identify import identify, model_evaluator
 from cpfls_cli.identification.judge import score_of
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
-from cpfls_cli.regressor import Motion, Regressor, data_ranges
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Regressor, data_ranges
 from tests.builders.flights import random_flight, rigid_torque
 
 SETTINGS = {

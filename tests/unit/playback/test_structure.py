@@ -11,6 +11,7 @@ from cpfls_cli.playback import structure
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import SearchStoppedError, Structure, choose, parts_of, tried_blocks
+from cpfls_cli.search.vehicle_search import kept_of
 from tests.builders.playback_flights import MIDDLING, STATED, flown, truth
 
 TRIED = ("linear_damping", "rotor_drag", "flapping_moment", "quadratic_damping", "inertia")
@@ -76,7 +77,7 @@ def test_a_search_goes_on_from_what_was_kept(flights, number):
     without = chosen(flights, lambda judged, _: whole.append(judged))
     with suppress(SearchStoppedError):
         chosen(flights, stopping)
-    kept = VehicleCheckpointRecord.of(parts[-1]).kept()
+    kept = kept_of(VehicleCheckpointRecord.of(parts[-1]))
     resumed = chosen(flights, lambda judged, _: parts.append(judged), kept)
     assert [len(judged) for judged in parts] == list(range(1, without.evaluated + 1))
     pairs = list(zip(whole[-1], parts[-1], strict=True))

@@ -7,15 +7,10 @@ import pytest
 
 from cpfls_cli.compiling import compiled
 from cpfls_cli.identification.chromosome import decode
-from cpfls_cli.regressor import (
-    Motion,
-    Regressor,
-    StructureSettings,
-    data_ranges,
-    kernels,
-    model_structure,
-    uniform_breakpoints,
-)
+from cpfls_cli.regressor import kernels
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.regressor.table import mapped_inputs, padded_breakpoints, structure_table
 from tests.builders.torque_sensitivity import torque_sensitivity
 

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
-from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 
 def relative_residual(tensor, **settings):

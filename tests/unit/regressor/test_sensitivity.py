@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli.identification.chromosome import decode, weight_jacobian
-from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Regressor, data_ranges
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from tests.builders.torque_sensitivity import torque_sensitivity
 
 SEESAW = {"consequents": "seesaw", "products": "additive"}

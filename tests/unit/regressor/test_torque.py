@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli.identification.chromosome import decode
-from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Regressor, data_ranges
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 ROLL, PITCH = 0, 1
 PLACES = {"D11": (0, 0, ()), "D13": (0, 2, (PITCH,)), "D22": (1, 1, (ROLL,))}

@@ -12,7 +12,8 @@ from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import read_artifact, write_artifact
 from cpfls_cli.config.load import validate
 from cpfls_cli.errors import InputError
-from cpfls_cli.evolution import Evaluation, start, step
+from cpfls_cli.evolution.archive import Evaluation
+from cpfls_cli.evolution.engine import start, step
 from cpfls_cli.files import seal_of
 from cpfls_cli.identification.search import Unfinished
 from cpfls_cli.search.checkpoint import Checkpoint

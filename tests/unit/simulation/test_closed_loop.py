@@ -14,7 +14,7 @@ from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.simulation.measured import measure
 from cpfls_cli.simulation.settings import SimulationSettings
-from cpfls_cli.vehicle import RotorSettings
+from cpfls_cli.vehicle.settings import RotorSettings
 from cpfls_cli.weak_form.windows import windows
 from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, planned, signals_of
 

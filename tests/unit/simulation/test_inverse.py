@@ -12,7 +12,8 @@ from cpfls_cli.simulation.inverse import collective_thrust, flyability, simulate
 from cpfls_cli.simulation.settings import SimulationSettings
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings
-from cpfls_cli.vehicle import RotorSettings, VehicleSettings, allocation_matrix, body_wrench
+from cpfls_cli.vehicle.rotors import allocation_matrix, body_wrench
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 VEHICLE = VehicleSettings(inertia_kg_m2=(0.6, 0.7, 1.2, 0.02, -0.03, 0.01))
 TENSOR = np.array([[0.6, 0.02, -0.03], [0.02, 0.7, 0.01], [-0.03, 0.01, 1.2]])

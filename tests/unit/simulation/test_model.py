@@ -14,7 +14,8 @@ from cpfls_cli.simulation.actuators import mixer
 from cpfls_cli.simulation.closed_loop import upright
 from cpfls_cli.simulation.model import in_the_loop, simulated_effects, with_effects
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
-from cpfls_cli.vehicle import VehicleSettings, body_wrench
+from cpfls_cli.vehicle.rotors import body_wrench
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 VEHICLE = VehicleSettings()
 

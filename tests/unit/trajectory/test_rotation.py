@@ -4,7 +4,7 @@ import pytest
 from cpfls_cli.errors import SettingError
 from cpfls_cli.trajectory.rotation import RotationLimits, RotationPath, full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
-from cpfls_cli.vehicle import VehicleSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 DURATION = 20.0
 

@@ -7,7 +7,8 @@ import pytest
 
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.regressor import StructureSettings, model_structure, uniform_breakpoints
+from cpfls_cli.regressor.regressor import uniform_breakpoints
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.validation.bands import definite_share
 from cpfls_cli.validation.bootstrap import Draws
 from cpfls_cli.validation.physical import cell_centres

@@ -14,8 +14,8 @@ from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
-from cpfls_cli.regressor import Regressor
 from cpfls_cli.regressor.motion import RIGID
+from cpfls_cli.regressor.regressor import Regressor
 from cpfls_cli.validation.bootstrap import bootstrap
 from tests.builders.flights import bent_torque, random_flight
 

@@ -9,7 +9,9 @@ from cpfls_cli.dynamics.visited import visited_cells
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.regressor import Motion, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.validation.bands import inertia_band
 from cpfls_cli.validation.bootstrap import Draws
 from cpfls_cli.validation.curves import curves

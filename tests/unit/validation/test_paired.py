@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 from scipy.stats import binom
 
 from cpfls_cli.identification.data import Flights, TorqueData
-from cpfls_cli.regressor import Motion
+from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.rotations import generalised_torque
 from cpfls_cli.validation.paired import (
     BLOCKS,

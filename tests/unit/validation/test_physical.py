@@ -10,8 +10,8 @@ from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.regressor import StructureSettings, model_structure, uniform_breakpoints
-from cpfls_cli.regressor.regressor import InertiaValues
+from cpfls_cli.regressor.regressor import InertiaValues, uniform_breakpoints
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.validation.physical import energy_share, one_period_away, physical_sense
 from tests.builders.flights import random_flight
 

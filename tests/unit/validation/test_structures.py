@@ -11,7 +11,8 @@ from cpfls_cli.identification.cross_validation import contiguous_blocks
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
-from cpfls_cli.regressor import Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.validation.structures import RIGID_BODY_NAME, candidate_structures, compare_structures, structure_name
 from tests.builders.flights import bent_torque, random_flight
 

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.vehicle import RotorSettings, VehicleSettings, allocation_matrix, body_wrench, rotor_demand
+from cpfls_cli.vehicle.rotors import allocation_matrix, body_wrench, rotor_demand
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 K, B, ARM = 121.5e-6, 2.7e-6, 0.3
 

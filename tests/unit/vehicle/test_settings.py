@@ -4,8 +4,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.errors import SettingError
-from cpfls_cli.vehicle import VehicleSettings
-from cpfls_cli.vehicle.settings import RotorSettings
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 
 @pytest.mark.parametrize(

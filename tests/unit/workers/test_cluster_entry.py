@@ -8,9 +8,8 @@ from importlib.metadata import PackageNotFoundError, version
 import pytest
 
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.workers import employ
 from cpfls_cli.workers.compatibility import Processor, processor, require_same_processor, require_same_versions
-from cpfls_cli.workers.employ import require_address
+from cpfls_cli.workers.employ import employ, require_address
 
 
 class Client:
@@ -83,5 +82,5 @@ def test_other_texts_are_refused(address):
 
 
 def test_dask_is_loaded_only_for_a_scheduler():
-    program = "import sys, cpfls_cli.workers; sys.exit(not {'distributed', 'llvmlite'}.isdisjoint(sys.modules))"
+    program = "import sys, cpfls_cli.workers.employ; sys.exit(not {'distributed', 'llvmlite'}.isdisjoint(sys.modules))"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.evolution import Evaluation
-from cpfls_cli.workers import Workforce
-from cpfls_cli.workers.workforce import WorkerError, attempt, chunks, result_of
+from cpfls_cli.evolution.archive import Evaluation
+from cpfls_cli.workers.workforce import WorkerError, Workforce, attempt, chunks, result_of
 
 GENES = np.arange(12).reshape(6, 2)
 

@@ -1,0 +1,73 @@
+"""Models that are given to a command: read, of the vehicle of the config, and rebuilt."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.learned import LearnedFlight
+from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.rebuilt import vehicle_model
+from cpfls_cli.artifacts.replay import VEHICLE
+from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.config.study import Study
+from cpfls_cli.errors import InputError
+from cpfls_cli.flights.same_vehicle import read_of_vehicle
+from cpfls_cli.playback.model import VehicleModel
+
+
+def read_model(path: Path, study: Study) -> VehicleModel:
+    """Read any model of the vehicle of a study.
+
+    Parameters
+    ----------
+    path : Path
+        An artifact, or the word `VEHICLE`.
+
+    Raises
+    ------
+    InputError
+        If it is none, or of another vehicle than that of the config.
+    """
+    if is_vehicle(path):
+        return VehicleModel(vehicle=study.vehicle)
+    return rebuilt(path, read_of_vehicle(path, ModelRecord, study))
+
+
+def learned_by(path: Path | None) -> tuple[LearnedFlight, ...]:
+    """List the flights that a model learned from: none by the vehicle of the config."""
+    return () if path is None or is_vehicle(path) else read_record(path, ModelRecord).learned_from
+
+
+def read_base(path: Path | None, study: Study) -> VehicleModel:
+    """Read what effects are sought for: an identified model, or the rigid body of the vehicle where there is none.
+
+    Raises
+    ------
+    InputError
+        If it is no identified model, or one of another vehicle.
+    """
+    rigid = VehicleModel(vehicle=study.vehicle)
+    if path is None:
+        return rigid
+    return replace(rigid, fuzzy=rebuilt(path, read_of_vehicle(path, IdentifiedRecord, study)).fuzzy)
+
+
+def rebuilt(path: Path, record: ModelRecord) -> VehicleModel:
+    """Rebuild the model of a record; the path is for messages.
+
+    Raises
+    ------
+    InputError
+        If this program does not know an effect, or numbers do not fit each other.
+    """
+    try:
+        return vehicle_model(record.vehicle)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def is_vehicle(path: Path) -> bool:
+    """Tell whether the vehicle of the config is meant; a file of that name has to be given with its folder."""
+    return str(path) == VEHICLE

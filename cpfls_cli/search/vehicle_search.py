@@ -1,0 +1,84 @@
+"""The search for the structure of a vehicle: where it leaves what it has judged, and how it begins or goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from cpfls_cli.artifacts.checkpoint import VehicleCheckpointRecord
+from cpfls_cli.artifacts.job import Job, check_outputs, header_of, take_inputs
+from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.store import write_record
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.playback.structure import Judged, Kept, Rules, Solution, Structure
+from cpfls_cli.search.checkpoint import Leftover, differences, keys_of
+
+_OF_VEHICLE = ("vehicle", "import", "playback")
+"""Sections of the config that the search depends on."""
+
+
+@dataclass(frozen=True)
+class VehicleCheckpoint(Leftover):
+    """Where a search for the structure of a vehicle leaves what it has judged."""
+
+    WORK: ClassVar = "search"
+    SUFFIX: ClassVar = ".checkpoint"
+    OUTPUT: ClassVar = VehicleRecord
+
+    def write(self, judged: Sequence[Judged]) -> None:
+        """Replace what was there by these structures, or leave it as it was."""
+        write_record(self.path, VehicleCheckpointRecord.of(judged).with_header(self.header))
+
+    def read(self) -> Kept:
+        """Take up what was left."""
+        record = self._read(VehicleCheckpointRecord)
+        with self._damaged():
+            kept = kept_of(record)
+        old, new = (keys_of(header, _OF_VEHICLE) for header in (record.origin, self.header))
+        self._require_same(differences(record.origin, self.header, old, new, unimportant="held-out"))
+        return kept
+
+
+def kept_of(record: VehicleCheckpointRecord) -> Kept:
+    """Rebuild what the search left, equal to what was stored down to the last bit."""
+    structure = record.structure
+    counts = np.repeat(structure.numbers, record.loss.shape[1])
+    values = iter(np.split(record.values, np.cumsum(counts)[:-1]))
+    hessians = iter(np.split(record.hessian, np.cumsum(counts**2)[:-1]))
+    rows = zip(structure.blocks, structure.rules.tolist(), record.loss.tolist(), strict=True)
+    return {
+        Structure(tuple(blocks.split()), Rules(*rules)): [
+            Solution(numbers := next(values), loss, next(hessians).reshape(2 * (len(numbers),))) for loss in losses
+        ]
+        for blocks, rules, losses in rows
+    }
+
+
+def begin_vehicle_search(
+    job: Job, inputs: Mapping[str, Path], *, resume: bool
+) -> tuple[dict[str, InputFile], VehicleCheckpoint, Kept | None]:
+    """Check inputs, checkpoint and output of a search for the structure of a vehicle before anything is computed.
+
+    Parameters
+    ----------
+    inputs : mapping of str to Path
+        By role.
+
+    Returns
+    -------
+    files : dict of str to InputFile
+    checkpoint : VehicleCheckpoint
+    kept : mapping of Structure to sequence of Solution, or None
+        Where to go on; None to start.
+    """
+    files = take_inputs(job, inputs)
+    checkpoint = VehicleCheckpoint.beside(job.output, header_of(job.study, files))
+    kept = checkpoint.read() if resume else None
+    if kept is None:
+        checkpoint.require_permission(force=job.force)
+    check_outputs(job, job.output, replaceable=resume and checkpoint.output_may_be_replaced())
+    return files, checkpoint, kept
