@@ -17,7 +17,7 @@ from cpfls_cli.artifacts.job import Job, Progress, begin, finish_parts
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.artifacts.store import count_rows, read_header, read_record
+from cpfls_cli.artifacts.store import count_rows, holds, read_header, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
@@ -59,8 +59,8 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
         Identified, one with effects, or of a whole vehicle.
     """
     inputs = begin(job, {"model": model, "flight": flight})
+    require_known(job.study, "predict", whole=holds(model, VehicleRecord))
     record = read_record(model, ModelRecord)
-    require_known(job.study, "predict", whole=isinstance(record, VehicleRecord))
     identified = record if isinstance(record, IdentifiedRecord) else None
     findings, wrong = Findings(), contradictions(check_file(flight, job.study, driven=identified is None))
     seen = seen_words(record, hashes_of(flight, inputs["flight"]))

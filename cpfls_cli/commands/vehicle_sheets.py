@@ -71,7 +71,7 @@ def bare_sheet(record: ModelRecord, model: VehicleModel) -> Sheet:
         record.origin,
         "",
         "",
-        verdict=None if record.trust == Trust.NOT_JUDGED else record.trust,
+        verdict=None if record.trust == Trust.NOT_JUDGED else str(record.trust),
         stopped=record.stopped or None,
         evidence=identified_evidence(record) if isinstance(record, IdentifiedRecord) else {},
     )

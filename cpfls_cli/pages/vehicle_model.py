@@ -95,8 +95,8 @@ def grounds(record: VehicleRecord) -> Iterator[str]:
         "about 1.1."
     )
     chosen = record.structure.blocks[record.structure.name.index("chosen")].split()
-    blocks = joined(block.replace("_", " ") for block in chosen)
-    yield f"It holds {blocks}." if blocks else f"It holds nothing but {alone}."
+    blocks = [block.replace("_", " ") for block in chosen]
+    yield f"It holds {joined(blocks)}." if blocks else f"It holds nothing but {alone}."
 
 
 def details(vehicle: Source[VehicleRecord]) -> Iterator[Block]:

@@ -43,15 +43,17 @@ def words(text):
     return " ".join(text.split()).lower().rstrip(".")
 
 
-def in_all_forms(source, blocks):
+def in_all_forms(source, blocks, beside=()):
     """Tell a record on a page; give the text of each form, one line for each row of a table.
 
     Parameters
     ----------
     blocks : iterable of Block
         The answer of its command.
+    beside : iterable of Source
+        On the same page.
     """
-    sources = Sources([source], source.vehicle, Study().report)
+    sources = Sources([source, *beside], source.vehicle, Study().report)
     with ExitStack() as drawing:
         for module in [module for name, module in sys.modules.items() if name.startswith("cpfls_cli.pages.")]:
             if hasattr(module, "plot"):

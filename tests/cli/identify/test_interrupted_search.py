@@ -172,8 +172,8 @@ def test_stalled_search_ends_converged(cpfls, words, tmp_path):
     assert (summary["stop_reason"], summary["complete"], summary["generations"] < 6) == ("converged", True, True)
     assert names(tmp_path) == ["model.h5"]
     lines = cpfls(*words, "-o", tmp_path / "told.h5", *stall).stdout.splitlines()
-    assert lines[1] == (
+    assert (
         f"converged after generation {summary['generations']}: no objective improved enough "
         "(identification.stall_generations = 1)"
-    )
+    ) in lines
     assert "converged" not in cpfls(*words, "-o", tmp_path / "whole.h5").stdout

@@ -194,7 +194,7 @@ def test_inertia_curves_and_verdicts_stand_side_by_side(compared, write):
     labels = [series["label"] for series in panel["series"]]
     assert {"one.h5", "two.h5", "rigid body", "95 % band of one.h5", "95 % band of two.h5"} == set(labels)
     rows = named(blocks, "comparison-1")["rows"]
-    assert [row[1] for row in rows] == ["do not use", "new", "—", ""]
+    assert [row[1] for row in rows] == ["do not use", "new", "not judged", ""]
 
 
 def test_differences_are_found_at_every_depth_and_long_values_are_cut():
