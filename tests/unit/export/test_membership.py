@@ -134,8 +134,8 @@ def test_the_learned_part_of_a_vehicle(airflow, form, tmp_path):
         require_gcc()
     model, still = airflow.model, np.zeros_like(airflow.air)
     rotor = np.eye(1, 1 + 4 * model.rotors).repeat(len(still), axis=0)
-    vehicle = model if form == "library" else FORMS[form](tmp_path, model)
-    torque = vehicle.table.wrench(airflow.air, still, rotor)[:, 0]
+    vehicle = model.table if form == "library" else FORMS[form](tmp_path, model)
+    torque = vehicle.wrench(airflow.air, still, rotor)[:, 0]
     np.testing.assert_allclose(torque, airflow.expected, rtol=0, atol=1e-12)
 
 

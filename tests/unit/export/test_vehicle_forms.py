@@ -245,7 +245,8 @@ def test_references_of_json_are_what_it_says(exports):
         )
         assert np.max(np.abs(exported.wrench(air[None], rate[None], rotor[None])[0] - wanted) / scale) < ALLOWED
     run = exported.document["reference_runs"][0]
-    found = MODELS["harmonic"].response.terms_by_step(np.array(run["speed"]), exported.document["period_s"], "linear")[-2]
+    response, period = MODELS["harmonic"].response, exported.document["period_s"]
+    found = response.terms_by_step(np.array(run["speed"]), period, "linear")[-2]
     np.testing.assert_allclose(found, run["rotor"], rtol=0, atol=1e-9)
 
 
