@@ -19,6 +19,7 @@ pin_threads()
 
 import numpy as np
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.playback.loop import loop_bounds
 from cpfls_cli.playback.model import VehicleModel
 from tests.builders.gusty_flights import CALM, GUSTS, LARGE, SMALL, STORM, Flight, gusty_flights
@@ -46,8 +47,8 @@ def main(draws: int) -> None:
                 low, high = (np.array([getattr(each, end) for each in found]) for end in ("low", "high"))
                 inside = (low <= 1 + ROUNDING) & (high >= 1 - ROUNDING)
                 seen = np.isfinite(low)
-                explained = np.nanmedian([each.explained for each in found], axis=0)
-                ends = [f"{np.nanmedian(low[:, k]):.2f} to {np.nanmedian(high[:, k]):.2f}" for k in range(3)]
+                explained = np.median([each.explained[:2] for each in found], axis=0)
+                ends = [_ends(low[:, axis], high[:, axis]) for axis in range(3)]
                 rows.append(
                     [
                         name,
@@ -61,6 +62,12 @@ def main(draws: int) -> None:
                 )
     header = ["vehicle", "gusts, rad/s²", "loop, rad/s", "Ixx", "Iyy", "Izz", "explained", "truth inside", "loop shown"]
     print(table(header, rows))
+
+
+def _ends(low: Array, high: Array) -> str:
+    """Give the medians of bounds; a dash where no draw shows the axis."""
+    seen = np.isfinite(low)
+    return f"{np.median(low[seen]):.2f} to {np.median(high[seen]):.2f}" if seen.any() else "—"
 
 
 if __name__ == "__main__":
