@@ -32,34 +32,30 @@ ROUNDING = 0.005
 
 
 def main(draws: int) -> None:
+    sets = [(name, gusts, loop) for name in VEHICLES for gusts in (CALM, GUSTS, STORM) for loop in BANDWIDTHS]
+    pairs = [(draw, path) for draw in range(draws) for path in (2 * draw, 2 * draw + 1)]
+    # All at once: a step of many flights takes hardly longer than one of a few.
+    flown = gusty_flights(
+        [Flight(VEHICLES[name], gusts, path, draw, loop) for name, gusts, loop in sets for draw, path in pairs]
+    )
     rows = []
-    for name, truth in VEHICLES.items():
-        for gusts in (CALM, GUSTS, STORM):
-            for bandwidth in BANDWIDTHS:
-                flights = [
-                    Flight(truth, gusts, path=2 * draw + k, draw=draw, bandwidth=bandwidth)
-                    for draw in range(draws)
-                    for k in (0, 1)
-                ]
-                flown = list(gusty_flights(flights))
-                model = VehicleModel(vehicle=truth.vehicle)
-                found = [loop_bounds(model, flown[2 * draw : 2 * draw + 2]) for draw in range(draws)]
-                low, high = (np.array([getattr(each, end) for each in found]) for end in ("low", "high"))
-                inside = (low <= 1 + ROUNDING) & (high >= 1 - ROUNDING)
-                seen = np.isfinite(low)
-                explained = np.median([each.explained[:2] for each in found], axis=0)
-                ends = [_ends(low[:, axis], high[:, axis]) for axis in range(3)]
-                rows.append(
-                    [
-                        name,
-                        ", ".join(f"{gust:g}" for gust in gusts),
-                        f"{bandwidth:g}",
-                        *ends,
-                        f"{explained[0]:.2f}, {explained[1]:.2f}",
-                        f"{int(inside[seen].sum())} of {int(seen.sum())}",
-                        f"{sum(each.shows_loop for each in found)} of {draws}",
-                    ]
-                )
+    for name, gusts, loop in sets:
+        model = VehicleModel(vehicle=VEHICLES[name].vehicle)
+        found = [loop_bounds(model, [next(flown), next(flown)]) for _ in range(draws)]
+        low, high = (np.array([getattr(each, end) for each in found]) for end in ("low", "high"))
+        seen, inside = np.isfinite(low), (low <= 1 + ROUNDING) & (high >= 1 - ROUNDING)
+        explained = np.median([each.explained[:2] for each in found], axis=0)
+        rows.append(
+            [
+                name,
+                ", ".join(f"{gust:g}" for gust in gusts),
+                f"{loop:g}",
+                *(_ends(low[:, axis], high[:, axis]) for axis in range(3)),
+                f"{explained[0]:.2f}, {explained[1]:.2f}",
+                f"{int(inside[seen].sum())} of {int(seen.sum())}",
+                f"{sum(each.shows_loop for each in found)} of {draws}",
+            ]
+        )
     header = ["vehicle", "gusts, rad/s²", "loop, rad/s", "Ixx", "Iyy", "Izz", "explained", "truth inside", "loop shown"]
     print(table(header, rows))
 
