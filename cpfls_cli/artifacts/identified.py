@@ -290,7 +290,8 @@ class IdentifiedRecord(ModelRecord):
     @property
     def trust(self) -> str:
         """How far to trust it by its verdict, a word of `Trust`; of a file by a newer program possibly another."""
-        return (self.verdict and self.verdict.label) or Trust.NOT_JUDGED
+        label = self.verdict and self.verdict.label
+        return Trust.NOT_JUDGED if label is None else label
 
     @property
     def validated(self) -> bool:

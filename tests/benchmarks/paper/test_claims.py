@@ -278,9 +278,10 @@ def test_ranking_by_quantity_beside_a_classical_one():
 
 
 @pytest.mark.parametrize(("torque", "passes"), [(np.cos, True), (np.sin, True), (np.asarray, False)])
-def test_torque_goes_on_across_a_full_turn(torque, passes):
+def test_torque_goes_on_across_a_full_turn(torque, passes, monkeypatch):
     functions = SimpleNamespace(torque=lambda motion: torque(motion.attitude))
-    record = SimpleNamespace(functions=SimpleNamespace(inertia=lambda: functions))
+    monkeypatch.setattr("benchmarks.paper.claims.inertia_functions", lambda _: functions)
+    record = SimpleNamespace(functions=None)
     model = SimpleNamespace(record=record, label="m.h5", config={"identification": {"structure": "cpfls"}})
     measured = CONTINUITY_CLAIM.measure(SimpleNamespace(models=[model]))
     assert (measured.verdict == ClaimVerdict.PASS) == passes
