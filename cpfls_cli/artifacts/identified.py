@@ -290,8 +290,7 @@ class IdentifiedRecord(ModelRecord):
     @property
     def trust(self) -> str:
         """How far to trust it by its verdict, a word of `Trust`; of a file by a newer program possibly another."""
-        label = self.verdict and self.verdict.label
-        return Trust.NOT_JUDGED if label is None else label
+        return Trust.NOT_JUDGED if self.verdict is None or self.verdict.label is None else self.verdict.label
 
     @property
     def validated(self) -> bool:
