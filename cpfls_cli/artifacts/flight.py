@@ -409,7 +409,9 @@ class FlightRecord(Record):
         estimate = report.delay
         names = [name for name in cls.signal_names() if name not in SETPOINTS]
         signals = {name: values for name in names if (values := getattr(flight, name)) is not None}
-        setpoints = {name: flight.setpoints[short] for name, short in SETPOINTS.items() if short in flight.setpoints}
+        setpoints: dict[str, Any] = {
+            name: flight.setpoints[short] for name, short in SETPOINTS.items() if short in flight.setpoints
+        }
         if "setpoint_thrust" in setpoints:
             setpoints["setpoint_thrust"] = setpoints["setpoint_thrust"][:, 0]
         return cls(
