@@ -13,6 +13,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record, rows_of
 
 if TYPE_CHECKING:
+    from cpfls_cli.simulation.room_left import RoomLeft
     from cpfls_cli.trajectory.legs import Leg
     from cpfls_cli.trajectory.planning import PlannedRotation
     from cpfls_cli.trajectory.settings import ExciteSettings
@@ -73,19 +74,17 @@ class ExcitedGroup:
         asked: ExciteSettings,
         flown: PlannedRotation,
         without: PlannedRotation,
-        crest: Sequence[float],
-        size: float,
-        limit: str,
+        room: RoomLeft,
     ) -> Self:
-        """Arrange what an excitation of a size (rad) and of crest factors by axis adds to a path."""
+        """Arrange what an excitation adds to a path."""
         added = {name: vars(flown)[name] - vars(without)[name] for name in ("attitude", "position", "acceleration")}
         return cls(
             axis=asked.axes,
-            crest=np.array(crest),
+            crest=np.array(room.added.crest),
             signal=asked.signal,
             band=np.array(asked.band_hz),
-            size=size,
-            limit=limit,
+            size=room.added.size,
+            limit=room.limit,
             **added,
         )
 

@@ -241,17 +241,17 @@ def trajectory(
 ) -> None:
     """Plan a smooth path, full rotations that excite a model, or the flight that settles a diagnosis."""
     with messages_for_errors():
-        missions = _of("mission")
-        added = missions.Added(repeat, excite, None if signal is None else signal.value, band, size, hover)
-        asked = _of("trajectory").option_overrides(waypoints, to_tell, diagnosis, box, height, duration)
+        options = _of("path-options")
+        added = options.Added(repeat, excite, None if signal is None else signal.value, band, size, hover)
+        asked = options.option_overrides(waypoints, to_tell, diagnosis, box, height, duration)
         asked += added.overrides(waypoints, to_tell is not None or diagnosis is not None, duration)
         common = replace(common, overrides=[*(common.overrides or []), *asked])
 
     def call(command: Any, job: Job) -> Any:
-        mission = missions.mission_of(job.study, [each.value for each in form or []], home)
+        mission = _of("mission").mission_of(job.study, [each.value for each in form or []], home)
         if job.study.trajectory.path == "next-flight":
             return _of("next-flight").run(job, diagnosis, plot)
-        command.require_no_room(box, height)
+        options.require_no_room(box, height)
         added.require_axes(job.study)
         return command.run(job, waypoints, plot, mission)
 

@@ -1,10 +1,9 @@
-"""Files of a planned path for autopilots, beside its artifact; options of repeats and excitations."""
+"""Files of a planned path for autopilots, beside its artifact."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import radians
 from pathlib import Path
 
 from cpfls_cli.artifacts.job import Job
@@ -116,64 +115,3 @@ def write_mission(texts: dict[Path, str]) -> None:
     """Write files for autopilots."""
     for path, text in texts.items():
         write_text(path, text)
-
-
-@dataclass(frozen=True)
-class Added:
-    """Options of repeats and excitations; None where one is not given.
-
-    Attributes
-    ----------
-    axes, band : str or None
-        With commas between; band in Hz.
-    size : float or None
-        Degrees.
-    hover : float or None
-        Duration at one place, s.
-    """
-
-    repeat: int | None = None
-    axes: str | None = None
-    signal: str | None = None
-    band: str | None = None
-    size: float | None = None
-    hover: float | None = None
-
-    def overrides(self, waypoints: Path | None, settles: bool, duration: float | None) -> list[str]:
-        """Write the options as overrides of the config, ``section.key=value`` each.
-
-        Parameters
-        ----------
-        settles : bool
-            Whether the path is to settle a diagnosis or to tell effects apart.
-
-        Raises
-        ------
-        InputError
-            If a hover is asked for beside another path or a duration.
-        """
-        others = {
-            f"--waypoints {waypoints}": waypoints is not None,
-            "--to-tell and --for": settles,
-            f"--duration {duration}": duration is not None,
-        }
-        for other, given in others.items():
-            if given and self.hover is not None:
-                raise InputError(f"--hover {self.hover:g}: stays at one place for so long; leave out {other}")
-        values = {
-            "repeat": self.repeat,
-            "excite.axes": None if self.axes is None else f"[{self.axes}]",
-            "excite.signal": self.signal,
-            "excite.band_hz": None if self.band is None else f"[{self.band}]",
-            "excite.size_rad": None if self.size is None else repr(radians(self.size)),
-            "duration_s": None if self.hover is None else repr(float(self.hover)),
-            "path": None if self.hover is None else "hover",
-        }
-        return [f"trajectory.{key}={value}" for key, value in values.items() if value is not None]
-
-    def require_axes(self, study: Study) -> None:
-        """Refuse what describes an excitation where there is none."""
-        given = {"--signal": self.signal, "--band": self.band, "--size": self.size}
-        for option, value in given.items():
-            if value is not None and not study.trajectory.excite.axes:
-                raise InputError(f"{option} {value}: describes an excitation; say of what with --excite AXES")

@@ -125,63 +125,6 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False, mission: Mi
     return Outcome(summary | {"files": [str(path) for path in texts]}, tuple(blocks))
 
 
-def option_overrides(
-    waypoints: Path | None,
-    to_tell: str | None,
-    diagnosis: Path | None,
-    box: str | None,
-    height: float | None,
-    duration: float | None,
-) -> list[str]:
-    """Write the options as overrides of the config, so that the artifact's config has them too.
-
-    Parameters
-    ----------
-    to_tell : str or None
-        Names of effects, with commas between.
-    diagnosis : Path or None
-        Whose open questions the path settles.
-    box : str or None
-        Three lengths in m, with commas between.
-    height, duration : float or None
-        m and s.
-
-    Returns
-    -------
-    list of str
-        ``section.key=value`` each.
-
-    Raises
-    ------
-    InputError
-        If points to fly to are given for a flight that is to be planned.
-    """
-    settles = to_tell is not None or diagnosis is not None
-    if settles and waypoints is not None:
-        raise InputError(f"--waypoints {waypoints}: --to-tell and --for choose the path themselves; leave it out")
-    next_flight = {
-        "to_tell": None if to_tell is None else f"[{to_tell}]",
-        "box_m": None if box is None else f"[{box}]",
-        "height_m": None if height is None else repr(float(height)),
-    }
-    path = "next-flight" if settles else "waypoints" if waypoints is not None else None
-    return [
-        *([] if path is None else [f"trajectory.path={path}"]),
-        *(f"trajectory.next_flight.{key}={value}" for key, value in next_flight.items() if value is not None),
-        *([] if duration is None else [f"trajectory.duration_s={float(duration)!r}"]),
-    ]
-
-
-def require_no_room(box: str | None, height: float | None) -> None:
-    """Refuse room for a path that is not planned for it."""
-    for option, value in (("--box", box), ("--height", height)):
-        if value is not None:
-            raise InputError(
-                f"{option} {value}: is room for the flight that --to-tell or --for plans, and this path is planned "
-                "without; give one of them, or set trajectory.displacement_m and trajectory.direction"
-            )
-
-
 def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:
     settings = study.trajectory
     if waypoints is not None:
@@ -206,24 +149,22 @@ def _flight(job: Job, settings: TrajectorySettings) -> Flight:
         )
     gravity = job.study.vehicle.gravity_m_s2
     plain = plan(settings, gravity)
-    added, room = None, RoomLeft(1.0, "")
+    room: RoomLeft | None = None
     if settings.excite.axes:
-        added = added_motion(settings.excite, plain, gravity)
-        room = room_left(plain, added, settings, job.study.vehicle)
+        room = room_left(plain, added_motion(settings.excite, plain, gravity), settings, job.study.vehicle)
     twice = replace(settings, repeat=min(settings.repeat, 2))
 
     def at(sample_time: float) -> PlannedRotation:
         finer = plan(replace(settings, sample_time_s=sample_time), gravity)
-        if settings.excite.axes:
-            finer = added_motion(settings.excite, finer, gravity).scaled(room.share).onto(finer, gravity)
+        if room is not None:
+            finer = added_motion(settings.excite, finer, gravity).of_size(room.added.size).onto(finer, gravity)
         return repeated(finer, twice, gravity)
 
     without = repeated(plain, settings, gravity)
-    if added is None:
+    if room is None:
         return Flight(without, at)
-    excited = repeated(added.scaled(room.share).onto(plain, gravity), settings, gravity)
-    size = room.share * settings.excite.size_rad
-    return Flight(excited, at, None, ExcitedGroup.of(settings.excite, excited, without, added.crest, size, room.limit))
+    excited = repeated(room.added.onto(plain, gravity), settings, gravity)
+    return Flight(excited, at, None, ExcitedGroup.of(settings.excite, excited, without, room))
 
 
 def _rotation(job: Job, settings: TrajectorySettings) -> tuple[RotationPath, Excitation | None]:

@@ -73,9 +73,9 @@ def _times(begins: Array) -> str:
 
 
 _SIGNALS = {
-    "multisine": "a multisine, each at frequencies of its own,",
-    "sweep-linear": "a linear sweep, one after the other,",
-    "sweep-logarithmic": "a logarithmic sweep, one after the other,",
+    "multisine": ("a multisine", ", each at frequencies of its own,"),
+    "sweep-linear": ("a linear sweep", ", one after the other,"),
+    "sweep-logarithmic": ("a logarithmic sweep", ", one after the other,"),
 }
 
 
@@ -89,8 +89,10 @@ def _excited_blocks(excited: ExcitedGroup) -> Iterator[Block]:
     of_vertical = f"of vertical as much acceleration as a tilt by {number(angle, 3)} degrees has"
     size = [f"{number(angle, 3)} degrees at most"] if tilts else []
     size += [of_vertical] if "vertical" in excited.axis else []
+    signal, apart = _SIGNALS[excited.signal]
+    apart = apart if len(excited.axis) > 1 else ""
     yield Text(
-        f"Excited: {joined(excited.axis)}, by {_SIGNALS[excited.signal]} from {low:g} to {high:g} Hz, "
+        f"Excited: {joined(excited.axis)}, by {signal}{apart} from {low:g} to {high:g} Hz, "
         f"{', '.join(size)}, at equal rates in the band (crest factor {crest}){away}."
     )
     if excited.limit:

@@ -79,22 +79,22 @@ def rotor_load(planned: Mapping[str, Array], vehicle: VehicleSettings) -> RotorL
 
 @dataclass(frozen=True)
 class RoomLeft:
-    """Share of an excitation that fits beside its path, and what limits it.
+    """Excitation that fits beside its path, and what limits it.
 
     Attributes
     ----------
-    share : float
-        Up to 1.
+    added : AddedMotion
+        Of the size asked for, or smaller.
     limit : str
         The limit that more would break, with its key; empty where all fits.
     """
 
-    share: float
+    added: AddedMotion
     limit: str
 
 
 def room_left(path: Trajectory, added: AddedMotion, settings: TrajectorySettings, vehicle: VehicleSettings) -> RoomLeft:
-    """Find the largest share of an excitation that keeps tilt, rotors and its velocity within their limits.
+    """Find the largest size of an excitation, up to its own, that keeps tilt, rotors and velocity within limits.
 
     Rotors keep some of what they have for control, unless the path alone already takes more.
 
@@ -111,20 +111,20 @@ def room_left(path: Trajectory, added: AddedMotion, settings: TrajectorySettings
     alone = rotor_load(vars(path), vehicle)
     whole = _exceeded(path, added, settings, vehicle, alone)
     if not whole:
-        return RoomLeft(1.0, "")
+        return RoomLeft(added, "")
     low, high, limit = 0.0, 1.0, whole
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        exceeded = _exceeded(path, added.scaled(middle), settings, vehicle, alone)
+        exceeded = _exceeded(path, added.of_size(middle * added.size), settings, vehicle, alone)
         low, high, limit = (low, middle, exceeded) if exceeded else (middle, high, limit)
     if low < _LEAST_SHARE:
-        degrees = np.degrees(low * settings.excite.size_rad)
+        degrees = np.degrees(low * added.size)
         raise SettingError(
             "excite.size_rad",
             f"leaves room for {degrees:.2g} degrees only: {limit}; lower the top of excite.band_hz, fly a gentler "
-            "path, or ask for that size",
+            "path, or ask for less",
         )
-    return RoomLeft(low, limit)
+    return RoomLeft(added.of_size(low * added.size), limit)
 
 
 def _exceeded(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import ceil, comb, tan
 
 import numpy as np
@@ -30,6 +31,12 @@ _LEAST_LINES = 5
 _LEAST_PERIODS = 4.0
 """Of the lowest frequency, that a sweep of one axis takes at least."""
 
+_RESOLUTION = 32
+"""Samples in a period of the fastest wave, where a peak is looked for."""
+
+_CLIPPINGS, _CLIPPED_AT = 100, 0.8
+"""Steps that lower a crest factor, and the share of the peak at which each clips."""
+
 _STEADY_YAW = 0.01
 """Change of yaw in rad from which on roll and pitch are no directions in space."""
 
@@ -44,17 +51,21 @@ class AddedMotion:
         Position and its derivatives up to the pop.
     heading : array, shape (3, time), rad and s
         Yaw, its rate and its acceleration.
+    size : float, rad
+        Largest tilt that it asks for in hover about each axis, and largest yaw.
     crest : tuple of float
         Crest factor of each excited axis, peak over root mean square between the fades.
     """
 
     motion: Array
     heading: Array
+    size: float
     crest: tuple[float, ...]
 
-    def scaled(self, share: float) -> AddedMotion:
-        """Make it smaller or larger."""
-        return replace(self, motion=share * self.motion, heading=share * self.heading)
+    def of_size(self, size: float) -> AddedMotion:
+        """Make it smaller or larger; the size in rad."""
+        motion, heading = tan(size) / tan(self.size) * self.motion, size / self.size * self.heading
+        return replace(self, motion=motion, heading=heading, size=size)
 
     def onto(self, path: Trajectory, gravity: float) -> Trajectory:
         """Add it to a path, which it was made for.
@@ -107,7 +118,7 @@ def added_motion(settings: ExciteSettings, path: Trajectory, gravity: float) -> 
             heading += settings.size_rad * signal[:3]
         else:
             motion += gravity * tan(settings.size_rad) * signal[:, :, None] * _direction(axis, float(path.yaw[0]))
-    return AddedMotion(motion, heading, tuple(crest))
+    return AddedMotion(motion, heading, settings.size_rad, tuple(crest))
 
 
 def _refuse_turning(settings: ExciteSettings, path: Trajectory) -> None:
@@ -161,14 +172,14 @@ def lines_of(settings: ExciteSettings, number: int, duration: float) -> IntArray
         least = _LEAST_LINES * axes / (high - low)
         raise SettingError(
             "excite.band_hz",
-            f"holds {len(lines)} whole numbers of periods in {duration:.4g} s, too few for {axes} "
-            f"{'axis' if axes == 1 else 'axes'}; widen it, or fly {least:.3g} s or longer",
+            f"has {len(lines)} of the frequencies whose periods fit {duration:.4g} s, and a multisine needs "
+            f"{_LEAST_LINES} for each axis; widen it, or fly {least:.3g} s or longer",
         )
     return lines[number::axes]
 
 
 def multisine(order: IntArray, duration: float, time: Array, lift: int = 0) -> Array:
-    """Evaluate a sum of cosines of amplitudes as 1/f, with phases that keep its peak low.
+    """Evaluate a sum of cosines of amplitudes as 1/f, with phases of a low crest factor.
 
     Parameters
     ----------
@@ -183,15 +194,9 @@ def multisine(order: IntArray, duration: float, time: Array, lift: int = 0) -> A
     -------
     array, shape (7, time)
         The signal, of peak 1 before it is integrated, and six derivatives.
-
-    References
-    ----------
-    Schroeder 1970, Synthesis of low-peak-factor signals and binary sequences with low autocorrelation, IEEE
-    Transactions on Information Theory 16: ``phase_k = -2 pi sum_(j < k) (k - j) p_j`` for shares of power p.
     """
     amplitude = 1.0 / order
-    power = amplitude**2 / (amplitude**2).sum()
-    phase = -2 * np.pi * np.concatenate([[0.0], np.cumsum(np.cumsum(power))[:-1]])
+    phase = _phases(tuple(order.tolist()))
     once = np.exp(1j * (2 * np.pi / duration * np.multiply.outer(_period(order, duration), order) + phase))
     peak = np.abs((once @ amplitude).real).max()
     frequency = 2 * np.pi / duration * order
@@ -202,9 +207,37 @@ def multisine(order: IntArray, duration: float, time: Array, lift: int = 0) -> A
     return values
 
 
+@lru_cache(maxsize=32)
+def _phases(order: tuple[int, ...]) -> Array:
+    """Choose phases of a low crest factor: Schroeder's, improved by clipping the peaks and keeping the amplitudes.
+
+    References
+    ----------
+    Schroeder 1970, Synthesis of low-peak-factor signals and binary sequences with low autocorrelation, IEEE
+    Transactions on Information Theory 16: ``phase_k = -2 pi sum_(j < k) (k - j) p_j`` for shares of power p.
+    Van der Ouderaa, Schoukens and Renneboog 1988, Peak factor minimization using a time-frequency domain swapping
+    algorithm, IEEE Transactions on Instrumentation and Measurement 37.
+    """
+    lines = np.array(order)
+    count = _RESOLUTION * order[-1]
+    amplitude = 1.0 / lines
+    power = amplitude**2 / (amplitude**2).sum()
+    phase = best = -2 * np.pi * np.concatenate([[0.0], np.cumsum(np.cumsum(power))[:-1]])
+    lowest = np.inf
+    for _ in range(_CLIPPINGS):
+        spectrum = np.zeros(count // 2 + 1, dtype=complex)
+        spectrum[lines] = amplitude * np.exp(1j * phase)
+        values = np.fft.irfft(spectrum)
+        peak = float(np.abs(values).max())
+        if peak < lowest:
+            lowest, best = peak, phase
+        phase = np.angle(np.fft.rfft(np.clip(values, -_CLIPPED_AT * peak, _CLIPPED_AT * peak))[lines])
+    return best
+
+
 def _period(order: IntArray, duration: float) -> Array:
     """Divide the duration of a multisine so that its fastest wave is resolved, s."""
-    count = 32 * int(order[-1])
+    count = _RESOLUTION * int(order[-1])
     times: Array = duration / count * np.arange(count, dtype=np.float64)
     return times
 
@@ -290,6 +323,6 @@ def _crest(settings: ExciteSettings, number: int, duration: float) -> float:
         values = multisine(order, duration, _period(order, duration))[0]
     else:
         length = duration / len(settings.axes)
-        count = 32 * ceil(settings.band_hz[1] * length)
+        count = _RESOLUTION * ceil(settings.band_hz[1] * length)
         values = sweep(settings, length, length / count * np.arange(count, dtype=np.float64))[0]
     return float(np.abs(values).max() / np.sqrt(np.mean(values**2)))

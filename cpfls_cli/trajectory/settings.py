@@ -82,7 +82,7 @@ class ExciteSettings(Settings):
     signal: Annotated[
         Literal["multisine", "sweep-linear", "sweep-logarithmic"],
         Doc(
-            "multisine: all axes at once, each at frequencies of its own, phases after Schroeder; sweep-linear, "
+            "multisine: all axes at once, each at frequencies of its own, of a low crest factor; sweep-linear, "
             "sweep-logarithmic: one frequency after another, axis after axis"
         ),
     ] = "multisine"
