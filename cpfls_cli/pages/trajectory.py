@@ -58,7 +58,7 @@ def _runs_blocks(runs: RunsGroup) -> Iterator[Block]:
     yield Text(
         f"The path is flown {len(runs.begin)} times, each run the same from rest to rest: {plain(runs.end[0])} s each, "
         f"{plain(between)} s between two to come back to the start and settle, {plain(runs.end[-1])} s "
-        f"({plain(runs.end[-1] / _MINUTE, 2)} min) in all. Runs begin at {_times(runs.begin)} s."
+        f"({runs.end[-1] / _MINUTE:.1f} min) in all. Runs begin at {_times(runs.begin)} s."
     )
     yield Text(
         "What every run shows again was asked for by the path; what differs between them is gusts and noise. The other "

@@ -143,10 +143,10 @@ def _exceeded(
         return f"tilt (trajectory.tilt_max_rad = {most:g})"
     load = rotor_load(flown, vehicle)
     if load.fast > max(1.0, alone.fast):
-        share = f"{ROTOR_SHARE:.0%} of the square of vehicle.rotor_speed_max_rad_s"
+        share = f"{100 * ROTOR_SHARE:.0f} % of the square of vehicle.rotor_speed_max_rad_s"
         return f"rotor speed ({share} = {vehicle.rotor_speed_max_rad_s:g})"
     return (
-        f"rotor speed ({1 - ROTOR_SHARE:.0%} of the square in hover, at least)"
+        f"rotor speed ({100 * (1 - ROTOR_SHARE):.0f} % of the square in hover, at least)"
         if load.slow > max(1.0, alone.slow)
         else ""
     )

@@ -61,7 +61,7 @@ def test_the_largest_speed_is_named():
     hover = float(np.sqrt(hover_squared(USUAL).max()))
     weak = replace(USUAL, rotor_speed_max_rad_s=1.15 * hover)
     _, _, _, room = of(weak, size_rad=0.1)
-    assert room.limit == f"rotor speed (85% of the square of vehicle.rotor_speed_max_rad_s = {1.15 * hover:g})"
+    assert room.limit == f"rotor speed (85 % of the square of vehicle.rotor_speed_max_rad_s = {1.15 * hover:g})"
 
 
 def test_next_to_no_room_is_refused():
