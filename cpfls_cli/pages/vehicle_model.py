@@ -73,6 +73,9 @@ _FLIGHTS = {
 }
 """What would tell a constant that the flights do not."""
 
+WHAT_TO_FLY = "cpfls trajectory CONFIG --hover 30 --excite roll,pitch --repeat 4 -o mission.h5"
+"""Plans what tells the vehicle from the loop."""
+
 _FAR = 3.0
 """Factor from the stated number from which on a found one is called effective, and no property of a part."""
 
@@ -185,7 +188,8 @@ def loop_words(record: VehicleRecord) -> str:
         f"These flights show the loop, not the vehicle: torque explains {shares}. An autopilot that answers gusts, or "
         f"an effect that is missing here, makes a body look heavier or lighter than it is: {times} what was found. "
         "What follows is a forecast of vehicle and autopilot together. Fly in still air, with faster and larger turns "
-        "of roll and pitch, until torque explains 90 %."
+        "of roll and pitch, until torque explains 90 %, and the same several times: "
+        f"{WHAT_TO_FLY}"
     )
 
 
