@@ -33,8 +33,8 @@ _MOTION_HZ = 5.0
 """Below which a vehicle follows anything; above there is the noise of sensors."""
 
 _HELD_S = 0.1
-_TIMES = 3.0
-"""As large or as small as what is measured that a setpoint may be: loops follow with an error, not with a factor."""
+_TIMES, _TIMES_BY_WORDS = 3.0, 1.6
+"""As large or as small as what is measured that a setpoint may be; a loop follows with an error, not with a factor."""
 
 _FULL = 1.05
 """Share of full deflection, or of the largest thrust, up to which one is believed."""
@@ -228,9 +228,10 @@ def _by_motion(own: _Candidate, fit: "_Following") -> _Judged:
         units = _UNITS[own.signal]
         unit = min(units, key=lambda each: abs(np.log(gain / known_unit(each).factor)))
         mapped, gain = replace(mapped, unit=unit), gain / known_unit(unit).factor
-    if not 1 / _TIMES < gain < _TIMES:
+    most = _TIMES if own.known else _TIMES_BY_WORDS
+    if not 1 / most < gain < most:
         return _Judged(
-            None, f"{', '.join(columns)}: {own.called}; the {what} is {gain:.2g} times as large, so no unit fits"
+            None, f"{', '.join(columns)}: {own.called}; the {what} is {gain:.2g} times as large, which no unit makes"
         )
     if opposed:
         mapped = replace(mapped, sign=tuple(-1.0 if against else 1.0 for against in fit.opposed))
@@ -338,7 +339,9 @@ class _Following:
             Of both, Hz.
         """
         smooth = slow(measured, rate_hz, _MOTION_HZ)
-        tried = [_at_delay(smooth, asked, round(late * rate_hz)) for late in _LATE_S]
+        edge = (len(asked) - len(smooth)) // 2
+        within = asked[edge : edge + len(smooth)]
+        tried = [_at_delay(smooth, within, round(late * rate_hz)) for late in _LATE_S]
         return max(tried, key=lambda own: float(np.sum(np.abs(own.along))))
 
 
