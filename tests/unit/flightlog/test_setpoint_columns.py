@@ -253,6 +253,7 @@ def test_columns_with_a_word_for_a_wish(own, asked, word):
         "setpoint_body_rate": "rad/s",
         "setpoint_thrust": "N",
     }
+    assert {own.sure for own in known.values()} == ({"guess", "named"} if "ref" in word else {"data", "named"})
     # No wish is a measurement.
     measured = {
         column for guess in proposal.signals if guess.signal not in SETPOINTS for column in guess.columns.columns
