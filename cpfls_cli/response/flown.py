@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -17,11 +18,11 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import Hold, RotorResponse
 from cpfls_cli.playback.table import rotor_weights
-from cpfls_cli.response.mismatch import Mismatch, mismatch
+from cpfls_cli.response.mismatch import ROTOR_SPEED, Mismatch, mismatch
 from cpfls_cli.response.spectra import Channel, FrequencyResponse, Stretch, frequency_response
 
 ROTATION = ("roll", "pitch", "yaw")
-THRUST, ROTOR_SPEED = "thrust", "rotor speed"
+THRUST = "thrust"
 
 Instruments = Callable[[Sequence[Array]], Sequence[Array | None]]
 """Gives the instruments of each flight, shape (time, column), NaN where there are none, for the inputs of all flights.
@@ -120,7 +121,7 @@ def _of_flight(model: VehicleModel, flight: LoggedFlight) -> dict[str, list[Stre
 def _of_part(model: VehicleModel, flight: LoggedFlight, part: Signals) -> Iterator[tuple[str, Stretch]]:
     signals = model.repaired(part)
     model.require(signals, flight.name)
-    acting = model.acting(signals)
+    acting = _in_air(model, model.acting(signals))
     rotors, wrench = _of_rotors(model, signals, flight.hold), model.wrench_along(acting)
     turning = _acceleration(model, acting, wrench[:, :3])
     for axis, name in enumerate(ROTATION):
@@ -143,6 +144,14 @@ def _speeds(model: VehicleModel, command: Array, period: float) -> Array | None:
         return None
     hold = model.hold or "previous"
     return np.asarray(lagged(delayed(command, response.delay_s / period, hold), response.lag_s / period, hold).start)
+
+
+def _in_air(model: VehicleModel, signals: Signals) -> Signals:
+    """Take the air for still where a model depends on it and the flight does not know it."""
+    if not model.table.feels_air or {"velocity", "attitude"} <= signals.available:
+        return signals
+    none = np.zeros((len(signals), 3))
+    return replace(signals, velocity=none, attitude=none if signals.attitude is None else signals.attitude)
 
 
 def _of_rotors(model: VehicleModel, signals: Signals, hold: Hold) -> Array:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.response.spectra import FrequencyResponse
+
+if TYPE_CHECKING:
+    # Who reads what was found waits for nothing that finds it.
+    from cpfls_cli.response.spectra import FrequencyResponse
+
+ROTOR_SPEED = "rotor speed"
+"""Name of the response of the rotors' speeds to their commands."""
 
 COHERENT = 0.6
 """Coherence above which a response is judged (Tischler and Remple)."""

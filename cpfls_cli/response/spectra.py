@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import ceil, floor, log10
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +40,7 @@ _BLOCKS_BESIDE = 2
 """Blocks of half a window: windows of those further away have no sample in common."""
 _RIDGE = 1e-6
 """Share of the power of a column of instruments, so that two equal ones leave something to solve."""
+_ROUNDING = 1e-9
 _TINY = np.finfo(float).tiny
 
 
@@ -154,8 +156,9 @@ def frequency_response(stretches: Sequence[Stretch], period: float) -> Frequency
         return None
     top = min(_OF_SAMPLING / period, _HIGHEST_HZ)
     lowest = max(_PERIODS / (lengths[-1] * period), _LOWEST_HZ)
-    grid = np.arange(np.ceil(_PER_DECADE * np.log10(lowest)), _PER_DECADE * np.log10(top) + 1e-9)
-    frequency = 10.0 ** (grid / _PER_DECADE)
+    # Numbers of one scale for all flights, so that curves of several can be put side by side.
+    steps = range(ceil(_PER_DECADE * log10(lowest) - _ROUNDING), floor(_PER_DECADE * log10(top) + _ROUNDING) + 1)
+    frequency = np.array([10.0 ** (step / _PER_DECADE) for step in steps])
     if not len(frequency):
         return None
     found = [_spectra(usable, period, length, frequency, instrumented) for length in lengths]
@@ -251,7 +254,7 @@ def _spectra(
     stretches: Sequence[Stretch], period: float, length: int, frequency: Array, instrumented: bool
 ) -> _Spectra:
     """Average over windows of one length, where it tells a frequency."""
-    told = frequency >= _PERIODS / ((length - 1) * period) * (1 - 1e-9)
+    told = frequency >= _PERIODS / ((length - 1) * period) * (1 - _ROUNDING)
     analysis = _Analysis.of(length, period, frequency[told])
     long = [stretch for stretch in stretches if len(stretch.input) >= length]
     u = np.concatenate([analysis.of_values(stretch.input) for stretch in long])
