@@ -16,7 +16,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import find_objects
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 
 _LENGTHS = 5
 """Windows of so many lengths, from the shortest to the longest by equal ratios."""
@@ -26,8 +26,8 @@ _FEWEST_SAMPLES = 16
 """Of a window: fewer do not follow its curve."""
 _FEWEST_WINDOWS = 5
 """Lengths of the longest window that all flights together have: fewer say nothing of the error."""
-_PERIODS = 2.0
-"""Of a frequency in the windows that tell it: within fewer a Hann window does not tell it from a drift."""
+_PERIODS, _FEWEST_PERIODS = 8.0, 2.0
+"""Of a frequency in the windows that tell it, and in the longest: within fewer, lower ones leak in by some per cent."""
 _OVERLAP = 0.75
 _PER_DECADE = 24
 _LOWEST_HZ = 0.1
@@ -155,13 +155,19 @@ def frequency_response(stretches: Sequence[Stretch], period: float) -> Frequency
     if not lengths:
         return None
     top = min(_OF_SAMPLING / period, _HIGHEST_HZ)
-    lowest = max(_PERIODS / (lengths[-1] * period), _LOWEST_HZ)
+    lowest = max(_FEWEST_PERIODS / ((lengths[-1] - 1) * period), _LOWEST_HZ)
     # Numbers of one scale for all flights, so that curves of several can be put side by side.
     steps = range(ceil(_PER_DECADE * log10(lowest) - _ROUNDING), floor(_PER_DECADE * log10(top) + _ROUNDING) + 1)
     frequency = np.array([10.0 ** (step / _PER_DECADE) for step in steps])
     if not len(frequency):
         return None
-    found = [_spectra(usable, period, length, frequency, instrumented) for length in lengths]
+    found = []
+    for length in lengths:
+        fewest = _FEWEST_PERIODS if length == lengths[-1] else _PERIODS
+        told = frequency >= fewest / ((length - 1) * period) * (1 - _ROUNDING)
+        if told.any():
+            analysis = _Analysis.of(length, period, frequency[told])
+            found.append(_spectra(usable, analysis, told, instrumented))
     return _of_spectra(frequency, _composite(found), instrumented)
 
 
@@ -250,12 +256,9 @@ class _Spectra(NamedTuple):
     averages: Array
 
 
-def _spectra(
-    stretches: Sequence[Stretch], period: float, length: int, frequency: Array, instrumented: bool
-) -> _Spectra:
-    """Average over windows of one length, where it tells a frequency."""
-    told = frequency >= _PERIODS / ((length - 1) * period) * (1 - _ROUNDING)
-    analysis = _Analysis.of(length, period, frequency[told])
+def _spectra(stretches: Sequence[Stretch], analysis: _Analysis, told: BoolArray, instrumented: bool) -> _Spectra:
+    """Average over windows of one length, at the frequencies that they tell."""
+    length = len(analysis.wave)
     long = [stretch for stretch in stretches if len(stretch.input) >= length]
     u = np.concatenate([analysis.of_values(stretch.input) for stretch in long])
     y = np.concatenate([analysis.of_channel(stretch.output) for stretch in long])
@@ -265,7 +268,7 @@ def _spectra(
     count = sum(analysis.independent((len(stretch.input) - length) // analysis.hop + 1) for stretch in long)
     whole = []
     for first, second in ((z, z), (z, u), (z, y), (u, u), (y, y), (u, y), (z, m)):
-        values = np.full(len(frequency), np.nan, dtype=complex)
+        values = np.full(len(told), np.nan, dtype=complex)
         values[told] = (first.conj() * second).mean(axis=0)
         whole.append(values)
     zz, zu, zy, uu, yy, uy, zm = whole
@@ -313,7 +316,7 @@ def _composite(found: Sequence[_Spectra]) -> _Spectra:
     # Where no length has a finite error all count alike.
     some = np.isfinite(least)
     weight = np.where(some, np.where(some, least, 1.0) / known, told) ** 8
-    weight = weight / weight.sum(axis=0)
+    weight = weight / np.maximum(weight.sum(axis=0), _TINY)
     joined = (np.where(weight > 0, weight * np.array(values), 0.0).sum(axis=0) for values in zip(*found, strict=True))
     return _Spectra(*joined)
 
