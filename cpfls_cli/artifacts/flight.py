@@ -11,6 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record
 from cpfls_cli.dynamics.rigid_body import not_positive_definite
+from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.regressor.motion import Motion
 
 if TYPE_CHECKING:
@@ -307,6 +308,63 @@ class FlightRecord(Record):
         units="SI",
         default=None,
     )
+    setpoint_position: Array | None = dataset(
+        "setpoint_position",
+        "position that was asked for; not finite where none was",
+        "time",
+        "axis",
+        units="m",
+        frame=WORLD,
+        gaps=True,
+        default=None,
+    )
+    setpoint_velocity: Array | None = dataset(
+        "setpoint_velocity",
+        "velocity that was asked for",
+        "time",
+        "axis",
+        units="m/s",
+        frame=WORLD,
+        gaps=True,
+        default=None,
+    )
+    setpoint_attitude: Array | None = dataset(
+        "setpoint_attitude",
+        "roll, pitch, yaw that were asked for",
+        "time",
+        "axis",
+        units="rad",
+        frame=EULER,
+        gaps=True,
+        default=None,
+    )
+    setpoint_body_rate: Array | None = dataset(
+        "setpoint_body_rate",
+        "body rates that were asked for",
+        "time",
+        "axis",
+        units="rad/s",
+        frame=BODY,
+        gaps=True,
+        default=None,
+    )
+    setpoint_thrust: Array | None = dataset(
+        "setpoint_thrust",
+        "thrust that was asked for: N, or share of the largest where import.signals.setpoint_thrust.unit is 1",
+        "time",
+        units="SI",
+        frame=BODY,
+        gaps=True,
+        default=None,
+    )
+    sticks: Array | None = dataset(
+        "sticks",
+        "roll, pitch, yaw and, where it counts alike, throttle of the pilot, shares of full deflection as logged",
+        "time",
+        "stick",
+        gaps=True,
+        default=None,
+    )
     quality: QualityGroup | None = group("quality", default=None)
     delay: DelayGroup | None = group("delay", default=None)
     noise: NoiseGroup | None = group("noise", default=None)
@@ -349,9 +407,16 @@ class FlightRecord(Record):
         """
         report = flight.report
         estimate = report.delay
-        signals = {name: values for name in cls.signal_names() if (values := getattr(flight, name)) is not None}
+        names = [name for name in cls.signal_names() if name not in SETPOINTS]
+        signals = {name: values for name in names if (values := getattr(flight, name)) is not None}
+        setpoints: dict[str, Any] = {
+            name: flight.setpoints[short] for name, short in SETPOINTS.items() if short in flight.setpoints
+        }
+        if "setpoint_thrust" in setpoints:
+            setpoints["setpoint_thrust"] = setpoints["setpoint_thrust"][:, 0]
         return cls(
             **signals,
+            **setpoints,
             quality=QualityGroup.of(findings, report.warnings, report.cut_off_hz),
             delay=DelayGroup(
                 value=report.delay_s,
@@ -376,6 +441,13 @@ class FlightRecord(Record):
     def signals(self) -> dict[str, Array]:
         """Time and the signals that it holds, by the names of the fields."""
         return {name: values for name in self.signal_names() if (values := getattr(self, name)) is not None}
+
+    @property
+    def setpoints_known(self) -> dict[str, int]:
+        """Count the samples at which each setpoint that it holds is known, by the names of `SETPOINTS`."""
+        held = {short: values for name, short in SETPOINTS.items() if (values := getattr(self, name)) is not None}
+        known = {name: np.isfinite(values.reshape(len(values), -1)).all(axis=1) for name, values in held.items()}
+        return {name: int(np.sum(own)) for name, own in known.items()}
 
     @property
     def motion(self) -> Motion:

@@ -63,5 +63,6 @@ def _summary(report: ImportReport, record: FlightRecord) -> dict[str, Any]:
         "saturated": dict(report.saturated),
         "delay_s": report.delay_s,
         "delay_r2": None if report.delay is None else [float(value) for value in report.delay.r2],
+        "setpoints": record.setpoints_known,
         "signals": [name for name in record.signals if name != "time"],
     }

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, TypeVar, cast
 
@@ -58,6 +58,11 @@ class Signals:
         Height of the ground in the world frame.
     wind : array, shape (3,), m/s, world frame, or None
         None for still air.
+    setpoints : mapping of str to array, shape (time, column)
+        What was asked of the autopilot and of its loops, where it is known at all samples: ``position`` and
+        ``velocity`` in the world frame, m and m/s; ``attitude`` as roll, pitch, yaw, rad; ``body_rate``, rad/s, body
+        frame; ``thrust``, one column, in N or as a share of the largest, as logged; ``sticks`` as roll, pitch, yaw,
+        throttle, shares of full deflection as logged. Each stays until the next sample.
     """
 
     time: Array
@@ -76,6 +81,7 @@ class Signals:
     voltage: Array | None = None
     ground_height_m: float = 0.0
     wind: Array | None = None
+    setpoints: Mapping[str, Array] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -263,9 +269,9 @@ class Signals:
 
 def stretch_of(signals: Signals, part: slice) -> Signals:
     """Take a part of a flight, with its clock."""
-    values: dict[str, Any] = {field.name: getattr(signals, field.name) for field in fields(signals)}
+    values: dict[str, Any] = {each.name: getattr(signals, each.name) for each in fields(signals)}
     cut: dict[str, Any] = {name: value[part] for name, value in values.items() if isinstance(value, np.ndarray)}
-    return replace(signals, **cut)
+    return replace(signals, **cut, setpoints={name: value[part] for name, value in signals.setpoints.items()})
 
 
 def fused(values: Array, rate: Array | None, period: float) -> Array:

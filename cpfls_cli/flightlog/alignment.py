@@ -103,7 +103,8 @@ def _shifted(signals: LogSignals, delay: float, speeds_command: bool) -> LogSign
             cut[name] = moved[first:]
     begin, end = signals.report.span_s
     report = replace(signals.report, samples=len(time), span_s=(begin + float(time[0]), end))
-    return replace(signals, time=time - time[0], report=report, **cut)
+    setpoints = {name: values[first:] for name, values in signals.setpoints.items()}
+    return replace(signals, time=time - time[0], report=report, setpoints=setpoints, **cut)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.repair import unwrap_angles
-from cpfls_cli.flightlog.settings import ROTORS, ColumnMap, ImportSettings, SignalMap
+from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, ColumnMap, ImportSettings, SignalMap
 from cpfls_cli.units import STANDARD_GRAVITY, to_si
 
 _SUFFICIENT_SIGNALS = ("attitude", "quaternion", "body_rate", "rotor_speed", "rotor_command")
@@ -206,6 +206,44 @@ def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) ->
         if "attitude" in converted:
             converted["acceleration"] = acceleration_from_specific_force(converted["attitude"], sensed)
     return converted
+
+
+def setpoints_to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) -> dict[str, Array]:
+    """Convert setpoints as what they are setpoints of.
+
+    Parameters
+    ----------
+    signals : mapping from signal name to array, shape (time, column), SI
+        Those of `SETPOINTS`, in the log's frames; NaN where nothing is asked for.
+    settings : ImportSettings
+        The frames and the order of a quaternion.
+
+    Returns
+    -------
+    dict from str to array, shape (time, column)
+        By the names that `SETPOINTS` gives: attitude as roll, pitch, yaw, also of a quaternion; thrust and sticks as
+        logged.
+    """
+    named = {short: signals[name] for name, short in SETPOINTS.items() if name in signals}
+    converted = dict(named)
+    converted |= {name: world_to_enu(named[name], settings.world_frame) for name in _WORLD_SIGNALS if name in named}
+    if "body_rate" in named:
+        converted["body_rate"] = body_to_flu(named["body_rate"], settings.body_frame)
+    if "attitude" in named:
+        converted["attitude"] = _attitude_asked(named["attitude"], settings)
+    return converted
+
+
+def _attitude_asked(values: Array, settings: ImportSettings) -> Array:
+    attitude = np.full((len(values), 3), np.nan)
+    known = np.isfinite(values).all(axis=1)
+    if known.any():
+        own = values[known]
+        if settings.signals["setpoint_attitude"].unit == "1":
+            own = attitude_from_quaternion(own, settings.quaternion_order)
+        angles = attitude_to_enu_flu(own, settings.body_frame, settings.world_frame)
+        attitude[known] = np.column_stack([unwrap_angles(angles[:, 0]), angles[:, 1], unwrap_angles(angles[:, 2])])
+    return attitude
 
 
 def _is_specific_force(name: str, settings: ImportSettings) -> bool:

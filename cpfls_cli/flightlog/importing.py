@@ -13,7 +13,12 @@ from cpfls_cli.errors import ComputationError, InputError, SettingError
 from cpfls_cli.flightlog.alignment import align_commands, apply_rotor_lag
 from cpfls_cli.flightlog.bandwidth import cut_offs, slow_signals, warn_of_cut_offs, warn_of_slow
 from cpfls_cli.flightlog.clock import longest_stretch
-from cpfls_cli.flightlog.conversion import drop_absent_signals, select_columns, to_program_frames
+from cpfls_cli.flightlog.conversion import (
+    drop_absent_signals,
+    select_columns,
+    setpoints_to_program_frames,
+    to_program_frames,
+)
 from cpfls_cli.flightlog.repair import (
     SignalTable,
     crop_and_order,
@@ -24,7 +29,7 @@ from cpfls_cli.flightlog.repair import (
     mask_values,
 )
 from cpfls_cli.flightlog.results import ImportedFlight, ImportReport, LogSignals
-from cpfls_cli.flightlog.settings import ImportSettings
+from cpfls_cli.flightlog.settings import SETPOINTS, ImportSettings
 from cpfls_cli.flightlog.smoothing import body_rate_of, derivative, low_pass
 from cpfls_cli.flightlog.stretches import (
     count_values,
@@ -35,6 +40,7 @@ from cpfls_cli.flightlog.stretches import (
     warn_of_rest,
     warn_of_values,
 )
+from cpfls_cli.flightlog.topics import hold_asked
 
 _STEEPEST_PITCH = pi / 2 - pi / 180
 _LARGEST_REFINEMENT = 10
@@ -43,6 +49,7 @@ _LARGEST_REFINEMENT = 10
 _SHORTEST_PERIOD_S = 1e-6
 _FASTEST_HZ = 40e3
 """Above the 32 kHz at which the fastest gyroscopes are read."""
+_ROUNDING = 1e-9
 _FEWEST_SAMPLES = 10
 """Of which a flight can be told."""
 
@@ -105,9 +112,12 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
         If columns are missing, too few signals are left, a gap is too long, the clock goes backward and stays
         behind, or the pitch is larger than any pitch.
     """
-    settings = drop_absent_signals(columns, settings)
-    read, broken = mask_impossible(SignalTable(*select_columns(columns, settings)), settings)
+    mapped = drop_absent_signals(columns, settings)
+    # What was asked for may be absent at any time: it decides on no row.
+    settings = replace(mapped, signals={name: own for name, own in mapped.signals.items() if name not in SETPOINTS})
+    read, broken = mask_impossible(SignalTable(*select_columns(columns, mapped)), mapped)
     table, dropped = crop_and_order(read, settings)
+    table, asked = _without_setpoints(table)
     table = make_continuous(table)
     spikes = find_signal_spikes(table, settings)
     repaired = table if settings.spike_deviations is None else mask_values(table, spikes)
@@ -119,6 +129,7 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
     clock, rate_hz = _uniform_clock(table.time)
     on_clock = {name: fill(table.time, values, clock) for name, values in repaired.signals.items()}
     refuse_steep_pitch(on_clock)
+    setpoints, unknown = _setpoints(asked, clock, mapped)
     steps = np.diff(table.time)
     slow = slow_signals(table)
     filtered = cut_offs(on_clock, rate_hz, slow)
@@ -146,9 +157,32 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
             *([f"{stretch.beyond_gap} rows beyond a gap are not used"] if stretch.beyond_gap else []),
             *_warn_of_clock(rate_hz, settings),
             *warn_of_angles(read.signals),
+            *unknown,
         ),
     )
-    return LogSignals(time=clock - clock[0], report=report, **to_program_frames(on_clock, settings))
+    return LogSignals(
+        time=clock - clock[0], setpoints=setpoints, report=report, **to_program_frames(on_clock, settings)
+    )
+
+
+def _without_setpoints(table: SignalTable) -> tuple[SignalTable, SignalTable]:
+    """Part what was measured or commanded from what was asked for."""
+    asked = {name: values for name, values in table.signals.items() if name in SETPOINTS}
+    others = {name: values for name, values in table.signals.items() if name not in SETPOINTS}
+    return SignalTable(table.time, others), SignalTable(table.time, asked)
+
+
+def _setpoints(asked: SignalTable, clock: Array, settings: ImportSettings) -> tuple[dict[str, Array], list[str]]:
+    """Put what was asked for on a clock; what is nowhere known is left out, with a sentence."""
+    held = {
+        name: np.column_stack([hold_asked(asked.time, column, clock, settings.gap_s) for column in values.T])
+        for name, values in asked.signals.items()
+    }
+    known = {name: values for name, values in held.items() if np.isfinite(values).all(axis=1).any()}
+    left = [
+        f"signal {name} is left out: nothing was asked for in the part that is kept" for name in held.keys() - known
+    ]
+    return setpoints_to_program_frames(known, settings), left
 
 
 def _uniform_clock(time: Array) -> tuple[Array, float]:
@@ -174,7 +208,7 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
     """Filter all signals alike and derive rates, accelerations and torques.
 
     One filter for every signal keeps the torque equation: its linear part holds between filtered signals as it did
-    between the raw ones. The result is interpolated to `rate_hz` last.
+    between the raw ones. The result is interpolated to `rate_hz` last. Setpoints stay as they were asked for.
 
     Parameters
     ----------
@@ -201,20 +235,22 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
     }
     smooth = replace(signals, **filtered)
     arrays = smooth.arrays | _derived(smooth)
-    time = smooth.time
+    time, setpoints = smooth.time, dict(smooth.setpoints)
     report = replace(signals.report, lowpass_hz=settings.lowpass_hz)
     if settings.rate_hz is not None:
         from scipy.interpolate import CubicSpline
 
         time = _clock(time, settings.rate_hz, report.log_rate_hz)
         arrays = {name: CubicSpline(smooth.time, values)(time) for name, values in arrays.items()}
+        previous = np.searchsorted(smooth.time, time * (1 + _ROUNDING), side="right") - 1
+        setpoints = {name: values[previous] for name, values in setpoints.items()}
         report = replace(
             report,
             rate_hz=settings.rate_hz,
             samples=len(time),
             warnings=report.warnings + _warn_of_aliasing(settings, report.log_rate_hz),
         )
-    return ImportedFlight(time=time, report=report, **arrays)
+    return ImportedFlight(time=time, setpoints=setpoints, report=report, **arrays)
 
 
 def _clock(time: Array, rate_hz: float, log_rate_hz: float) -> Array:

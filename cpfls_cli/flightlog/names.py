@@ -24,6 +24,7 @@ from cpfls_cli.flightlog.vocabulary import (
     RATE_WORDS,
     SECOND_HAND,
     SPELLINGS,
+    WISHED,
     Meaning,
 )
 from cpfls_cli.units import KNOWN_UNITS, UnitName
@@ -191,7 +192,7 @@ def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Na
         Kind of log, as its reader names it; empty where any may be meant.
     """
     found = [named for group in groups for named in (*_known_to_systems(group, system), *_by_words(group))]
-    if any(_is_of(system, known) for known in (PX4, ARDUPILOT, BETAFLIGHT)):
+    if any(is_of(system, known) for known in (PX4, ARDUPILOT, BETAFLIGHT)):
         # Of these logs all that drives rotors is in the list; words would find parameters and allocations.
         found = [named for named in found if named.known or named.signal not in (*ROTORS, "voltage")]
     best: dict[tuple[SignalName, tuple[str, ...]], Named] = {}
@@ -200,14 +201,14 @@ def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Na
     return tuple(best.values())
 
 
-def _is_of(system: str, known: str) -> bool:
+def is_of(system: str, known: str) -> bool:
     """Tell whether a log was written by a program or its kin."""
     return system.startswith((known, *KIN.get(known, ())))
 
 
 def _known_to_systems(group: ColumnGroup, system: str) -> Iterator[Named]:
     for rank, known in enumerate(KNOWN):
-        of_other = system and not _is_of(system, known.system)
+        of_other = system and not is_of(system, known.system)
         angles = known.signal != "attitude" or group.kind == "angles"
         # On its card a Crazyflie puts the name of an event before that of a variable.
         patterns = (group.pattern, group.pattern.partition(".")[2] if system.startswith(CRAZYFLIE) else "")
@@ -235,13 +236,49 @@ def _by_words(group: ColumnGroup) -> Iterator[Named]:
         if (squared and signal in ROTORS) or not _suits(meaning, group):
             continue
         stated = stated_unit(group, signal)
-        of_other = group.ending and stated is None and (len(group.ending.strip("_ ")) > 1 or group.ending == "_m")
-        if of_other or (NOT_MEASURED - ALLOWED.get(signal, frozenset())) & {*words}:
+        if _in_other_unit(group, stated) or (NOT_MEASURED - ALLOWED.get(signal, frozenset())) & {*words}:
             continue
         if _means(meaning, group, words):
             fast = any(signal in IN_RADIANS.get(word, ()) for word in words)
             usual: UnitName | None = "rad/s" if fast else "1" if signal == "quaternion" else None
             yield Named(signal, group, rank, *(stated or (usual, 1.0)))
+
+
+def _in_other_unit(group: ColumnGroup, stated: tuple[UnitName, float] | None) -> bool:
+    """Tell whether a name ends in a unit, and in none that is stated of a signal."""
+    return bool(group.ending) and stated is None and (len(group.ending.strip("_ ")) > 1 or group.ending == "_m")
+
+
+_SETPOINT_OF: Final[Mapping[SignalName, SignalName]] = {
+    "position": "setpoint_position",
+    "velocity": "setpoint_velocity",
+    "attitude": "setpoint_attitude",
+    "quaternion": "setpoint_attitude",
+    "body_rate": "setpoint_body_rate",
+    "thrust": "setpoint_thrust",
+}
+
+
+def wished_signals(groups: tuple[ColumnGroup, ...]) -> tuple[Named, ...]:
+    """List what groups of columns may be a setpoint of: a word says that it is one, the others what of."""
+    found = (named for group in groups for named in _wished(group))
+    return tuple(sorted(found, key=lambda named: named.rank))
+
+
+def _wished(group: ColumnGroup) -> Iterator[Named]:
+    words = tuple(word for word in group.words if word not in WISHED)
+    if len(words) == len(group.words):
+        return
+    before, _, after = group.pattern.partition("*")
+    pqr = group.kind == "angles" and group.columns[0].removeprefix(before).removesuffix(after) == "p"
+    for meaning in MEANINGS:
+        signal, stated = meaning.signal, stated_unit(group, meaning.signal)
+        ruled_out = (NOT_MEASURED - WISHED - ALLOWED.get(signal, frozenset())) & {*words}
+        if signal not in _SETPOINT_OF or ruled_out or not _suits(meaning, group) or _in_other_unit(group, stated):
+            continue
+        if signal == "body_rate" if pqr else _means(meaning, group, words):
+            usual: UnitName | None = "1" if signal == "quaternion" else None
+            yield Named(_SETPOINT_OF[signal], group, _BY_WORDS + len(words), *(stated or (usual, 1.0)))
 
 
 def stated_unit(group: ColumnGroup, signal: SignalName) -> tuple[UnitName, float] | None:

@@ -19,7 +19,8 @@ from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signa
 from cpfls_cli.flightlog.readings import Reading
 from cpfls_cli.flightlog.recognised import Recognition, Rival, Seen, called
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_rotors
-from cpfls_cli.flightlog.settings import ROTORS, SignalName
+from cpfls_cli.flightlog.setpoint_columns import tell_setpoints
+from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics
 from cpfls_cli.rounding import largest
 
@@ -95,6 +96,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     speeds, moved = _tell_rotors(seen, rotors)
     _tell_wrench(seen)
     _doubt_columns(seen)
+    tell_setpoints(seen, parameters, system)
     driving = rotors.speed or rotors.command
     return _gathered(seen, flown, speeds, moved, "" if driving is None else driving.kind)
 
@@ -254,6 +256,7 @@ def _doubt_columns(seen: Seen) -> None:
 def _gathered(seen: Seen, flown: Flown, speeds: Array | None, moved: MovedBy | None, kind: str) -> Recognition:
     log = seen.log
     signals = tuple(seen.guesses[name] for name in _ORDER if name in seen.guesses)
+    asked = tuple(seen.guesses[name] for name in SETPOINTS if name in seen.guesses)
     rates = {guess.signal: log.rate_hz(guess.columns.columns) for guess in signals}
     # An accelerometer is often logged faster than all that matters more.
     clocked = [guess for guess in signals if guess.signal not in ("voltage", "acceleration")] or list(signals)
@@ -271,7 +274,7 @@ def _gathered(seen: Seen, flown: Flown, speeds: Array | None, moved: MovedBy | N
     return Recognition(
         time_column=time_column,
         time_unit=unit,
-        signals=signals,
+        signals=(*signals, *asked),
         choices=tuple(seen.choices.values()),
         left_out=tuple(seen.left_out),
         flown=flown,

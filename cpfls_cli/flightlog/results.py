@@ -115,6 +115,9 @@ class LogSignals:
     rotor_speed : array, shape (time, rotor), rad/s, or None
     rotor_command : array, shape (time, rotor), SI unit of the signal's `unit`, or None
     voltage : array, shape (time,), V, or 1 as a share of the full battery's, or None
+    setpoints : mapping of str to array, shape (time, column)
+        What was asked for, by the names of `SETPOINTS`, neither shifted nor filtered; NaN where nothing was. Position,
+        velocity, attitude and body rate as those above; thrust in N or as a share, and sticks, as logged.
     """
 
     time: Array
@@ -129,12 +132,13 @@ class LogSignals:
     rotor_speed: Array | None = None
     rotor_command: Array | None = None
     voltage: Array | None = None
+    setpoints: Mapping[str, Array] = field(default_factory=dict)
     report: ImportReport = field(repr=False)
 
     @property
     def arrays(self) -> dict[str, Array]:
-        """Signals that there are, by name."""
-        names = sorted({entry.name for entry in fields(self)} - {"time", "report"})
+        """Signals that there are, by name, without the setpoints."""
+        names = sorted({entry.name for entry in fields(self)} - {"time", "setpoints", "report"})
         return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
 
 

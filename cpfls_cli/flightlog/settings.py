@@ -26,6 +26,12 @@ SignalName = Literal[
     "rotor_speed",
     "rotor_command",
     "voltage",
+    "setpoint_position",
+    "setpoint_velocity",
+    "setpoint_attitude",
+    "setpoint_body_rate",
+    "setpoint_thrust",
+    "sticks",
 ]
 UNITS_OF_SIGNAL: Final = MappingProxyType(
     {
@@ -42,12 +48,31 @@ UNITS_OF_SIGNAL: Final = MappingProxyType(
         "rotor_speed": ("rad/s",),
         "rotor_command": ("1", "s", "rad/s"),
         "voltage": ("V", "1"),
+        "setpoint_position": ("m",),
+        "setpoint_velocity": ("m/s",),
+        "setpoint_attitude": ("rad", "1"),
+        "setpoint_body_rate": ("rad/s",),
+        "setpoint_thrust": ("N", "1"),
+        "sticks": ("1",),
     }
 )
+SETPOINTS: Final[Mapping[SignalName, str]] = MappingProxyType(
+    {
+        "setpoint_position": "position",
+        "setpoint_velocity": "velocity",
+        "setpoint_attitude": "attitude",
+        "setpoint_body_rate": "body_rate",
+        "setpoint_thrust": "thrust",
+        "sticks": "sticks",
+    }
+)
+"""Signals that say what was asked of the autopilot and of its loops, and the name of each among the setpoints."""
 ROTORS: Final[tuple[SignalName, ...]] = ("rotor_speed", "rotor_command")
 """Signals with a column for each rotor."""
-_COLUMNS_OF_SIGNAL: Final = MappingProxyType({"quaternion": 4, "thrust": 1, "voltage": 1})
-_COLUMNS_OF_VECTOR = 3
+_COLUMNS_OF_SIGNAL: Final = MappingProxyType({"quaternion": 4, "thrust": 1, "voltage": 1, "setpoint_thrust": 1})
+_COLUMNS_OF_VECTOR, _COLUMNS_OF_QUATERNION = 3, 4
+_COLUMNS_OF_STICKS = (3, 4)
+"""Roll, pitch, yaw, and the throttle where it counts in the same way."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,6 +122,16 @@ class SignalMap(ColumnMap):
         return (self, *self.otherwise)
 
 
+def _expected_columns(name: SignalName, signal: SignalMap) -> int:
+    """Give the number of columns of a kind of signal; an attitude that is asked for may be a quaternion, in unit 1."""
+    given = len(signal.names)
+    if name in ROTORS or (name == "sticks" and given in _COLUMNS_OF_STICKS):
+        return given
+    if name == "setpoint_attitude" and signal.unit == "1":
+        return _COLUMNS_OF_QUATERNION
+    return _COLUMNS_OF_SIGNAL.get(name, _COLUMNS_OF_VECTOR)
+
+
 def _check_signal(name: SignalName, signal: SignalMap) -> None:
     """Check the number of columns and the unit against the kind of signal.
 
@@ -105,8 +140,7 @@ def _check_signal(name: SignalName, signal: SignalMap) -> None:
     SettingError
         Naming the key below the section `import`.
     """
-    fixed = None if name in ROTORS else _COLUMNS_OF_SIGNAL.get(name, _COLUMNS_OF_VECTOR)
-    expected = fixed or len(signal.names)
+    expected = _expected_columns(name, signal)
     # A flight keeps one unit of a signal, whichever columns it came from.
     kinds = UNITS_OF_SIGNAL[name]
     for number, choice in enumerate(signal.choices):
@@ -134,7 +168,9 @@ class ImportSettings(Settings):
     signals: Annotated[
         Mapping[SignalName, SignalMap], Doc("for each signal of the log: its columns and their unit")
     ] = field(default_factory=dict)
-    quaternion_order: Annotated[Literal["wxyz", "xyzw"], Doc("order of the quaternion's columns")] = "wxyz"
+    quaternion_order: Annotated[
+        Literal["wxyz", "xyzw"], Doc("order of the columns of quaternion, and of setpoint_attitude where it is one")
+    ] = "wxyz"
     body_frame: Annotated[Literal["FLU", "FRD"], Doc("body axes of the log; converted to FLU")] = "FLU"
     world_frame: Annotated[Literal["ENU", "NED"], Doc("world axes of the log; converted to ENU")] = "ENU"
     acceleration_frame: Annotated[
@@ -188,6 +224,8 @@ class ImportSettings(Settings):
             raise SettingError("crop_s", "needs 0 <= begin < end")
         for name, signal in self.signals.items():
             _check_signal(name, signal)
+        if self.signals and not self.signals.keys() - SETPOINTS.keys():
+            raise SettingError("signals", "holds setpoints alone; add what was measured, or commanded of the rotors")
         if self.signals:
             _check_attitude(self)
             _check_torque(self)

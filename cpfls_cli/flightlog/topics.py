@@ -12,14 +12,17 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.clock import increasing_rows
 from cpfls_cli.flightlog.conversion import columns_in_words, present_choices
 from cpfls_cli.flightlog.repair import align_quaternion_signs, unwrap_angles
-from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
+from cpfls_cli.flightlog.settings import SETPOINTS, ImportSettings, SignalMap
 from cpfls_cli.units import known_unit
 
 Topics = Mapping[str, Mapping[str, Array]]
 STAMP = "timestamp"
 """The field of a topic that holds its time stamps."""
-_SETPOINTS = ("torque", "body_torque", "thrust", "rotor_command")
+_COMMANDS = ("torque", "body_torque", "thrust", "rotor_command")
 _ANGLES_THAT_JUMP = (0, 2)
+_STEPS_HELD = 3
+"""Of its usual steps for which a setpoint stays: the next one may be lost, and behind two nobody asks for it."""
+
 _THINNED = 1.5
 """Times as fast that a topic has to be for its thinning to matter."""
 
@@ -38,9 +41,9 @@ def on_one_clock(
 ) -> tuple[dict[str, Array], ImportSettings, tuple[str, ...]]:
     """Put the mapped columns of all topics on the clock that `time_column` names; a flat log is on one already.
 
-    Between two samples a setpoint (torque, thrust, rotor command) keeps the previous value, and what is measured is
+    Between two samples a command (torque, thrust, of rotors) keeps the previous value, and what is measured is
     interpolated linearly, quaternions with one sign and roll and yaw without full turns. Inside a pause of a topic
-    longer than `gap_s` the values are absent.
+    longer than `gap_s` the values are absent. A setpoint is held as `hold_asked` does.
 
     Parameters
     ----------
@@ -103,7 +106,8 @@ def _with_clock(topics: Topics, settings: ImportSettings) -> ImportSettings:
         base, stamp = topic_and_field(settings.time_column)
         if len(topics.get(base, {}).get(stamp, ())) and stamp.startswith(STAMP):
             return settings
-    mapped = [topic_and_field(column)[0] for signal in settings.signals.values() for column in signal.columns]
+    clocked = [signal for name, signal in settings.signals.items() if name not in SETPOINTS]
+    mapped = [topic_and_field(column)[0] for signal in clocked for column in signal.columns]
     steps = {topic: _step(topics[topic][STAMP]) for topic in mapped if STAMP in topics.get(topic, {})}
     # Some topics have stamps that stand still.
     steps = {topic: step for topic, step in steps.items() if 0 < step < inf}
@@ -131,7 +135,10 @@ def _resampled(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Arra
     columns[str(settings.time_column)] = target.copy()
     used, warnings = {base}, []
     for name, signal in settings.signals.items():
-        unfit = None if signal.required else _unfit(signal, topics, clocks, base, settings)
+        asked = name in SETPOINTS
+        # A setpoint comes as seldom as it likes: it stays until the next one.
+        limit_s = inf if asked else settings.gap_s
+        unfit = None if signal.required else _unfit(signal, topics, clocks, base, limit_s)
         if unfit:
             warnings.append(f"signal {name} is left out: {unfit}")
             left = {".".join(topic_and_field(column)) for column in signal.columns} | {*signal.columns}
@@ -139,27 +146,28 @@ def _resampled(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Arra
             continue
         for column, values in _continuous(name, signal, topics).items():
             topic = topic_and_field(column)[0]
+            if asked:
+                columns[column] = hold_asked(clocks[topic], values, target, settings.gap_s)
+                continue
             used.add(topic)
             if topic != base:
                 if _step(clocks[topic]) > settings.gap_s:
-                    slow = _slowness(topic, clocks[topic], settings)
+                    slow = _slowness(topic, clocks[topic], settings.gap_s)
                     raise InputError(f"{slow}: raise import.gap_s, or leave its signals out of import.signals")
-                between = hold_previous if name in _SETPOINTS else interpolate
+                between = hold_previous if name in _COMMANDS else interpolate
                 values = between(clocks[topic], values, target, settings.gap_s)
             columns[column] = values
     return columns, (*warnings, *_warn_of_thinning(base, {topic: clocks[topic] for topic in sorted(used)}))
 
 
-def _unfit(
-    signal: SignalMap, topics: Topics, clocks: Mapping[str, Array], base: str, settings: ImportSettings
-) -> str | None:
+def _unfit(signal: SignalMap, topics: Topics, clocks: Mapping[str, Array], base: str, limit_s: float) -> str | None:
     """Say why a signal that a log may lack is as good as lacking in it; None if it is not."""
     parts = [topic_and_field(column) for column in signal.columns]
     values = [topics[topic][field] for topic, field in parts if field in topics.get(topic, {})]
     if values and not any(np.any(own[np.isfinite(own)]) for own in values):
         return "its columns are 0 or absent throughout"
-    slow = [topic for topic, _ in parts if topic != base and topic in clocks and _step(clocks[topic]) > settings.gap_s]
-    return _slowness(slow[0], clocks[slow[0]], settings) if slow else None
+    slow = [topic for topic, _ in parts if topic != base and topic in clocks and _step(clocks[topic]) > limit_s]
+    return _slowness(slow[0], clocks[slow[0]], limit_s) if slow else None
 
 
 def _continuous(name: str, signal: SignalMap, topics: Topics) -> dict[str, Array]:
@@ -178,11 +186,8 @@ def _continuous(name: str, signal: SignalMap, topics: Topics) -> dict[str, Array
     return existing
 
 
-def _slowness(topic: str, time: Array, settings: ImportSettings) -> str:
-    return (
-        f"topic {topic} has a sample only every {_step(time):.3g} s (median), longer than import.gap_s ="
-        f" {settings.gap_s:g}"
-    )
+def _slowness(topic: str, time: Array, gap_s: float) -> str:
+    return f"topic {topic} has a sample only every {_step(time):.3g} s (median), longer than import.gap_s = {gap_s:g}"
 
 
 def _warn_of_thinning(base: str, clocks: Mapping[str, Array]) -> tuple[str, ...]:
@@ -229,6 +234,33 @@ def hold_previous(time: Array, values: Array, target: Array, longest_s: float) -
         return np.full(len(target), np.nan)
     previous = np.maximum(np.searchsorted(time, target, side="right") - 1, 0)
     return np.where(_bridged(time, target, longest_s), values[previous], np.nan)
+
+
+def hold_asked(time: Array, values: Array, target: Array, gap_s: float) -> Array:
+    """Hold what was asked for until it is asked for again, for three of its usual steps, and for `gap_s`, at most.
+
+    What comes before the first sample by no more than that has its value: the log began between two.
+
+    Parameters
+    ----------
+    time, values : array, shape (sample,)
+        Stamps, s, and values; those that are not finite are absent.
+    target : array, shape (row,), s
+        When values are wanted.
+    gap_s : float
+        Longest step between measurements that is bridged, s.
+
+    Returns
+    -------
+    array, shape (row,)
+        NaN where nothing is asked for.
+    """
+    time, values = _present(time, values)
+    if not len(time):
+        return np.full(len(target), np.nan)
+    held_s = max(gap_s, _STEPS_HELD * _step(time) if len(time) > 1 else 0.0) * _ROUNDING
+    previous = np.maximum(np.searchsorted(time, target, side="right") - 1, 0)
+    return np.where(np.abs(target - time[previous]) <= held_s, values[previous], np.nan)
 
 
 def _present(time: Array, values: Array) -> tuple[Array, Array]:

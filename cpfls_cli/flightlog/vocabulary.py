@@ -130,6 +130,76 @@ def _known(row: str) -> Known:
 KNOWN: Final = tuple(_known(row) for row in _KNOWN.splitlines() if row.strip() and "#" not in row)
 
 
+class KnownSetpoint(NamedTuple):
+    """Columns in which a kind of log holds what was asked for; the axes are those of what it measures."""
+
+    system: str
+    signal: SignalName
+    columns: tuple[str, ...]
+    unit: UnitName
+    scale: float
+    offset: float
+    sign: tuple[float, ...] | None
+
+
+_SETPOINTS: Final = """
+    # system, signal, columns, unit, factor and offset that make the unit of what is logged, signs
+    # What a controller is given comes before what it makes of it.
+    PX4         setpoint_position   trajectory_setpoint.position[{0,1,2}]       m      1       0   +
+    PX4         setpoint_position   trajectory_setpoint.{x,y,z}                 m      1       0   +
+    PX4         setpoint_position   vehicle_local_position_setpoint.{x,y,z}     m      1       0   +
+    PX4         setpoint_velocity   trajectory_setpoint.velocity[{0,1,2}]       m/s    1       0   +
+    PX4         setpoint_velocity   trajectory_setpoint.v{x,y,z}                m/s    1       0   +
+    PX4         setpoint_velocity   vehicle_local_position_setpoint.v{x,y,z}    m/s    1       0   +
+    PX4         setpoint_attitude   vehicle_attitude_setpoint.q_d[{0,1,2,3}]    1      1       0   +
+    PX4         setpoint_attitude   vehicle_attitude_setpoint.{roll,pitch,yaw}_body  rad  1    0   +
+    PX4         setpoint_body_rate  vehicle_rates_setpoint.{roll,pitch,yaw}     rad/s  1       0   +
+    # Along z, which points down.
+    PX4         setpoint_thrust     vehicle_rates_setpoint.thrust_body[{2}]     1      1       0   -
+    PX4         setpoint_thrust     vehicle_attitude_setpoint.thrust_body[{2}]  1      1       0   -
+    PX4         sticks              manual_control_setpoint.{roll,pitch,yaw,throttle}  1  1    0   +
+    PX4         sticks              manual_control_setpoint.{y,x,r,z}           1      1       0   +
+    ArduPilot   setpoint_position   PSC{N.DPN,E.DPE,D.DPD}                      m      1       0   +
+    ArduPilot   setpoint_position   PSC{N.TPN,E.TPE,D.TPD}                      m      1       0   +
+    ArduPilot   setpoint_velocity   PSC{N.DVN,E.DVE,D.DVD}                      m/s    1       0   +
+    ArduPilot   setpoint_velocity   PSC{N.TVN,E.TVE,D.TVD}                      m/s    1       0   +
+    ArduPilot   setpoint_attitude   ATT.Des{Roll,Pitch,Yaw}                     deg    1       0   +
+    ArduPilot   setpoint_body_rate  RATE.{R,P,Y}Des                             deg/s  1       0   +
+    # Pulses of 1500 us and 500 to each side.
+    ArduPilot   sticks              RCIN.C{1,2,4,3}                             1      1/500  -3   +
+    Betaflight  setpoint_body_rate  setpoint[{0,1,2}]                           deg/s  1       0   +
+    Betaflight  setpoint_thrust     setpoint[{3}]                               1      1/1000  0   +
+    # The throttle counts from 1000, and so in another way.
+    Betaflight  sticks              rcCommand[{0,1,2}]                          1      1/500   0   +
+    Crazyflie   setpoint_position   ctrltarget.{x,y,z}                          m      1       0   +
+    Crazyflie   setpoint_position   ctrltargetZ.{x,y,z}                         mm     1       0   +
+    Crazyflie   setpoint_velocity   ctrltarget.v{x,y,z}                         m/s    1       0   +
+    Crazyflie   setpoint_velocity   ctrltargetZ.v{x,y,z}                        mm/s   1       0   +
+    # A pitch is positive with the nose up, as in stabilizer.pitch.
+    Crazyflie   setpoint_attitude   ctrltarget.{roll,pitch,yaw}                 deg    1       0   +-+
+    Crazyflie   setpoint_attitude   controller.{roll,pitch,yaw}                 deg    1       0   +-+
+    Crazyflie   setpoint_body_rate  controller.{roll,pitch,yaw}Rate             deg/s  1       0   +-+
+"""
+
+
+def _known_setpoint(row: str) -> KnownSetpoint:
+    system, signal, pattern, unit, scale, offset, signs = row.split()
+    before, _, rest = pattern.partition("{")
+    axes, _, after = rest.partition("}")
+    columns = tuple(f"{before}{axis}{after}" for axis in axes.split(","))
+    sign = None if signs == "+" else tuple(1.0 if own == "+" else -1.0 for own in signs)
+    stated = next(own for own in get_args(UnitName) if own == unit)
+    name = cast("SignalName", signal)
+    return KnownSetpoint(system, name, columns, stated, float(Fraction(scale)), float(offset), sign)
+
+
+KNOWN_SETPOINTS: Final = tuple(
+    _known_setpoint(row) for row in _SETPOINTS.splitlines() if row.strip() and "#" not in row
+)
+WISHED: Final = _each("des desired sp setpoint setpoints ref reference target goal ctrltarget")
+"""Words of a name that say: what was asked for."""
+
+
 class Meaning(NamedTuple):
     """What words of a name mean a signal.
 

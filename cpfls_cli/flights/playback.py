@@ -17,6 +17,7 @@ from cpfls_cli.consistency.numbers import beyond_belief
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, ConfigError, CpflsError, InputError
 from cpfls_cli.flightlog.results import ImportedFlight
+from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flights.imported import imported
 from cpfls_cli.flights.recordings import (
     FEWEST,
@@ -152,10 +153,11 @@ def _require_control(study: Study) -> None:
 
 
 def _known(flight: ReadFlight, actuation: str, part: slice) -> dict[str, Array]:
-    """Cut out a stretch, with what is known in all of it."""
+    """Cut out a stretch, with what is known in all of it and what was asked for."""
     names = [name for name in ("time", *_STATE, actuation) if name in flight.signals]
     beside = [name for name in _BESIDE if name in flight.signals and np.isfinite(flight.signals[name][part]).all()]
-    return {name: flight.signals[name][part] for name in (*names, *beside)}
+    asked = [name for name in SETPOINTS if name in flight.signals]
+    return {name: flight.signals[name][part] for name in (*names, *beside, *asked)}
 
 
 def _warnings(flight: ReadFlight, stretches: Sequence[slice], signals: Signals) -> list[str]:

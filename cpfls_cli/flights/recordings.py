@@ -22,6 +22,7 @@ from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.results import ImportedFlight
+from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flightlog.smoothing import body_rate_of
 from cpfls_cli.flights.imported import commanded_speed, imported, log_findings
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
@@ -148,7 +149,7 @@ def signals_of(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
     Parameters
     ----------
     known : mapping of str to array
-        The stretch: time and signals, all known.
+        The stretch: time and signals, all known; setpoints that are not known in all of it are left out.
 
     Returns
     -------
@@ -176,12 +177,14 @@ def _of_motion(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
         rate = np.zeros((len(time), 3))
         notes = ("neither body rates nor attitude; taken as level and at rest, so only the balance is judged",)
     optional: dict[str, Any] = {name: known.get(name) for name in _LOGGED}
+    asked = {short: known[name] for name, short in SETPOINTS.items() if name in known}
     made = Signals(
         time=time,
         body_rate=rate,
         vehicle=study.vehicle,
         voltage=None if doubts_on_voltage(known, flight.units) else known.get("voltage"),
         ground_height_m=study.gap.ground_height_m,
+        setpoints={name: own.reshape(len(time), -1) for name, own in asked.items() if np.isfinite(own).all()},
         **optional,
     )
     return made, notes
@@ -224,10 +227,10 @@ def _known_part(flight: ReadFlight) -> tuple[dict[str, Array], tuple[str, ...]]:
 
 
 def all_known(signals: Mapping[str, Array]) -> BoolArray:
-    """Mark the samples at which every signal is known."""
+    """Mark the samples at which every signal is known; what was asked for may be absent."""
     count = len(signals["time"])
     known = np.ones(count, dtype=bool)
-    for values in signals.values():
+    for values in (values for name, values in signals.items() if name not in SETPOINTS):
         known &= np.isfinite(values.reshape(count, -1)).all(axis=1)
     return known
 

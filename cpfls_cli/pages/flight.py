@@ -93,7 +93,16 @@ def _facts(flight: Source[FlightRecord]) -> Iterator[tuple[str, str]]:
         if r2 is not None:
             told = f"estimated from this flight (pooled R² of the rigid body there {r2:.3f})"
         yield "Delay taken out", f"{1e3 * record.delay.value:.1f} ms of motion behind command, {told}"
+    if record.setpoints_known:
+        yield "Setpoints", ", ".join(_setpoints(record))
     yield "Noise added", _noise(flight)
+
+
+def _setpoints(record: FlightRecord) -> Iterator[str]:
+    """Name the setpoints; of one that is not known in all of the flight, say in how much of it."""
+    samples = len(record.time)
+    for name, known in record.setpoints_known.items():
+        yield name.replace("_", " ") + ("" if known == samples else f" (at {known} of {samples} samples)")
 
 
 def _noise(flight: Source[FlightRecord]) -> str:

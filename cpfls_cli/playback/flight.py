@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -33,6 +33,8 @@ class PlaybackFlight:
         Stated torque and force of a flight without rotor speeds, which are then 0.
     specific_force : array, shape (time, 3), m/s^2, body frame, or None
         Of an accelerometer.
+    setpoints : mapping of str to array, shape (time, column)
+        Those of `Signals` that are known in all stretches.
     group : str
         Configuration of the vehicle that flew it, where there are several; empty for the one of the config.
     """
@@ -47,6 +49,7 @@ class PlaybackFlight:
     has_position: bool = True
     wrench: Array | None = None
     specific_force: Array | None = None
+    setpoints: Mapping[str, Array] = field(default_factory=dict)
     group: str = ""
 
     def __len__(self) -> int:
@@ -162,6 +165,11 @@ def playback_flight(name: str, parts: Sequence[Signals], hold: Hold) -> Playback
         has_position=first.position is not None,
         wrench=None if first.rotor_speed is not None else _joined([part.wrench for part in parts]),
         specific_force=_joined(force) if len(force) == len(parts) else None,
+        setpoints={
+            name: _joined([part.setpoints[name] for part in parts])
+            for name in first.setpoints
+            if all(name in part.setpoints for part in parts)
+        },
     )
 
 

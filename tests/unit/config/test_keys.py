@@ -79,7 +79,7 @@ def test_the_commented_default_lists_the_values_below_the_line_on_the_key():
 
 def test_signals_come_with_their_names_units_and_an_example_that_is_a_study():
     comments = above("signals: {}")
-    assert all(name in " ".join(comments[1:3]) for name in get_args(SignalName))
+    assert all(name in " ".join(comments[1:4]) for name in get_args(SignalName))
     assert f"    one of '1', {', '.join(list(KNOWN_UNITS)[1:])}" in comments
     begin = next(number for number, line in enumerate(comments) if line.startswith("example"))
     example = "import:\n  signals:\n" + "\n".join(f"  {line}" for line in comments[begin + 1 :])

@@ -1,0 +1,357 @@
+"""What was asked of an autopilot: columns of setpoints and sticks, held against what was measured."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Final, Literal, get_args
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.flightlog.agreement import slow
+from cpfls_cli.flightlog.airframe import Parameters
+from cpfls_cli.flightlog.conversion import attitude_from_quaternion
+from cpfls_cli.flightlog.log_table import LogTable
+from cpfls_cli.flightlog.names import Named, column_groups, is_of, wished_signals
+from cpfls_cli.flightlog.recognised import Guess, Rival, Seen, Sure
+from cpfls_cli.flightlog.repair import unwrap_angles
+from cpfls_cli.flightlog.settings import SETPOINTS, UNITS_OF_SIGNAL, SignalMap, SignalName
+from cpfls_cli.flightlog.topics import hold_asked
+from cpfls_cli.flightlog.vocabulary import ARDUPILOT, CRAZYFLIE, KNOWN_SETPOINTS, KnownSetpoint
+from cpfls_cli.units import KNOWN_UNITS, UnitName, known_unit
+
+_FEWEST_SAMPLES = 20
+_FEWEST_COMPARED = 100
+"""Of the one clock, a second of flight."""
+
+_FOLLOWS = 0.6
+"""Correlation from which on what is measured follows what is asked for; of the negative, from which on it opposes."""
+
+_LATE_S = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)
+"""By which a vehicle follows, s."""
+
+_MOTION_HZ = 5.0
+"""Below which a vehicle follows anything; above there is the noise of sensors."""
+
+_HELD_S = 0.1
+_TIMES = 3.0
+"""As large or as small as what is measured that a setpoint may be: loops follow with an error, not with a factor."""
+
+_FULL = 1.05
+"""Share of full deflection, or of the largest thrust, up to which one is believed."""
+
+_UNITS: Final[dict[SignalName, tuple[UnitName, ...]]] = {
+    "setpoint_position": ("m", "mm"),
+    "setpoint_velocity": ("m/s", "mm/s"),
+    "setpoint_attitude": ("rad", "deg"),
+    "setpoint_body_rate": ("rad/s", "deg/s"),
+}
+"""What setpoints may be in where no name says it."""
+
+_RC_MAP: Final = ("RCMAP_ROLL", "RCMAP_PITCH", "RCMAP_YAW", "RCMAP_THROTTLE")
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """Columns that may be a setpoint.
+
+    Attributes
+    ----------
+    signal : str
+        Of `SETPOINTS`.
+    columns : SignalMap
+        As they would be mapped.
+    called : str
+        Why they may be, in words.
+    known : bool
+        Whether a kind of log is known for them, so that unit and signs are; else only words of the name say it.
+    states_unit : bool
+        Whether the unit is known.
+    """
+
+    signal: SignalName
+    columns: SignalMap
+    called: str
+    known: bool
+    states_unit: bool
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """A guess, or why there is none; and how many axes are followed."""
+
+    guess: Guess | None
+    why: str = ""
+    followed: int = 0
+
+
+def tell_setpoints(seen: Seen, parameters: Parameters, system: str) -> None:
+    """Take columns for setpoints that what was measured follows, and for sticks and thrust those of known logs.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Of the autopilot: the channels of its sticks.
+    system : str
+        What wrote the log; empty where that is not known.
+    """
+    candidates = [*_of_known_logs(seen.log, parameters, system), *_by_words(seen)]
+    for name in SETPOINTS:
+        judged = [_judged(seen, own) for own in candidates if own.signal == name and _changes(seen.log, own)]
+        taken = [own for own in judged if own.guess is not None]
+        best = max(taken, key=lambda own: own.followed, default=None)
+        if best is not None and best.guess is not None:
+            seen.guesses[name] = best.guess
+        else:
+            seen.left_out += [own.why for own in judged]
+
+
+# Candidates.
+
+
+def _of_known_logs(log: LogTable, parameters: Parameters, system: str) -> Iterator[_Candidate]:
+    # On its card a Crazyflie puts the name of an event before that of a variable.
+    events = tuple(f"{topic}." for topic in log.topics) if system.startswith(CRAZYFLIE) else ("",)
+    names = frozenset(log.names)
+    for row in KNOWN_SETPOINTS:
+        for event in () if system and not is_of(system, row.system) else events:
+            columns = tuple(f"{event}{column}" for column in _channels(row, parameters))
+            if names.issuperset(columns):
+                mapped = SignalMap(
+                    columns=columns,
+                    unit=row.unit,
+                    scale=row.scale,
+                    offset=row.offset,
+                    sign=row.sign,
+                    required=False,
+                )
+                called = f"a log of {row.system} calls it so"
+                yield _Candidate(row.signal, _in_stated_unit(log, row.signal, mapped), called, True, True)
+
+
+def _channels(row: KnownSetpoint, parameters: Parameters) -> tuple[str, ...]:
+    """Give the columns of a kind of log; of ArduPilot's sticks those of the channels that its parameters name."""
+    if row.system != ARDUPILOT or row.signal != "sticks":
+        return row.columns
+    stated = [parameters.get(name) for name in _RC_MAP]
+    given = zip(stated, row.columns, strict=True)
+    return tuple(usual if own is None else f"RCIN.C{int(float(own))}" for own, usual in given)
+
+
+def _in_stated_unit(log: LogTable, signal: SignalName, mapped: SignalMap) -> SignalMap:
+    """Let the unit that a log states win over the one that its kind is known for."""
+    stated = log.units.get(mapped.columns[0], "")
+    unit = next((own for own in get_args(UnitName) if own == stated), None)
+    if unit is None or KNOWN_UNITS[unit].si not in UNITS_OF_SIGNAL[signal] or len(mapped.columns) != 3:
+        return mapped
+    return replace(mapped, unit=unit, scale=1.0, offset=0.0)
+
+
+def _by_words(seen: Seen) -> Iterator[_Candidate]:
+    for named in wished_signals(column_groups(seen.log.names)):
+        columns, unit = _in_order(seen, named), named.unit
+        usual = next(iter(_UNITS.get(named.signal, ())), None)
+        if unit is None and usual is None:
+            seen.left_out.append(
+                f"{named.group.pattern}: looks like a thrust that is asked for, in no unit that is said"
+            )
+            continue
+        mapped = SignalMap(columns=columns, unit=unit or usual or "1", scale=named.scale, required=False)
+        mapped = _in_stated_unit(seen.log, named.signal, mapped)
+        known = unit is not None or mapped.columns[0] in seen.log.units
+        yield _Candidate(named.signal, mapped, f"called {named.group.pattern}", False, known)
+
+
+def _in_order(seen: Seen, named: Named) -> tuple[str, ...]:
+    """Give the columns in the order in which quaternions of the log are read."""
+    columns = named.group.columns
+    if named.group.kind == "wxyz" and _quaternion_order(seen) == "xyzw":
+        return (*columns[1:], columns[0])
+    return columns
+
+
+def _quaternion_order(seen: Seen) -> Literal["wxyz", "xyzw"]:
+    choice = seen.choices.get("quaternion_order")
+    return "xyzw" if choice is not None and choice.value == "xyzw" else "wxyz"
+
+
+def _changes(log: LogTable, own: _Candidate) -> bool:
+    values = [log.values((column,))[1] for column in own.columns.columns]
+    return all(len(one) >= _FEWEST_SAMPLES for one in values) and any(np.ptp(one) > 0 for one in values)
+
+
+# Judgement.
+
+
+def _judged(seen: Seen, own: _Candidate) -> _Judged:
+    asked = _asked(seen, own.columns)
+    if own.signal in ("setpoint_thrust", "sticks"):
+        return _by_range(own, asked)
+    measured = _measured(seen, own.signal)
+    columns = ", ".join(own.columns.columns)
+    if measured is None:
+        against = f"no {_words(own.signal)} is there to hold it against"
+        if not own.known:
+            return _Judged(None, f"{columns}: looks like a setpoint of the {_words(own.signal)}, and {against}")
+        return _Judged(_guess(own, own.columns, f"{own.called}; {against}", "named"))
+    if own.signal == "setpoint_attitude":
+        asked = _as_angles(seen, own, asked)
+    fit = _Following.of(measured, asked, seen.rate_hz)
+    if not fit.followed.any():
+        return _Judged(None, f"{columns}: looks like a setpoint of the {_words(own.signal)}, which does not follow it")
+    return _by_motion(own, fit)
+
+
+def _by_range(own: _Candidate, asked: Array) -> _Judged:
+    """Judge shares by their range; nothing that is measured is in their unit."""
+    columns, known = ", ".join(own.columns.columns), asked[np.isfinite(asked)]
+    if not len(known):
+        return _Judged(None, f"{columns}: {own.called}, and it is absent in flight")
+    largest = float(np.quantile(np.abs(known), 0.999))
+    what = "the largest thrust" if own.signal == "setpoint_thrust" else "full deflection"
+    if own.columns.unit == "1" and largest > _FULL:
+        return _Judged(None, f"{columns}: {own.called}, and reaches {largest:.3g} times {what}")
+    if own.signal == "setpoint_thrust" and not float(np.median(known)) > 0:
+        return _Judged(None, f"{columns}: {own.called}, and it does not lift")
+    unit = f"shares of {what}" if own.columns.unit == "1" else f"in {own.columns.unit}"
+    return _Judged(_guess(own, own.columns, f"{own.called}; {unit}, {largest:.2g} at most", "named"))
+
+
+def _by_motion(own: _Candidate, fit: "_Following") -> _Judged:
+    """Judge a setpoint that is followed: its unit by the size, its signs by the direction."""
+    columns, what = own.columns.columns, _words(own.signal)
+    axes = columns if len(columns) == len(fit.along) else ("roll", "pitch", "yaw")
+    opposed = [axis for axis, against in zip(axes, fit.opposed, strict=True) if against]
+    if opposed and (own.known or axes is not columns):
+        return _Judged(None, f"{', '.join(columns)}: {own.called}, and the {what} runs against {', '.join(opposed)}")
+    mapped, gain = own.columns, fit.gain
+    if not own.states_unit:
+        units = _UNITS[own.signal]
+        unit = min(units, key=lambda each: abs(np.log(gain / known_unit(each).factor)))
+        mapped, gain = replace(mapped, unit=unit), gain / known_unit(unit).factor
+    if not 1 / _TIMES < gain < _TIMES:
+        return _Judged(
+            None, f"{', '.join(columns)}: {own.called}; the {what} is {gain:.2g} times as large, so no unit fits"
+        )
+    if opposed:
+        mapped = replace(mapped, sign=tuple(-1.0 if against else 1.0 for against in fit.opposed))
+    share = f"{float(np.mean(np.abs(fit.along[fit.followed | fit.opposed]))):.2f}"
+    turned = f" with {', '.join(opposed)} reversed" if opposed else ""
+    size = "" if own.states_unit else f", in {mapped.unit} by its size"
+    loose = [axis for axis, not_told in zip(axes, fit.loose, strict=True) if not_told]
+    rivals = (Rival(f"leave {own.signal} out", f"{', '.join(loose)} is not followed"),) if loose else ()
+    reason = f"{own.called}; the {what} follows it{turned} (correlation {share}){size}"
+    sure: Sure = "guess" if loose else "data"
+    return _Judged(_guess(own, mapped, reason, sure, rivals), followed=int(fit.followed.sum()))
+
+
+def _guess(own: _Candidate, columns: SignalMap, reason: str, sure: Sure, rivals: tuple[Rival, ...] = ()) -> Guess:
+    return Guess(signal=own.signal, columns=columns, reason=reason, sure=sure, rivals=rivals)
+
+
+def _words(signal: SignalName) -> str:
+    return SETPOINTS[signal].replace("_", " ")
+
+
+def _asked(seen: Seen, columns: SignalMap) -> Array:
+    """Give the columns of a candidate in the part that is flown, as they would be mapped, in SI; NaN where absent."""
+    grid = seen.log.grid[seen.part]
+    held = []
+    for column in columns.columns:
+        time, values = seen.log.values((column,))
+        held.append(hold_asked(time, values[:, 0], grid, _HELD_S))
+    values = columns.scale * np.column_stack(held) + columns.offset
+    return np.asarray(known_unit(columns.unit).factor * np.asarray(columns.sign or 1.0) * values)
+
+
+def _measured(seen: Seen, signal: SignalName) -> Array | None:
+    """Give what a setpoint is one of in the part that is flown, in SI and the axes of the log."""
+    quaternion = seen.guesses.get("quaternion")
+    if signal == "setpoint_attitude" and quaternion is not None:
+        return attitude_from_quaternion(seen.mapped(quaternion), _quaternion_order(seen))
+    counterparts: dict[SignalName, SignalName] = {
+        "setpoint_position": "position",
+        "setpoint_velocity": "velocity",
+        "setpoint_attitude": "attitude",
+        "setpoint_body_rate": "body_rate",
+    }
+    guess = seen.guesses.get(counterparts[signal])
+    if guess is None:
+        return None
+    values = seen.mapped(guess)
+    return np.column_stack([unwrap_angles(v) for v in values.T]) if signal == "setpoint_attitude" else values
+
+
+def _as_angles(seen: Seen, own: _Candidate, asked: Array) -> Array:
+    """Give an attitude that is asked for as angles without jumps, in the unit that is stated."""
+    angles, known = np.full((len(asked), 3), np.nan), np.isfinite(asked).all(axis=1)
+    if known.any() and asked.shape[1] > angles.shape[1]:
+        known &= asked.any(axis=1)
+        angles[known] = attitude_from_quaternion(asked[known], _quaternion_order(seen))
+    elif known.any():
+        turn = 2 * np.pi if own.states_unit or float(np.nanmax(np.abs(asked))) < 4 * np.pi else 360.0
+        angles[known] = np.column_stack([unwrap_angles(v, turn) for v in asked[known].T])
+    return angles
+
+
+@dataclass(frozen=True)
+class _Following:
+    """How what is measured follows what was asked for, axis by axis.
+
+    Attributes
+    ----------
+    along : array, shape (3,)
+        Correlation; 0 where one of the two does not move.
+    moves : array of bool, shape (3,)
+        Whether the setpoint does.
+    gain : float
+        Measured over asked for, of the axes that are followed; of others that oppose, its size.
+    """
+
+    along: Array
+    moves: BoolArray
+    gain: float
+
+    @property
+    def followed(self) -> BoolArray:
+        """Axes that follow, shape (3,)."""
+        return np.asarray(self.along > _FOLLOWS, dtype=bool)
+
+    @property
+    def opposed(self) -> BoolArray:
+        """Axes that run the other way, shape (3,)."""
+        return np.asarray(self.along < -_FOLLOWS, dtype=bool)
+
+    @property
+    def loose(self) -> BoolArray:
+        """Axes that move and do neither, shape (3,)."""
+        return np.asarray(self.moves & (np.abs(self.along) <= _FOLLOWS), dtype=bool)
+
+    @classmethod
+    def of(cls, measured: Array, asked: Array, rate_hz: float) -> "_Following":
+        """Correlate what is measured with what was asked for some time before, as late as it follows best.
+
+        Parameters
+        ----------
+        measured, asked : array, shape (time, 3)
+            The latter NaN where nothing is.
+        rate_hz : float
+            Of both, Hz.
+        """
+        smooth = slow(measured, rate_hz, _MOTION_HZ)
+        tried = [_at_delay(smooth, asked, round(late * rate_hz)) for late in _LATE_S]
+        return max(tried, key=lambda own: float(np.sum(np.abs(own.along))))
+
+
+def _at_delay(measured: Array, asked: Array, steps: int) -> _Following:
+    late, earlier = measured[steps:], asked[: len(asked) - steps]
+    known = np.isfinite(earlier).all(axis=1)
+    if known.sum() < _FEWEST_COMPARED:
+        return _Following(np.zeros(3), np.zeros(3, dtype=bool), 1.0)
+    late, earlier = (own[known] - own[known].mean(axis=0) for own in (late, earlier))
+    spread, shared = (earlier**2).mean(axis=0), (late * earlier).mean(axis=0)
+    moves = np.asarray(spread > 1e-12 * max(float(spread.max()), 1e-12), dtype=bool)
+    size = np.sqrt(spread * (late**2).mean(axis=0))
+    along = np.where(moves & (size > 0), shared / np.where(size > 0, size, 1.0), 0.0)
+    told = np.abs(along) > _FOLLOWS
+    gain = float(np.abs(shared[told]).sum() / spread[told].sum()) if told.any() else 1.0
+    return _Following(along, moves, gain)
