@@ -73,7 +73,7 @@ class ResponseRecord(Record):
     name: tuple[str, ...] = dataset(
         "name",
         "roll, pitch, yaw: torque of the rotors to angular acceleration; thrust: to specific force along z; rotor "
-        "speed: from its command",
+        "speed: from its command; roll rate, roll angle and others alike: from its setpoint",
         "response",
     )
     frequency: Array = dataset(

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ANGULAR = "torque of the rotors to angular acceleration"
+_FOLLOWERS = (" rate", " angle")
+_BEHIND = 45.0
+"""Degrees: a first-order lag is so far behind at the frequency that is the inverse of its time."""
 _KINDS = {"thrust": "thrust of the rotors to specific force along z", "rotor speed": "command of the rotors to speed"}
 _UNITS = {"thrust": "m/s² per N", "rotor speed": "rad/s per rad/s"}
 _WORDS = {"good": "good", "acceptable": "acceptable", NOT_ACCEPTABLE: "not acceptable", NOT_JUDGED: "not judged"}
@@ -91,12 +94,25 @@ def _told(record: ResponseRecord, index: int) -> str:
         return f"{name}: not judged, no coherence above {COHERENT:g}"
     where = _span(low, high)
     if not np.isfinite(record.cost[index]):
-        return f"{name}: shown {where}; the model does not say what follows a command"
+        return f"{name}: {_behind(record, index)} {where}"
     parts = record.deviations(index)
     right = len(parts) == 1 and parts[0].right
     details = "right throughout" if right else ", ".join(map(_deviation, parts))
     of_loop = f"{word_of(word)}, " if record.is_of_vehicle(index) else "of the loop: "
     return f"{name}: {of_loop}J = {number(float(record.cost[index]), 3)} {where}; {details}"
+
+
+def _behind(record: ResponseRecord, index: int) -> str:
+    """Say from which frequency on a response without a model lags."""
+    low, high = record.band[index].tolist()
+    inside = (record.frequency >= low) & (record.frequency <= high) & np.isfinite(record.measured.phase[index])
+    phase = np.unwrap(record.measured.phase[index][inside], period=360)
+    late = np.flatnonzero(phase < -_BEHIND)
+    if not len(late):
+        return f"follows what is asked less than {_BEHIND:g}° behind"
+    around = slice(max(int(late[0]) - 1, 0), int(late[0]) + 1)
+    place = np.interp(_BEHIND, -phase[around], np.log(record.frequency[inside][around]))
+    return f"{_BEHIND:g}° behind what is asked at {number(float(np.exp(place)), 2)} Hz, seen"
 
 
 def word_of(word: str) -> str:
@@ -175,7 +191,7 @@ def _section(response: Source[ResponseRecord], index: int) -> Iterator[Block]:
 def bode_figure(name: str, record: ResponseRecord, row: int) -> Plot:
     """Draw one response: magnitude, phase and coherence over the logarithm of the frequency."""
     shown, title = record.coherent[row], record.name[row]
-    kind, unit = _KINDS.get(title, _ANGULAR), _UNITS.get(title, "rad/s² per N m")
+    kind, unit = _kind(title)
 
     def draw(figure: Figure) -> None:
         upper, middle, lower = figure.subplots(3, 1, sharex=True, height_ratios=(3, 3, 2))
@@ -203,6 +219,13 @@ def bode_figure(name: str, record: ResponseRecord, row: int) -> Plot:
         f"Grey: coherence below {COHERENT:g}, nothing to go by.{loop}"
     )
     return plot(name, caption, f"Bode plot of {title}: {kind}, measured and of the model", 5.6, draw)
+
+
+def _kind(name: str) -> tuple[str, str]:
+    """Say from what to what a response is, and in which unit."""
+    if name.endswith(_FOLLOWERS):
+        return f"setpoint to {name}, of vehicle and autopilot", "rad per rad"
+    return _KINDS.get(name, _ANGULAR), _UNITS.get(name, "rad/s² per N m")
 
 
 def _error(record: ResponseRecord, row: int, shown: BoolArray) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -24,7 +25,7 @@ from cpfls_cli.response.spectra import Channel, FrequencyResponse, Stretch, freq
 ROTATION = ("roll", "pitch", "yaw")
 THRUST = "thrust"
 
-Instruments = Callable[[Sequence[Array]], Sequence[Array | None]]
+InstrumentSource = Callable[[Sequence[Array]], Sequence[Array | None]]
 """Gives the instruments of each flight, shape (time, column), NaN where there are none, for the inputs of all flights.
 
 The inputs, shape (time,), are those of one response. Of repeats they are the instruments for each other; setpoints do
@@ -39,7 +40,8 @@ class VehicleResponse(NamedTuple):
     ----------
     name : str
         Roll, pitch and yaw: torque of the rotors to angular acceleration, body frame, in rad/s^2 per N m. Thrust: to
-        specific force along z, in m/s^2 per N. Rotor speed: command to speed, of all rotors together.
+        specific force along z, in m/s^2 per N. Rotor speed: command to speed, of all rotors together. Roll rate, roll
+        angle and others alike: setpoint to what follows it, of vehicle and autopilot.
     """
 
     name: str
@@ -53,7 +55,7 @@ def no_instruments(inputs: Sequence[Array]) -> Sequence[Array | None]:
 
 
 def vehicle_responses(
-    model: VehicleModel, flights: Sequence[LoggedFlight], instruments: Instruments = no_instruments
+    model: VehicleModel, flights: Sequence[LoggedFlight], instruments: InstrumentSource = no_instruments
 ) -> tuple[VehicleResponse, ...]:
     """Estimate all responses that flights show, with those of a model along the same flights.
 
@@ -68,7 +70,7 @@ def vehicle_responses(
     flights : sequence of LoggedFlight
         Of one sampling period.
     instruments : callable
-        See `Instruments`.
+        See `InstrumentSource`.
 
     Raises
     ------
@@ -81,7 +83,7 @@ def vehicle_responses(
         own = [parts[name] for parts in by_flight if name in parts]
         # Repeats are instruments for each other: a flight that lacks the response leaves the others without.
         if name != ROTOR_SPEED and len(own) == len(flights):
-            given = instruments([np.concatenate([part.input for part in parts]) for parts in own])
+            given = _alike(instruments([np.concatenate([part.input for part in parts]) for parts in own]))
             own = [_with_instrument(*pair) for pair in zip(own, given, strict=True)]
         found[name] = [part for parts in own for part in parts]
     period = flights[0].parts[0].period
@@ -94,6 +96,13 @@ def vehicle_responses(
             "too short for a frequency response; give longer flights"
         )
     return tuple(known)
+
+
+def _alike(given: Sequence[Array | None]) -> list[Array | None]:
+    """Keep the instruments of those flights that have as many as most: one estimate takes the same for all."""
+    columns = Counter(each.shape[1] for each in given if each is not None)
+    usual = max(columns, key=lambda number: (columns[number], number), default=0)
+    return [each if each is not None and each.shape[1] == usual else None for each in given]
 
 
 def _with_instrument(parts: Sequence[Stretch], instrument: Array | None) -> list[Stretch]:
@@ -135,6 +144,18 @@ def _of_part(model: VehicleModel, flight: LoggedFlight, part: Signals) -> Iterat
         for rotor, command in enumerate(signals.rotor_command.T):
             speed = Channel(signals.rotor_speed[:, rotor])
             yield ROTOR_SPEED, Stretch(command, speed, None if modelled is None else Channel(modelled[:, rotor]))
+    yield from _of_autopilot(signals)
+
+
+def _of_autopilot(signals: Signals) -> Iterator[tuple[str, Stretch]]:
+    """List what follows a setpoint, which no model of the vehicle alone says."""
+    followers = (("rate", "body_rate", signals.body_rate), ("angle", "attitude", signals.attitude))
+    for word, setpoint, measured in followers:
+        asked = signals.setpoints.get(setpoint)
+        if asked is not None and measured is not None:
+            # A heading goes round.
+            for axis, name in enumerate(ROTATION[: 3 if word == "rate" else 2]):
+                yield f"{name} {word}", Stretch(asked[:, axis], Channel(measured[:, axis]))
 
 
 def _speeds(model: VehicleModel, command: Array, period: float) -> Array | None:
