@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
-from cpfls_cli.response.mismatch import ACCEPTABLE, COHERENT, GOOD, ROTOR_SPEED, Deviation
+from cpfls_cli.response.mismatch import ACCEPTABLE, COHERENT, GOOD, ROTOR_SPEED, Deviation, clearness
 from cpfls_cli.rounding import at_most
 
 if TYPE_CHECKING:
@@ -192,7 +192,17 @@ class ResponseRecord(Record):
     @property
     def coherent(self) -> BoolArray:
         """Whether a response shows at a frequency, shape (response, frequency)."""
-        return np.asarray(self.coherence > COHERENT)
+        return np.asarray(self.clearness > COHERENT)
+
+    @property
+    def clearness(self) -> Array:
+        """The coherence that counts, shape (response, frequency); see `cpfls_cli.response.mismatch.clearness`."""
+        return np.array(
+            [
+                clearness(coherence, error, self.instrumented and name != ROTOR_SPEED)
+                for name, coherence, error in zip(self.name, self.coherence, self.random_error, strict=True)
+            ]
+        )
 
     def is_of_vehicle(self, index: int) -> bool:
         """Tell whether a response is of the vehicle: speeds that follow their command feel no gust."""

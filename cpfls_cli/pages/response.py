@@ -14,7 +14,7 @@ from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, ResponseRec
 from cpfls_cli.pages.gap import MEASURED
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.report.canvas import BASELINE, GREY, HELD, band, legend_over, plain_ticks, plot, style_of
+from cpfls_cli.report.canvas import BASELINE, GREY, HELD, band, legend_above, legend_over, plain_ticks, plot, style_of
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import joined, number, plain, sentence
 from cpfls_cli.response.mismatch import ACCEPTABLE, COHERENT, GOOD, Deviation
@@ -91,7 +91,7 @@ def _told(record: ResponseRecord, index: int) -> str:
     name, word = record.name[index], record.word(index)
     low, high = record.band[index].tolist()
     if not np.isfinite(low):
-        return f"{name}: not judged, no coherence above {COHERENT:g}"
+        return f"{name}: not judged, nowhere {_clear(record)}"
     where = _span(low, high)
     if not np.isfinite(record.cost[index]):
         return f"{name}: {_behind(record, index)} {where}"
@@ -156,11 +156,17 @@ def _table(record: ResponseRecord, index: int) -> Table:
         )
     caption = (
         f"Frequency responses of {joined(record.flown)} and of the model along the same flights. J adds up differences "
-        f"in decibels and degrees over the band of coherence above {COHERENT:g} (Tischler and Remple): up to {GOOD:g} "
-        f"is good, up to {ACCEPTABLE:g} acceptable."
+        f"in decibels and degrees over the band of {_clear(record)} (Tischler and Remple): up to {GOOD:g} is good, up "
+        f"to {ACCEPTABLE:g} acceptable."
     )
     header = ("Response", "J", "The model", "Band, Hz", "Coherence", "Random error, %")
     return Table(f"response-{index}", caption, header, rows, frozenset({0, 2}))
+
+
+def _clear(record: ResponseRecord) -> str:
+    """Say what a response has to have to be judged."""
+    averaged = ", or of a random error of less than 10 %" if record.instrumented else ""
+    return f"a coherence above {COHERENT:g}{averaged}"
 
 
 def _median(values: Array) -> str:
@@ -201,7 +207,9 @@ def bode_figure(name: str, record: ResponseRecord, row: int) -> Plot:
         middle.set_ylabel("degrees")
         lower.plot(record.frequency, record.coherence_output[row], label="output", **MEASURED)
         if record.is_of_vehicle(row) and record.instrumented:
-            lower.plot(record.frequency, record.coherence_input[row], label="input", **_MODEL)
+            lower.plot(record.frequency, record.coherence_input[row], label="input", **HELD)
+            lower.plot(record.frequency, record.clearness[row], label="by random error", **_MODEL)
+            legend_above(lower)
         lower.axhline(COHERENT, **BASELINE)
         lower.set_ylim(0.0, 1.05)
         lower.set_ylabel("coherence")
@@ -216,7 +224,7 @@ def bode_figure(name: str, record: ResponseRecord, row: int) -> Plot:
     loop = "" if record.is_of_vehicle(row) else " Without instruments: of vehicle and autopilot together."
     caption = (
         f"{title.capitalize()}: {kind}, of the vehicle with 95 % of its scatter, and of the model by the same windows. "
-        f"Grey: coherence below {COHERENT:g}, nothing to go by.{loop}"
+        f"Grey: outside {_clear(record)}; nothing to go by.{loop}"
     )
     return plot(name, caption, f"Bode plot of {title}: {kind}, measured and of the model", 5.6, draw)
 

@@ -21,6 +21,8 @@ COHERENT = 0.6
 ACCEPTABLE, GOOD = 100.0, 50.0
 """Costs up to which a model is acceptable and good (Tischler and Remple)."""
 
+_SURE_WINDOWS = 33
+"""With which a coherence of 0.6 leaves a random error of 10 %."""
 _MOST_POINTS = 20
 _FEWEST_POINTS = 4
 """Of a band that is judged: a sixth of a decade."""
@@ -64,7 +66,7 @@ class Mismatch(NamedTuple):
     cost : float
         J; NaN where there is no model or no band.
     band : tuple of (float, float), Hz, or None
-        Over which coherence is above 0.6; None where nowhere.
+        Over which the coherence that counts is above 0.6; None where nowhere.
     deviations : tuple of Deviation
         Of the band, from low to high; empty without a model.
     """
@@ -74,9 +76,25 @@ class Mismatch(NamedTuple):
     deviations: tuple[Deviation, ...]
 
 
+def clearness(coherence: Array, random_error: Array, instrumented: bool) -> Array:
+    """Give the coherence that counts: with instruments that of 33 windows with the same random error, where it is more.
+
+    What gusts add to a flight takes coherence away, however many repeats average them out; a coherence of 0.6 stands
+    for the random error of 10 % that it usually leaves. Without instruments it is the share that may be the loop's.
+
+    Parameters
+    ----------
+    coherence, random_error : array, shape (..., frequency)
+        See `FrequencyResponse`.
+    """
+    if not instrumented:
+        return coherence
+    return np.asarray(np.fmax(coherence, 1 / (1 + 2 * _SURE_WINDOWS * random_error**2)))
+
+
 def judged_band(response: FrequencyResponse) -> slice | None:
-    """Find the widest band of coherence above 0.6, in which it may dip for a point or two; None where there is none."""
-    clear = (response.coherence > COHERENT) & np.isfinite(response.gain)
+    """Find the widest band of `clearness` above 0.6, in which it may dip for a point or two; None for none."""
+    clear = (response.clearness > COHERENT) & np.isfinite(response.gain)
     if response.model is not None:
         clear &= np.isfinite(response.model)
     ends = np.flatnonzero(clear)
@@ -90,9 +108,9 @@ def judged_band(response: FrequencyResponse) -> slice | None:
 def mismatch(response: FrequencyResponse) -> Mismatch:
     """Compute ``J = 20 / n sum W ((d|G| in dB)^2 + 0.01745 (d arg G in degrees)^2)`` over the band that is judged.
 
-    ``W = (1.58 (1 - exp(-g^2)))^2`` with the coherence g^2, over at most 20 frequencies, evenly spread on a logarithmic
-    scale. A model is off where this sum, without W, is above 100 for one frequency alone, and by more than twice the
-    random error.
+    ``W = (1.58 (1 - exp(-g^2)))^2`` with the coherence g^2 that counts (`clearness`), over at most 20 frequencies,
+    evenly spread on a logarithmic scale. A model is off where this sum, without W, is above 100 for one frequency
+    alone, and by more than twice the random error.
 
     References
     ----------
@@ -108,7 +126,7 @@ def mismatch(response: FrequencyResponse) -> Mismatch:
     ratio = response.model[part] / response.gain[part]
     apart = _apart(ratio)
     chosen = np.unique(np.linspace(0, len(frequency) - 1, _MOST_POINTS).round().astype(int))
-    weight = (1.58 * (1 - np.exp(-response.coherence[part][chosen]))) ** 2
+    weight = (1.58 * (1 - np.exp(-response.clearness[part][chosen]))) ** 2
     cost = 20.0 * float((weight * apart[chosen]).mean())
     off = (20.0 * apart > ACCEPTABLE) & (np.abs(ratio - 1) > _SURE * response.random_error[part])
     return Mismatch(cost, band, tuple(_deviations(frequency, ratio, off)))

@@ -17,6 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import find_objects
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.response.mismatch import clearness
 
 _LENGTHS = 5
 """Windows of so many lengths, from the shortest to the longest by equal ratios."""
@@ -57,7 +58,8 @@ class Channel(NamedTuple):
     values: Array | None = None
     integral: Array | None = None
 
-    def __getitem__(self, part: slice) -> Channel:
+    def cut(self, part: slice) -> Channel:
+        """Take a part of it."""
         return Channel(*(None if each is None else each[part] for each in self))
 
 
@@ -120,6 +122,11 @@ class FrequencyResponse:
         """The smaller of both coherences, shape (frequency,): an estimate is no better than its weaker half."""
         return np.minimum(self.coherence_input, self.coherence_output)
 
+    @property
+    def clearness(self) -> Array:
+        """The coherence that counts, shape (frequency,)."""
+        return clearness(self.coherence, self.random_error, self.instrumented)
+
 
 def frequency_response(stretches: Sequence[Stretch], period: float) -> FrequencyResponse | None:
     """Estimate ``G = S_zy / S_zu`` over windows of five lengths, weighed at each frequency by their random errors.
@@ -176,14 +183,14 @@ def _known(stretch: Stretch, instrumented: bool) -> Iterator[Stretch]:
     if not instrumented:
         yield stretch
     elif stretch.instrument is not None:
-        known = np.isfinite(stretch.instrument).all(axis=1)
+        known: BoolArray = np.asarray(np.isfinite(stretch.instrument).all(axis=1))
         number = np.concatenate([[1], 1 + np.cumsum(known[1:] != known[:-1])]) * known
         for found in find_objects(number):
             if found is not None:
                 part = found[0]
-                model = None if stretch.model is None else stretch.model[part]
+                model = None if stretch.model is None else stretch.model.cut(part)
                 cut = stretch.instrument[part]
-                yield Stretch(stretch.input[part], stretch.output[part], model, cut, stretch.start + part.start)
+                yield Stretch(stretch.input[part], stretch.output.cut(part), model, cut, stretch.start + part.start)
 
 
 def _lengths(stretches: Sequence[Stretch], period: float) -> list[int]:

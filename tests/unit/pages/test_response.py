@@ -18,7 +18,7 @@ from tests.builders.forms import in_all_forms, phrases, source_of_record, words
 FREQUENCY = 10.0 ** (np.arange(-18, 29) / 24)
 
 
-def estimate(ratio=1.0, coherence=0.95, lag_s=0.0, model=True):
+def estimate(ratio=1.0, coherence=0.95, lag_s=0.0, model=True, error=0.02):
     gain = 5.0 / (1 + 2j * np.pi * FREQUENCY * lag_s) * np.ones_like(FREQUENCY)
     return FrequencyResponse(
         frequency=FREQUENCY,
@@ -27,7 +27,7 @@ def estimate(ratio=1.0, coherence=0.95, lag_s=0.0, model=True):
         direct=0.5 * gain,
         coherence_input=np.broadcast_to(coherence, FREQUENCY.shape),
         coherence_output=np.broadcast_to(coherence, FREQUENCY.shape),
-        random_error=np.full(len(FREQUENCY), 0.02),
+        random_error=np.broadcast_to(error, FREQUENCY.shape),
         averages=np.full(len(FREQUENCY), 12.0),
         instrumented=True,
     )
@@ -51,13 +51,17 @@ def test_a_good_model():
 
 
 def test_a_model_that_is_off_is_told_where():
-    record = record_of(roll=estimate(), pitch=estimate(STRONG_BELOW), yaw=estimate(LATE_ABOVE), thrust=estimate(1, 0.4))
+    record = record_of(
+        roll=estimate(), pitch=estimate(STRONG_BELOW), yaw=estimate(LATE_ABOVE), thrust=estimate(1, 0.4, error=0.3)
+    )
     box = response_box(record)
     assert box.title == "vehicle.h5 does not answer as the vehicle does: pitch and yaw."
     assert box.tone == "warning"
     assert "2.5 times too strong from 0.18 to 0.91 Hz, right from 1.0 to 15 Hz" in box.sentences[1]
     assert "right from 0.18 to 4.6 Hz, 40° too late (13 ms) from 5.1 to 15 Hz" in box.sentences[2]
-    assert box.sentences[3] == "Thrust: not judged, no coherence above 0.6."
+    assert (
+        box.sentences[3] == "Thrust: not judged, nowhere a coherence above 0.6, or of a random error of less than 10 %."
+    )
     assert [record.word(index) for index in range(4)] == ["good", "not-acceptable", "not-acceptable", "not-judged"]
 
 
@@ -96,7 +100,10 @@ def test_the_report_says_what_the_command_says(instruments):
 
 
 def test_bode_plots_hold_the_curves():
-    record = record_of(roll=estimate(0.5, np.where(FREQUENCY < 5, 0.9, 0.2)), yaw=estimate(np.nan))
+    record = record_of(
+        roll=estimate(0.5, np.where(FREQUENCY < 5, 0.9, 0.2), error=np.where(FREQUENCY < 5, 0.02, 0.4)),
+        yaw=estimate(np.nan),
+    )
     upper, middle, lower = bode_figure("roll", record, 0).picture.panels
     curves = {series.label: series for series in upper.series}
     assert {"95 %", "not excited", "without instruments", "vehicle", "model"} == set(curves)

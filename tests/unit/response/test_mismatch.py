@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.response.mismatch import judged_band, mismatch
+from cpfls_cli.response.mismatch import clearness, judged_band, mismatch
 from cpfls_cli.response.spectra import FrequencyResponse
 
 FREQUENCY = 10.0 ** (np.arange(-24, 25) / 24)
 
 
-def response(ratio, coherence=1.0, error=0.01, model=True):
+def response(ratio, coherence=1.0, error=0.01, model=True, instrumented=False):
     """A measured gain of 5 with some phase, and a model that is off by a ratio."""
     gain = np.full(len(FREQUENCY), 5.0 * np.exp(-0.3j))
     whole = np.broadcast_to(np.asarray(coherence, dtype=float), FREQUENCY.shape)
@@ -22,7 +22,7 @@ def response(ratio, coherence=1.0, error=0.01, model=True):
         coherence_output=whole,
         random_error=np.full(len(FREQUENCY), error),
         averages=np.full(len(FREQUENCY), 20.0),
-        instrumented=True,
+        instrumented=instrumented,
     )
 
 
@@ -86,3 +86,14 @@ def test_a_model_that_does_nothing_has_a_cost():
     found = mismatch(response(0.0))
     assert np.isfinite(found.cost)
     assert found.deviations[0].gain == pytest.approx(1e-6)
+
+
+def test_many_repeats_make_up_for_little_coherence():
+    """A random error of 10 % is that of a coherence of 0.6 in 33 windows; without instruments it counts for nothing."""
+    few, enough = (response(1.0, 0.2, error, instrumented=True) for error in (0.11, 0.09))
+    assert judged_band(few) is None
+    assert judged_band(enough) == slice(0, 49)
+    assert judged_band(response(1.0, 0.2, 0.01)) is None
+    expected = np.sqrt((1 - 0.6) / (2 * 33 * 0.6))
+    assert clearness(np.array(0.0), np.array(expected), True) == pytest.approx(0.6)
+    assert mismatch(response(1.0, 0.2, 0.09, instrumented=True)).cost == 0.0
