@@ -11,6 +11,8 @@ from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
 from cpfls_cli.artifacts.output import refuse_own, write_text
 from cpfls_cli.artifacts.replay import VEHICLE, contradictions_of
 from cpfls_cli.artifacts.response import NO_INSTRUMENTS, ResponseRecord
+from cpfls_cli.artifacts.store import holds
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.replay import model_notes
 from cpfls_cli.config.unknown import require_known
 from cpfls_cli.flights.inputs import known_by, numbered_roles
@@ -39,9 +41,9 @@ def run(job: Job, flights: Sequence[Path], model: Path | None, table: Path | Non
     table : Path or None
         Written too, as CSV.
     """
-    require_known(job.study, "response", whole=model is not None)
     roles = numbered_roles("flight", flights)
     inputs = begin(job, ({} if model is None else {"model": model}) | roles)
+    require_known(job.study, "response", whole=model is not None and holds(model, VehicleRecord))
     if table is not None:
         refuse_own(table, job.output)
         check_outputs(job, table)
