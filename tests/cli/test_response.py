@@ -7,7 +7,11 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.response import ResponseRecord
-from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.artifacts.store import read_record, write_record
+from cpfls_cli.config.load import load_study
+from cpfls_cli.config.study import resolved_yaml
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from tests.builders import vehicle_models
 from tests.builders.studies import VEHICLE
 
 CONFIG = """\
@@ -180,3 +184,28 @@ def test_a_vehicle_of_unknown_numbers_needs_a_model(refuse, folder, tmp_path):
     config.write_text(CONFIG + VEHICLE.replace("[0.6, 0.6, 1.2]", "null"))
     (message,) = refuse("response", config, folder / "light.csv", "-o", tmp_path / "r.h5")
     assert "vehicle.inertia_kg_m2: not known in this config, and `cpfls response` needs" in message
+
+
+def test_an_identified_model_is_judged_with_its_inertia(cpfls, pipeline, study, tmp_path):
+    words = ("response", study, pipeline.flight, "--model", pipeline.model, "-o", tmp_path / "r.h5", "--json")
+    result = cpfls(*words)
+    assert result.exit_code == 0, result.stderr
+    told = json.loads(result.stdout)
+    assert told["model"] == "model.h5"
+    assert list(told["responses"])[:3] == ["roll", "pitch", "yaw"]
+    assert any("model.h5" in warning and "learned" in warning for warning in told["warnings"])
+
+
+def test_air_that_a_flight_does_not_know_is_still(cpfls, folder, tmp_path):
+    """A vehicle with drag along flights without velocity."""
+    config = tmp_path / "study.yaml"
+    config.write_text(CONFIG + VEHICLE)
+    model = tmp_path / "vehicle.h5"
+    drag = ModelEffect("rotor_drag", {}, np.array([1e-4]))
+    whole = VehicleModel(vehicle=load_study(config).vehicle, effects=(drag,))
+    write_record(model, vehicle_models.record_of(whole, config=resolved_yaml(load_study(config))))
+    result = cpfls("response", config, folder / "light.csv", "--model", model, "-o", tmp_path / "r.h5", "--json")
+    assert result.exit_code == 0, result.stderr
+    told = json.loads(result.stdout)
+    assert "vehicle.h5 depends on the velocity through the air, which is taken as 0 in light.csv" in told["warnings"]
+    assert told["responses"]["roll"]["cost"] < 5.0
