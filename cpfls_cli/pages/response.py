@@ -133,9 +133,10 @@ def _deviation(part: Deviation) -> str:
         strong = decibels > 0
         said.append(f"{number(part.gain if strong else 1 / part.gain, 2)} times too {'strong' if strong else 'weak'}")
     if abs(part.phase) >= _AUDIBLE_DEG:
-        delay = abs(part.phase) / 360 / np.sqrt(part.low * part.high)
-        side = "late" if part.phase < 0 else "early"
-        said.append(f"{number(abs(part.phase), 2)}° too {side} ({number(1e3 * float(delay), 2)} ms)")
+        # A difference of phases alone is that of a delay or a lag.
+        delay = 1e3 * abs(part.phase) / 360 / float(np.sqrt(part.low * part.high))
+        of_delay = "" if said else f" ({number(delay, 2)} ms)"
+        said.append(f"{number(abs(part.phase), 2)}° too {'late' if part.phase < 0 else 'early'}{of_delay}")
     return f"{' and '.join(said) or 'off'} {where}"
 
 
