@@ -19,6 +19,7 @@ _RECORDS = {
     ("cpfls/sweep", ""): "sweep.SweepRecord",
     ("cpfls/prediction", ""): "prediction.PredictionRecord",
     ("cpfls/replay", ""): "replay.ReplayRecord",
+    ("cpfls/response", ""): "response.ResponseRecord",
     ("cpfls/disagreement", ""): "disagreement.DisagreementRecord",
     ("cpfls/diagnosis", ""): "diagnosis.DiagnosisRecord",
     ("cpfls/model", "extended"): "extended.ExtendedRecord",

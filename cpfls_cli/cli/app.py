@@ -140,6 +140,14 @@ PlayedArgument = Annotated[
         help="Made by `cpfls identify`, `extend` or `vehicle`; or the word vehicle: that of the config.",
     ),
 ]
+JudgedOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--model",
+        metavar="MODEL",
+        help="Made by `cpfls identify`, `extend` or `vehicle`; without, the vehicle of the config.",
+    ),
+]
 HorizonOption = Annotated[
     float | None,
     typer.Option("--horizon", metavar="TIME", parser=seconds, help="Longest horizon (1, 1s); without, half a second."),
@@ -436,6 +444,20 @@ def replay(
         return command.run(job, model, flights, options)
 
     _run("replay", config, output, common, call)
+
+
+@_command()
+def response(
+    config: ConfigArgument,
+    flights: FlightsArgument,
+    output: OutputOption,
+    model: JudgedOption = None,
+    table: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write the curves as CSV, too.")] = None,
+    *,
+    common: Common,
+) -> None:
+    """Estimate how a vehicle answers its rotors, by frequency, and say where a model answers as it does."""
+    _run("response", config, output, common, lambda command, job: command.run(job, flights, model, table))
 
 
 @_command()

@@ -18,7 +18,7 @@ from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.replay import Played, ReplayOptions, replay
+from cpfls_cli.playback.replay import ReplayOptions, replay
 from cpfls_cli.report.numbers import joined
 from cpfls_cli.report.outcome import Outcome, nothing_written
 
@@ -50,17 +50,17 @@ def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) 
         *seen_twice((inputs[role] for role in roles), ()),
         *seen_warnings(model.name, learned_by(model), known_by(roles, inputs)),
         *(warning for flight in given for warning in flight.warnings),
-        *_warnings(model.name, to_play, pairs),
+        *model_notes(model.name, to_play, given),
     ]
     record = finish(job, ReplayRecord.of(model.name, options, given, pairs, errors, warnings), inputs)
     return Outcome(record.summary, tuple(answer(source_of(job, record))))
 
 
-def _warnings(name: str, model: VehicleModel, pairs: Sequence[Played]) -> Iterator[str]:
-    """Say what a model does to flights, and what it lacks in them."""
+def model_notes(name: str, model: VehicleModel, flights: Sequence[LoggedFlight]) -> Iterator[str]:
+    """Say what a model of this name does to flights, and what it lacks in them."""
     for repair in repairs_of(model):
         yield f"{name} takes a fault of the sensors out of the flights first: {repair}"
-    still = [each.flight.name for each in pairs if each.model.table.feels_air and not each.flight.translates]
+    still = [flight.name for flight in flights if model.table.feels_air and not flight.playback.translates]
     if still:
         yield f"{name} depends on the velocity through the air, which is taken as 0 in {joined(still)}"
 

@@ -46,6 +46,8 @@ class Signals:
         Measured, or commanded where `commanded`.
     commanded : bool
         Whether actuation is what was asked for, not what was measured.
+    rotor_command : array, shape (time, rotor), rad/s, or None
+        What was asked for beside speeds that were measured.
     stated_torque : array, shape (time, 3), N m, body frame, or None
         Torque of a log that has no rotor speeds.
     stated_thrust : array, shape (time,), N, or None
@@ -73,6 +75,7 @@ class Signals:
     specific_force: Array | None = None
     rotor_speed: Array | None = None
     commanded: bool = False
+    rotor_command: Array | None = None
     stated_torque: Array | None = None
     stated_thrust: Array | None = None
     voltage: Array | None = None

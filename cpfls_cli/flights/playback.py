@@ -42,7 +42,7 @@ from cpfls_cli.weak_form.windows import Recording
 
 _STATE = ("body_rate", "attitude", "velocity", "position")
 _ACTUATION = ("rotor_speed", "rotor_command", "body_torque")
-_BESIDE = ("acceleration", "specific_force", "voltage", "thrust")
+_BESIDE = ("acceleration", "specific_force", "voltage", "thrust", "rotor_command")
 _MOST_PARTS = 50
 _SAME_PERIOD = 1e-3
 

@@ -205,8 +205,19 @@ def _actuated(signals: Signals, flight: ReadFlight, known: Mapping[str, Array], 
             "motion with; name their columns in import.signals"
         )
     if speed is not None:
-        return replace(signals, rotor_speed=speed, commanded=commanded)
+        command = _command_beside(flight, known, study)
+        return replace(signals, rotor_speed=speed, commanded=commanded, rotor_command=command)
     return replace(signals, stated_torque=known["body_torque"], stated_thrust=known.get("thrust"), commanded=True)
+
+
+def _command_beside(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> Array | None:
+    """Give the commands of rotors whose speeds were measured, where they are speeds or shares of the largest."""
+    command, unit = known.get("rotor_command"), flight.units.get("rotor_command", "rad/s")
+    if "rotor_speed" not in known or command is None or command.shape != known["rotor_speed"].shape:
+        return None
+    with suppress(InputError):
+        return commanded_speed(command, unit, study.vehicle.rotor_speed_max_rad_s)
+    return None
 
 
 def _known_part(flight: ReadFlight) -> tuple[dict[str, Array], tuple[str, ...]]:

@@ -22,6 +22,7 @@ from cpfls_cli.pages.prediction import prediction_section
 from cpfls_cli.pages.provenance import missing, provenance_section
 from cpfls_cli.pages.replay import replay_section
 from cpfls_cli.pages.residuals import residual_blocks
+from cpfls_cli.pages.response import response_section
 from cpfls_cli.pages.selection import reduction_section
 from cpfls_cli.pages.sensors import sensors_section, unseen_section
 from cpfls_cli.pages.source import R, Source, Sources, section_of_each
@@ -86,6 +87,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | None]] = (
     search_section,
     _of_each("partitions", "Partitions and parameters", IdentifiedRecord, partitions_blocks),
     prediction_section,
+    response_section,
     replay_section,
     tracking_section,
     _of_each("rules", "Excitation of the rules", IdentifiedRecord, rules_blocks),

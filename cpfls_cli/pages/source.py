@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.identified import IdentifiedRecord
     from cpfls_cli.artifacts.prediction import PredictionRecord
     from cpfls_cli.artifacts.replay import ReplayRecord
+    from cpfls_cli.artifacts.response import ResponseRecord
     from cpfls_cli.artifacts.selection import SelectionRecord
     from cpfls_cli.artifacts.sweep import SweepRecord
     from cpfls_cli.artifacts.trajectory import TrajectoryRecord
@@ -84,6 +85,7 @@ class Sources:
     sweeps: ClassVar[_OfFormat[SweepRecord]] = _OfFormat("cpfls/sweep")
     predictions: ClassVar[_OfFormat[PredictionRecord]] = _OfFormat("cpfls/prediction")
     replays: ClassVar[_OfFormat[ReplayRecord]] = _OfFormat("cpfls/replay")
+    responses: ClassVar[_OfFormat[ResponseRecord]] = _OfFormat("cpfls/response")
     disagreements: ClassVar[_OfFormat[DisagreementRecord]] = _OfFormat("cpfls/disagreement")
     diagnoses: ClassVar[_OfFormat[DiagnosisRecord]] = _OfFormat("cpfls/diagnosis")
     vehicles: ClassVar[_OfFormat[VehicleRecord]] = _OfFormat("cpfls/model", "vehicle")
@@ -97,7 +99,8 @@ class Sources:
     @property
     def only_gap(self) -> bool:
         """Whether nothing else was given than how models and flights disagree, and what was found then."""
-        return len(self.gap) + len(self.replays) + len(self.vehicles) == len(self.all)
+        told = (self.gap, self.replays, self.responses, self.vehicles)
+        return sum(map(len, told)) == len(self.all)
 
     @property
     def title(self) -> str:
@@ -106,7 +109,9 @@ class Sources:
             return self.settings.title
         if self.vehicles:
             return "A vehicle found in flights"
-        return "Where simulation and flight disagree" if self.gap else "What a model predicts of flights"
+        if self.gap:
+            return "Where simulation and flight disagree"
+        return "What a model predicts of flights" if self.replays else "How a vehicle answers its rotors"
 
     def of_kind(self, kind: type[R]) -> list[Source[R]]:
         """List the artifacts of one kind, in the order given."""

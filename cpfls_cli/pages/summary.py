@@ -12,6 +12,7 @@ from cpfls_cli.pages.identification import scores_table, solution, verdict_line
 from cpfls_cli.pages.model import trust_box
 from cpfls_cli.pages.provenance import missing
 from cpfls_cli.pages.replay import told_at, verdict_box
+from cpfls_cli.pages.response import response_box
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import learned_words
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Text, Tone
@@ -25,6 +26,7 @@ def summary_section(sources: Sources) -> Section:
     blocks += gap_blocks(sources)
     blocks += [trust_box(vehicle) for vehicle in sources.vehicles]
     blocks += [verdict_box(replay) for replay in sources.replays if told_at(replay.record, sources) is None]
+    blocks += [response_box(response.record) for response in sources.responses]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)
     if not sources.models and not sources.only_gap:

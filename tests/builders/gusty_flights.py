@@ -5,8 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import lfilter
 
-from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.kernels import MeasuredMotion
+from cpfls_cli.rotations import euler_angles
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 STEP_S, EVERY = 2e-3, 5
@@ -65,20 +67,24 @@ LARGE = Truth(1.5, (0.018, 0.02, 0.034), 0.17, 8.5e-6, 1.36e-7, 0.03, 3e-3, 0.3)
 
 
 class Flight(NamedTuple):
-    """What is flown: a vehicle in gusts on a path; each number of a path, and of a draw of gusts, is another one."""
+    """What is flown: a vehicle in gusts on a path; each number of a path, and of a draw of gusts, is another one.
+
+    A path has frequencies of 0.8 Hz at most, and if asked for a shake of its acceleration up to `reach`.
+    """
 
     truth: Truth
     gusts: tuple[float, float, float] = CALM
     path: int = 0
     draw: int = 0
     bandwidth: float = 12.0
+    reach: float = 0.0
 
 
 def gusty_flights(flights, seconds=30.0):
     """Fly all flights at once, as long as each other; the bandwidth of the attitude loop is in rad/s."""
     samples = round(seconds / STEP_S)
     rngs = [np.random.default_rng([flight.path, flight.draw]) for flight in flights]
-    path = np.stack([_path(np.random.default_rng([1000, flight.path]), samples) for flight in flights], axis=1)
+    path = np.stack([path_of(flight, samples) for flight in flights], axis=1)
     pushes = [_memory(rng, samples, MEMORY_S) * flight.gusts for rng, flight in zip(rngs, flights, strict=True)]
     shoves = [_memory(rng, samples, np.ones(3)) * 0.06 * max(f.gusts) for rng, f in zip(rngs, flights, strict=True)]
     noise = [f.truth.gyro_noise * rng.standard_normal((samples, 3)) for rng, f in zip(rngs, flights, strict=True)]
@@ -107,11 +113,21 @@ def _memory(rng, samples, memory_s):
     return np.stack([lfilter([1.0], [1.0, -k], column) for k, column in zip(keep, drawn.T, strict=True)], axis=1)
 
 
-def _path(rng, samples):
-    """Draw position, velocity and acceleration of a path of sines, shape (samples, 9)."""
+def path_of(flight, samples):
+    """Draw position, velocity and acceleration that a flight is asked for, shape (samples, 9)."""
+    rng = np.random.default_rng([1000, flight.path])
     turns = 2 * np.pi * np.linspace(0.08, 0.8, 9)
     size = rng.uniform(0.5, 1.0, (3, 9)) * 0.035 / (turns / 2 / np.pi) ** 1.2 * np.array([[1.0], [1.0], [0.5]])
-    phase = np.arange(samples)[:, None, None] * STEP_S * turns + rng.uniform(0, 2 * np.pi, (3, 9))
+    path = _sines(rng, turns, size, samples)
+    if flight.reach:
+        turns = 2 * np.pi * np.geomspace(0.8, flight.reach, 25)
+        path += _sines(rng, turns, 0.35 / turns**2 * np.ones((3, 1)), samples)
+    return path
+
+
+def _sines(rng, turns, size, samples):
+    """Add sines of random phases: value, first and second derivative, shape (samples, 9)."""
+    phase = np.arange(samples)[:, None, None] * STEP_S * turns + rng.uniform(0, 2 * np.pi, (3, len(turns)))
     sine, cosine = size * np.sin(phase), size * np.cos(phase)
     return np.hstack([sine.sum(axis=2), (turns * cosine).sum(axis=2), -(turns**2 * sine).sum(axis=2)])
 
@@ -163,3 +179,18 @@ def _flown(flights, path, pushes, shoves, noise):
         turn = turn @ (np.eye(3) + small + 0.5 * small @ small + small @ small @ small / 6)
         rate = rate + STEP_S * spin_up
     return [np.array(each) for each in zip(*logs, strict=True)]
+
+
+def logged(flight, vehicle):
+    """Give a flight as one that was read, of a vehicle that a config states."""
+    motion, samples = flight.motion, len(flight)
+    signals = Signals(
+        time=motion.period * np.arange(samples),
+        body_rate=motion.rate,
+        vehicle=vehicle,
+        attitude=euler_angles(motion.rotation),
+        velocity=motion.velocity,
+        position=motion.position,
+        rotor_speed=flight.speed,
+    )
+    return LoggedFlight(flight.name, (signals,), flight.hold, "measured rotor speeds", ())

@@ -20,6 +20,7 @@ COMMANDS = (
     "predict",
     "vehicle",
     "replay",
+    "response",
     "export",
     "verify-export",
     "report",

@@ -191,6 +191,7 @@ def test_a_vehicle_with_more_than_its_table_is_evaluated_whole(cpfls, config, pa
         "compare": (flight, "--model", model),
         "predict": (model, flight),
         "replay": (model, flight),
+        "response": (flight, "--model", model),
     }
     for command, given in words.items():
         result = cpfls(command, config, *given, "-o", tmp_path / f"{command}.h5")
@@ -335,10 +336,10 @@ def test_a_config_may_leave_open_what_the_model_knows(cpfls, config, path, open_
     assert flown.exit_code == 0, flown.stderr
 
 
-@pytest.mark.parametrize("command", ["compare", "predict", "replay"])
+@pytest.mark.parametrize("command", ["compare", "predict", "replay", "response"])
 def test_what_a_config_leaves_open_is_no_fact_for_another_model(refuse, open_config, tmp_path, command):
     left_open, log = open_config
-    words = {"compare": (log,), "predict": (log, log), "replay": ("vehicle", log)}[command]
+    words = {"predict": (log, log), "replay": ("vehicle", log)}.get(command, (log,))
     (line,) = refuse(command, left_open, *words, "-o", tmp_path / "x.h5")
     assert f"not known in this config, and `cpfls {command}` needs what is null there" in line
 

@@ -18,7 +18,7 @@ from cpfls_cli.report.outcome import as_json
 from tests.builders import gap_artifacts, vehicle_models
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
 
-FROM_COMMANDS = ("trajectory", "flight", "selection", "model", "prediction", "replay", "sweep")
+FROM_COMMANDS = ("trajectory", "flight", "selection", "model", "prediction", "replay", "response", "sweep")
 FROM_NUMBERS = {"disagreement": disagreement, "diagnosis": diagnosis, "extended": model}
 FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS, "vehicle")
 # What a plan asks of the vehicle between its samples is not in its artifact.
@@ -38,6 +38,7 @@ def told(cpfls, study, tmp_path_factory):
         "model": ("identify", study, paths["flight"], "--selection", paths["selection"]),
         "prediction": ("predict", study, paths["model"], paths["flight"]),
         "replay": ("replay", study, paths["model"], paths["flight"]),
+        "response": ("response", study, paths["flight"]),
         "sweep": ("sweep", study, paths["flight"], "--set", "sweep.seeds=2"),
     }
     artifacts = {}

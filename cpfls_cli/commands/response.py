@@ -1,0 +1,80 @@
+"""Command `response`: frequency responses of a vehicle as flights show it, and of a model along them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
+from cpfls_cli.artifacts.output import refuse_own, write_text
+from cpfls_cli.artifacts.replay import VEHICLE, contradictions_of
+from cpfls_cli.artifacts.response import NO_INSTRUMENTS, ResponseRecord
+from cpfls_cli.artifacts.store import holds
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.commands.replay import model_notes
+from cpfls_cli.config.unknown import require_known
+from cpfls_cli.flights.inputs import known_by, numbered_roles
+from cpfls_cli.flights.models import learned_by, read_model
+from cpfls_cli.flights.playback import flights_to_play
+from cpfls_cli.flights.recordings import seen_twice
+from cpfls_cli.pages.response import answer
+from cpfls_cli.pages.source import source_of
+from cpfls_cli.pages.trust import seen_warnings
+from cpfls_cli.report.content import Text
+from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.response.flown import no_instruments, vehicle_responses
+
+_DIGITS = 9
+
+
+def run(job: Job, flights: Sequence[Path], model: Path | None, table: Path | None = None) -> Outcome:
+    """Estimate frequency responses and write them.
+
+    Parameters
+    ----------
+    flights : sequence of Path
+        Artifacts, or logs that the config describes.
+    model : Path or None
+        Any model; None for the vehicle of the config.
+    table : Path or None
+        Written too, as CSV.
+    """
+    roles = numbered_roles("flight", flights)
+    inputs = begin(job, ({} if model is None else {"model": model}) | roles)
+    require_known(job.study, "response", whole=model is not None and holds(model, VehicleRecord))
+    if table is not None:
+        refuse_own(table, job.output)
+        check_outputs(job, table)
+    name = VEHICLE if model is None else model.name
+    judged = read_model(Path(VEHICLE) if model is None else model, job.study)
+    given = flights_to_play(flights, job.study)
+    if job.dry_run:
+        return nothing_written(job)
+    responses = vehicle_responses(judged, given, no_instruments)
+    warnings = [
+        *seen_twice((inputs[role] for role in roles), ()),
+        *seen_warnings(name, learned_by(model), known_by(roles, inputs)),
+        *(warning for flight in given for warning in flight.warnings),
+        *model_notes(name, judged, given),
+    ]
+    flown = [flight.name for flight in given]
+    made = ResponseRecord.of(name, flown, NO_INSTRUMENTS, responses, warnings, contradictions_of(given))
+    record = finish(job, made, inputs)
+    written: tuple[Text, ...] = ()
+    if table is not None:
+        write_text(table, _csv(record))
+        written = (Text(f"{table}: written, the curves as CSV"),)
+    return Outcome(record.summary, (*answer(source_of(job, record)), *written))
+
+
+def _csv(record: ResponseRecord) -> str:
+    """Write one line for each response and frequency at which a window tells something; empty where not known."""
+    columns = record.columns
+    lines = [",".join(["response", "frequency_hz", *columns])]
+    for row, name in enumerate(record.name):
+        for at in np.flatnonzero(np.isfinite(record.measured.magnitude[row])):
+            values = [record.frequency[at], *(values[row, at] for values in columns.values())]
+            lines.append(",".join([name, *(f"{value:.{_DIGITS}g}" if np.isfinite(value) else "" for value in values)]))
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,214 @@
+"""Which responses flights and a model have: torque to angular acceleration, thrust to specific force, and others."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import RotationState, acceleration_law
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.errors import InputError
+from cpfls_cli.lag import delayed, lagged
+from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.rotors import Hold, RotorResponse
+from cpfls_cli.playback.table import rotor_weights
+from cpfls_cli.response.mismatch import ROTOR_SPEED, Mismatch, mismatch
+from cpfls_cli.response.spectra import Channel, FrequencyResponse, Stretch, frequency_response
+
+ROTATION = ("roll", "pitch", "yaw")
+THRUST = "thrust"
+
+InstrumentSource = Callable[[Sequence[Array]], Sequence[Array | None]]
+"""Gives the instruments of each flight, shape (time, column), NaN where there are none, for the inputs of all flights.
+
+The inputs, shape (time,), are those of one response. Of repeats they are the instruments for each other; setpoints do
+not depend on them.
+"""
+
+
+class VehicleResponse(NamedTuple):
+    """One response of a vehicle, measured and of a model.
+
+    Attributes
+    ----------
+    name : str
+        Roll, pitch and yaw: torque of the rotors to angular acceleration, body frame, in rad/s^2 per N m. Thrust: to
+        specific force along z, in m/s^2 per N. Rotor speed: command to speed, of all rotors together. Roll rate, roll
+        angle and others alike: setpoint to what follows it, of vehicle and autopilot.
+    """
+
+    name: str
+    estimate: FrequencyResponse
+    mismatch: Mismatch
+
+
+def no_instruments(inputs: Sequence[Array]) -> Sequence[Array | None]:
+    """Give none: what is estimated is then the response of vehicle and autopilot together."""
+    return [None] * len(inputs)
+
+
+def vehicle_responses(
+    model: VehicleModel, flights: Sequence[LoggedFlight], instruments: InstrumentSource = no_instruments
+) -> tuple[VehicleResponse, ...]:
+    """Estimate all responses that flights show, with those of a model along the same flights.
+
+    The input is what the rotors of the model give at the logged speeds, without lag, delay and effects. The model's
+    output is its acceleration along the measured motion, with all of them, through the same windows and instruments:
+    what a window does to a curve it does to both. A command of the rotors knows no gust that the speeds do not know, so
+    the response of the speeds needs no instruments.
+
+    Parameters
+    ----------
+    model : VehicleModel
+    flights : sequence of LoggedFlight
+        Of one sampling period.
+    instruments : callable
+        See `InstrumentSource`.
+
+    Raises
+    ------
+    InputError
+        If a flight lacks what the model needs, or all are too short for a window.
+    """
+    by_flight = [_of_flight(model, flight) for flight in flights]
+    found: dict[str, list[Stretch]] = {}
+    for name in dict.fromkeys(name for parts in by_flight for name in parts):
+        own = [parts[name] for parts in by_flight if name in parts]
+        # Repeats are instruments for each other: a flight that lacks the response leaves the others without.
+        if name != ROTOR_SPEED and len(own) == len(flights):
+            given = _alike(instruments([np.concatenate([part.input for part in parts]) for parts in own]))
+            own = [_with_instrument(*pair) for pair in zip(own, given, strict=True)]
+        found[name] = [part for parts in own for part in parts]
+    period = flights[0].parts[0].period
+    estimates = {name: frequency_response(parts, period) for name, parts in found.items()}
+    known = [VehicleResponse(name, each, mismatch(each)) for name, each in estimates.items() if each is not None]
+    if not known:
+        longest = max(len(part) for flight in flights for part in flight.parts) * period
+        raise InputError(
+            f"{', '.join(flight.name for flight in flights)}: the longest stretch without a pause is {longest:.3g} s, "
+            "too short for a frequency response; give longer flights"
+        )
+    return tuple(known)
+
+
+def _alike(given: Sequence[Array | None]) -> list[Array | None]:
+    """Keep the instruments of those flights that have as many as most: one estimate takes the same for all."""
+    columns = Counter(each.shape[1] for each in given if each is not None)
+    usual = max(columns, key=lambda number: (columns[number], number), default=0)
+    return [each if each is not None and each.shape[1] == usual else None for each in given]
+
+
+def _with_instrument(parts: Sequence[Stretch], instrument: Array | None) -> list[Stretch]:
+    """Hand the instruments of a flight on to its parts."""
+    if instrument is None:
+        return list(parts)
+    ends = np.cumsum([0, *(len(part.input) for part in parts)]).tolist()
+    # Of repeats the first known sample is the same place of the path.
+    begin = int(np.argmax(np.isfinite(instrument).all(axis=1)))
+    return [
+        part._replace(instrument=instrument[first:end], start=first - begin)
+        for part, (first, end) in zip(parts, pairwise(ends), strict=True)
+    ]
+
+
+def _of_flight(model: VehicleModel, flight: LoggedFlight) -> dict[str, list[Stretch]]:
+    """List the stretches of a flight by response, in the order of its parts."""
+    found: dict[str, list[Stretch]] = {}
+    for part in flight.parts:
+        for name, stretch in _of_part(model, flight, part):
+            found.setdefault(name, []).append(stretch)
+    return found
+
+
+def _of_part(model: VehicleModel, flight: LoggedFlight, part: Signals) -> Iterator[tuple[str, Stretch]]:
+    signals = model.repaired(part)
+    model.require(signals, flight.name)
+    acting = _in_air(model, model.acting(signals))
+    rotors, wrench = _of_rotors(model, signals, flight.hold), model.wrench_along(acting)
+    turning = _acceleration(model, acting, wrench[:, :3])
+    for axis, name in enumerate(ROTATION):
+        measured = Channel(integral=signals.body_rate[:, axis])
+        yield name, Stretch(rotors[:, axis], measured, Channel(turning[:, axis]))
+    felt = specific_force(signals)
+    if felt is not None and signals.thrust is not None:
+        yield THRUST, Stretch(rotors[:, 5], felt, Channel(wrench[:, 5] / model.vehicle.mass_kg))
+    if signals.rotor_command is not None and signals.rotor_speed is not None:
+        modelled = _speeds(model, signals.rotor_command, signals.period)
+        for rotor, command in enumerate(signals.rotor_command.T):
+            speed = Channel(signals.rotor_speed[:, rotor])
+            yield ROTOR_SPEED, Stretch(command, speed, None if modelled is None else Channel(modelled[:, rotor]))
+    yield from _of_autopilot(signals)
+
+
+def _of_autopilot(signals: Signals) -> Iterator[tuple[str, Stretch]]:
+    """List what follows a setpoint, which no model of the vehicle alone says."""
+    followers = (("rate", "body_rate", signals.body_rate), ("angle", "attitude", signals.attitude))
+    for word, setpoint, measured in followers:
+        asked = signals.setpoints.get(setpoint)
+        if asked is not None and measured is not None:
+            # A heading goes round.
+            for axis, name in enumerate(ROTATION[: 3 if word == "rate" else 2]):
+                yield f"{name} {word}", Stretch(asked[:, axis], Channel(measured[:, axis]))
+
+
+def _speeds(model: VehicleModel, command: Array, period: float) -> Array | None:
+    """Give the speeds that follow commands, where the model knows a lag or a delay behind them."""
+    response = model.response
+    if not (model.commanded and (response.lag_s or response.delay_s)):
+        return None
+    hold = model.hold or "previous"
+    return np.asarray(lagged(delayed(command, response.delay_s / period, hold), response.lag_s / period, hold).start)
+
+
+def _in_air(model: VehicleModel, signals: Signals) -> Signals:
+    """Take the air for still where a model depends on it and the flight does not know it."""
+    if not model.table.feels_air or {"velocity", "attitude"} <= signals.available:
+        return signals
+    none = np.zeros((len(signals), 3))
+    return replace(signals, velocity=none, attitude=none if signals.attitude is None else signals.attitude)
+
+
+def _of_rotors(model: VehicleModel, signals: Signals, hold: Hold) -> Array:
+    """Evaluate torque and thrust of the rotors at the logged speeds, or as stated, shape (time, 6)."""
+    if signals.rotor_speed is None:
+        return signals.wrench
+    at_once = RotorResponse()
+    weights = rotor_weights(model.vehicle, model.thrust_linear, at_once)
+    return np.asarray(at_once.terms_at_samples(signals.rotor_speed, signals.period, hold) @ weights.T)
+
+
+def _acceleration(model: VehicleModel, signals: Signals, torque: Array) -> Array:
+    """Compute the angular acceleration that a torque gives at the measured motion, shape (time, 3)."""
+    if model.fuzzy is None:
+        momentum = signals.body_rate @ model.body.inertia
+        return np.asarray((torque - np.cross(signals.body_rate, momentum)) @ model.body.inverse)
+    assert signals.attitude is not None, "what a model with inertia functions requires"
+    beyond = np.asarray(np.cos(signals.attitude[:, 1]) < 0)
+    state = RotationState(signals.rotation, signals.body_rate, beyond, np.ones(len(signals), dtype=bool))
+    return acceleration_law(model.fuzzy)(state, torque).value
+
+
+def specific_force(signals: Signals) -> Channel | None:
+    """Give the specific force along body z: of the accelerometer, or else of the velocity without differentiating it.
+
+    With the velocity v over the ground in body axes it is ``v_z' + (omega x v)_z + g R_zz``.
+    """
+    if signals.specific_force is not None:
+        return Channel(signals.specific_force[:, 2])
+    if signals.attitude is None:
+        return None
+    weight = signals.vehicle.gravity_m_s2 * signals.rotation[:, 2, 2]
+    if signals.velocity is not None:
+        velocity = signals.ground_velocity
+        turned = signals.body_rate[:, 0] * velocity[:, 1] - signals.body_rate[:, 1] * velocity[:, 0]
+        return Channel(turned + weight, velocity[:, 2])
+    if signals.acceleration is not None:
+        return Channel(np.einsum("ti,ti->t", signals.rotation[:, :, 2], signals.acceleration) + weight)
+    return None

@@ -1,0 +1,179 @@
+"""How far a model's frequency response is from a measured one: the cost by axis, and at which frequencies it is off."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray
+
+if TYPE_CHECKING:
+    # Who reads what was found waits for nothing that finds it.
+    from cpfls_cli.response.spectra import FrequencyResponse
+
+ROTOR_SPEED = "rotor speed"
+"""Name of the response of the rotors' speeds to their commands."""
+
+COHERENT = 0.6
+"""Coherence above which a response is judged (Tischler and Remple)."""
+
+ACCEPTABLE, GOOD = 100.0, 50.0
+"""Costs up to which a model is acceptable and good (Tischler and Remple)."""
+
+_SURE_WINDOWS = 33
+"""With which a coherence of 0.6 leaves a random error of 10 %."""
+_MOST_POINTS = 20
+_FEWEST_POINTS = 4
+"""Of a band that is judged: a sixth of a decade."""
+_DIP = 2
+"""Points in which the coherence may dip without ending a band."""
+_PHASE = 0.01745
+"""Weight of a squared degree beside a squared decibel: 7.6 degrees count as 1 dB."""
+_SURE = 2.0
+"""Random errors from which on a difference is none of chance."""
+_SHORTEST = 3
+"""Points of a stretch that is told: a single one is scatter."""
+_LEAST = 1e-6
+"""Gain over another, to which a model that does nothing is set: decibels of nothing are none."""
+
+
+class Deviation(NamedTuple):
+    """Frequencies over which a model is right, or off in one way.
+
+    Attributes
+    ----------
+    low, high : float, Hz
+    right : bool
+    gain : float
+        Gain of the model over the measured one, geometric mean.
+    phase : float, degrees
+        Phase of the model less the measured one, mean.
+    """
+
+    low: float
+    high: float
+    right: bool
+    gain: float
+    phase: float
+
+
+class Mismatch(NamedTuple):
+    """How far a model is from a measured response.
+
+    Attributes
+    ----------
+    cost : float
+        J; NaN where there is no model or no band.
+    band : tuple of (float, float), Hz, or None
+        Over which the coherence that counts is above 0.6; None where nowhere.
+    deviations : tuple of Deviation
+        Of the band, from low to high; empty without a model.
+    """
+
+    cost: float
+    band: tuple[float, float] | None
+    deviations: tuple[Deviation, ...]
+
+
+def clearness(coherence: Array, random_error: Array, instrumented: bool) -> Array:
+    """Give the coherence that counts: with instruments that of 33 windows with the same random error, where it is more.
+
+    What gusts add to a flight takes coherence away, however many repeats average them out; a coherence of 0.6 stands
+    for the random error of 10 % that it usually leaves. Without instruments it is the share that may be the loop's.
+
+    Parameters
+    ----------
+    coherence, random_error : array, shape (..., frequency)
+        See `FrequencyResponse`.
+    """
+    if not instrumented:
+        return coherence
+    return np.asarray(np.fmax(coherence, 1 / (1 + 2 * _SURE_WINDOWS * random_error**2)))
+
+
+def judged_band(response: FrequencyResponse) -> slice | None:
+    """Find the widest band of `clearness` above 0.6, in which it may dip for a point or two; None for none."""
+    clear = (response.clearness > COHERENT) & np.isfinite(response.gain)
+    if response.model is not None:
+        clear &= np.isfinite(response.model)
+    ends = np.flatnonzero(clear)
+    if not len(ends):
+        return None
+    groups = np.split(ends, np.flatnonzero(np.diff(ends) > _DIP + 1) + 1)
+    best = max(groups, key=lambda group: int(group[-1] - group[0]))
+    return slice(int(best[0]), int(best[-1]) + 1) if best[-1] - best[0] + 1 >= _FEWEST_POINTS else None
+
+
+def mismatch(response: FrequencyResponse) -> Mismatch:
+    """Compute ``J = 20 / n sum W ((d|G| in dB)^2 + 0.01745 (d arg G in degrees)^2)`` over the band that is judged.
+
+    ``W = (1.58 (1 - exp(-g^2)))^2`` with the coherence g^2 that counts (`clearness`), over at most 20 frequencies,
+    evenly spread on a logarithmic scale. A model is off where this sum, without W, is above 100 for one frequency
+    alone, and by more than twice the random error.
+
+    References
+    ----------
+    Tischler and Remple, *Aircraft and Rotorcraft System Identification*, chapter 11.
+    """
+    part = judged_band(response)
+    if part is None:
+        return Mismatch(np.nan, None, ())
+    frequency = response.frequency[part]
+    band = float(frequency[0]), float(frequency[-1])
+    if response.model is None:
+        return Mismatch(np.nan, band, ())
+    ratio = response.model[part] / response.gain[part]
+    apart = _apart(ratio)
+    chosen = np.unique(np.linspace(0, len(frequency) - 1, _MOST_POINTS).round().astype(int))
+    weight = (1.58 * (1 - np.exp(-response.clearness[part][chosen]))) ** 2
+    cost = 20.0 * float((weight * apart[chosen]).mean())
+    off = (20.0 * apart > ACCEPTABLE) & (np.abs(ratio - 1) > _SURE * response.random_error[part])
+    return Mismatch(cost, band, tuple(_deviations(frequency, ratio, off)))
+
+
+def _apart(ratio: Array) -> Array:
+    """Add squared differences in decibels and degrees."""
+    phase = np.degrees(np.angle(ratio))
+    return np.asarray(_decibels(ratio) ** 2 + _PHASE * phase**2)
+
+
+def _decibels(ratio: Array) -> Array:
+    return np.asarray(20 * np.log10(np.maximum(np.abs(ratio), _LEAST)))
+
+
+def _deviations(frequency: Array, ratio: Array, off: BoolArray) -> list[Deviation]:
+    """Cut a band into stretches in which a model is right, too strong, too weak, late or early."""
+    kind = np.where(off, _kinds(ratio), 0)
+    kind = _without_scatter(kind)
+    starts = np.flatnonzero(np.concatenate([[True], kind[1:] != kind[:-1]]))
+    stretches = zip(starts, [*starts[1:], len(kind)], strict=True)
+    return [_deviation(frequency[a:b], ratio[a:b], bool(kind[a] == 0)) for a, b in stretches]
+
+
+def _kinds(ratio: Array) -> Array:
+    """Tell what a difference is: 1 too strong, -1 too weak, 2 early, -2 late."""
+    gain, phase = _decibels(ratio), np.degrees(np.angle(ratio))
+    return np.asarray(np.where(gain**2 >= _PHASE * phase**2, np.sign(gain), 2 * np.sign(phase)), dtype=int)
+
+
+def _without_scatter(kind: Array) -> Array:
+    """Give stretches that are too short to be told to their neighbours, the shortest first."""
+    kind = kind.copy()
+    while True:
+        starts = np.flatnonzero(np.concatenate([[True], kind[1:] != kind[:-1]]))
+        ends = np.append(starts[1:], len(kind))
+        sizes = ends - starts
+        shortest = int(np.argmin(sizes))
+        if sizes[shortest] >= _SHORTEST or len(starts) == 1:
+            return kind
+        beside = [index for index in (shortest - 1, shortest + 1) if 0 <= index < len(starts)]
+        longer = max(beside, key=lambda index: int(sizes[index]))
+        kind[starts[shortest] : ends[shortest]] = kind[starts[longer]]
+
+
+def _deviation(frequency: Array, ratio: Array, right: bool) -> Deviation:
+    gain = float(10 ** (_decibels(ratio).mean() / 20))
+    # Angles are averaged as directions: those at half a turn have either sign.
+    phase = float(np.degrees(np.angle(np.exp(1j * np.angle(ratio)).mean())))
+    return Deviation(float(frequency[0]), float(frequency[-1]), right, gain, phase)

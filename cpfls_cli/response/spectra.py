@@ -1,0 +1,362 @@
+"""Frequency responses by averages over windows of several lengths, with instruments: of the vehicle, not of its loop.
+
+A vehicle under an autopilot flies in a loop: its rotors answer what disturbs its motion. The usual estimate
+``S_uy / S_uu`` then shows a mixture of vehicle and autopilot. An instrument z moves the vehicle and knows nothing of
+the disturbance, such as a logged setpoint or the same path flown again: ``S_zy / S_zu`` is of the vehicle alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import ceil, floor, log10
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.ndimage import find_objects
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.response.mismatch import clearness
+
+_LENGTHS = 5
+"""Windows of so many lengths, from the shortest to the longest by equal ratios."""
+_LONGEST_S = 20.0
+_SHORTEST_S = 1.0
+_FEWEST_SAMPLES = 16
+"""Of a window: fewer do not follow its curve."""
+_FEWEST_WINDOWS = 5
+"""Lengths of the longest window that all flights together have: fewer say nothing of the error."""
+_PERIODS, _FEWEST_PERIODS = 8.0, 2.0
+"""Of a frequency in the windows that tell it, and in the longest: within fewer, lower ones leak in by some per cent."""
+_OVERLAP = 0.75
+_PER_DECADE = 24
+_LOWEST_HZ = 0.1
+_HIGHEST_HZ = 100.0
+_OF_SAMPLING = 0.2
+"""Highest frequency, share of that of sampling: above it a straight line between samples is no signal any more."""
+_MOST_BLOCKS = 40
+"""Of windows, in which combinations of instruments are found apart: more cost time."""
+_BLOCKS_BESIDE = 2
+"""Blocks of half a window: windows of those further away have no sample in common."""
+_RIDGE = 1e-6
+"""Share of the power of a column of instruments, so that two equal ones leave something to solve."""
+_ROUNDING = 1e-9
+_TINY = np.finfo(float).tiny
+
+
+class Channel(NamedTuple):
+    """A signal, or the derivative of one that is never differentiated, or the sum of both.
+
+    Attributes
+    ----------
+    values : array, shape (time,), or None
+    integral : array, shape (time,), or None
+        Of which the derivative is meant, unit times s.
+    """
+
+    values: Array | None = None
+    integral: Array | None = None
+
+    def cut(self, part: slice) -> Channel:
+        """Take a part of it."""
+        return Channel(*(None if each is None else each[part] for each in self))
+
+
+class Stretch(NamedTuple):
+    """Signals without a pause, evenly sampled.
+
+    Attributes
+    ----------
+    input : array, shape (time,)
+    output : Channel
+    model : Channel or None
+        What a model gives for the output.
+    instrument : array, shape (time, column), or None
+        NaN where there is none. None: the input, which is right where nothing disturbs the output.
+    start : int
+        First sample, counted from where the path begins that a flight has in common with its repeats.
+    """
+
+    input: Array
+    output: Channel
+    model: Channel | None = None
+    instrument: Array | None = None
+    start: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrequencyResponse:
+    """A frequency response and how far to trust it.
+
+    Attributes
+    ----------
+    frequency : array, shape (frequency,), Hz
+    gain : array of complex, shape (frequency,), unit of the output per unit of the input
+        NaN where no window tells it.
+    model : array of complex, shape (frequency,), or None
+        Of the model, by the same windows and instruments.
+    direct : array of complex, shape (frequency,)
+        Without instruments.
+    coherence_input, coherence_output : array, shape (frequency,)
+        Shares of input and of output that the instruments explain; without instruments 1 and that of the output.
+    random_error : array, shape (frequency,)
+        Standard error of the gain over the gain; in radians that of the phase.
+    averages : array, shape (frequency,)
+        Windows that count as independent.
+    instrumented : bool
+    """
+
+    frequency: Array
+    gain: Array
+    model: Array | None
+    direct: Array
+    coherence_input: Array
+    coherence_output: Array
+    random_error: Array
+    averages: Array
+    instrumented: bool
+
+    @property
+    def coherence(self) -> Array:
+        """The smaller of both coherences, shape (frequency,): an estimate is no better than its weaker half."""
+        return np.minimum(self.coherence_input, self.coherence_output)
+
+    @property
+    def clearness(self) -> Array:
+        """The coherence that counts, shape (frequency,)."""
+        return clearness(self.coherence, self.random_error, self.instrumented)
+
+
+def frequency_response(stretches: Sequence[Stretch], period: float) -> FrequencyResponse | None:
+    """Estimate ``G = S_zy / S_zu`` over windows of five lengths, weighed at each frequency by their random errors.
+
+    Windows are Hann's, blind to a constant and to a drift; a derivative is moved onto the window by parts. Of several
+    instruments those combinations are taken, frequency by frequency, that follow the input. They are found in windows
+    of other parts of the path, in all flights alike: else many instruments, or a repeat that is an instrument for what
+    is one for it, would find the disturbance again. With e = y - G u the random error is
+    ``sqrt(S_ee / (2 n |G|^2 S_uu g^2))``, g^2 the coherence of instrument and input; with the input for instrument it
+    is Bendat and Piersol's ``sqrt((1 - g^2) / (2 n g^2))``.
+
+    Parameters
+    ----------
+    stretches : sequence of Stretch
+        All with a model, or none; all with as many instruments, or none. One without them beside others that have
+        some is left out.
+    period : float, s
+
+    Returns
+    -------
+    FrequencyResponse or None
+        None where no stretch is long enough.
+
+    References
+    ----------
+    Tischler and Remple, *Aircraft and Rotorcraft System Identification*, chapters 7 and 10 (random error; composite
+    windows: spectra are averaged with the squares of ``(error / least error)^-4``); Bendat and Piersol, *Random Data*;
+    Angrist, Imbens and Krueger 1999 (instruments found without the sample that they are used in).
+    """
+    instrumented = any(stretch.instrument is not None for stretch in stretches)
+    usable = [part for stretch in stretches for part in _known(stretch, instrumented)]
+    lengths = _lengths(usable, period)
+    if not lengths:
+        return None
+    top = min(_OF_SAMPLING / period, _HIGHEST_HZ)
+    lowest = max(_FEWEST_PERIODS / ((lengths[-1] - 1) * period), _LOWEST_HZ)
+    # Numbers of one scale for all flights, so that curves of several can be put side by side.
+    steps = range(ceil(_PER_DECADE * log10(lowest) - _ROUNDING), floor(_PER_DECADE * log10(top) + _ROUNDING) + 1)
+    frequency = np.array([10.0 ** (step / _PER_DECADE) for step in steps])
+    if not len(frequency):
+        return None
+    found = []
+    for length in lengths:
+        fewest = _FEWEST_PERIODS if length == lengths[-1] else _PERIODS
+        told = frequency >= fewest / ((length - 1) * period) * (1 - _ROUNDING)
+        if told.any():
+            analysis = _Analysis.of(length, period, frequency[told])
+            found.append(_spectra(usable, analysis, told, instrumented))
+    return _of_spectra(frequency, _composite(found), instrumented)
+
+
+def _known(stretch: Stretch, instrumented: bool) -> Iterator[Stretch]:
+    """Cut out where the instruments are known."""
+    if not instrumented:
+        yield stretch
+    elif stretch.instrument is not None:
+        known: BoolArray = np.asarray(np.isfinite(stretch.instrument).all(axis=1))
+        number = np.concatenate([[1], 1 + np.cumsum(known[1:] != known[:-1])]) * known
+        for found in find_objects(number):
+            if found is not None:
+                part = found[0]
+                model = None if stretch.model is None else stretch.model.cut(part)
+                cut = stretch.instrument[part]
+                yield Stretch(stretch.input[part], stretch.output.cut(part), model, cut, stretch.start + part.start)
+
+
+def _lengths(stretches: Sequence[Stretch], period: float) -> list[int]:
+    """Choose the lengths of the windows in samples, the shortest first."""
+    samples = [len(stretch.input) for stretch in stretches]
+    longest = min(max(samples, default=0), sum(samples) // _FEWEST_WINDOWS, round(_LONGEST_S / period) + 1)
+    shortest = max(round(_SHORTEST_S / period) + 1, _FEWEST_SAMPLES)
+    return (
+        [] if longest < shortest else np.unique(np.geomspace(shortest, longest, _LENGTHS).round().astype(int)).tolist()
+    )
+
+
+class _Analysis(NamedTuple):
+    """Windows of one length times waves: what signals and integrals are multiplied with, shape (length, frequency)."""
+
+    wave: Array
+    slope: Array
+    hop: int
+    correlation: Array
+
+    @classmethod
+    def of(cls, length: int, period: float, frequency: Array) -> _Analysis:
+        """Make them: ``w(t) (exp(-j 2 pi f t) - a - b t)``, with a and b such that constants and drifts vanish."""
+        place = np.linspace(-0.5, 0.5, length)
+        time, duration = place * (length - 1) * period, (length - 1) * period
+        window = np.cos(np.pi * place) ** 2
+        window_slope = -np.pi / duration * np.sin(2 * np.pi * place)
+        wave = np.exp(-2j * np.pi * time[:, None] * frequency)
+        plain = np.stack([np.ones(length), time], axis=1)
+        seen = np.linalg.solve(plain.T @ (window[:, None] * plain), plain.T @ (window[:, None] * wave))
+        left = wave - plain @ seen
+        slope = window_slope[:, None] * left + window[:, None] * (-2j * np.pi * frequency * wave - seen[1])
+        hop = max(1, round((1 - _OVERLAP) * length))
+        overlaps = [float(window[lag:] @ window[: length - lag]) for lag in range(0, length, hop)]
+        # Of unit power: spectra of windows of several lengths are averaged.
+        size = np.sqrt((np.abs(window[:, None] * left) ** 2).sum(axis=0))
+        return cls(window[:, None] * left / size, slope / size, hop, (np.array(overlaps) / overlaps[0]) ** 2)
+
+    def of_values(self, values: Array) -> Array:
+        """Transform a signal, shape (window, frequency)."""
+        return self._applied(values, self.wave)
+
+    def of_channel(self, channel: Channel) -> Array:
+        """Transform a channel, shape (window, frequency), its derivative by parts."""
+        direct = 0.0 if channel.values is None else self.of_values(channel.values)
+        by_parts = 0.0 if channel.integral is None else -self._applied(channel.integral, self.slope)
+        return np.asarray(direct + by_parts)
+
+    def _applied(self, values: Array, wave: Array) -> Array:
+        # A constant goes first: windows are blind to it, rounding is not.
+        frames = sliding_window_view(values - values.mean(), len(wave))[:: self.hop]
+        return np.asarray(frames @ wave.real + 1j * (frames @ wave.imag))
+
+    def independent(self, windows: int) -> float:
+        """Count the windows that would scatter as much if they did not overlap (Welch 1967)."""
+        lags = np.arange(1, min(len(self.correlation), windows))
+        return windows / (1 + 2 * float(((1 - lags / windows) * self.correlation[lags]).sum()))
+
+
+class _Spectra(NamedTuple):
+    """Power and cross spectra over windows of one length or several, shape (frequency,); NaN where none tells it."""
+
+    zz: Array
+    zu: Array
+    zy: Array
+    uu: Array
+    yy: Array
+    uy: Array
+    zm: Array
+    averages: Array
+
+
+def _spectra(stretches: Sequence[Stretch], analysis: _Analysis, told: BoolArray, instrumented: bool) -> _Spectra:
+    """Average over windows of one length, at the frequencies that they tell."""
+    length = len(analysis.wave)
+    long = [stretch for stretch in stretches if len(stretch.input) >= length]
+    u = np.concatenate([analysis.of_values(stretch.input) for stretch in long])
+    y = np.concatenate([analysis.of_channel(stretch.output) for stretch in long])
+    modelled = [analysis.of_channel(stretch.model) for stretch in long if stretch.model is not None]
+    m = np.concatenate(modelled) if modelled else np.full_like(y, np.nan)
+    z = _instrument(long, analysis, u) if instrumented else u
+    count = sum(analysis.independent((len(stretch.input) - length) // analysis.hop + 1) for stretch in long)
+    whole = []
+    for first, second in ((z, z), (z, u), (z, y), (u, u), (y, y), (u, y), (z, m)):
+        values = np.full(len(told), np.nan, dtype=complex)
+        values[told] = (first.conj() * second).mean(axis=0)
+        whole.append(values)
+    zz, zu, zy, uu, yy, uy, zm = whole
+    averages = np.where(told, count, np.nan)
+    return _Spectra(zz.real, zu, zy, uu.real, yy.real, uy, zm, averages)
+
+
+def _instrument(stretches: Sequence[Stretch], analysis: _Analysis, u: Array) -> Array:
+    """Transform the instruments and join them to one, shape (window, frequency)."""
+    each = []
+    for stretch in stretches:
+        assert stretch.instrument is not None, "what has none was left out"
+        each.append(np.stack([analysis.of_values(column) for column in stretch.instrument.T], axis=2))
+    z = np.concatenate(each)
+    if z.shape[2] == 1:
+        return np.asarray(z[:, :, 0])
+    z = z / np.sqrt(np.maximum((np.abs(z) ** 2).mean(axis=0), _TINY))
+    number = _blocks(stretches, analysis)
+    blocks = int(number.max()) + 1
+    power = np.array([np.einsum("nfk,nfl->fkl", z[number == b].conj(), z[number == b]) for b in range(blocks)])
+    cross = np.array([np.einsum("nfk,nf->fk", z[number == b].conj(), u[number == b]) for b in range(blocks)])
+    apart = np.abs(np.subtract.outer(np.arange(blocks), np.arange(blocks))) > _BLOCKS_BESIDE
+    others = np.tensordot(apart.astype(float), power, 1) + _RIDGE * len(z) * np.eye(z.shape[2])
+    weights = np.linalg.solve(others, np.tensordot(apart.astype(float), cross, 1)[..., None])[..., 0]
+    return np.asarray(np.einsum("nfk,nfk->nf", z, weights[number]))
+
+
+def _blocks(stretches: Sequence[Stretch], analysis: _Analysis) -> IntArray:
+    """Tell which block of the path each window begins in, shape (window,)."""
+    length = len(analysis.wave)
+    starts = [stretch.start + np.arange(0, len(stretch.input) - length + 1, analysis.hop) for stretch in stretches]
+    begin = np.concatenate(starts)
+    begin = begin - begin.min()
+    return np.asarray(begin // max(length // 2 + 1, int(begin.max()) // _MOST_BLOCKS + 1), dtype=np.int64)
+
+
+def _composite(found: Sequence[_Spectra]) -> _Spectra:
+    """Average spectra over the lengths of windows, the surer ones with more weight (see `frequency_response`)."""
+    if len(found) == 1:
+        return found[0]
+    error = np.array([_random_error(each) for each in found])
+    told = np.isfinite([each.averages for each in found])
+    known = np.where(told & np.isfinite(error), np.maximum(error, _TINY), np.inf)
+    least = known.min(axis=0)
+    # Where no length has a finite error all count alike.
+    some = np.isfinite(least)
+    weight = np.where(some, np.where(some, least, 1.0) / known, told) ** 8
+    weight = weight / np.maximum(weight.sum(axis=0), _TINY)
+    joined = (np.where(weight > 0, weight * np.array(values), 0.0).sum(axis=0) for values in zip(*found, strict=True))
+    return _Spectra(*joined)
+
+
+def _random_error(spectra: _Spectra) -> Array:
+    """Estimate the standard error of the gain over the gain, shape (frequency,); see `frequency_response`."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gain = spectra.zy / spectra.zu
+        rest = spectra.yy - 2 * (gain.conj() * spectra.uy).real + np.abs(gain) ** 2 * spectra.uu
+        strength = np.abs(spectra.zu) ** 2 / spectra.zz
+        found = np.sqrt(np.maximum(rest, 0.0) / (2 * spectra.averages * np.abs(gain) ** 2 * strength))
+    return np.asarray(found)
+
+
+def _of_spectra(frequency: Array, spectra: _Spectra, instrumented: bool) -> FrequencyResponse:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gain, model, direct = spectra.zy / spectra.zu, spectra.zm / spectra.zu, spectra.uy / spectra.uu
+    return FrequencyResponse(
+        frequency=frequency,
+        gain=gain,
+        model=None if np.isnan(model).all() else model,
+        direct=direct,
+        coherence_input=_coherence(spectra.zu, spectra.zz, spectra.uu, spectra.averages),
+        coherence_output=_coherence(spectra.zy, spectra.zz, spectra.yy, spectra.averages),
+        random_error=_random_error(spectra),
+        averages=spectra.averages,
+        instrumented=instrumented,
+    )
+
+
+def _coherence(cross: Array, first: Array, second: Array, averages: Array) -> Array:
+    """Compute the share that one signal explains of another, less what chance explains with so few windows."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        raw = np.abs(cross) ** 2 / (first * second)
+        found = 1 - (1 - raw) * averages / (averages - 1)
+    return np.asarray(np.clip(np.where(averages > 1, found, 0.0), 0.0, 1.0))

@@ -1,0 +1,211 @@
+"""`cpfls response`: what it writes, prints and draws of flights, and what it refuses."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts.response import ResponseRecord
+from cpfls_cli.artifacts.store import read_record, write_record
+from cpfls_cli.config.load import load_study
+from cpfls_cli.config.study import resolved_yaml
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from tests.builders import vehicle_models
+from tests.builders.studies import VEHICLE
+
+CONFIG = """\
+import:
+  time_column: t
+  torque_source: null
+  rate_hz: null
+  lowpass_hz: null
+  spike_deviations: null
+  acceleration_frame: body-specific-force
+  signals:
+    body_rate: {columns: [p, q, r], unit: rad/s}
+    rotor_speed: {columns: [w1, w2, w3, w4], unit: rad/s}
+    rotor_command: {columns: [c1, c2, c3, c4], unit: rad/s, required: false}
+    acceleration: {columns: [fx, fy, fz], unit: m/s^2, required: false}
+    setpoint_body_rate: {columns: [ps, qs, rs], unit: rad/s, required: false}
+"""
+MASS, INERTIA = 6.0, np.array([0.6, 0.6, 1.2])
+ARM, THRUST, DRAG = 0.3, 121.5e-6, 2.7e-6
+ALLOCATION = np.array(
+    [
+        [THRUST] * 4,
+        [0, -ARM * THRUST, 0, ARM * THRUST],
+        [-ARM * THRUST, 0, ARM * THRUST, 0],
+        [-DRAG, DRAG, -DRAG, DRAG],
+    ]
+)
+LAG_S = 0.04
+
+
+def flight_table(seed, scale=1.0, samples=3000):
+    """Columns of a log in still air, of a body that is heavier than stated by a scale; rates are sums of sines."""
+    rng, time = np.random.default_rng(seed), 0.01 * np.arange(samples)
+    turns = 2 * np.pi * np.geomspace(0.2, 9.0, 40)
+    phases = np.multiply.outer(time, turns)[:, None] + rng.uniform(0, 2 * np.pi, (3, 40))
+    size = 0.02 * np.array([[1.0], [1.0], [0.3]]) / np.sqrt(turns)
+    rate, slope = (size * np.sin(phases)).sum(axis=2), (size * turns * np.cos(phases)).sum(axis=2)
+    torque = scale * (INERTIA * slope + np.cross(rate, INERTIA * rate))
+    lift = 9.81 + 0.3 * np.sin(phases[:, 0]).sum(axis=1) / 4
+    squared = np.linalg.solve(ALLOCATION, np.column_stack([MASS * lift, torque]).T).T
+    speed = np.sqrt(squared)
+    command = speed + LAG_S * np.gradient(speed, 0.01, axis=0)
+    asked = rate + 0.02 * slope
+    columns = {"t": time, **dict(zip("pqr", rate.T, strict=True))}
+    columns |= {f"w{n}": speed[:, n - 1] for n in range(1, 5)} | {f"c{n}": command[:, n - 1] for n in range(1, 5)}
+    columns |= {"fx": 0 * time, "fy": 0 * time, "fz": lift}
+    return columns | {"ps": asked[:, 0], "qs": asked[:, 1], "rs": asked[:, 2]}
+
+
+def save(path, columns):
+    np.savetxt(path, np.column_stack(list(columns.values())), delimiter=",", header=",".join(columns), comments="")
+    return path
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("response")
+    (folder / "study.yaml").write_text(CONFIG + VEHICLE)
+    save(folder / "light.csv", flight_table(1))
+    save(folder / "heavy.csv", flight_table(2, 2.0))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def told(cpfls, folder):
+    """What is printed for machines of two flights, with the files that are written."""
+
+    def call(*words):
+        output, table = folder / "response.h5", folder / "response.csv"
+        result = cpfls("response", folder / "study.yaml", *words, "-o", output, "--csv", table, "--json", "--force")
+        assert result.exit_code == 0, result.stderr
+        return json.loads(result.stdout), output, table
+
+    return call
+
+
+def test_json_tells_curves_and_costs(cpfls, told, folder):
+    answer, output, _ = told(folder / "light.csv")
+    assert answer["model"] == "vehicle"
+    assert answer["flights"] == ["light.csv"]
+    names = ["roll", "pitch", "yaw", "thrust", "rotor speed", "roll rate", "pitch rate", "yaw rate"]
+    assert list(answer["responses"]) == names
+    frequency = np.array(answer["frequency_hz"])
+    for name, gain in (("roll", 1 / 0.6), ("yaw", 1 / 1.2), ("thrust", 1 / MASS)):
+        own = answer["responses"][name]
+        low, high = own["band_hz"]
+        assert low < 0.6
+        assert high > 8.0
+        inside = (frequency > low) & (frequency < 8.0)
+        measured = np.array(own["magnitude_db"], dtype=float)[inside]
+        assert measured == pytest.approx(20 * np.log10(gain) * np.ones(inside.sum()), abs=0.4)
+        assert own["cost"] < 5.0
+    lag = np.array(answer["responses"]["rotor speed"]["phase_deg"], dtype=float)
+    expected = -np.degrees(np.arctan(2 * np.pi * frequency * LAG_S))
+    assert np.abs(lag - expected)[(frequency > 0.6) & (frequency < 6.0)].max() < 4.0
+    assert cpfls("check", output).exit_code == 0
+    assert json.loads(json.dumps(answer)) == answer
+    assert list(read_record(output, ResponseRecord).name) == names
+
+
+def test_a_body_that_is_heavier_than_stated(told, folder):
+    answer, _, _ = told(folder / "heavy.csv")
+    (only,) = answer["responses"]["roll"]["deviations"]
+    assert not only["right"]
+    assert only["gain"] == pytest.approx(2.0, rel=0.02)
+    assert answer["responses"]["roll"]["cost"] > 100.0
+    assert answer["responses"]["thrust"]["cost"] < 5.0
+
+
+def test_the_table_holds_what_json_tells(told, folder):
+    answer, _, table = told(folder / "light.csv")
+    with table.open() as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0])[:4] == ["response", "frequency_hz", "magnitude_db", "phase_deg"]
+    rolls = [float(row["magnitude_db"]) for row in rows if row["response"] == "roll"]
+    known = [value for value in answer["responses"]["roll"]["magnitude_db"] if value is not None]
+    assert rolls == pytest.approx(known, rel=1e-6)
+    assert {row["model_magnitude_db"] for row in rows if row["response"] == "roll rate"} == {""}
+
+
+def test_the_answer_begins_with_what_the_flights_tell(cpfls, folder, tmp_path):
+    result = cpfls("response", folder / "study.yaml", folder / "light.csv", "-o", tmp_path / "r.h5")
+    assert result.exit_code == 0
+    first = " ".join(result.stdout.split())
+    assert first.startswith("RESPONSE: The vehicle of the config: not judged: these flights show the loop")
+    assert "Rotor speed: 45° behind what is asked at" in first
+
+
+def test_a_report_shows_bode_plots(cpfls, told, folder, tmp_path):
+    _, output, _ = told(folder / "light.csv")
+    page = tmp_path / "page.html"
+    assert cpfls("report", folder / "study.yaml", output, "-o", page).exit_code == 0
+    html = page.read_text()
+    assert "How a vehicle answers its rotors" in html
+    assert "Frequency responses" in html
+    assert html.count("<svg") == 8
+    assert "cpfls response study-" in html
+
+
+def test_equal_flights_give_equal_files(cpfls, folder, tmp_path):
+    outputs = [tmp_path / "a.h5", tmp_path / "b.h5"]
+    for output in outputs:
+        words = ("response", folder / "study.yaml", folder / "light.csv", folder / "heavy.csv", "-o", output)
+        assert cpfls(*words).exit_code == 0
+    assert outputs[0].read_bytes() == outputs[1].read_bytes()
+
+
+def test_what_is_refused(refuse, folder, tmp_path):
+    config, log = folder / "study.yaml", folder / "light.csv"
+    short = save(tmp_path / "short.csv", {name: own[:60] for name, own in flight_table(3).items()})
+    (message,) = refuse("response", config, short, "-o", tmp_path / "r.h5")
+    assert message.endswith("is 0.6 s, too short for a frequency response; give longer flights")
+    (message,) = refuse("response", config, log, "-o", tmp_path / "r.h5", "--csv", tmp_path / "r.h5")
+    assert "is what the command writes for -o" in message
+    (message,) = refuse("response", config, log, "--model", log, "-o", tmp_path / "r.h5")
+    assert "light.csv" in message
+    (message,) = refuse("response", config, log, "-o", log)
+    assert "light.csv" in message
+
+
+def test_a_dry_run_writes_nothing(cpfls, folder, tmp_path):
+    output, table = tmp_path / "r.h5", tmp_path / "r.csv"
+    words = ("response", folder / "study.yaml", folder / "light.csv", "-o", output, "--csv", table, "--dry-run")
+    assert cpfls(*words).exit_code == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_vehicle_of_unknown_numbers_needs_a_model(refuse, folder, tmp_path):
+    config = tmp_path / "open.yaml"
+    config.write_text(CONFIG + VEHICLE.replace("[0.6, 0.6, 1.2]", "null"))
+    (message,) = refuse("response", config, folder / "light.csv", "-o", tmp_path / "r.h5")
+    assert "vehicle.inertia_kg_m2: not known in this config, and `cpfls response` needs" in message
+
+
+def test_an_identified_model_is_judged_with_its_inertia(cpfls, pipeline, study, tmp_path):
+    words = ("response", study, pipeline.flight, "--model", pipeline.model, "-o", tmp_path / "r.h5", "--json")
+    result = cpfls(*words)
+    assert result.exit_code == 0, result.stderr
+    told = json.loads(result.stdout)
+    assert told["model"] == "model.h5"
+    assert list(told["responses"])[:3] == ["roll", "pitch", "yaw"]
+    assert any("model.h5" in warning and "learned" in warning for warning in told["warnings"])
+
+
+def test_air_that_a_flight_does_not_know_is_still(cpfls, folder, tmp_path):
+    """A vehicle with drag along flights without velocity."""
+    config = tmp_path / "study.yaml"
+    config.write_text(CONFIG + VEHICLE)
+    model = tmp_path / "vehicle.h5"
+    drag = ModelEffect("rotor_drag", {}, np.array([1e-4]))
+    whole = VehicleModel(vehicle=load_study(config).vehicle, effects=(drag,))
+    write_record(model, vehicle_models.record_of(whole, config=resolved_yaml(load_study(config))))
+    result = cpfls("response", config, folder / "light.csv", "--model", model, "-o", tmp_path / "r.h5", "--json")
+    assert result.exit_code == 0, result.stderr
+    told = json.loads(result.stdout)
+    assert "vehicle.h5 depends on the velocity through the air, which is taken as 0 in light.csv" in told["warnings"]
+    assert told["responses"]["roll"]["cost"] < 5.0

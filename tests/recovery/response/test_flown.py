@@ -1,0 +1,129 @@
+"""Responses of a quadrotor that is flown through gusts by dynamics of its own, beside models right and wrong."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.errors import InputError
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.response.flown import specific_force, vehicle_responses
+from tests.builders.gusty_flights import EVERY, GUSTS, SMALL, STEP_S, Flight, gusty_flights, logged, path_of
+
+SECONDS = 40.0
+RIGHT = VehicleModel(vehicle=SMALL.vehicle)
+
+
+@pytest.fixture(scope="module")
+def flights():
+    """The same path four times, with a gust of its own each."""
+    flown = gusty_flights([Flight(SMALL, GUSTS, 0, draw, reach=10.0) for draw in range(4)], SECONDS)
+    return [logged(flight, SMALL.vehicle) for flight in flown]
+
+
+def by_repeats(inputs):
+    """The mean of the other flights."""
+    return [((sum(inputs) - own) / (len(inputs) - 1))[:, None] for own in inputs]
+
+
+def by_setpoints(inputs):
+    """The acceleration that the path asks for."""
+    asked = path_of(Flight(SMALL, path=0, reach=10.0), round(SECONDS / STEP_S))[::EVERY, 6:]
+    return [asked for _ in inputs]
+
+
+def by_name(responses):
+    return {each.name: each for each in responses}
+
+
+@pytest.mark.parametrize("instruments", [by_repeats, by_setpoints])
+def test_the_right_model_is_good(flights, instruments):
+    found = by_name(vehicle_responses(RIGHT, flights, instruments))
+    assert list(found) == ["roll", "pitch", "yaw", "thrust"]
+    for name in ("roll", "pitch", "thrust"):
+        low, high = found[name].mismatch.band
+        assert low < 1.0
+        assert high > 10.0
+        assert found[name].mismatch.cost < 8.0
+        assert all(each.right for each in found[name].mismatch.deviations)
+    # Nothing turns the vehicle about yaw but gusts, and that is said.
+    assert found["yaw"].mismatch.band is None
+
+
+def test_without_instruments_gusts_are_taken_for_the_vehicle(flights):
+    found = by_name(vehicle_responses(RIGHT, flights))
+    assert found["yaw"].mismatch.cost > 500.0
+    assert found["thrust"].mismatch.deviations[0].gain > 1.5
+    assert not found["thrust"].mismatch.deviations[0].right
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.3, 2.0])
+def test_a_body_of_another_weight_is_seen(flights, factor):
+    inertia = tuple(factor * value for value in SMALL.inertia)
+    wrong = VehicleModel(vehicle=replace(SMALL.vehicle, inertia_kg_m2=(*inertia, 0.0, 0.0, 0.0)))
+    found = by_name(vehicle_responses(wrong, flights, by_repeats))
+    for name in ("roll", "pitch"):
+        (only,) = found[name].mismatch.deviations
+        assert not only.right
+        assert only.gain == pytest.approx(1 / factor, rel=0.03)
+        assert found[name].mismatch.cost > 80.0
+
+
+def test_a_lag_that_is_not_there_is_seen(flights):
+    slow = VehicleModel(vehicle=SMALL.vehicle, response=RotorResponse(lag_s=0.03))
+    found = by_name(vehicle_responses(slow, flights, by_repeats))["roll"].mismatch
+    last = found.deviations[-1]
+    assert not last.right
+    middle = np.sqrt(last.low * last.high)
+    assert last.phase == pytest.approx(-np.degrees(np.arctan(2 * np.pi * middle * 0.03)), abs=6.0)
+
+
+def test_specific_force_of_velocity_is_that_of_an_accelerometer(flights):
+    """A derivative by parts, so that no velocity is differentiated."""
+    part = flights[0].parts[0]
+    assert part.thrust is not None
+    felt = np.gradient(part.velocity, part.period, axis=0) + np.array([0.0, 0.0, part.vehicle.gravity_m_s2])
+    along = np.einsum("tji,tj->ti", part.rotation, felt)
+    measured = replace(flights[0], parts=(replace(part, specific_force=along),))
+    assert specific_force(measured.parts[0]).integral is None
+    one, other = (by_name(vehicle_responses(RIGHT, [each]))["thrust"].estimate for each in (flights[0], measured))
+    clear = (one.coherence > 0.9) & (one.frequency < 4.0)
+    assert clear.any()
+    assert np.abs(other.gain / one.gain - 1)[clear].max() < 0.05
+
+
+def test_speeds_follow_their_commands(flights):
+    """A lag of 50 ms behind the commands is found whatever the gusts, and that of the model stands beside it."""
+    part = flights[0].parts[0]
+    behind = RotorResponse(lag_s=0.05)
+    speed = behind.terms_at_samples(part.rotor_speed, part.period, "linear")[:, 1:5]
+    logged_both = replace(flights[0], parts=(replace(part, rotor_speed=speed, rotor_command=part.rotor_speed),))
+    model = VehicleModel(vehicle=SMALL.vehicle, response=behind, commanded=True, hold="linear")
+    found = by_name(vehicle_responses(model, [logged_both]))["rotor speed"]
+    lag = 1 / (1 + 2j * np.pi * found.estimate.frequency * 0.05)
+    seen = found.estimate.frequency < 10.0
+    assert np.abs(found.estimate.gain / lag - 1)[seen].max() < 0.03
+    assert found.mismatch.cost < 1.0
+    without = by_name(vehicle_responses(RIGHT, [logged_both]))["rotor speed"]
+    assert without.estimate.model is None
+
+
+def test_a_flight_in_parts_is_one_flight(flights):
+    whole = flights[0].parts[0]
+    halves = [slice(0, 1900), slice(2100, len(whole))]
+    cut = [replace(f, parts=tuple(_part(f.parts[0], half) for half in halves)) for f in flights]
+    found = by_name(vehicle_responses(RIGHT, cut, by_repeats))
+    assert found["roll"].mismatch.cost < 10.0
+
+
+def _part(signals, part):
+    from cpfls_cli.effects.signals import stretch_of
+
+    return stretch_of(signals, part)
+
+
+def test_a_flight_of_a_second_is_refused(flights):
+    short = replace(flights[0], parts=(_part(flights[0].parts[0], slice(0, 80)),))
+    with pytest.raises(InputError, match=r"gusty-0: the longest stretch without a pause is 0\.8 s"):
+        vehicle_responses(RIGHT, [short])
