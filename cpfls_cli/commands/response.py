@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
 from cpfls_cli.artifacts.output import refuse_own, write_text
 from cpfls_cli.artifacts.replay import VEHICLE, contradictions_of
-from cpfls_cli.artifacts.response import NO_INSTRUMENTS, ResponseRecord
+from cpfls_cli.artifacts.response import ResponseRecord
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.replay import model_notes
@@ -22,9 +22,10 @@ from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.pages.response import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import seen_warnings
+from cpfls_cli.playback.instruments import instruments
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
-from cpfls_cli.response.flown import no_instruments, vehicle_responses
+from cpfls_cli.response.flown import vehicle_responses
 
 _DIGITS = 9
 
@@ -52,7 +53,8 @@ def run(job: Job, flights: Sequence[Path], model: Path | None, table: Path | Non
     given = flights_to_play(flights, job.study)
     if job.dry_run:
         return nothing_written(job)
-    responses = vehicle_responses(judged, given, no_instruments)
+    moved_by = instruments([flight.playback for flight in given])
+    responses = vehicle_responses(judged, given, moved_by.beside)
     warnings = [
         *seen_twice((inputs[role] for role in roles), ()),
         *seen_warnings(name, learned_by(model), known_by(roles, inputs)),
@@ -60,7 +62,7 @@ def run(job: Job, flights: Sequence[Path], model: Path | None, table: Path | Non
         *model_notes(name, judged, given),
     ]
     flown = [flight.name for flight in given]
-    made = ResponseRecord.of(name, flown, NO_INSTRUMENTS, responses, warnings, contradictions_of(given))
+    made = ResponseRecord.of(name, flown, moved_by.kind, responses, warnings, contradictions_of(given))
     record = finish(job, made, inputs)
     written: tuple[Text, ...] = ()
     if table is not None:
