@@ -9,7 +9,7 @@ from operator import add
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous
 from cpfls_cli.effects.polynomial import state_terms
 from cpfls_cli.playback.evaluation import Evaluated, VehicleAt
@@ -28,8 +28,8 @@ FOLDS = 5
 """Parts of the flights that are kept aside in turn."""
 _OF_FORCE = (*BANDS[1:3], (1.2, None))
 """Forces are seen in slower motion, and the longest windows keep the mean: the weight."""
-_BLOCK_S = 2.0
-"""Longer than what gusts remember."""
+_BLOCK_S, _LEAST_BLOCK_S, _BLOCKS = 4.0, 2.0, 9
+"""Longer than what gusts remember and the longest windows see; the shortest, and how many a short path is cut into."""
 _LAG_S, _LAGS = 0.05, 10
 """What was asked for is answered within half a second."""
 _RIDGE = 1e-6
@@ -108,13 +108,23 @@ class Balances:
             if asked is not None and not self.given.repeats.beside[number]
         }
 
-    def sums(self, values: Array) -> Sums:
-        """Sum products at values of the numbers, shape (number,)."""
+    @cached_property
+    def block_s(self) -> float:
+        """Length of the blocks of the paths: shorter than usual on short paths, so that there are enough."""
+        numbers = {first for first, _ in self.path.values()}
+        total = sum(len(self.flights[number]) for number in numbers) * self.flights[0].motion.period
+        return min(_BLOCK_S, max(total / _BLOCKS, _LEAST_BLOCK_S))
+
+    def sums(self, values: Array, bands: BoolArray) -> Sums:
+        """Sum products at values of the numbers, shape (number,), in some bands; 0 in others."""
         evaluated, size = Evaluated.of(self.free, values), 2 + len(self.free.numbers)
         sides = {number: _sides(evaluated, self.flights[number], terms) for number, terms in self.terms.items()}
         known = [sides.get(number, np.zeros((len(flight), 0))) for number, flight in enumerate(self.flights)]
         others = {number: self.given.repeats.others(number, known) for number in self.path if number not in self.asked}
-        found = [self._of_band(band, rows, sides, others) for band, rows in self.bands]
+        found = [
+            self._of_band(band, rows, sides, others) if used else {}
+            for (band, rows), used in zip(self.bands, bands, strict=True)
+        ]
         empty = np.zeros((3, size, size)), np.zeros((3, size, size)), np.zeros((3, size, size)), 0
         blocks = [[each.get(name, empty) for each in found] for name in sorted(set().union(*found))]
         return Sums(*(np.array([[band[part] for band in block] for block in blocks]) for part in range(4)))
@@ -131,7 +141,7 @@ class Balances:
             flight, here, beside = self.flights[number], own[number], there[number]
             place = path[_middles(band, flight)]
             known = np.isfinite(beside).all(axis=(1, 2)) & np.isfinite(place)
-            block = np.where(known, place * flight.motion.period // _BLOCK_S, -1)
+            block = np.where(known, place * flight.motion.period // self.block_s, -1)
             for each in np.unique(block[known]):
                 mine, theirs = here[block == each], beside[block == each]
                 sums = _products(theirs, mine), _products(mine, mine), _products(theirs, theirs), len(mine)

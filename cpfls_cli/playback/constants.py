@@ -8,7 +8,7 @@ instrument, and what is left of a balance must not go with it.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -31,7 +31,7 @@ _EXPLAINED = 0.9
 """Share of what comes again that a model has to explain: below it lacks an effect in that band."""
 _NOT_TRIED = ("wind", "slow_actuation")
 """Air of a flight, and a number that answers for whatever is slow: neither is a constant of the vehicle."""
-_STEPS, _SETTLED = 12, 1e-3
+_STEPS, _SETTLED = 12, 1e-2
 """Of an estimate, and natural sizes of a step that is none any more."""
 _LEAST = 1e-6
 """Of the power of a band that is never taken for what comes again."""
@@ -98,7 +98,7 @@ class _Problem:
     sums: Sums
     values: Array
     bands: BoolArray
-    held: Collection[str]
+    held: Set[str]
 
     @cached_property
     def places(self) -> IntArray:
@@ -110,7 +110,7 @@ class _Problem:
         """Inverse variance of what does not come again, shape (band, 3), for windows that overlap."""
         own, crossed = (each.sum(axis=0)[:, :, 0, 0] for each in (self.sums.own, self.sums.crossed))
         count = self.sums.windows.sum(axis=0)[:, None]
-        left = np.maximum(own - np.maximum(crossed, 0.0), _LEAST * own) / count
+        left = np.maximum(own - np.maximum(crossed, 0.0), _LEAST * own) / np.maximum(count, 1)
         return np.where(self.bands[:, None], (1 - OVERLAP) / np.maximum(left, np.finfo(float).tiny), 0.0)
 
     @cached_property
@@ -157,9 +157,9 @@ def find_constants(
     """Estimate the constants of a vehicle from flights that repeat each other, or whose setpoints are known.
 
     Numbers that are not known are free, and the moments of inertia; blocks of others join one by one while they lower
-    what is left of balances that were kept aside. Slower bands join the faster ones while the model explains 90 % of
-    the rotation in them that comes again, and agree with them on the moments of inertia: where they do not, the model
-    lacks something there, which no constant may stand for.
+    what is left of balances that were kept aside. The slowest band is left out, and the next, where the faster ones
+    tell the moments of inertia, and it disagrees with them or the model does not explain 90 % of the rotation in it
+    that comes again: the model lacks something there, which no constant may stand for.
 
     Parameters
     ----------
@@ -188,30 +188,52 @@ def find_constants(
     if not begun.path:
         return None
     # Of drag factor and moment of inertia about yaw only the ratio is known: both would drift along it.
-    held = (DRAG,) if {DRAG, LOG_INERTIA[2]} <= set(begun.free.index) else ()
-    found = None
-    for slowest in range(len(BANDS)):
-        bands = np.array([number <= slowest or number >= len(BANDS) for number in range(len(begun.bands))])
-        problem = _settled(begun, bands, {}, held)
-        if len(problem.sums.crossed) < _FEWEST_BLOCKS:
-            return None
-        problem = _chosen(setting, problem, tried)
-        share, error = _explained(problem.sums)
-        if found is not None and not _agree(found, problem):
+    held = {DRAG} if {DRAG, LOG_INERTIA[2]} <= set(begun.free.index) else set()
+    problem = _problem(setting, np.ones(len(begun.bands), dtype=bool), blocks, tried, held)
+    if len(problem.sums.crossed) < _FEWEST_BLOCKS:
+        return None
+    for slowest in range(len(BANDS) - 1, 0, -1):
+        faster = problem.bands.copy()
+        faster[slowest] = False
+        fast = _problem(setting, faster, blocks, tried, held)
+        if not _tells(fast) or (_agree(fast, problem) and _explains(problem, slowest)):
             break
-        if slowest and not (share[slowest, :2] + error[slowest, :2] >= _EXPLAINED).all():
-            break
-        found = problem
-    return None if found is None else _constants(found)
+        problem = fast
+    return _constants(setting, problem)
+
+
+def _problem(
+    setting: _Setting, bands: BoolArray, blocks: Sequence[str], tried: Sequence[str], held: Set[str]
+) -> _Problem:
+    """Estimate what is asked for in some bands, and choose what else is worth it."""
+    return _chosen(setting, _settled(setting.balances(blocks), bands, {}, held), tried)
+
+
+def _tells(problem: _Problem) -> bool:
+    """Whether the moments of inertia about roll and pitch are known to a factor of two."""
+    if problem.held & {*LOG_INERTIA[:2]}:
+        return False
+    left_out = _moments_left_out(problem)
+    return bool((2 * half_width(jackknife_error(left_out), len(left_out)) <= np.log(_KNOWN)).all())
 
 
 def _agree(fast: _Problem, more: _Problem) -> bool:
     """Tell whether a slower band leaves the moments of inertia about roll and pitch where the faster ones have them."""
-    moments = np.array([[each.named[name] for name in LOG_INERTIA[:2]] for each in (fast, more)])
-    left_out = [_left_out(each)[:, [each.free.index[name] for name in LOG_INERTIA[:2]]] for each in (fast, more)]
-    scale = fast.free.scales[[fast.free.index[name] for name in LOG_INERTIA[:2]]]
-    error = jackknife_error((left_out[1] - left_out[0]) * scale)
-    return bool((np.abs(moments[1] - moments[0]) <= _APART * error).all())
+    moved = np.array([more.named[name] - fast.named[name] for name in LOG_INERTIA[:2]])
+    error = jackknife_error(_moments_left_out(more) - _moments_left_out(fast))
+    return bool((np.abs(moved) <= _APART * error).all())
+
+
+def _explains(problem: _Problem, band: int) -> bool:
+    """Tell whether a model explains 90 % of roll and pitch that come again in a band, as far as is known."""
+    share, error = _explained(problem.sums)
+    return bool((share[band, :2] + error[band, :2] >= _EXPLAINED).all())
+
+
+def _moments_left_out(problem: _Problem) -> Array:
+    """Estimate logarithms of the moments about roll and pitch without each block, but for a constant, (block, 2)."""
+    places = [problem.free.index[name] for name in LOG_INERTIA[:2]]
+    return np.asarray(_left_out(problem)[:, places] * problem.free.scales[places])
 
 
 def _left_out(problem: _Problem) -> Array:
@@ -251,9 +273,8 @@ def _chosen(setting: _Setting, problem: _Problem, tried: Sequence[str]) -> _Prob
         best = _best_block(setting.balances([*taken, *others]), problem, taken)
         if best is None:
             return problem
-        more = _settled(setting.balances([*taken, best]), problem.bands, problem.named, problem.held)
-        told = _f_statistics(more) >= _STRONG
-        if not told[[more.free.numbers[place].block == best for place in more.places]].any():
+        more = _settled(setting.balances([*taken, best]), problem.bands, problem.named, problem.held & {DRAG})
+        if not len(_of_blocks(more, [best])):
             return problem
         problem = more
 
@@ -262,7 +283,7 @@ def _best_block(balances: Balances, problem: _Problem, taken: Sequence[str]) -> 
     """Find the block with which least is left of what was kept aside; None where none is worth it."""
     free = JointNumbers(balances.free)
     values = free.values({number.name: number.absent for number in free.numbers} | problem.named)
-    every = _Problem(free, balances.sums(values), values, problem.bands, problem.held)
+    every = _Problem(free, balances.sums(values, problem.bands), values, problem.bands, problem.held)
     left, found = every.left(_of_blocks(every, taken)), []
     for block in dict.fromkeys(number.block for number in free.numbers):
         if block not in taken:
@@ -277,12 +298,19 @@ def _of_blocks(problem: _Problem, blocks: Sequence[str]) -> IntArray:
     return np.array([place for place in problem.places if problem.free.numbers[place].block in blocks], dtype=np.int64)
 
 
-def _settled(balances: Balances, bands: BoolArray, known: Mapping[str, float], held: Collection[str]) -> _Problem:
-    """Step to the numbers at which nothing that is left goes with other runs, within bounds; some are held."""
+def _settled(balances: Balances, bands: BoolArray, known: Mapping[str, float], held: Set[str]) -> _Problem:
+    """Step to the numbers at which nothing that is left goes with other runs, within bounds.
+
+    What instruments hardly tell is held with the numbers that are held anyway, where it was believed to be.
+    """
     free = JointNumbers(balances.free)
     values = free.values(known)
+    problem = _Problem(free, balances.sums(values, bands), values, bands, held)
+    weak = problem.places[_f_statistics(problem) < _STRONG]
+    values[weak] = free.values({name: free.numbers[place].absent for name, place in free.index.items()})[weak]
+    held = held | {free.numbers[place].name for place in weak}
     for _ in range(_STEPS):
-        problem = _Problem(free, balances.sums(values), values, bands, held)
+        problem = _Problem(free, balances.sums(values, bands), values, bands, held)
         step = np.clip(problem.step(problem.weighed.sum(axis=0)), -_FARTHEST, _FARTHEST)
         moved = np.clip(values + step * free.scales, free.lows, free.highs)
         if (np.abs(moved - values) <= _SETTLED * free.scales).all():
@@ -299,13 +327,13 @@ def _explained(sums: Sums) -> tuple[Array, Array]:
     """Compute the share of the rotation that comes again that a model explains, and its error, shape (band, 3)."""
 
     def share(crossed: Array) -> Array:
-        return np.asarray(1.0 - crossed[..., 0, 0] / crossed[..., -1, -1])
+        return np.asarray(1.0 - crossed[..., 0, 0] / np.where(crossed[..., -1, -1] == 0, np.nan, crossed[..., -1, -1]))
 
     crossed = sums.crossed[:, : len(BANDS)]
     return share(crossed.sum(axis=0)), jackknife_error(share(crossed.sum(axis=0) - crossed))
 
 
-def _constants(problem: _Problem) -> Constants:
+def _constants(setting: _Setting, problem: _Problem) -> Constants:
     """Gather the numbers of a solved problem, and how far they scatter over the blocks of the path.
 
     What instruments hardly tell scatters by what was believed before, however it scatters over the blocks.
@@ -317,7 +345,8 @@ def _constants(problem: _Problem) -> Constants:
         told[yaw] = False
     without = _left_out(problem)
     covariance = np.diag(np.where(told, 0.0, free.spreads**2)) + jackknife_covariance(without)
-    share, _ = _explained(problem.sums)
+    everywhere = setting.balances(_blocks(problem.free)).sums(problem.values, np.ones_like(problem.bands))
+    share, _ = _explained(everywhere)
     fitted = Fitted(free, problem.values, float(1 - share[0, :2].mean()), problem.information(total))
     spread = Uncertainty(covariance * np.outer(free.scales, free.scales), len(without), told)
     return Constants(fitted, spread, Explained(share, problem.bands[: len(BANDS)]))

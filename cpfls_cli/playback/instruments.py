@@ -65,9 +65,7 @@ class Instruments:
         if self.kind != "repeats":
             return list(self.setpoints)
         places = self.repeats.beside
-        return [
-            self.repeats.others(number, values)[:, None] if place else None for number, place in enumerate(places)
-        ]
+        return [self.repeats.others(number, values)[:, None] if place else None for number, place in enumerate(places)]
 
 
 def instruments(flights: Sequence[PlaybackFlight]) -> Instruments:

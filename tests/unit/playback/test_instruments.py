@@ -1,0 +1,78 @@
+"""What moves flights apart from their gusts: runs of one path, found and aligned, and setpoints from outside."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.instruments import instruments
+from cpfls_cli.playback.kernels import MeasuredMotion
+
+PERIOD = 0.01
+
+
+def _flown(path, late=0.0, drift=1.0, seconds=30.0, **given):
+    """Fly a path of sines that begins so many seconds late, by a clock that runs so much faster."""
+    rng = np.random.default_rng(path)
+    turns, size, phase = rng.uniform(0.5, 6.0, (3, 5)), rng.uniform(0.5, 1.0, (3, 5)), rng.uniform(0, 6.0, (3, 5))
+    time = drift * np.arange(round(seconds / PERIOD)) * PERIOD + late
+    angle = turns * time[:, None, None] + phase
+    velocity, rate = (size * np.sin(angle)).sum(axis=2), (size * turns * np.cos(angle)).sum(axis=2)
+    count = len(time)
+    motion = MeasuredMotion(velocity, velocity, np.tile(np.eye(3), (count, 1, 1)), rate, PERIOD)
+    whole = (slice(0, count),)
+    return PlaybackFlight(
+        name=f"path-{path}", motion=motion, speed=np.ones((count, 4)), hold="linear", stretches=whole, **given
+    )
+
+
+@pytest.mark.parametrize("has_velocity", [True, False])
+def test_runs_of_a_path_are_found_however_late_they_begin(has_velocity):
+    flights = [
+        _flown(1, has_velocity=has_velocity),
+        _flown(2, has_velocity=has_velocity),
+        _flown(1, late=3.217, has_velocity=has_velocity),
+        _flown(2, late=-1.5, has_velocity=has_velocity),
+    ]
+    found = instruments(flights)
+    assert found.kind == "repeats"
+    assert found.repeats.paths() == ((0, 2), (1, 3))
+    assert min(found.repeats.likeness.values()) > 0.95
+
+
+def test_runs_are_aligned_though_their_clocks_drift():
+    first, second = _flown(1), _flown(1, late=1.0, drift=1.002)
+    place = instruments([first, second]).repeats.beside[0][1]
+    known = np.isfinite(place)
+    # The same place of the path by both clocks: t = 1.002 t' + 1.
+    assert place[known] * PERIOD == pytest.approx((np.arange(3000)[known] * PERIOD - 1.0) / 1.002, abs=0.02)
+    assert known.mean() > 0.9
+
+
+def test_what_other_runs_have_at_the_same_place_is_averaged():
+    flights = [_flown(1), _flown(1, late=0.5), _flown(1, late=1.25)]
+    repeats = instruments(flights).repeats
+    others = repeats.others(0, [flight.motion.rate for flight in flights])
+    known = np.isfinite(others).all(axis=1)
+    assert others[known] == pytest.approx(flights[0].motion.rate[known], abs=0.2)
+    assert np.isnan(repeats.others(0, [flight.motion.rate for flight in [flights[0], *flights[1:]]])[:40]).all()
+
+
+def test_paths_that_differ_repeat_nothing():
+    found = instruments([_flown(path) for path in range(6)])
+    assert found.kind == "none"
+    assert found.beside([flight.motion.rate[:, 0] for flight in [_flown(path) for path in range(6)]]) == [None] * 6
+
+
+def test_setpoints_from_outside_of_the_loops_are_instruments_and_others_are_none():
+    flight = _flown(1)
+    position, still = flight.motion.position, np.zeros((len(flight), 3))
+    asked = {"position": position, "velocity": position, "attitude": position, "body_rate": position}
+    assert instruments([replace(flight, setpoints=asked)]).names == ("position", "velocity")
+    # A velocity alone may be what a loop of position asks for; what does not move tells nothing.
+    for others in ({"velocity": position}, {"position": still}, {"attitude": position, "thrust": position[:, :1]}):
+        assert instruments([replace(flight, setpoints=others)]).kind == "none"
+    found = instruments([replace(flight, setpoints={"sticks": position}), _flown(2)])
+    assert found.kind == "setpoints"
+    assert found.setpoints[1] is None
