@@ -159,9 +159,12 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
             *unknown,
         ),
     )
-    return LogSignals(
-        time=clock - clock[0], setpoints=setpoints, report=report, **to_program_frames(on_clock, settings)
-    )
+    converted = to_program_frames(on_clock, settings)
+    if "attitude" in setpoints and "attitude" in converted:
+        # A full turn beside the vehicle's own is the same.
+        away = rotations.wrapped(setpoints["attitude"] - converted["attitude"])
+        setpoints["attitude"] = converted["attitude"] + away
+    return LogSignals(time=clock - clock[0], setpoints=setpoints, report=report, **converted)
 
 
 def _without_setpoints(table: SignalTable) -> tuple[SignalTable, SignalTable]:

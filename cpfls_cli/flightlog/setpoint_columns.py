@@ -39,6 +39,12 @@ _HELD_S = 0.1
 _TIMES, _TIMES_BY_WORDS = 3.0, 1.6
 """As large or as small as what is measured that a setpoint may be; a loop follows with an error, not with a factor."""
 
+_LARGEST_ANGLE = 4 * np.pi
+"""In rad; larger ones are degrees."""
+
+_BOUND = 0.15
+"""Of a turn that an error spreads at most; one that is drawn at random does over 0.29."""
+
 _FULL = 1.05
 """Share of full deflection, or of the largest thrust, up to which one is believed."""
 
@@ -205,7 +211,7 @@ def _judged(seen: Seen, own: _Candidate) -> _Judged:
             return _Judged(None, f"{columns}: looks like a setpoint of the {_words(own.signal)}, and {against}")
         return _Judged(_guess(own, own.columns, f"{own.called}; {against}", "named"))
     if own.signal == "setpoint_attitude":
-        asked = _as_angles(seen, own, asked)
+        asked = _as_angles(seen, own, asked, measured)
     fit = _Following.of(measured, asked, seen.rate_hz, _units(own))
     if not fit.followed.any():
         return _Judged(None, f"{columns}: looks like a setpoint of the {_words(own.signal)}, which does not follow it")
@@ -303,16 +309,25 @@ def _measured(seen: Seen, signal: SignalName) -> Array | None:
     return np.column_stack([unwrap_angles(v) for v in values.T]) if signal == "setpoint_attitude" else values
 
 
-def _as_angles(seen: Seen, own: _Candidate, asked: Array) -> Array:
-    """Give an attitude that is asked for as angles without jumps, in the unit that is stated."""
-    angles, known = np.full((len(asked), 3), np.nan), np.isfinite(asked).all(axis=1)
-    if known.any() and asked.shape[1] > angles.shape[1]:
-        known &= asked.any(axis=1)
+def _as_angles(seen: Seen, own: _Candidate, asked: Array, measured: Array) -> Array:
+    """Give an attitude that is asked for as angles in the unit that is stated, within half a turn of those measured."""
+    is_quaternion = asked.shape[1] > measured.shape[1]
+    known = np.isfinite(asked).all(axis=1) & (asked.any(axis=1) | (not is_quaternion))
+    angles, turn = np.full_like(measured, np.nan), 2 * np.pi
+    if not known.any():
+        return angles
+    if is_quaternion:
         angles[known] = attitude_from_quaternion(asked[known], _quaternion_order(seen))
-    elif known.any():
-        turn = 2 * np.pi if own.states_unit or float(np.nanmax(np.abs(asked))) < 4 * np.pi else 360.0
-        angles[known] = np.column_stack([unwrap_angles(v, turn) for v in asked[known].T])
-    return angles
+    else:
+        angles[known] = asked[known]
+        if not own.states_unit and float(np.max(np.abs(asked[known]))) > _LARGEST_ANGLE:
+            turn = 360.0
+    near = measured * turn / (2 * np.pi)
+    error = np.mod(angles - near + turn / 2, turn) - turn / 2
+    # What has nothing to do with an attitude that turns round and round is within half a turn of it as well.
+    bound = np.nanstd(error, axis=0) < _BOUND * turn
+    free = np.column_stack([unwrap_angles(own, turn) for own in angles.T])
+    return np.asarray(np.where(bound, near + error, free))
 
 
 @dataclass(frozen=True)

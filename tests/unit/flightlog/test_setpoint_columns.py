@@ -328,3 +328,18 @@ def test_logs_flown_in_other_modes_share_a_config(own, asked):
     assert [own.columns for own in attitude.otherwise] == [("roll_des", "pitch_des", "yaw_des")]
     assert found["setpoint_position"].sure == "guess"
     assert "what b follows" in [rival.reason for rival in found["setpoint_position"].rivals]
+
+
+@pytest.mark.parametrize("crosses", [True, False])
+def test_an_angle_is_followed_beyond_a_turn_and_chance_is_not(own, asked, crosses):
+    """Round and round: what is asked for crosses half a turn at other times, or has nothing to do with it."""
+    turning = SimpleNamespace(**vars(own))
+    turning.angles = own.angles + np.outer(own.time, [0, 0, 1.0])
+    turning.rotation = Rotation.from_euler("ZYX", turning.angles[:, ::-1])
+    wished = asked.angles + np.outer(own.time, [0, 0, 1.0])
+    wished[:, :2] = 0.0
+    if not crosses:
+        wished[:, 2] = 3.0 * np.random.default_rng(4).standard_normal(len(wished)).cumsum()
+    wished[:, 2] = (wished[:, 2] + np.pi) % (2 * np.pi) - np.pi
+    known, _ = found(flat_log(turning, rate=None, wished=named(wished, "roll_sp", "pitch_sp", "yaw_sp")).topics, "")
+    assert ("setpoint_attitude" in known) == crosses

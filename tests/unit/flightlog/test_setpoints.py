@@ -171,3 +171,12 @@ def test_on_a_clock_that_was_computed_a_setpoint_is_not_a_row_late():
     values = np.arange(len(time), dtype=float)
     clock = time[0] + float(np.median(np.diff(time))) * np.arange(1000)
     np.testing.assert_array_equal(hold_asked(time, values, clock, 0.1)[:50], values[:50])
+
+
+def test_an_attitude_that_is_asked_for_is_within_half_a_turn_of_the_one_that_is_flown():
+    angles = np.column_stack([0.1 * np.sin(TIME), 0.1 * np.cos(TIME), 3 * TIME])
+    wished = angles + np.array([0.0, 0.0, 0.4 - 2 * np.pi])
+    signals = {"attitude": mapped("rad", *columns_of("a")), "setpoint_attitude": mapped("rad", *columns_of("q"))}
+    flight = read_signals(log(a=angles, q=(wished + np.pi) % (2 * np.pi) - np.pi), settings(signals))
+    away = flight.setpoints["attitude"] - flight.attitude
+    np.testing.assert_allclose(away, np.tile([0.0, 0.0, 0.4], (SAMPLES, 1)), atol=1e-9)
