@@ -199,8 +199,8 @@ class ResponseRecord(Record):
         """The coherence that counts, shape (response, frequency); see `cpfls_cli.response.mismatch.clearness`."""
         return np.array(
             [
-                clearness(coherence, error, self.instrumented and name != ROTOR_SPEED)
-                for name, coherence, error in zip(self.name, self.coherence, self.random_error, strict=True)
+                clearness(*known, self.instrumented and name != ROTOR_SPEED)
+                for name, *known in zip(self.name, self.coherence, self.random_error, self.averages, strict=True)
             ]
         )
 
