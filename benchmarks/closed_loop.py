@@ -57,7 +57,7 @@ def main(draws: int) -> None:
             ]
         )
     header = ["vehicle", "gusts, rad/s²", "loop, rad/s", "Ixx", "Iyy", "Izz", "explained", "truth inside", "loop shown"]
-    print(table(header, rows))
+    table("closed_loop", header, rows)
 
 
 def _ends(low: Array, high: Array) -> str:

@@ -26,6 +26,7 @@ pin_threads()
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.proposal import KnownLog, known_log, propose
 from cpfls_cli.flightlog.recognised import Guess
+from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.logs.formats import log_contents
 from cpfls_cli.units import known_unit
 
@@ -40,6 +41,12 @@ SI = {
     "position": "m",
     "velocity": "m/s",
     "rotor_speed": "rad/s",
+    "setpoint_position": "m",
+    "setpoint_velocity": "m/s",
+    "setpoint_attitude": "1",
+    "setpoint_body_rate": "rad/s",
+    "setpoint_thrust": "1",
+    "sticks": "1",
 }
 FLU = {"body_frame": "FLU", "world_frame": "ENU"}
 FRD = {"body_frame": "FRD", "world_frame": "NED"}
@@ -63,19 +70,26 @@ class LogSet:
         in SI.
     rotors : tuple
         Corner and way to turn of each; empty where the set does not say.
+    setpoints : mapping
+        As `signals`; one that is left out is none that is wrong.
     """
 
     names: tuple[str, ...]
     signals: Mapping[str, str | Truth]
     keys: Mapping[str, str] = field(default_factory=dict)
     rotors: tuple[tuple[str, int], ...] = ()
+    setpoints: Mapping[str, str | Truth] = field(default_factory=dict)
 
 
 def columns(pattern: str, places: Iterable[object]) -> str:
     return " ".join(pattern.replace("*", str(place)) for place in places)
 
 
-NOSE_UP = (("", "roll"), ("-", "pitch"), ("", "yaw"))
+def nose_up(pattern: str) -> str:
+    return " ".join(f"{sign}{pattern.replace('*', axis)}" for sign, axis in zip(("", "-", ""), ANGLES, strict=True))
+
+
+ANGLES = ("roll", "pitch", "yaw")
 XYZ, WXYZ, ONE_TO_FOUR, ZERO_TO_THREE = "xyz", "wxyz", range(1, 5), range(4)
 NANODRONE = {
     "quaternion": columns("q*", WXYZ),
@@ -142,9 +156,13 @@ SETS = {
         {
             "position": columns("fixedFrequency.stateEstimate.*", XYZ),
             # Its pitch is that of the nose up.
-            "body_rate": " ".join(f"{sign}fixedFrequency.controller.r_{axis}" for sign, axis in NOSE_UP),
+            "body_rate": nose_up("fixedFrequency.controller.r_*"),
         },
         FLU,
+        setpoints={
+            "setpoint_attitude": (nose_up("fixedFrequency.controller.*"), "deg", 1.0),
+            "setpoint_body_rate": (nose_up("fixedFrequency.controller.*Rate"), "deg/s", 1.0),
+        },
     ),
     "crazyswarm2, Lee (CSV)": LogSet(
         ("log45.csv", "log119.csv", "log149.csv"),
@@ -157,6 +175,10 @@ SETS = {
             "thrust": ("ctrlLee_thrustSi", "N", 1.0),
         },
         FLU,
+        setpoints={
+            "setpoint_position": columns("ctrltargetZ_*", XYZ),
+            "setpoint_velocity": columns("ctrltargetZ_v*", XYZ),
+        },
     ),
     "nano-drone, prepared (CSV)": LogSet(
         ("square_20251017_run[123].csv",),
@@ -198,12 +220,24 @@ SETS = {
             "rotor_command_is": "speed",
         },
         PX4,
+        {
+            "setpoint_position": columns("trajectory_setpoint.position[*]", range(3)),
+            "setpoint_velocity": columns("trajectory_setpoint.velocity[*]", range(3)),
+            "setpoint_attitude": columns("vehicle_attitude_setpoint.q_d[*]", ZERO_TO_THREE),
+            "setpoint_body_rate": columns("vehicle_rates_setpoint.*", ANGLES),
+            "setpoint_thrust": "-vehicle_rates_setpoint.thrust_body[2]",
+        },
     ),
     "ArduPilot 3.4 (DataFlash)": LogSet(
         ("ap_0036.bin", "0036.bin"),
         ARDUPILOT_SIGNALS,
         FRD | {"acceleration_frame": "body-specific-force"},
         PX4,
+        {
+            "setpoint_attitude": (columns("ATT.Des*", ("Roll", "Pitch", "Yaw")), "deg", 1.0),
+            "setpoint_body_rate": (columns("RATE.*Des", "RPY"), "deg/s", 1.0),
+            "sticks": (columns("RCIN.C*", (1, 2, 4, 3)), "1", 1 / 500),
+        },
     ),
     "Betaflight 3.1 (blackbox)": LogSet(
         ("pa_*.BBL",),
@@ -215,6 +249,11 @@ SETS = {
         },
         {"body_frame": "FLU", "acceleration_frame": "body-specific-force"},
         BETAFLIGHT,
+        {
+            "setpoint_body_rate": (columns("setpoint[*]", range(3)), "deg/s", 1.0),
+            "setpoint_thrust": ("setpoint[3]", "1", 1e-3),
+            "sticks": (columns("rcCommand[*]", range(3)), "1", 1 / 500),
+        },
     ),
 }
 REFUSED = {
@@ -228,7 +267,7 @@ REFUSED = {
 
 @dataclass
 class Count:
-    """Signals, keys and rotors of a set: how many there are, how many are right, guessed and listed."""
+    """Signals, keys, rotors of a set, and setpoints that are mapped: how many, and how many are right."""
 
     logs: int = 0
     signals: int = 0
@@ -239,6 +278,8 @@ class Count:
     keys_right: int = 0
     rotors: int = 0
     rotors_right: int = 0
+    setpoints: int = 0
+    setpoints_right: int = 0
     wrong: list[str] = field(default_factory=list)
 
 
@@ -255,7 +296,16 @@ def main(folders: Sequence[Path]) -> None:
                 print(f"{name}: {wrong}", file=sys.stderr)
     if not rows:
         sys.exit("no log of a known set in these folders; call it as: python benchmarks/recognition.py FOLDER...")
-    header = ("set", "logs", "signals right", "of them guessed", "wrong, the right one listed", "keys right", "rotors")
+    header = (
+        "set",
+        "logs",
+        "signals right",
+        "of them guessed",
+        "wrong, the right one listed",
+        "keys right",
+        "rotors",
+        "setpoints",
+    )
     table("recognition", header, rows)
     for path in {path.name: path for path in files}.values():
         if path.name in REFUSED:
@@ -265,6 +315,7 @@ def main(folders: Sequence[Path]) -> None:
 
 def row(name: str, count: Count) -> tuple[str, ...]:
     rotors = f"{count.rotors_right} of {count.rotors}" if count.rotors else "-"
+    setpoints = f"{count.setpoints_right} of {count.setpoints}" if count.setpoints else "-"
     return (
         name,
         str(count.logs),
@@ -273,6 +324,7 @@ def row(name: str, count: Count) -> tuple[str, ...]:
         str(count.listed),
         f"{count.keys_right} of {count.keys}",
         rotors,
+        setpoints,
     )
 
 
@@ -311,27 +363,44 @@ def judge(path: Path, own: LogSet, count: Count) -> None:
         found = tuple((rotor.name, rotor.spin) for rotor in (proposal.airframe.rotors if proposal.airframe else ()))
         count.rotors_right += found == own.rotors
         count.wrong += [] if found == own.rotors else [f"{path.name}: rotors {found}"]
-    extra = [signal for signal in guesses if signal not in own.signals]
+    for signal in SETPOINTS.keys() & guesses.keys() & own.setpoints.keys():
+        count.setpoints += 1
+        wrong = wrong_map(own.setpoints[signal], signal, guesses[signal], path)
+        count.setpoints_right += wrong is None
+        count.wrong += [] if wrong is None else [f"{path.name}: {wrong}"]
+    extra = [signal for signal in guesses if signal not in own.signals and signal not in own.setpoints]
     count.wrong += [f"{path.name}: {signal} is mapped, and the set has none" for signal in extra]
 
 
 def judge_signal(path: Path, signal: str, truth: str | Truth, guess: Guess | None, count: Count) -> None:
-    names, unit, factor = (truth, SI[signal], 1.0) if isinstance(truth, str) else truth
-    log, names = path.name, names.replace("@", path.stem)
+    log = path.name
     if guess is None:
         count.wrong.append(f"{log}: {signal} is missing")
         return
+    wrong = wrong_map(truth, signal, guess, path)
+    count.right += wrong is None
+    count.guessed += wrong is None and guess.sure == "guess"
+    if wrong is not None:
+        _, unit, factor = stated(truth, signal)
+        listed = any(rival.text in (f"unit: {unit}", f"scale: {factor:.6g}") for rival in guess.rivals)
+        count.listed += listed
+        count.wrong.append(f"{log}: {wrong}")
+
+
+def stated(truth: str | Truth, signal: str) -> Truth:
+    return (truth, SI[signal], 1.0) if isinstance(truth, str) else truth
+
+
+def wrong_map(truth: str | Truth, signal: str, guess: Guess, path: Path) -> str | None:
+    """Say how a signal is mapped; None where that is right."""
+    names, unit, factor = stated(truth, signal)
     own = guess.columns
     same = isclose(known_unit(own.unit).factor * own.scale, known_unit(unit).factor * factor, rel_tol=1e-6)
     sign = own.sign or (1.0,) * len(own.columns)
     found = [f"{'-' * (way < 0)}{column}" for way, column in zip(sign, own.columns, strict=True)]
-    right = found == names.split() and same
-    count.right += right
-    count.guessed += right and guess.sure == "guess"
-    if not right:
-        listed = any(rival.text in (f"unit: {unit}", f"scale: {factor:.6g}") for rival in guess.rivals)
-        count.listed += listed
-        count.wrong.append(f"{log}: {signal} is {own.columns} {own.unit} x {own.scale:.6g} {own.sign or ''}")
+    if found == names.replace("@", path.stem).split() and same:
+        return None
+    return f"{signal} is {own.columns} {own.unit} x {own.scale:.6g} {own.sign or ''}"
 
 
 if __name__ == "__main__":

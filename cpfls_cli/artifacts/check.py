@@ -14,6 +14,7 @@ import numpy as np
 from cpfls_cli.artifacts.formats import record_of_format
 from cpfls_cli.artifacts.spec import (
     CONFIG,
+    FIXED,
     INPUTS,
     SCHEMA_VERSION,
     ArtifactSpec,
@@ -24,7 +25,6 @@ from cpfls_cli.artifacts.spec import (
 from cpfls_cli.errors import InputError, NotAnArtifactError
 from cpfls_cli.files import is_hdf5, is_sealed, read_content, text_sha256
 
-_FIXED = {"axis": 3}
 # Text in memory and in a file.
 _KINDS = {"U": "text", "S": "text", "i": "numbers", "u": "numbers", "f": "numbers"}
 _LARGEST = 1e150
@@ -79,7 +79,7 @@ def _dimensions(artifact: Checkable) -> Iterator[str]:
             yield f"{spec.path}: has {values.ndim} dimensions, expected {len(spec.dimensions)} {spec.dimensions}"
             continue
         for label, length in zip(spec.dimensions, values.shape, strict=True):
-            fixed = int(label) if label.isdigit() else _FIXED.get(label)
+            fixed = int(label) if label.isdigit() else FIXED.get(label)
             known, where = (fixed, "the format") if fixed else lengths.setdefault(label, (length, spec.path))
             if length != known:
                 yield f"{spec.path}: {length} along '{label}', but {known} by {where}"

@@ -100,7 +100,7 @@ def _reason(record: VehicleRecord, row: dict[str, Any]) -> str:
     ]
     if row["determined"]:
         return ""
-    if record.loop.shown and name != FOUND_AS[THRUST]:
+    if record.loop.shown and record.instruments is None and name != FOUND_AS[THRUST]:
         return "these flights show the loop, not the vehicle"
     if name in OF_TURNING and too_heavy(record):
         return too_heavy(record)

@@ -33,7 +33,9 @@ PART = 8192
 """Samples of a compressed artifact that are written at a time, each such part compressed on its own."""
 
 _TEXT = "text"
-_PATH, _GROUP = "dataset", "group"
+_PATH, _GROUP, _APART = "dataset", "group", "apart"
+FIXED = {"axis": 3}
+"""Axes whose label says their length."""
 
 
 @dataclass(frozen=True)
@@ -179,15 +181,17 @@ def dataset(
     return field(default=default, metadata={_PATH: spec})
 
 
-def group(path: str, *, default: Any = MISSING) -> Any:
+def group(path: str, *, default: Any = MISSING, apart: bool = False) -> Any:
     """Make a field of a record a group of datasets, itself a record; with ``default=None`` an artifact may lack all.
 
     Parameters
     ----------
     path : str
         Below the group of the outer record; empty where the inner paths are whole.
+    apart : bool
+        Whether its axes are as long as they like, though another group is a record of the same kind.
     """
-    return field(default=default, metadata={_GROUP: path})
+    return field(default=default, metadata={_GROUP: path, _APART: apart})
 
 
 _Class = TypeVar("_Class")
@@ -366,12 +370,19 @@ def _specs(cls: Any, prefix: str, optional: bool) -> Iterator[DatasetSpec]:
     for entry in _entries(cls):
         if _GROUP in entry.field.metadata:
             inner = _joined(prefix, entry.field.metadata[_GROUP])
-            yield from _specs(entry.kind, inner, optional or entry.optional)
+            for spec in _specs(entry.kind, inner, optional or entry.optional):
+                yield _relabelled(spec, f"{inner}_") if entry.field.metadata[_APART] else spec
         else:
-            spec: DatasetSpec = entry.field.metadata[_PATH]
+            spec = entry.field.metadata[_PATH]
             units = _TEXT if entry.kind in (str, tuple[str, ...]) else spec.units
             required = spec.required and not optional
             yield replace(spec, path=_joined(prefix, spec.path), units=units, required=required)
+
+
+def _relabelled(spec: DatasetSpec, before: str) -> DatasetSpec:
+    """Give axes labels of their own, but for those whose length their label says."""
+    labels = (label if label.isdigit() or label in FIXED else before + label for label in spec.dimensions)
+    return replace(spec, dimensions=tuple(labels), into=before + spec.into if spec.into else "")
 
 
 @cache

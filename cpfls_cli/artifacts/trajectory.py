@@ -13,8 +13,10 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record, rows_of
 
 if TYPE_CHECKING:
+    from cpfls_cli.simulation.room_left import RoomLeft
     from cpfls_cli.trajectory.legs import Leg
     from cpfls_cli.trajectory.planning import PlannedRotation
+    from cpfls_cli.trajectory.settings import ExciteSettings
 
 DERIVATIVES = ("pop", "crackle", "snap", "jerk", "acceleration", "velocity", "displacement")
 """Derivatives of the displacement, from the sixth down to itself."""
@@ -40,6 +42,64 @@ class LegGroup:
             displacement=np.array([leg.vector for leg in legs]),
             limited_by=tuple(" ".join(leg.limited_by) for leg in legs),
         )
+
+
+@record
+class RunsGroup:
+    """Runs of a path that is repeated: what is planned is the same in all, but for whole turns of yaw."""
+
+    begin: Array = dataset("begin", "when each run leaves its rest", "run", units="s")
+    end: Array = dataset("end", "when each run is at rest again", "run", units="s")
+
+
+@record
+class ExcitedGroup:
+    """The test signal in a path: attitude and acceleration that the setpoints have on its account."""
+
+    axis: tuple[str, ...] = dataset("axis", "roll, pitch, yaw or vertical", "excited")
+    crest: Array = dataset("crest", "crest factor of the signal of each, peak over root mean square", "excited")
+    signal: str = dataset("signal", "multisine, sweep-linear or sweep-logarithmic")
+    band: Array = dataset("band", "lowest and highest frequency", "2", units="Hz")
+    size: float = dataset("size", "largest angle, as planned", units="rad")
+    limit: str = dataset("limit", "limit of the vehicle that made it smaller than asked for; empty where none did")
+    attitude: Array = dataset("attitude", "roll, pitch, yaw that it adds", "time", "axis", units="rad", frame=EULER)
+    position: Array = dataset("position", "position that it adds", "time", "axis", units="m", frame=WORLD)
+    acceleration: Array = dataset(
+        "acceleration", "acceleration that it adds", "time", "axis", units="m/s^2", frame=WORLD
+    )
+
+    @classmethod
+    def of(
+        cls,
+        asked: ExciteSettings,
+        flown: PlannedRotation,
+        without: PlannedRotation,
+        room: RoomLeft,
+    ) -> Self:
+        """Arrange what an excitation adds to a path."""
+        added = {name: vars(flown)[name] - vars(without)[name] for name in ("attitude", "position", "acceleration")}
+        return cls(
+            axis=asked.axes,
+            crest=np.array(room.added.crest),
+            signal=asked.signal,
+            band=np.array(asked.band_hz),
+            size=room.added.size,
+            limit=room.limit,
+            **added,
+        )
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What is excited, for machines."""
+        return {
+            "axes": list(self.axis),
+            "signal": self.signal,
+            "band_hz": self.band.tolist(),
+            "size_rad": self.size,
+            "limit": self.limit,
+            "crest_factor": self.crest.tolist(),
+            "max_displacement_m": float(np.linalg.norm(self.position, axis=1).max()),
+        }
 
 
 @record
@@ -130,14 +190,25 @@ class TrajectoryRecord(Record):
     )
     body_rate: Array = dataset("body_rate", "body rates p, q, r", "time", "axis", units="rad/s", frame=BODY)
     leg: LegGroup | None = group("leg", default=None)
+    run: RunsGroup | None = group("run", default=None)
+    excited: ExcitedGroup | None = group("excited", default=None)
     question: QuestionGroup | None = group("question", default=None)
 
     @classmethod
-    def of(cls, planned: PlannedRotation, question: QuestionGroup | None = None) -> Self:
-        """Arrange a plan, with what it is to tell."""
+    def of(
+        cls, planned: PlannedRotation, question: QuestionGroup | None = None, excited: ExcitedGroup | None = None
+    ) -> Self:
+        """Arrange a plan, with what it is to tell, or what excites it."""
         sampled = vars(planned)
         signals = {name: sampled[name] for name in cls.__dataclass_fields__ if name in sampled}
-        return cls(**signals, leg=LegGroup.of(sampled["legs"]) if sampled.get("legs") else None, question=question)
+        runs = np.array(sampled.get("runs", ()))
+        return cls(
+            **signals,
+            leg=LegGroup.of(sampled["legs"]) if sampled.get("legs") else None,
+            run=RunsGroup(begin=runs[:, 0], end=runs[:, 1]) if len(runs) else None,
+            question=question,
+            excited=excited,
+        )
 
     @classmethod
     def lacking(cls, present: Container[str]) -> list[str]:
@@ -160,6 +231,8 @@ class TrajectoryRecord(Record):
             "max_rate_rad_s": _largest(self.attitude_rate),
             "max_body_rate_rad_s": _largest(self.body_rate),
             "max_acceleration_rad_s2": _largest(self.attitude_acceleration),
+            **({"runs": rows_of(self.run)} if self.run else {}),
+            **({"excited": self.excited.summary} if self.excited else {}),
             **({"questions": self.question.summary} if self.question else {}),
         }
 

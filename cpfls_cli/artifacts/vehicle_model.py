@@ -18,6 +18,8 @@ from cpfls_cli.validation.trust import Trust, capped
 
 if TYPE_CHECKING:
     # Reading a record does not need the compiled loops that play a vehicle back.
+    from cpfls_cli.playback.constants import Constants
+    from cpfls_cli.playback.instruments import Instruments
     from cpfls_cli.playback.loop import LoopBounds
     from cpfls_cli.playback.structure import Choice
     from cpfls_cli.playback.vehicle import FoundVehicle
@@ -113,6 +115,65 @@ class LoopGroup:
 
 
 @record
+class InstrumentsGroup:
+    """What told how the flights were moved, apart from gusts: other runs of their paths, or setpoints."""
+
+    kind: str = dataset("kind", "repeats or setpoints")
+    setpoint: tuple[str, ...] = dataset("setpoint", "signals asked for from outside of the loop", "setpoint")
+    first: IntArray = dataset("first", "a flight that repeats another, counted from 0", "repeat", least=0)
+    second: IntArray = dataset("second", "the other", "repeat", least=0)
+    likeness: Array = dataset("likeness", "correlation of the two along their path", "repeat")
+    low: Array = dataset("low", "lower end, about", "band", units="Hz")
+    high: Array = dataset("high", "upper end, about", "band", units="Hz")
+    explained: Array = dataset(
+        "explained", "share of the rotation that comes again that the constants explain", "band", "axis", frame=BODY
+    )
+    used: BoolArray = dataset("used", "1 where the constants rest on the band; others lack an effect", "band")
+
+    @classmethod
+    def of(cls, given: Instruments, constants: Constants) -> Self:
+        """Arrange instruments, and what they say of the constants."""
+        pairs, ends = list(given.repeats.likeness), np.array(constants.explained.bands_hz)
+        return cls(
+            kind=given.kind,
+            setpoint=given.names,
+            first=np.array([first for first, _ in pairs], dtype=np.int64),
+            second=np.array([second for _, second in pairs], dtype=np.int64),
+            likeness=np.array(list(given.repeats.likeness.values()), dtype=float),
+            low=ends[:, 0],
+            high=ends[:, 1],
+            explained=constants.explained.share,
+            used=constants.explained.used,
+        )
+
+    @property
+    def runs(self) -> int:
+        """Flights that repeat another."""
+        return len({*self.first.tolist(), *self.second.tolist()})
+
+    @property
+    def lacks_below(self) -> float | None:
+        """Frequency in Hz below which the vehicle answers with something that the constants lack; None for nowhere."""
+        return None if self.used.all() else float(self.low[self.used].min())
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The instruments for machines."""
+        return {
+            "kind": self.kind,
+            "setpoints": list(self.setpoint),
+            "repeats": [
+                {"flights": [int(first), int(second)], "correlation": float(alike)}
+                for first, second, alike in zip(self.first, self.second, self.likeness, strict=True)
+            ],
+            "bands": [
+                {"hz": [float(low), float(high)], "explained": explained.tolist(), "used": bool(used)}
+                for low, high, explained, used in zip(self.low, self.high, self.explained, self.used, strict=True)
+            ],
+        }
+
+
+@record
 class VehicleRecord(ModelRecord):
     """The artifact `cpfls/model` of a vehicle found in flights."""
 
@@ -124,6 +185,8 @@ class VehicleRecord(ModelRecord):
     trade: TradesGroup = group("trade")
     structure: StructuresTriedGroup = group("structure")
     loop: LoopGroup = group("loop")
+    instruments: InstrumentsGroup | None = group("instruments", default=None)
+    forecast: VehicleGroup | None = group("forecast", default=None, apart=True)
     held_out: HeldOutGroup | None = group("held_out", default=None)
     share: SharesGroup = group("share")
     airspeed: float = dataset(
@@ -165,6 +228,8 @@ class VehicleRecord(ModelRecord):
             trade=columns_of(TradesGroup, found.trades),
             structure=StructuresTriedGroup.of(found.choice),
             loop=LoopGroup.of(found.loop),
+            instruments=None if found.constants is None else InstrumentsGroup.of(found.instruments, found.constants),
+            forecast=None if found.forecast is None else VehicleGroup.of(replace(found.forecast, commanded=commanded)),
             held_out=held_out,
             share=SharesGroup(
                 name=tuple(share.name for share in found.shares),
@@ -193,8 +258,20 @@ class VehicleRecord(ModelRecord):
 
     @property
     def verdict(self) -> Trust:
-        """What playback on flights held out says of it, where they neither contradict themselves nor show the loop."""
-        return capped(trust_by_playback(self.held_out), self.contradiction or (), loop=self.loop.shown)
+        """How far to trust its constants, where the flights neither contradict themselves nor show the loop.
+
+        Where instruments tell them, by what they explain of the motion that comes again; else by playback.
+        """
+        against = self.contradiction or ()
+        if self.instruments is None:
+            return capped(self.forecast_verdict, against, loop=self.loop.shown)
+        lacking = self.instruments.lacks_below is not None or bool(self.found.at_bound[self.found.value != 0].any())
+        return capped(Trust.LACKING if lacking else Trust.SIMULATION, against)
+
+    @property
+    def forecast_verdict(self) -> Trust:
+        """What playback on flights held out says of it as a forecast along logged rotor speeds."""
+        return trust_by_playback(self.held_out)
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -205,6 +282,7 @@ class VehicleRecord(ModelRecord):
             # Its effects were chosen among those that the table of weights holds.
             "not_held": [],
             "verdict": self.verdict,
+            "forecast_verdict": self.forecast_verdict,
             **self.provenance,
             "parameters": {row.pop("key"): row for row in (each._asdict() for each in parameters_of(self))},
             "numbers": numbers,
@@ -219,6 +297,7 @@ class VehicleRecord(ModelRecord):
                     for name in ("low", "high", "explained")
                 },
             },
+            "instruments": None if self.instruments is None else self.instruments.summary,
             "structures": rows_of(self.structure),
             "held_out": None if self.held_out is None else self.held_out.summary,
             "shares": {row.pop("name"): row for row in rows_of(self.share)},

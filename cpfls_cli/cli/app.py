@@ -13,6 +13,23 @@ import typer
 
 from cpfls_cli.cli.interrupts import deferred_interrupts
 from cpfls_cli.cli.options import Commands, Common, ConfigArgument, OutputOption, seconds, with_common
+from cpfls_cli.cli.path_options import (
+    BandOption,
+    BoxOption,
+    DurationOption,
+    ExciteOption,
+    ForOption,
+    HeightOption,
+    HomeOption,
+    HoverOption,
+    MissionOption,
+    PlotOption,
+    RepeatOption,
+    SignalOption,
+    SizeOption,
+    ToTellOption,
+    WaypointsOption,
+)
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
 from cpfls_cli.logs.formats import formats_in_words, suffixes_in_words
 from cpfls_cli.report.forms import Form
@@ -212,52 +229,39 @@ def _main(
 def trajectory(
     config: ConfigArgument,
     output: OutputOption,
-    waypoints: Annotated[
-        Path | None,
-        typer.Option(
-            "--waypoints",
-            metavar="FILE",
-            help="CSV of points to fly to, in place of the path of the config: x_m, y_m, z_m, and if wanted yaw_rad, "
-            "pause_s.",
-        ),
-    ] = None,
-    to_tell: Annotated[
-        str | None,
-        typer.Option(
-            "--to-tell", metavar="A,B", help="Plan the flight that tells these effects apart (`cpfls effects`)."
-        ),
-    ] = None,
-    diagnosis: Annotated[
-        Path | None,
-        typer.Option(
-            "--for", metavar="DIAGNOSIS", help="Plan the flight that settles what this diagnosis leaves open."
-        ),
-    ] = None,
-    box: Annotated[
-        str | None, typer.Option("--box", metavar="X,Y,Z", help="Space for such a flight, m; about x = y = 0.")
-    ] = None,
-    height: Annotated[
-        float | None, typer.Option("--height", metavar="M", help="Height of the middle of the box above the ground, m.")
-    ] = None,
-    duration: Annotated[
-        float | None, typer.Option("--duration", metavar="S", help="Duration, s, in place of that of the config.")
-    ] = None,
-    plot: Annotated[
-        bool, typer.Option("--plot", help="Draw the derivatives and the attitude, as SVG beside OUTPUT.")
-    ] = False,
+    waypoints: WaypointsOption = None,
+    to_tell: ToTellOption = None,
+    diagnosis: ForOption = None,
+    box: BoxOption = None,
+    height: HeightOption = None,
+    duration: DurationOption = None,
+    hover: HoverOption = None,
+    repeat: RepeatOption = None,
+    excite: ExciteOption = None,
+    signal: SignalOption = None,
+    band: BandOption = None,
+    size: SizeOption = None,
+    form: MissionOption = None,
+    home: HomeOption = None,
+    plot: PlotOption = False,
     *,
     common: Common,
 ) -> None:
     """Plan a smooth path, full rotations that excite a model, or the flight that settles a diagnosis."""
     with messages_for_errors():
-        asked = _of("trajectory").option_overrides(waypoints, to_tell, diagnosis, box, height, duration)
+        options = _of("path-options")
+        added = options.Added(repeat, excite, None if signal is None else signal.value, band, size, hover)
+        asked = options.option_overrides(waypoints, to_tell, diagnosis, box, height, duration)
+        asked += added.overrides(waypoints, to_tell is not None or diagnosis is not None, duration)
         common = replace(common, overrides=[*(common.overrides or []), *asked])
 
     def call(command: Any, job: Job) -> Any:
+        mission = _of("mission").mission_of(job.study, [each.value for each in form or []], home)
         if job.study.trajectory.path == "next-flight":
             return _of("next-flight").run(job, diagnosis, plot)
-        command.require_no_room(box, height)
-        return command.run(job, waypoints, plot)
+        options.require_no_room(box, height)
+        added.require_axes(job.study)
+        return command.run(job, waypoints, plot, mission)
 
     _run("trajectory", config, output, common, call)
 

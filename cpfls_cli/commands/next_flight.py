@@ -17,10 +17,12 @@ from cpfls_cli.artifacts.rebuilt import audit, vehicle_model
 from cpfls_cli.artifacts.trajectory import QuestionGroup, TrajectoryRecord
 from cpfls_cli.commands.trajectory import figure_paths
 from cpfls_cli.config.study import Study, generator, settings_of
+from cpfls_cli.config.unknown import require_known
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError, SettingError
+from cpfls_cli.export.mission import waypoint_lines
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
@@ -46,13 +48,13 @@ from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.simulation.inverse import flyability
 from cpfls_cli.trajectory.planning import Trajectory
+from cpfls_cli.trajectory.repeats import repeated
 from cpfls_cli.weak_form.windows import common_windows
 
 _PERIOD = 0.02
 """Most time between samples that a search looks at, s."""
 
 _SAMPLES_IN_A_WINDOW = 20
-_WAYPOINT_STEP_S = 0.1
 _OPEN = (GapVerdict.NOT_EXCITED, GapVerdict.NO_GAP)
 """Verdicts that leave open what the flights could not show."""
 
@@ -93,6 +95,7 @@ def run(job: Job, diagnosis: Path | None = None, plot: bool = False) -> Outcome:
         If there is nothing to tell, or no flight tells it.
     """
     study = job.study
+    require_known(study, "trajectory", whole=False)
     inputs = begin(job, {"diagnosis": diagnosis} if diagnosis else {})
     waypoints = job.output.with_name(f"{job.output.stem}-waypoints.csv")
     figures = figure_paths(job, figure_names(held=False) if plot else ())
@@ -111,8 +114,9 @@ def run(job: Job, diagnosis: Path | None = None, plot: bool = False) -> Outcome:
     if problems:
         raise ComputationError("\n".join([*problems, f"{job.output}: no path was written; lower trajectory.limits"]))
     questions, notes = _told(study, asked, flight, planned)
+    planned = repeated(planned, study.trajectory, study.vehicle.gravity_m_s2)
     record = finish(job, TrajectoryRecord.of(planned, questions), inputs)
-    write_text(waypoints, waypoint_lines(planned))
+    write_text(waypoints, waypoint_lines(record))
     source = source_of(job, record)
     for path, drawn in zip(figures, path_figures(source) if figures else (), strict=True):
         write_text(path, drawn.picture.svg)
@@ -120,15 +124,6 @@ def run(job: Job, diagnosis: Path | None = None, plot: bool = False) -> Outcome:
     blocks += [Text(f"written beside it: {', '.join(map(str, (waypoints, *figures)))}")]
     files = {"waypoints": str(waypoints), "figures": [str(path) for path in figures]}
     return Outcome(record.summary | files | {"duration_s": planned.duration}, tuple(blocks))
-
-
-def waypoint_lines(planned: Trajectory) -> str:
-    """Write a path as CSV for an autopilot: time, position, yaw and velocity, world frame with z up."""
-    step = max(1, round(_WAYPOINT_STEP_S / float(planned.time[1])))
-    columns = (planned.time[:, None], planned.position, planned.yaw[:, None], planned.velocity)
-    rows = np.concatenate(columns, axis=1)[::step]
-    head = "time_s,x_m,y_m,z_m,yaw_rad,vx_m_s,vy_m_s,vz_m_s"
-    return "\n".join([head, *(",".join(f"{value:.4f}" for value in row) for row in rows)]) + "\n"
 
 
 def _effects(study: Study) -> list[Effect]:

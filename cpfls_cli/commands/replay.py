@@ -37,7 +37,7 @@ def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) 
     of_model = {} if is_vehicle(model) else {"model": model}
     roles = numbered_roles("flight", flights)
     inputs = begin(job, of_model | roles)
-    to_play = read_model(model, job.study)
+    to_play = read_model(model, job.study, forecast=True)
     given = flights_to_play(flights, job.study, options.hold)
     pairs = [played(to_play, flight, job.study.vehicle) for flight in given]
     horizon = _samples(options.horizon_s, given[0])

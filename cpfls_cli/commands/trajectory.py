@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, replace
+from dataclasses import astuple, dataclass, replace
 from difflib import get_close_matches
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,10 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
 from cpfls_cli.artifacts.output import write_text
-from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+from cpfls_cli.artifacts.trajectory import ExcitedGroup, TrajectoryRecord
+from cpfls_cli.commands.mission import Mission, mission_paths, mission_texts, write_mission
 from cpfls_cli.config.study import Study, generator, settings_of
+from cpfls_cli.config.unknown import require_known
 from cpfls_cli.errors import ComputationError, ConfigError, InputError, SettingError
 from cpfls_cli.excitation.optimise import Excitation, optimised_rotation
 from cpfls_cli.logs.csv_log import read_csv, row_lines
@@ -24,15 +27,20 @@ from cpfls_cli.pages.trajectory import (
     answer,
     demand_sentences,
     figure_names,
+    guessed_words,
+    mission_blocks,
     path_figures,
     plan_blocks,
 )
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.simulation.inverse import Flyability, flyability, single_axis_torque
+from cpfls_cli.simulation.room_left import RoomLeft, room_left
 from cpfls_cli.trajectory.consistency import check_waypoints
+from cpfls_cli.trajectory.excited import added_motion
 from cpfls_cli.trajectory.legs import Leg
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory, held_rotation, plan
+from cpfls_cli.trajectory.repeats import repeated
 from cpfls_cli.trajectory.rotation import RotationPath, full_rotation
 from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
 
@@ -46,7 +54,29 @@ _SAMPLES_IN_A_PART = 8
 _MOST_SAMPLES = 1_000_000
 
 
-def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
+@dataclass(frozen=True)
+class Flight:
+    """A path as it is to be flown.
+
+    Attributes
+    ----------
+    planned : PlannedRotation
+        All runs of it.
+    at : callable
+        Samples it anew, two runs at most, for a look between its samples.
+    excitation : Excitation or None
+        Of a held vehicle, where the path is optimised.
+    excited : ExcitedGroup or None
+        What is added to the setpoints.
+    """
+
+    planned: PlannedRotation
+    at: PlanAt
+    excitation: Excitation | None = None
+    excited: ExcitedGroup | None = None
+
+
+def run(job: Job, waypoints: Path | None = None, plot: bool = False, mission: Mission | None = None) -> Outcome:
     """Plan the path of a study and write it.
 
     Parameters
@@ -55,92 +85,44 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
         CSV of the points to fly to, in place of the path of the config.
     plot : bool
         Draw the path beside the output.
+    mission : Mission or None
+        Files for autopilots to write beside it; None for none.
 
     Raises
     ------
     ComputationError
         If the path asks for more than the vehicle has, unless `trajectory.infeasible` is ``report``.
     """
+    mission = mission or Mission()
     inputs = begin(job, {"waypoints": waypoints} if waypoints else {})
     settings = _settings(job.study, waypoints)
+    require_known(job.study, "trajectory", whole=not settings.held)
     figures = figure_paths(job, figure_names(held=settings.held) if plot else ())
-    check_outputs(job, *figures)
+    check_outputs(job, *figures, *mission_paths(job, mission))
     # To optimise takes long; what else can go wrong shows only when it is planned.
     if job.dry_run and settings.path == "optimised":
         return nothing_written(job)
     with settings_of("trajectory", job.study):
-        at, excitation = _plan(job, settings)
-        planned = at(settings.sample_time_s)
-        demand, problems = _demand(job.study, settings, planned, at)
+        flight = _flight(job, settings)
+        planned = flight.planned
+        demand, problems = _demand(job.study, settings, planned, flight.at)
     if problems and settings.infeasible == "stop":
         change = f"{_remedy(job.study, settings)}, change the vehicle, or set trajectory.infeasible: report"
         raise ComputationError("\n".join([*problems, f"{job.output}: no path was written; {change}"]))
+    record = TrajectoryRecord.of(planned, excited=flight.excited)
+    texts = mission_texts(job, mission, record)
     if job.dry_run:
         return nothing_written(job)
-    source = source_of(job, finish(job, TrajectoryRecord.of(planned), inputs))
+    source = source_of(job, finish(job, record, inputs))
     for path, drawn in zip(figures, path_figures(source) if figures else (), strict=True):
         write_text(path, drawn.picture.svg)
-    blocks = [*plan_blocks(planned, demand, excitation), *answer(source)]
+    write_mission(texts)
+    blocks = [*plan_blocks(planned, demand, flight.excitation), *answer(source)]
     blocks += [Text(f"drawn: {', '.join(map(str, figures))}")] if figures else []
-    blocks += [Text(problem, "warning") for problem in problems]
-    return Outcome(_summary(source.record, planned, demand, excitation, figures), tuple(blocks))
-
-
-def option_overrides(
-    waypoints: Path | None,
-    to_tell: str | None,
-    diagnosis: Path | None,
-    box: str | None,
-    height: float | None,
-    duration: float | None,
-) -> list[str]:
-    """Write the options as overrides of the config, so that the artifact's config has them too.
-
-    Parameters
-    ----------
-    to_tell : str or None
-        Names of effects, with commas between.
-    diagnosis : Path or None
-        Whose open questions the path settles.
-    box : str or None
-        Three lengths in m, with commas between.
-    height, duration : float or None
-        m and s.
-
-    Returns
-    -------
-    list of str
-        ``section.key=value`` each.
-
-    Raises
-    ------
-    InputError
-        If points to fly to are given for a flight that is to be planned.
-    """
-    settles = to_tell is not None or diagnosis is not None
-    if settles and waypoints is not None:
-        raise InputError(f"--waypoints {waypoints}: --to-tell and --for choose the path themselves; leave it out")
-    next_flight = {
-        "to_tell": None if to_tell is None else f"[{to_tell}]",
-        "box_m": None if box is None else f"[{box}]",
-        "height_m": None if height is None else repr(float(height)),
-    }
-    path = "next-flight" if settles else "waypoints" if waypoints is not None else None
-    return [
-        *([] if path is None else [f"trajectory.path={path}"]),
-        *(f"trajectory.next_flight.{key}={value}" for key, value in next_flight.items() if value is not None),
-        *([] if duration is None else [f"trajectory.duration_s={float(duration)!r}"]),
-    ]
-
-
-def require_no_room(box: str | None, height: float | None) -> None:
-    """Refuse room for a path that is not planned for it."""
-    for option, value in (("--box", box), ("--height", height)):
-        if value is not None:
-            raise InputError(
-                f"{option} {value}: is room for the flight that --to-tell or --for plans, and this path is planned "
-                "without; give one of them, or set trajectory.displacement_m and trajectory.direction"
-            )
+    blocks += mission_blocks(texts, mission.forms, source.record)
+    blocks += [Text(problem, "warning") for problem in (*problems, *guessed_words(job.study.vehicle))]
+    summary = _summary(source.record, planned, demand, flight.excitation, figures)
+    return Outcome(summary | {"files": [str(path) for path in texts]}, tuple(blocks))
 
 
 def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:
@@ -156,13 +138,33 @@ def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:
     return settings
 
 
-def _plan(job: Job, settings: TrajectorySettings) -> tuple[PlanAt, Excitation | None]:
-    if not settings.held:
-        gravity = job.study.vehicle.gravity_m_s2
-        return lambda sample_time: plan(replace(settings, sample_time_s=sample_time), gravity), None
-    with settings_of("trajectory.rotation", job.study):
-        path, excitation = _rotation(job, settings)
-    return lambda sample_time: held_rotation(path, sample_time), excitation
+def _flight(job: Job, settings: TrajectorySettings) -> Flight:
+    if settings.held:
+        with settings_of("trajectory.rotation", job.study):
+            path, excitation = _rotation(job, settings)
+        return Flight(
+            held_rotation(path, settings.sample_time_s),
+            lambda sample_time: held_rotation(path, sample_time),
+            excitation,
+        )
+    gravity = job.study.vehicle.gravity_m_s2
+    plain = plan(settings, gravity)
+    room: RoomLeft | None = None
+    if settings.excite.axes:
+        room = room_left(plain, added_motion(settings.excite, plain, gravity), settings, job.study.vehicle)
+    twice = replace(settings, repeat=min(settings.repeat, 2))
+
+    def at(sample_time: float) -> PlannedRotation:
+        finer = plan(replace(settings, sample_time_s=sample_time), gravity)
+        if room is not None:
+            finer = added_motion(settings.excite, finer, gravity).of_size(room.added.size).onto(finer, gravity)
+        return repeated(finer, twice, gravity)
+
+    without = repeated(plain, settings, gravity)
+    if room is None:
+        return Flight(without, at)
+    excited = repeated(room.added.onto(plain, gravity), settings, gravity)
+    return Flight(excited, at, None, ExcitedGroup.of(settings.excite, excited, without, room))
 
 
 def _rotation(job: Job, settings: TrajectorySettings) -> tuple[RotationPath, Excitation | None]:
@@ -249,7 +251,7 @@ def _demand(
     shortest = _shortest_part(planned, settings)
     step = shortest / _SAMPLES_IN_A_PART
     if step < settings.sample_time_s:
-        if planned.duration > _MOST_SAMPLES * step:
+        if planned.duration / settings.repeat * min(settings.repeat, 2) > _MOST_SAMPLES * step:
             message = f"moves have parts of {shortest:.3g} s, too short to be checked between samples; lower it"
             raise SettingError("sample_time_s", f"{message}, or plan longer moves")
         planned = at(step)
@@ -259,12 +261,14 @@ def _demand(
 
 
 def _shortest_part(planned: PlannedRotation, settings: TrajectorySettings) -> float:
-    """Shortest wave or hold of any move, or half a period of the fastest harmonic."""
+    """Shortest wave or hold of any move, or half a period of the fastest harmonic; infinite in hover."""
     if not isinstance(planned, Trajectory):
         return 0.5 / settings.rotation.frequency_max_hz
     profiles = [profile for leg in planned.legs for profile in leg.profiles]
-    parts = (part for profile in profiles for part in (profile.period, *astuple(profile.holds)))
-    return min(float(part) for part in parts if part > 0)
+    parts = [part for profile in profiles for part in (profile.period, *astuple(profile.holds))]
+    if settings.excite.axes:
+        parts.append(0.5 / settings.excite.band_hz[1])
+    return min((float(part) for part in parts if part > 0), default=inf)
 
 
 def _remedy(study: Study, settings: TrajectorySettings) -> str:

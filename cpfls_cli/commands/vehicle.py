@@ -162,7 +162,7 @@ def _found(
 
 def _judged(vehicle: FoundVehicle, flights: Sequence[LoggedFlight], job: Job) -> HeldOutGroup:
     """Play a vehicle back along flights that it was not found in, from every sample."""
-    models = {"": vehicle.model, **vehicle.others}
+    models = {"": vehicle.forecast or vehicle.model, **vehicle.others}
     pairs = [played(models[flight.group], flight, job.study.vehicle) for flight in flights]
     errors = replay(
         pairs, _horizon(job, flights[0]), 1, lambda done: job.progress(done, 1, "plays back the flights held out")

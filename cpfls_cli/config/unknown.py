@@ -28,11 +28,12 @@ _DRAG_LEVER = 0.1
 _HOVER = 0.55
 """Rotor speed in hover, share of the largest: a vehicle lifts about three times its weight."""
 
-_TAKEN = frozenset({"import", "vehicle", "replay", "response", "report", "export", "predict", "compare"})
+_TAKEN = frozenset({"import", "vehicle", "replay", "response", "report", "export", "predict", "compare", "trajectory"})
 """Commands that work with guesses; a report and an export are of a model, which has its own numbers.
 
 `predict`, `replay`, `response` and `compare` do with that of a whole vehicle, and ask `require_known` where theirs is
-another.
+another; `trajectory` where torque or effects choose the path. Else guesses only serve to check what it asks of the
+rotors.
 """
 
 

@@ -40,7 +40,7 @@ from cpfls_cli.flightlog.stretches import (
     warn_of_rest,
     warn_of_values,
 )
-from cpfls_cli.flightlog.topics import hold_asked
+from cpfls_cli.flightlog.topics import hold_asked, previous_rows
 
 _STEEPEST_PITCH = pi / 2 - pi / 180
 _LARGEST_REFINEMENT = 10
@@ -49,7 +49,6 @@ _LARGEST_REFINEMENT = 10
 _SHORTEST_PERIOD_S = 1e-6
 _FASTEST_HZ = 40e3
 """Above the 32 kHz at which the fastest gyroscopes are read."""
-_ROUNDING = 1e-9
 _FEWEST_SAMPLES = 10
 """Of which a flight can be told."""
 
@@ -242,7 +241,7 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
 
         time = _clock(time, settings.rate_hz, report.log_rate_hz)
         arrays = {name: CubicSpline(smooth.time, values)(time) for name, values in arrays.items()}
-        previous = np.searchsorted(smooth.time, time * (1 + _ROUNDING), side="right") - 1
+        previous = previous_rows(smooth.time, time)
         setpoints = {name: values[previous] for name, values in setpoints.items()}
         report = replace(
             report,

@@ -261,7 +261,10 @@ _SETPOINT_OF: Final[Mapping[SignalName, SignalName]] = {
 
 def wished_signals(groups: tuple[ColumnGroup, ...]) -> tuple[Named, ...]:
     """List what groups of columns may be a setpoint of: a word says that it is one, the others what of."""
-    found = (named for group in groups for named in _wished(group))
+    # Three components of a quaternion follow an attitude too, at half of its size.
+    of_quaternions = {column for group in groups if group.kind == "wxyz" for column in group.columns}
+    own = (group for group in groups if group.kind == "wxyz" or not of_quaternions & {*group.columns})
+    found = (named for group in own for named in _wished(group))
     return tuple(sorted(found, key=lambda named: named.rank))
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import Airframe, Parameters, stated_airframe, thrust_number, usual_airframe
-from cpfls_cli.flightlog.recognised import Choice, Guess, Recognition
+from cpfls_cli.flightlog.recognised import Choice, Guess, Recognition, Rival
 from cpfls_cli.flightlog.recognition import recognise
-from cpfls_cli.flightlog.settings import ColumnMap, SignalMap, SignalName
+from cpfls_cli.flightlog.settings import SETPOINTS, ColumnMap, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import Topics
 from cpfls_cli.units import UnitName, known_unit
 
@@ -248,6 +248,8 @@ def _merged_signals(logs: Sequence[KnownLog]) -> tuple[Guess, ...]:
     for name in dict.fromkeys(guess.signal for one in logs for guess in one.recognition.signals):
         found = [(one, guess) for one in logs if (guess := one.recognition.signal(name)) is not None]
         surest = min(found, key=lambda entry: _SURENESS.index(entry[1].sure))
+        if name in SETPOINTS:
+            surest, found = _setpoint_of_all(surest, found)
         lacking = [one for one in logs if not set(surest[1].columns.columns) <= one.columns]
         others = {guess.columns: one.name for one, guess in found if one in lacking}
         for one, guess in found:
@@ -258,13 +260,30 @@ def _merged_signals(logs: Sequence[KnownLog]) -> tuple[Guess, ...]:
     return tuple(sorted(merged, key=lambda guess: order.get(guess.signal, len(order))))
 
 
+def _setpoint_of_all(
+    surest: tuple[KnownLog, Guess], found: Sequence[tuple[KnownLog, Guess]]
+) -> tuple[tuple[KnownLog, Guess], list[tuple[KnownLog, Guess]]]:
+    """Keep the logs whose setpoint is mapped alike, or stands in; who flew in another mode is no other vehicle."""
+    first, kept = surest
+    columns, kind = set(kept.columns.columns), known_unit(kept.columns.unit).si
+    shared, rivals = [], []
+    for one, guess in found:
+        stands_in = not columns <= one.columns and known_unit(guess.columns.unit).si == kind
+        if stands_in or guess.columns == kept.columns:
+            shared.append((one, guess))
+        else:
+            rivals.append(Rival(f"columns: [{', '.join(guess.columns.columns)}]", f"what {one.name} follows"))
+    told = replace(kept, sure="guess", rivals=(*kept.rivals, *rivals)) if rivals else kept
+    return (first, told), [(one, told if one is first else guess) for one, guess in shared]
+
+
 def _standing_in(guess: Guess, others: Mapping[SignalMap, str], lacking: Sequence[str]) -> Guess:
     """Let other columns stand in where logs lack those of a guess; a signal that some lack altogether is optional."""
     if not lacking:
         return guess
     maps = tuple(ColumnMap(**{each.name: getattr(own, each.name) for each in fields(ColumnMap)}) for own in others)
     without = [name for name in lacking if name not in others.values()]
-    columns = replace(guess.columns, otherwise=maps, required=not without)
+    columns = replace(guess.columns, otherwise=maps, required=guess.columns.required and not without)
     reason = f"{guess.reason}; {', '.join(lacking)} lacks these columns"
     return replace(guess, columns=columns, reason=reason)
 

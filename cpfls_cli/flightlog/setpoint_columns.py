@@ -16,15 +16,18 @@ from cpfls_cli.flightlog.recognised import Guess, Rival, Seen, Sure
 from cpfls_cli.flightlog.repair import unwrap_angles
 from cpfls_cli.flightlog.settings import SETPOINTS, UNITS_OF_SIGNAL, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import hold_asked
-from cpfls_cli.flightlog.vocabulary import ARDUPILOT, CRAZYFLIE, KNOWN_SETPOINTS, KnownSetpoint
+from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, CRAZYFLIE, KNOWN_SETPOINTS, PX4, KnownSetpoint
 from cpfls_cli.units import KNOWN_UNITS, UnitName, known_unit
 
 _FEWEST_SAMPLES = 20
 _FEWEST_COMPARED = 100
 """Of the one clock, a second of flight."""
 
-_FOLLOWS = 0.6
-"""Correlation from which on what is measured follows what is asked for; of the negative, from which on it opposes."""
+_FOLLOWS, _OPPOSES = 0.6, -0.8
+"""Correlations from which on what is measured follows what is asked for, and runs against it."""
+
+_MOVES = 0.25
+"""As large as what is measured from which on a setpoint moves: one that stays tells nothing of a drift."""
 
 _LATE_S = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8)
 """By which a vehicle follows, s."""
@@ -33,8 +36,8 @@ _MOTION_HZ = 5.0
 """Below which a vehicle follows anything; above there is the noise of sensors."""
 
 _HELD_S = 0.1
-_TIMES = 3.0
-"""As large or as small as what is measured that a setpoint may be: loops follow with an error, not with a factor."""
+_TIMES, _TIMES_BY_WORDS = 3.0, 1.6
+"""As large or as small as what is measured that a setpoint may be; a loop follows with an error, not with a factor."""
 
 _FULL = 1.05
 """Share of full deflection, or of the largest thrust, up to which one is believed."""
@@ -47,6 +50,7 @@ _UNITS: Final[dict[SignalName, tuple[UnitName, ...]]] = {
 }
 """What setpoints may be in where no name says it."""
 
+_REFERENCE: Final = "a reference may be a second measurement, and nothing that was asked for"
 _RC_MAP: Final = ("RCMAP_ROLL", "RCMAP_PITCH", "RCMAP_YAW", "RCMAP_THROTTLE")
 
 
@@ -66,6 +70,8 @@ class _Candidate:
         Whether a kind of log is known for them, so that unit and signs are; else only words of the name say it.
     states_unit : bool
         Whether the unit is known.
+    doubts : tuple of str
+        Why they may be something else, however well they are followed.
     """
 
     signal: SignalName
@@ -73,15 +79,15 @@ class _Candidate:
     called: str
     known: bool
     states_unit: bool
+    doubts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class _Judged:
-    """A guess, or why there is none; and how many axes are followed."""
+    """A guess, or why there is none."""
 
     guess: Guess | None
     why: str = ""
-    followed: int = 0
 
 
 def tell_setpoints(seen: Seen, parameters: Parameters, system: str) -> None:
@@ -94,13 +100,17 @@ def tell_setpoints(seen: Seen, parameters: Parameters, system: str) -> None:
     system : str
         What wrote the log; empty where that is not known.
     """
-    candidates = [*_of_known_logs(seen.log, parameters, system), *_by_words(seen)]
+    candidates = list(_of_known_logs(seen.log, parameters, system))
+    if not any(is_of(system, known) for known in (PX4, ARDUPILOT, BETAFLIGHT)):
+        # Of these logs all that is asked for is in the list.
+        known = {column for own in candidates for column in own.columns.columns}
+        candidates += [own for own in _by_words(seen) if not known & {*own.columns.columns}]
     for name in SETPOINTS:
         judged = [_judged(seen, own) for own in candidates if own.signal == name and _changes(seen.log, own)]
-        taken = [own for own in judged if own.guess is not None]
-        best = max(taken, key=lambda own: own.followed, default=None)
-        if best is not None and best.guess is not None:
-            seen.guesses[name] = best.guess
+        taken = [own.guess for own in judged if own.guess is not None]
+        if taken:
+            # The first that is sure; what a controller is given stands before what it makes of it.
+            seen.guesses[name] = min(taken, key=lambda guess: guess.sure == "guess")
         else:
             seen.left_out += [own.why for own in judged]
 
@@ -158,7 +168,8 @@ def _by_words(seen: Seen) -> Iterator[_Candidate]:
         mapped = SignalMap(columns=columns, unit=unit or usual or "1", scale=named.scale, required=False)
         mapped = _in_stated_unit(seen.log, named.signal, mapped)
         known = unit is not None or mapped.columns[0] in seen.log.units
-        yield _Candidate(named.signal, mapped, f"called {named.group.pattern}", False, known)
+        doubts = (_REFERENCE,) if {"ref", "reference"} & {*named.group.words} else ()
+        yield _Candidate(named.signal, mapped, f"called {named.group.pattern}", False, known, doubts)
 
 
 def _in_order(seen: Seen, named: Named) -> tuple[str, ...]:
@@ -195,7 +206,7 @@ def _judged(seen: Seen, own: _Candidate) -> _Judged:
         return _Judged(_guess(own, own.columns, f"{own.called}; {against}", "named"))
     if own.signal == "setpoint_attitude":
         asked = _as_angles(seen, own, asked)
-    fit = _Following.of(measured, asked, seen.rate_hz)
+    fit = _Following.of(measured, asked, seen.rate_hz, _units(own))
     if not fit.followed.any():
         return _Judged(None, f"{columns}: looks like a setpoint of the {_words(own.signal)}, which does not follow it")
     return _by_motion(own, fit)
@@ -225,12 +236,13 @@ def _by_motion(own: _Candidate, fit: "_Following") -> _Judged:
         return _Judged(None, f"{', '.join(columns)}: {own.called}, and the {what} runs against {', '.join(opposed)}")
     mapped, gain = own.columns, fit.gain
     if not own.states_unit:
-        units = _UNITS[own.signal]
-        unit = min(units, key=lambda each: abs(np.log(gain / known_unit(each).factor)))
-        mapped, gain = replace(mapped, unit=unit), gain / known_unit(unit).factor
-    if not 1 / _TIMES < gain < _TIMES:
+        factor = _nearest(gain, _units(own))
+        unit = next(each for each in _UNITS[own.signal] if known_unit(each).factor == factor)
+        mapped, gain = replace(mapped, unit=unit), gain / factor
+    most = _TIMES if own.known else _TIMES_BY_WORDS
+    if not 1 / most < gain < most:
         return _Judged(
-            None, f"{', '.join(columns)}: {own.called}; the {what} is {gain:.2g} times as large, so no unit fits"
+            None, f"{', '.join(columns)}: {own.called}; the {what} is {gain:.2g} times as large, which no unit makes"
         )
     if opposed:
         mapped = replace(mapped, sign=tuple(-1.0 if against else 1.0 for against in fit.opposed))
@@ -238,10 +250,20 @@ def _by_motion(own: _Candidate, fit: "_Following") -> _Judged:
     turned = f" with {', '.join(opposed)} reversed" if opposed else ""
     size = "" if own.states_unit else f", in {mapped.unit} by its size"
     loose = [axis for axis, not_told in zip(axes, fit.loose, strict=True) if not_told]
-    rivals = (Rival(f"leave {own.signal} out", f"{', '.join(loose)} is not followed"),) if loose else ()
+    doubts = [*own.doubts, *([f"{', '.join(loose)} is not followed"] if loose else [])]
+    rivals = tuple(Rival(f"leave {own.signal} out", doubt) for doubt in doubts)
     reason = f"{own.called}; the {what} follows it{turned} (correlation {share}){size}"
-    sure: Sure = "guess" if loose else "data"
-    return _Judged(_guess(own, mapped, reason, sure, rivals), followed=int(fit.followed.sum()))
+    sure: Sure = "guess" if rivals else "data"
+    return _Judged(_guess(own, mapped, reason, sure, rivals))
+
+
+def _units(own: _Candidate) -> tuple[float, ...]:
+    """Give the factors that may make SI units of what is asked for."""
+    return (1.0,) if own.states_unit else tuple(known_unit(unit).factor for unit in _UNITS[own.signal])
+
+
+def _nearest(gain: float, factors: tuple[float, ...]) -> float:
+    return min(factors, key=lambda factor: abs(np.log(gain / factor)))
 
 
 def _guess(own: _Candidate, columns: SignalMap, reason: str, sure: Sure, rivals: tuple[Rival, ...] = ()) -> Guess:
@@ -319,15 +341,15 @@ class _Following:
     @property
     def opposed(self) -> BoolArray:
         """Axes that run the other way, shape (3,)."""
-        return np.asarray(self.along < -_FOLLOWS, dtype=bool)
+        return np.asarray(self.along < _OPPOSES, dtype=bool)
 
     @property
     def loose(self) -> BoolArray:
         """Axes that move and do neither, shape (3,)."""
-        return np.asarray(self.moves & (np.abs(self.along) <= _FOLLOWS), dtype=bool)
+        return np.asarray(self.moves & ~self.followed & ~self.opposed, dtype=bool)
 
     @classmethod
-    def of(cls, measured: Array, asked: Array, rate_hz: float) -> "_Following":
+    def of(cls, measured: Array, asked: Array, rate_hz: float, factors: tuple[float, ...]) -> "_Following":
         """Correlate what is measured with what was asked for some time before, as late as it follows best.
 
         Parameters
@@ -336,22 +358,31 @@ class _Following:
             The latter NaN where nothing is.
         rate_hz : float
             Of both, Hz.
+        factors : tuple of float
+            One of which makes the latter as large as the former.
         """
         smooth = slow(measured, rate_hz, _MOTION_HZ)
-        tried = [_at_delay(smooth, asked, round(late * rate_hz)) for late in _LATE_S]
+        edge = (len(asked) - len(smooth)) // 2
+        within = asked[edge : edge + len(smooth)]
+        tried = [_at_delay(smooth, within, round(late * rate_hz), factors) for late in _LATE_S]
         return max(tried, key=lambda own: float(np.sum(np.abs(own.along))))
 
 
-def _at_delay(measured: Array, asked: Array, steps: int) -> _Following:
+def _at_delay(measured: Array, asked: Array, steps: int, factors: tuple[float, ...]) -> _Following:
     late, earlier = measured[steps:], asked[: len(asked) - steps]
     known = np.isfinite(earlier).all(axis=1)
     if known.sum() < _FEWEST_COMPARED:
         return _Following(np.zeros(3), np.zeros(3, dtype=bool), 1.0)
     late, earlier = (own[known] - own[known].mean(axis=0) for own in (late, earlier))
-    spread, shared = (earlier**2).mean(axis=0), (late * earlier).mean(axis=0)
-    moves = np.asarray(spread > 1e-12 * max(float(spread.max()), 1e-12), dtype=bool)
-    size = np.sqrt(spread * (late**2).mean(axis=0))
-    along = np.where(moves & (size > 0), shared / np.where(size > 0, size, 1.0), 0.0)
-    told = np.abs(along) > _FOLLOWS
+    spread, flown, shared = ((a * b).mean(axis=0) for a, b in ((earlier, earlier), (late, late), (late, earlier)))
+    size = np.sqrt(spread * flown)
+    along = np.where(size > 0, shared / np.where(size > 0, size, 1.0), 0.0)
+    best = int(np.argmax(along))
+    if not along[best] > 0:
+        return _Following(np.zeros(3), np.asarray(spread > 0, dtype=bool), 1.0)
+    factor = _nearest(float(shared[best] / spread[best]), factors)
+    moves = np.asarray(factor**2 * spread > _MOVES**2 * flown, dtype=bool)
+    along = np.where(moves, along, 0.0)
+    told = (along > _FOLLOWS) | (along < _OPPOSES)
     gain = float(np.abs(shared[told]).sum() / spread[told].sum()) if told.any() else 1.0
     return _Following(along, moves, gain)

@@ -7,7 +7,7 @@ from math import inf, pi
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.clock import increasing_rows
 from cpfls_cli.flightlog.conversion import columns_in_words, present_choices
@@ -23,6 +23,7 @@ _ANGLES_THAT_JUMP = (0, 2)
 _STEPS_HELD = 3
 """Of its usual steps for which a setpoint stays: the next one may be lost, and behind two nobody asks for it."""
 
+_ON_TIME = 0.01
 _THINNED = 1.5
 """Times as fast that a topic has to be for its thinning to matter."""
 
@@ -259,8 +260,21 @@ def hold_asked(time: Array, values: Array, target: Array, gap_s: float) -> Array
     if not len(time):
         return np.full(len(target), np.nan)
     held_s = max(gap_s, _STEPS_HELD * _step(time) if len(time) > 1 else 0.0) * _ROUNDING
-    previous = np.maximum(np.searchsorted(time, target, side="right") - 1, 0)
+    previous = previous_rows(time, target)
     return np.where(np.abs(target - time[previous]) <= held_s, values[previous], np.nan)
+
+
+def previous_rows(time: Array, target: Array) -> IntArray:
+    """Find the last row at each target or before it, the first row before them all.
+
+    Parameters
+    ----------
+    time : array, shape (row,), s
+    target : array, shape (time,), s
+        Its clock may have been computed: what is a hundredth of its step late counts as on time.
+    """
+    late = _ON_TIME * _step(target) if len(target) > 1 else 0.0
+    return np.asarray(np.maximum(np.searchsorted(time, target + late, side="right") - 1, 0))
 
 
 def _present(time: Array, values: Array) -> tuple[Array, Array]:

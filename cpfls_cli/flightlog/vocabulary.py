@@ -175,9 +175,10 @@ _SETPOINTS: Final = """
     Crazyflie   setpoint_position   ctrltargetZ.{x,y,z}                         mm     1       0   +
     Crazyflie   setpoint_velocity   ctrltarget.v{x,y,z}                         m/s    1       0   +
     Crazyflie   setpoint_velocity   ctrltargetZ.v{x,y,z}                        mm/s   1       0   +
-    # A pitch is positive with the nose up, as in stabilizer.pitch.
-    Crazyflie   setpoint_attitude   ctrltarget.{roll,pitch,yaw}                 deg    1       0   +-+
+    # A pitch is positive with the nose up, as in stabilizer.pitch. What is asked for in each mode stands in controller;
+    # in ctrltarget only in the mode that asks for an attitude, and of yaw a rate.
     Crazyflie   setpoint_attitude   controller.{roll,pitch,yaw}                 deg    1       0   +-+
+    Crazyflie   setpoint_attitude   ctrltarget.{roll,pitch,yaw}                 deg    1       0   +-+
     Crazyflie   setpoint_body_rate  controller.{roll,pitch,yaw}Rate             deg/s  1       0   +-+
 """
 

@@ -11,19 +11,23 @@ from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.playback.model import VehicleModel
 
 
-def read_model(path: Path, study: Study) -> VehicleModel:
+def read_model(path: Path, study: Study, *, forecast: bool = False) -> VehicleModel:
     """Read any model of the vehicle of a study.
 
     Parameters
     ----------
     path : Path
         An artifact, or the word `VEHICLE`.
+    forecast : bool
+        Whether it is to forecast along logged rotor speeds: where a file holds a model for that beside the vehicle,
+        that one is taken.
 
     Raises
     ------
@@ -32,7 +36,9 @@ def read_model(path: Path, study: Study) -> VehicleModel:
     """
     if is_vehicle(path):
         return VehicleModel(vehicle=study.vehicle)
-    return rebuilt(path, read_of_vehicle(path, ModelRecord, study))
+    record = read_of_vehicle(path, ModelRecord, study)
+    apart = record.forecast if forecast and isinstance(record, VehicleRecord) else None
+    return rebuilt(path, record if apart is None else replace(record, vehicle=apart))
 
 
 def learned_by(path: Path | None) -> tuple[LearnedFlight, ...]:

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.scores import AXES
-from cpfls_cli.artifacts.trajectory import DERIVATIVES, LegGroup, TrajectoryRecord
+from cpfls_cli.artifacts.trajectory import DERIVATIVES, ExcitedGroup, LegGroup, RunsGroup, TrajectoryRecord
 from cpfls_cli.pages.next_flight import question_blocks
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, legend_above, line, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Plot, Table, Text
-from cpfls_cli.report.numbers import number, plain
+from cpfls_cli.report.numbers import joined, number, plain
 from cpfls_cli.trajectory.legs import Leg
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory
 from cpfls_cli.vehicle.rotors import RotorViolation
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 _UNITS = ("m/s⁶", "m/s⁵", "m/s⁴", "m/s³", "m/s²", "m/s", "m")
 _MOVES_SHOWN = 20
 _TURN = 360.0
+_MINUTE = 60.0
+_RUNS_SHOWN = 8
 
 
 def answer(trajectory: Source[TrajectoryRecord], index: int = 1) -> Iterator[Block]:
@@ -39,9 +43,93 @@ def answer(trajectory: Source[TrajectoryRecord], index: int = 1) -> Iterator[Blo
         return
     if record.question is not None:
         yield from question_blocks(f"questions-{index}", record.question)
+    if record.excited is not None:
+        yield from _excited_blocks(record.excited)
+    if record.run is not None:
+        yield from _runs_blocks(record.run)
     yield _peaks(f"peaks-{index}", trajectory)
     if record.leg is not None and any(record.leg.limited_by):
         yield _moves(f"legs-{index}", trajectory.label, record.leg)
+
+
+def _runs_blocks(runs: RunsGroup) -> Iterator[Block]:
+    """Say when the runs of a repeated path are flown, how long it takes, and why."""
+    between = runs.begin[1] - runs.end[0]
+    yield Text(
+        f"The path is flown {len(runs.begin)} times, each run the same from rest to rest: {plain(runs.end[0])} s each, "
+        f"{plain(between)} s between two to come back to the start and settle, {plain(runs.end[-1])} s "
+        f"({runs.end[-1] / _MINUTE:.1f} min) in all. Runs begin at {_times(runs.begin)} s."
+    )
+    yield Text(
+        "What every run shows again was asked for by the path; what differs between them is gusts and noise. The other "
+        "runs know nothing of the gusts of this one, so each is an instrument for the others: it tells the vehicle "
+        "from the loop."
+    )
+
+
+def _times(begins: Array) -> str:
+    listed = [plain(value) for value in begins[:_RUNS_SHOWN]]
+    return joined(listed) if len(begins) <= _RUNS_SHOWN else f"{', '.join(listed)}, ..."
+
+
+_SIGNALS = {
+    "multisine": ("a multisine", ", each at frequencies of its own,"),
+    "sweep-linear": ("a linear sweep", ", one after the other,"),
+    "sweep-logarithmic": ("a logarithmic sweep", ", one after the other,"),
+}
+
+
+def _excited_blocks(excited: ExcitedGroup) -> Iterator[Block]:
+    """Say what a test signal excites, in which band, how far it moves the vehicle, and what made it smaller."""
+    low, high = excited.band
+    angle, moved = np.degrees(excited.size), np.linalg.norm(excited.position, axis=1).max()
+    crest = joined(number(value, 2) for value in excited.crest)
+    away = f"; it moves the vehicle by up to {number(moved, 2)} m" if moved else ""
+    tilts = [axis for axis in excited.axis if axis != "vertical"]
+    of_vertical = f"of vertical as much acceleration as a tilt by {number(angle, 3)} degrees has"
+    size = [f"{number(angle, 3)} degrees at most"] if tilts else []
+    size += [of_vertical] if "vertical" in excited.axis else []
+    signal, apart = _SIGNALS[excited.signal]
+    apart = apart if len(excited.axis) > 1 else ""
+    yield Text(
+        f"Excited: {joined(excited.axis)}, by {signal}{apart} from {low:g} to {high:g} Hz, "
+        f"{', '.join(size)}, at equal rates in the band (crest factor {crest}){away}."
+    )
+    if excited.limit:
+        yield Text(
+            f"The excitation is smaller than asked for: more than {number(angle, 3)} degrees would be beyond the limit "
+            f"of {excited.limit}",
+            "warning",
+        )
+
+
+def mission_blocks(files: Iterable[Path], forms: Sequence[str], record: TrajectoryRecord) -> list[Block]:
+    """Name the files for autopilots, and say what each does with the path."""
+    names = ", ".join(map(str, files))
+    said = [f"written beside it: {names}"] if names else []
+    if "px4" in forms:
+        said.append(
+            "PX4 flies the mission in its own time, by its own limits, at rest at each point: runs are alike, but do "
+            "not take as long as those planned. Load it in QGroundControl, and check heights and the way back."
+        )
+    if "ardupilot" in forms:
+        runs = 1 if record.run is None else len(record.run.begin)
+        times = "once" if runs == 1 else f"{runs} times"
+        said.append(
+            f"ArduPilot makes the sweeps itself, in hover: switch to System ID mode {times} for each axis; the path of "
+            "the artifact is not flown."
+        )
+    return [Text(sentence) for sentence in said]
+
+
+def guessed_words(vehicle: VehicleSettings) -> list[str]:
+    """Warn where what the rotors can was checked with guesses."""
+    if not vehicle.unknown:
+        return []
+    return [
+        f"{joined(name.replace('_', ' ') for name in vehicle.unknown)}: null in the config; what the path asks of the "
+        "rotors was checked with guesses"
+    ]
 
 
 def plan_blocks(planned: PlannedRotation, demand: Flyability, excitation: Excitation | None) -> Iterator[Block]:

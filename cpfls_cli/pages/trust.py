@@ -27,6 +27,9 @@ _WORDS: dict[str, Words] = {
         "good inside its region", "Good inside the region that training visited, and only there", "note"
     ),
     Trust.NOT_JUDGED: Words("not judged", "Not judged", "note"),
+    Trust.LACKING: Words(
+        "constants of the vehicle, which lacks an effect", "Constants of the vehicle, but it lacks an effect", "note"
+    ),
     Trust.LOOP: Words(
         "not judged: the flights show the loop", "Not judged: these flights show the loop, not the vehicle", "warning"
     ),

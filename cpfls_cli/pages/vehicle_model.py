@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.parameters import (
     CENTRE,
     DELAY,
@@ -24,7 +24,7 @@ from cpfls_cli.artifacts.parameters import (
 )
 from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.spec import rows_of
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.inertia import INERTIA_PARAMETERS
@@ -73,6 +73,9 @@ _FLIGHTS = {
 }
 """What would tell a constant that the flights do not."""
 
+WHAT_TO_FLY = "cpfls trajectory CONFIG --hover 30 --excite roll,pitch --repeat 4 -o mission.h5"
+"""Plans what tells the vehicle from the loop."""
+
 _FAR = 3.0
 """Factor from the stated number from which on a found one is called effective, and no property of a part."""
 
@@ -85,6 +88,11 @@ def title(record: VehicleRecord) -> str:
 def grounds(record: VehicleRecord) -> Iterator[str]:
     """Say what a vehicle is good for, and how well it predicts what it was not fitted to."""
     yield from _judged_words(record)
+    if record.forecast is not None:
+        yield (
+            "Beside these constants the file holds a forecast along logged rotor speeds, loop and all, which `cpfls "
+            "replay` plays: good for forecasts of such flights, and no vehicle. What follows is said of it."
+        )
     yield from () if record.held_out is None else beside_rivals(record.held_out)
     errors = dict(zip(record.structure.name, record.structure.error, strict=True))
     alone = "the constants" if _guessed(record) else "the stated vehicle"
@@ -127,9 +135,40 @@ def worth(record: VehicleRecord) -> Iterator[str]:
 
 
 def _judged_words(record: VehicleRecord) -> Iterator[str]:
+    if record.instruments is not None and not record.contradiction:
+        return instrument_words(record, record.instruments)
     if record.trust == Trust.LOOP:
         return iter([loop_words(record)])
     return playback_words(record.trust, record.held_out, record.contradiction)
+
+
+def instrument_words(record: VehicleRecord, given: InstrumentsGroup) -> Iterator[str]:
+    """Say what the constants rest on, how much of what comes again they explain, and where they lack something."""
+    if given.kind == "repeats":
+        alike = f"{number(float(given.likeness.min()), 2)} to {number(float(given.likeness.max()), 2)}"
+        told = f"{given.runs} flights that repeat each other (correlation {alike})"
+    else:
+        told = f"what was asked for from outside of the loop ({joined(given.setpoint)})"
+    yield (
+        f"The constants rest on {told}: gusts do not come again, what the vehicle does comes again. From "
+        f"{number(float(given.low[given.used].min()), 2)} to {number(float(given.high[given.used].max()), 2)} Hz they "
+        f"explain {_explained_words(given, given.used)} acceleration that comes again."
+    )
+    below = given.lacks_below
+    if below is not None:
+        yield (
+            f"Below {number(below, 2)} Hz they explain {_explained_words(given, ~given.used)}: the vehicle does "
+            "something there that no constant may stand for; `cpfls gap` looks for it."
+        )
+    held = [row["name"] for row in rows_of(record.found) if row["at_bound"] and row["value"] != 0]
+    if held:
+        yield f"{joined(held)}: on a bound of what is tried, so these are not the vehicle's own numbers yet."
+
+
+def _explained_words(given: InstrumentsGroup, bands: BoolArray) -> str:
+    """Give the least share in some bands about roll and pitch."""
+    shares = np.clip(given.explained[bands].min(axis=0), 0.0, 1.0)
+    return f"{whole_percent(float(shares[0]))} of the roll and {whole_percent(float(shares[1]))} of the pitch"
 
 
 def loop_words(record: VehicleRecord) -> str:
@@ -149,7 +188,8 @@ def loop_words(record: VehicleRecord) -> str:
         f"These flights show the loop, not the vehicle: torque explains {shares}. An autopilot that answers gusts, or "
         f"an effect that is missing here, makes a body look heavier or lighter than it is: {times} what was found. "
         "What follows is a forecast of vehicle and autopilot together. Fly in still air, with faster and larger turns "
-        "of roll and pitch, until torque explains 90 %."
+        "of roll and pitch, until torque explains 90 %, and the same several times: "
+        f"{WHAT_TO_FLY}"
     )
 
 
@@ -162,16 +202,15 @@ def warnings(record: VehicleRecord) -> list[str]:
     none = [row["name"] for row in named if row["at_bound"] and row["value"] == 0]
     heavy = too_heavy(record)
     told = OF_TURNING if heavy else ()
-    open_ = [
-        row["name"] for row in named if not row["determined"] and row["name"] not in told and not record.loop.shown
-    ]
+    misled = record.loop.shown and record.instruments is None
+    open_ = [row["name"] for row in named if not row["determined"] and row["name"] not in told and not misled]
     if bound:
         said.append(f"{joined(bound)}: on a bound of what is tried, so the flights ask for more; not a physical number")
     if none:
         said.append(f"{joined(none)}: 0, the least that it can be; the flights show none of it")
     if open_:
         said.append(f"{joined(open_)}: not determined, the flights say too little of it")
-    if record.loop.shown and record.trust != Trust.LOOP:
+    if misled and record.trust != Trust.LOOP:
         said.append(loop_words(record))
     if heavy:
         said.append(f"inertia and drag factor: {heavy}")

@@ -12,9 +12,11 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.inertia import INERTIA_PARAMETERS, beyond_any_body
+from cpfls_cli.playback.constants import Constants, find_constants
 from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import OF_A_WEIGHT, Group, JointNumbers
+from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.loop import LoopBounds, loop_bounds
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import Physical, needs_velocity
@@ -122,6 +124,11 @@ class FoundVehicle:
         What they have that the vehicle of the config has not.
     loop : LoopBounds
         How far the loop may have misled the fit.
+    instruments : Instruments
+    constants : Constants or None
+        What instruments tell; the model and its numbers are then these.
+    forecast : VehicleModel or None
+        What forecasts the flights, loop and all, where the model is the vehicle alone.
     """
 
     model: VehicleModel
@@ -136,6 +143,9 @@ class FoundVehicle:
     others: Mapping[str, VehicleModel]
     differences: tuple[Difference, ...]
     loop: LoopBounds
+    instruments: Instruments
+    constants: Constants | None = None
+    forecast: VehicleModel | None = None
 
 
 def find_vehicle(
@@ -154,21 +164,30 @@ def find_vehicle(
     flown = {flight.group for flight in flights}
     groups = tuple(Group(group.name, group.differs or OF_A_WEIGHT) for group in settings.groups if group.name in flown)
     fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fits[0], groups)
-    spread, model = uncertainty(fitted, windows), fitted.model
+    given = instruments(own)
+    constants = find_constants(begun, own, given, settings.leave_out)
+    if constants is not None and constants.tells:
+        solved, spread, forecast = constants.fitted, constants.spread, fitted.model
+    else:
+        solved, spread, forecast = fitted, uncertainty(fitted, windows), None
+    model = solved.model
     loop = loop_bounds(model, own)
-    numbers = (*sensed, *bodily(begun, tuple(found_numbers(fitted, spread))))
+    numbers = (*sensed, *bodily(begun, tuple(found_numbers(solved, spread))))
     return FoundVehicle(
         model,
-        tuple(beside_loop(numbers, loop)),
+        tuple(beside_loop(numbers, loop)) if forecast is None else numbers,
         *_shares(model, own),
-        tuple(_trades(fitted, spread)),
+        tuple(_trades(solved, spread)),
         choice,
-        fitted.condition_number,
+        solved.condition_number,
         spread.blocks,
         tuple(sorted(set(vehicle.unknown) - set(begun.unknown) - {number.name for number in sensed})),
         {group.name: fitted.free.at(fitted.values, group.name).model for group in groups},
-        tuple(differences(fitted, spread)) if groups else (),
+        tuple(differences(fitted, uncertainty(fitted, windows))) if groups else (),
         loop,
+        given,
+        None if forecast is None else constants,
+        forecast,
     )
 
 

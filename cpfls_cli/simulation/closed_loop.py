@@ -118,12 +118,20 @@ class Autopilot:
         array, shape (4,), N and N m
             Thrust along body z, body torque.
         """
-        planned = self._planned
-        pull = self._gravity + planned.acceleration[step] + self._position_gain * (planned.position[step] - position)
-        pull += self._velocity_gain * (planned.velocity[step] - velocity)
-        target = upright(pull, planned.attitude[step, 2])
+        pull = self._pull(step, position, velocity)
+        target = upright(pull, self._planned.attitude[step, 2])
         torque = self._torque(step, target.T @ rotation, body_rate)
         return np.array([self._mass * (pull @ rotation[:, 2]), *torque])
+
+    def target(self, step: int, position: Array, velocity: Array) -> Array:
+        """Orient the body as the path asks for, shape (3, 3), body to world; arguments are those of `wrench`."""
+        return upright(self._pull(step, position, velocity), self._planned.attitude[step, 2])
+
+    def _pull(self, step: int, position: Array, velocity: Array) -> Array:
+        """Compute what the thrust has to pull with, shape (3,), m/s^2, world frame."""
+        planned = self._planned
+        pull = self._gravity + planned.acceleration[step] + self._position_gain * (planned.position[step] - position)
+        return np.asarray(pull + self._velocity_gain * (planned.velocity[step] - velocity))
 
     def _torque(self, step: int, turned: Array, body_rate: Array) -> Array:
         """Compute the torque that turns the body to its target attitude."""
@@ -323,6 +331,35 @@ def fly(
                 progress(number, clock.steps)
     progress(clock.steps, clock.steps)
     return _sampled(np.array(states), steps, clock.parts)
+
+
+def asked(
+    time: Array,
+    planned: Mapping[str, Array],
+    vehicle: VehicleSettings,
+    settings: ClosedLoopSettings,
+    state: Array,
+) -> dict[str, Array]:
+    """Give what the autopilot asked for along a flight: of its position loop the plan, of its attitude loop the target.
+
+    Parameters
+    ----------
+    time, planned
+        As `fly` takes them.
+    state : array, shape (time, state)
+        Of the flight, at the samples of the plan.
+
+    Returns
+    -------
+    dict of str to array, shape (time, 3), m, m/s, rad
+        ``position`` and ``velocity`` in the world frame; ``attitude`` as roll, pitch, yaw, within half a turn of those
+        that are flown.
+    """
+    autopilot = Autopilot(vehicle, settings, reference(planned, time, time))
+    targets = [autopilot.target(step, own[POSITION], own[VELOCITY]) for step, own in enumerate(state)]
+    flown = state[:, ATTITUDE]
+    attitude = flown + rotations.wrapped(rotations.euler_angles(np.array(targets)) - flown)
+    return {"position": planned["position"], "velocity": planned["velocity"], "attitude": attitude}
 
 
 def _loop(

@@ -133,13 +133,18 @@ def flyability(planned: Mapping[str, Array], vehicle: VehicleSettings, tilt_max:
     Section 2 of the paper; method.md sections 2 and 3.
     """
     about_body, thrust = _needed(planned, vehicle)
-    (sr, cr), (sp, cp) = ((np.sin(angle), np.cos(angle)) for angle in planned["attitude"].T[:2])
-    # The arc cosine of the vertical component of body z would lose small angles.
-    tilt = np.asarray(np.arctan2(np.hypot(sp * cr, sr), cr * cp))
+    tilt = tilt_of(planned["attitude"])
     most = sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors) * vehicle.rotor_speed_max_rad_s**2
     limits = [("thrust, N", thrust, most)] + ([("tilt, rad", tilt, tilt_max)] if tilt_max else [])
     excesses = [too_much for name, values, limit in limits for too_much in _beyond(name, values, limit)]
     return Flyability(thrust, tilt, tuple(excesses), rotor_demand(vehicle, thrust, about_body).violations)
+
+
+def tilt_of(attitude: Array) -> Array:
+    """Compute the angle between thrust and vertical, shape (time,), rad, of attitudes, shape (time, 3), rad."""
+    (sr, cr), (sp, cp) = ((np.sin(angle), np.cos(angle)) for angle in attitude.T[:2])
+    # The arc cosine of the vertical component of body z would lose small angles.
+    return np.asarray(np.arctan2(np.hypot(sp * cr, sr), cr * cp))
 
 
 def _rotation(planned: Mapping[str, Array]) -> tuple[Array, Array, Array]:

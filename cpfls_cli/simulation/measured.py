@@ -11,7 +11,7 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.hooks import TrueMotion
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.simulation.closed_loop import SimulatedMotion, fly
+from cpfls_cli.simulation.closed_loop import SimulatedMotion, asked, fly
 from cpfls_cli.simulation.model import SimulatedEffects, in_table, simulated_effects, with_effects
 from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, POSITION, VELOCITY
 from cpfls_cli.simulation.settings import SimulationSettings
@@ -81,10 +81,12 @@ def measure(
     ComputationError
         If the plan is not sampled uniformly, or the vehicle leaves the path or overturns.
     """
-    asked = simulated_effects(settings.closed_loop.effects, vehicle)
-    held, effects = with_effects(model, asked)
+    given = simulated_effects(settings.closed_loop.effects, vehicle)
+    held, effects = with_effects(model, given)
     motion = fly(time, planned, vehicle, settings.closed_loop, held, effects, progress)
     signals, noise_std = _logged(time, motion, vehicle, settings, effects, rng)
+    setpoints = asked(time, planned, vehicle, settings.closed_loop, motion.state)
+    signals |= {f"setpoint_{name}": values for name, values in setpoints.items()}
     return MeasuredFlight(
         signals,
         noise_std,

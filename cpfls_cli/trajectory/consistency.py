@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
 
 _LARGEST_PEAK = 1e100
+# Of the fastest wave of an excitation, between which an autopilot and a simulation interpolate.
+_SAMPLES_IN_A_PERIOD = 10
 _MAY_JUMP = ("crackle", "pop")
 # Samples of a path, of 34 numbers each: 2.7 GB.
 _LARGEST_SIZE = 10_000_000
@@ -24,7 +26,9 @@ def check_consistency(settings: TrajectorySettings) -> None:
     if settings.held:
         _check_held(settings)
     _check_clock(settings)
-    if settings.held or settings.path == "next-flight":
+    _check_excited(settings)
+    _check_repeated(settings)
+    if settings.held or settings.path in ("next-flight", "hover"):
         return
     _check_direction(settings)
     _check_limits(settings)
@@ -42,7 +46,7 @@ def check_consistency(settings: TrajectorySettings) -> None:
 
 def _check_clock(settings: TrajectorySettings) -> None:
     if settings.duration_s is None:
-        if settings.held or settings.path == "next-flight":
+        if settings.held or settings.path in ("next-flight", "hover"):
             raise SettingError("duration_s", f"is null; path {settings.path} needs a duration")
         return
     check_samples(settings.duration_s, settings.sample_time_s)
@@ -59,6 +63,33 @@ def _check_held(settings: TrajectorySettings) -> None:
         raise SettingError("limits", f"hold for moves in space; path {settings.path} has those of the key rotation")
     if settings.tilt_max_rad is not None:
         raise SettingError("tilt_max_rad", f"holds for paths in space; path {settings.path} turns all the way round")
+
+
+def _check_excited(settings: TrajectorySettings) -> None:
+    asked = settings.excite
+    if len(set(asked.axes)) < len(asked.axes):
+        raise SettingError("excite.axes", "names an axis twice; name each once")
+    low, high = asked.band_hz
+    if low >= high:
+        raise SettingError("excite.band_hz", "must rise: give the lowest frequency, then the highest")
+    if not asked.axes:
+        return
+    if settings.held or settings.path == "next-flight":
+        raise SettingError("excite.axes", f"excite a path in space; path {settings.path} chooses its motion itself")
+    if high * settings.sample_time_s * _SAMPLES_IN_A_PERIOD > 1 + 1e-9:
+        message = f"leaves less than {_SAMPLES_IN_A_PERIOD} samples in a period of {high:g} Hz, the top of"
+        remedy = f"lower it to {1 / (_SAMPLES_IN_A_PERIOD * high):.3g} or less"
+        raise SettingError("sample_time_s", f"{message} excite.band_hz; {remedy}")
+
+
+def _check_repeated(settings: TrajectorySettings) -> None:
+    if settings.repeat == 1:
+        return
+    if settings.held:
+        raise SettingError("repeat", f"flies a path from rest to rest again; path {settings.path} never rests")
+    if settings.yaw_profile == "uniform" and settings.yaw_turn:
+        message = "turns at the ends of a run too, and a run that is repeated begins and ends at rest; use base"
+        raise SettingError("yaw_profile", f"uniform {message}, or yaw_turn_rad: 0")
 
 
 def _check_direction(settings: TrajectorySettings) -> None:

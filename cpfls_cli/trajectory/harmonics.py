@@ -132,4 +132,6 @@ def harmonic_trajectory(path: HarmonicPath, sample_time: float, gravity: float) 
     position, heading = motion[..., :3], motion[:3, :, 3]
     lengths = np.linalg.norm(np.concatenate([(position[0] - position[0, 0])[None], position[1:]]), axis=2).max(axis=1)
     maxima = dict(zip(_NAMES, lengths.tolist(), strict=True))
-    return Trajectory(duration=path.duration, legs=(), maxima=maxima, **along(time, position, heading, gravity))
+    return Trajectory(
+        duration=path.duration, legs=(), maxima=maxima, runs=(), **along(time, position, heading, gravity)
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +12,7 @@ from cpfls_cli.errors import ComputationError
 from cpfls_cli.trajectory.attitude import along, heading_of_legs, rotation_samples, stretched_heading, uniform_heading
 from cpfls_cli.trajectory.consistency import check_duration, check_peaks, check_samples, check_waypoints
 from cpfls_cli.trajectory.legs import Leg, MoveInSpace, evaluate_legs, move_in_space
+from cpfls_cli.trajectory.profile import Peaks
 from cpfls_cli.trajectory.rotation import RotationPath
 from cpfls_cli.trajectory.settings import TrajectorySettings
 
@@ -58,6 +59,8 @@ class Trajectory(PlannedRotation):
         World frame, z up.
     legs : tuple of Leg
         The rest-to-rest moves that it is made of.
+    runs : tuple of (float, float), s
+        When each run of a path that is repeated begins and ends; empty where it is flown once.
     maxima : dict
         Largest absolute value of each derivative of any move, by name, in the displacement measure of the
         settings, in m and s; from the closed form, not from the samples.
@@ -72,10 +75,11 @@ class Trajectory(PlannedRotation):
     pop: Array
     legs: tuple[Leg, ...]
     maxima: dict[str, float]
+    runs: tuple[tuple[float, float], ...]
 
 
 def plan(settings: TrajectorySettings, gravity: float) -> Trajectory:
-    """Plan a path in space.
+    """Plan a path in space, one run of it and without what excites it.
 
     Parameters
     ----------
@@ -100,8 +104,8 @@ def plan(settings: TrajectorySettings, gravity: float) -> Trajectory:
         duration = _duration_of(settings, legs)
         time = sample_times(duration, settings.sample_time_s)
         heading = _heading(settings, legs, time, duration)
-        flown = along(time, evaluate_legs(legs, time), heading, gravity)
-        planned = Trajectory(duration=duration, legs=legs, maxima=_maxima(legs), **flown)
+        flown = along(time, evaluate_legs(legs, time) if legs else np.zeros((7, len(time), 3)), heading, gravity)
+        planned = Trajectory(duration=duration, legs=legs, maxima=_maxima(legs), runs=(), **flown)
     if not all(np.isfinite(values).all() for values in vars(planned).values() if isinstance(values, np.ndarray)):
         raise ComputationError(
             "the attitude's derivatives are too large for numbers to hold; lower trajectory.yaw_turn_rad"
@@ -111,6 +115,8 @@ def plan(settings: TrajectorySettings, gravity: float) -> Trajectory:
 
 def _heading(settings: TrajectorySettings, legs: tuple[Leg, ...], time: Array, duration: float) -> Array:
     """Compute yaw, its rate and its acceleration, shape (3, time)."""
+    if not legs:
+        return uniform_heading(time, 0.0, duration)
     if legs[0].yaw is not None:
         return heading_of_legs(time, legs)
     if settings.yaw_profile == "uniform":
@@ -119,7 +125,9 @@ def _heading(settings: TrajectorySettings, legs: tuple[Leg, ...], time: Array, d
 
 
 def _itinerary(settings: TrajectorySettings) -> tuple[Leg, ...]:
-    """Plan the legs of a path in space, in the order of time."""
+    """Plan the legs of a path in space, in the order of time; none of one that hovers."""
+    if settings.path == "hover":
+        return ()
     start, yaw = np.zeros(3), []
     if settings.path == "waypoints":
         moves = _between_waypoints(settings)
@@ -139,11 +147,17 @@ def _itinerary(settings: TrajectorySettings) -> tuple[Leg, ...]:
 
 
 def _duration_of(settings: TrajectorySettings, legs: tuple[Leg, ...]) -> float:
-    """Compute the duration of a path, s: as set, or up to the first sample at which all is at rest."""
+    """Compute the duration of a path, s: as set, or up to the first sample at which all is at rest.
+
+    A run that is repeated ends at a sample, so that all runs are sampled alike.
+    """
     if settings.duration_s is not None:
-        return settings.duration_s
-    duration = legs[-1].end + (settings.waypoints[-1].pause_s if settings.path == "waypoints" else 0.0)
-    check_samples(duration, settings.sample_time_s)
+        duration = settings.duration_s
+        if settings.repeat == 1:
+            return duration
+    else:
+        duration = legs[-1].end + (settings.waypoints[-1].pause_s if settings.path == "waypoints" else 0.0)
+        check_samples(duration, settings.sample_time_s)
     steps = np.ceil(duration / settings.sample_time_s - 1e-6)
     return float(steps * settings.sample_time_s)
 
@@ -174,7 +188,7 @@ def _begins(settings: TrajectorySettings, durations: Array) -> Array:
 def _maxima(legs: tuple[Leg, ...]) -> dict[str, float]:
     """Find the largest peak of every derivative over all legs; infinite for crackle and pop without a limit."""
     peaks = [asdict(profile.peaks) for leg in legs for profile in leg.profiles]
-    return {name: max(abs(peak[name]) for peak in peaks) for name in peaks[0]}
+    return {field.name: max((abs(peak[field.name]) for peak in peaks), default=0.0) for field in fields(Peaks)}
 
 
 def held_rotation(path: RotationPath, sample_time: float) -> PlannedRotation:

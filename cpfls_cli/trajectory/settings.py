@@ -20,7 +20,8 @@ from cpfls_cli.trajectory.profile import BaseProfile, Holds
 _Turns = Annotated[int, Ge(-10_000), Le(10_000)]
 _Torque = Annotated[float, Gt(0)]
 _Length = Annotated[float, Gt(0)]
-PathKind = Literal["cube-diagonal", "straight", "waypoints", "next-flight", "full-rotation", "optimised"]
+PathKind = Literal["cube-diagonal", "straight", "waypoints", "hover", "next-flight", "full-rotation", "optimised"]
+ExcitedAxis = Literal["roll", "pitch", "yaw", "vertical"]
 _USUAL_PERIOD = 1.0
 _ROTATIONS = ("full-rotation", "optimised")
 
@@ -71,6 +72,36 @@ class NextFlightSettings(Settings):
 
 
 @dataclass(frozen=True, kw_only=True)
+class ExciteSettings(Settings):
+    """Describe a test signal that is added to a path in space, from rest to rest."""
+
+    axes: Annotated[
+        tuple[ExcitedAxis, ...],
+        Doc("what is excited, each apart from the others: roll, pitch, yaw, vertical; none: nothing is added"),
+    ] = ()
+    signal: Annotated[
+        Literal["multisine", "sweep-linear", "sweep-logarithmic"],
+        Doc(
+            "multisine: all axes at once, each at frequencies of its own, of a low crest factor; sweep-linear, "
+            "sweep-logarithmic: one frequency after another, axis after axis"
+        ),
+    ] = "multisine"
+    band_hz: Annotated[
+        tuple[Annotated[float, Gt(0)], Annotated[float, Gt(0)]], Doc("lowest and highest frequency, Hz")
+    ] = (0.5, 5.0)
+    size_rad: Annotated[
+        float,
+        Gt(0),
+        Le(0.5),
+        Doc(
+            "largest angle, rad, less where the vehicle cannot; amplitudes fall with frequency, rates are equal in the "
+            "band; of vertical the angle of a tilt with as much acceleration"
+        ),
+    ] = 0.1
+    velocity_max_m_s: Annotated[float, Gt(0), Doc("largest velocity that the excitation adds, m/s")] = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
 class WaypointSettings(Settings):
     """Describe a point at which the vehicle comes to rest."""
 
@@ -89,6 +120,7 @@ class TrajectorySettings(Settings):
         PathKind,
         Doc(
             "cube-diagonal: to and fro along (1, 1, 1); straight: along `direction`; waypoints: from point to point; "
+            "hover: at one place; "
             "next-flight: what tells rivals of a diagnosis apart, harmonics from rest to rest; "
             "full-rotation, optimised: held at its centre of mass, turns through complete circles, at random or as "
             "conditions the model of `identification` best"
@@ -143,7 +175,7 @@ class TrajectorySettings(Settings):
         float | None,
         Doc(
             "yaw turned over the whole duration, rad, unless the waypoints have a yaw; null: a full turn on a path to "
-            "and fro, none through waypoints"
+            "and fro, none through waypoints, in hover and where something is excited"
         ),
     ] = None
     yaw_profile: Annotated[
@@ -154,6 +186,13 @@ class TrajectorySettings(Settings):
         default_factory=RotationSettings
     )
     next_flight: Annotated[NextFlightSettings, Doc("for path next-flight")] = field(default_factory=NextFlightSettings)
+    excite: Annotated[ExciteSettings, Doc("test signal that is added to a path in space")] = field(
+        default_factory=ExciteSettings
+    )
+    repeat: Annotated[int, Ge(1), Le(1000), Doc("runs of a path in space, each the same from rest to rest")] = 1
+    repeat_pause_s: Annotated[
+        float, Ge(0), Doc("rest before the next run, s, after the way back to the start where the path ends elsewhere")
+    ] = 5.0
     tilt_max_rad: Annotated[
         Annotated[float, Gt(0), Le(math.pi)] | None,
         Doc("largest tilt of a path in space, rad; null: any, and 35 degrees on path next-flight"),
@@ -177,7 +216,7 @@ class TrajectorySettings(Settings):
         """Yaw turned over the whole duration, rad."""
         if self.yaw_turn_rad is not None:
             return self.yaw_turn_rad
-        return 0.0 if self.path == "waypoints" else 2 * math.pi
+        return 0.0 if self.path in ("waypoints", "hover") or self.excite.axes else 2 * math.pi
 
     @property
     def period(self) -> float | None:

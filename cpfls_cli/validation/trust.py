@@ -13,6 +13,7 @@ class Trust(StrEnum):
     CONTROL = "good-for-control"
     INSIDE = "good-inside-region"
     NOT_JUDGED = "not-judged"
+    LACKING = "lacks-an-effect"
     LOOP = "shows-the-loop"
     RIGID_BODY = "not-better-than-rigid-body"
     DO_NOT_USE = "do-not-use"

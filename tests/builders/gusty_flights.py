@@ -90,7 +90,7 @@ def gusty_flights(flights, seconds=30.0):
     noise = [f.truth.gyro_noise * rng.standard_normal((samples, 3)) for rng, f in zip(rngs, flights, strict=True)]
     logs = _flown(flights, path, *(np.stack(each, axis=1) for each in (pushes, shoves, noise)))
     for number, (rng, flight) in enumerate(zip(rngs, flights, strict=True)):
-        *motion, speed = (np.ascontiguousarray(log[:, number]) for log in logs)
+        *motion, speed, up = (np.ascontiguousarray(log[:, number]) for log in logs)
         speed += flight.truth.speed_noise * speed.mean() * rng.standard_normal(speed.shape)
         yield PlaybackFlight(
             name=f"gusty-{number}",
@@ -98,6 +98,11 @@ def gusty_flights(flights, seconds=30.0):
             speed=speed,
             hold="linear",
             stretches=(slice(0, len(speed)),),
+            setpoints={
+                "position": path[::EVERY, number, :3],
+                "velocity": path[::EVERY, number, 3:6],
+                "attitude": np.stack([-np.arcsin(up[:, 1]), np.arctan2(up[:, 0], up[:, 2]), 0 * up[:, 0]], axis=1),
+            },
         )
 
 
@@ -135,7 +140,7 @@ def _skew(vector):
 
 
 def _flown(flights, path, pushes, shoves, noise):
-    """Integrate all flights side by side; give position, velocity, rotation, measured rate and speed as logged."""
+    """Integrate all flights side by side; give position, velocity, rotation, measured rate, speed and wanted up."""
     truths, bandwidth = [flight.truth for flight in flights], np.array([[flight.bandwidth] for flight in flights])
     mass, lag, damping, drag = (
         np.array([[getattr(truth, name)] for truth in truths]) for name in ("mass", "lag_s", "damping", "drag")
@@ -159,14 +164,16 @@ def _flown(flights, path, pushes, shoves, noise):
         thrust = mass * (wanted * turn[:, :, 2]).sum(axis=1, keepdims=True)
         squared = (unmix @ np.concatenate([thrust, torque], axis=1)[:, :, None])[:, :, 0]
         if now % EVERY == 0:
-            logs.append([position, velocity, turn, measured, speed])
-        speed = speed + STEP_S / lag * (np.sqrt(np.clip(squared, 0.05 * hover, 4 * hover)) - speed)
-        wrench = (mixer @ (speed**2)[:, :, None])[:, :, 0]
+            logs.append([position, velocity, turn, measured, speed, up])
+        before, speed = speed, speed + STEP_S / lag * (np.sqrt(np.clip(squared, 0.05 * hover, 4 * hover)) - speed)
+        wrench = (mixer @ (0.5 * (before**2 + speed**2))[:, :, None])[:, :, 0]
         gyroscopic = (_skew(rate) @ (inertia * rate)[:, :, None])[:, :, 0]
         spin_up = (wrench[:, 1:] - damping * rate - gyroscopic) / inertia + pushes[now]
-        force = -drag * (velocity[:, None] @ turn)[:, 0] * [1.0, 1.0, 0.0] + wrench[:, :1] * [0.0, 0.0, 1.0]
-        faster = (turn @ force[:, :, None])[:, :, 0] / mass + shoves[now] - UP
-        position, velocity = position + STEP_S * velocity, velocity + STEP_S * faster
+        # In the middle of the step, as all that turns and pushes is.
+        midway = turn @ (np.eye(3) + 0.5 * STEP_S * _skew(rate))
+        force = -drag * (velocity[:, None] @ midway)[:, 0] * [1.0, 1.0, 0.0] + wrench[:, :1] * [0.0, 0.0, 1.0]
+        faster = (midway @ force[:, :, None])[:, :, 0] / mass + shoves[now] - UP
+        position, velocity = position + STEP_S * (velocity + 0.5 * STEP_S * faster), velocity + STEP_S * faster
         angle = STEP_S * (rate + 0.5 * STEP_S * spin_up)
         small = _skew(angle)
         turn = turn @ (np.eye(3) + small + 0.5 * small @ small + small @ small @ small / 6)

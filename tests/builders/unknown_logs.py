@@ -137,8 +137,11 @@ def with_ground(own, before_s=5.0, after_s=4.0, idle=0.25):
     return longer
 
 
-def ulog_of_flight(own, without=None, **parameters):
-    """The flight as PX4 writes it: FRD in NED, topics at rates of their own, thrust linearised, parameters."""
+def ulog_of_flight(own, without=None, asked=None, **parameters):
+    """The flight as PX4 writes it: FRD in NED, topics at rates of their own, thrust linearised, parameters.
+
+    `asked` has further topics: their fields, rows from one sample to the next, and their values.
+    """
     turned = Rotation.from_matrix(NED @ own.rotation.as_matrix() @ FLIP)
     share = (own.speed / 1000.0) ** 2
     motors = np.hstack([share, np.full((len(share), 8), np.nan)])
@@ -157,6 +160,7 @@ def ulog_of_flight(own, without=None, **parameters):
         ),
         "actuator_motors": ("float[12] control", 1, motors),
     }
+    topics |= asked or {}
     topics.pop(without, None)
     rows = [
         (round(1e6 * own.time[row]), number, values[row])

@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
+from cpfls_cli.rotations import rotation_matrix
 from tests.builders.studies import VEHICLE
 
 SHORT = """\
@@ -21,6 +22,9 @@ identification:
   local_search: {enabled: false}
   validation: {draws: 20, windows: 20, horizon_samples: 6}
 """
+
+
+MOVED = ("position", "velocity", "acceleration", "attitude")
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +62,23 @@ def test_flight_is_logged_and_keeps_to_its_format(fly, cpfls):
     with h5py.File(path) as file:
         assert "effects" not in file
         assert "voltage" not in file
+
+
+def test_a_flight_says_what_its_autopilot_followed(fly, short):
+    path, said = fly("--effect", "wind=1e-4,2,0")
+    assert "Setpoints position, velocity, attitude" in " ".join(said.split())
+    plan = dict(zip(MOVED, read(short[1], *MOVED), strict=True))
+    flown = dict(zip(MOVED[:2], read(path, *MOVED[:2]), strict=True))
+    position, velocity, attitude = read(path, "setpoint_position", "setpoint_velocity", "setpoint_attitude")
+    np.testing.assert_array_equal(position, plan["position"])
+    np.testing.assert_array_equal(velocity, plan["velocity"])
+    # The thrust is to carry the vehicle and to take it back to its path: 0.25 Hz and a damping of 0.9.
+    stiff = 2 * np.pi * 0.25
+    pull = plan["acceleration"] + stiff**2 * (position - flown["position"])
+    pull += 1.8 * stiff * (velocity - flown["velocity"]) + [0, 0, 9.81]
+    up = rotation_matrix(attitude)[:, :, 2]
+    np.testing.assert_allclose(up, pull / np.linalg.norm(pull, axis=1, keepdims=True), atol=1e-9)
+    np.testing.assert_allclose(attitude[:, 2], plan["attitude"][:, 2], atol=1e-6)
 
 
 def test_effects_are_recorded_with_their_values(fly):

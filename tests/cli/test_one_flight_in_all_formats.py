@@ -116,6 +116,8 @@ def test_the_same_flight_comes_back(cpfls, tmp_path, name):
     write, time, columns = WRITERS[name]
     write(tmp_path / name)
     signals = {signal: {"columns": own, "unit": UNITS[signal]} for signal, own in columns.items()}
+    # What was asked for comes the same way: here it is what was flown.
+    signals |= {f"setpoint_{signal}": {**signals[signal], "required": False} for signal in ("attitude", "body_rate")}
     (tmp_path / "study.yaml").write_text(
         VEHICLE + yaml.safe_dump({"import": {"time_column": time, "signals": signals}})
     )
@@ -127,3 +129,5 @@ def test_the_same_flight_comes_back(cpfls, tmp_path, name):
         for signal, values in SIGNALS.items():
             # Most logs keep seven digits.
             np.testing.assert_allclose(file[signal], values, atol=1e-6, err_msg=signal)
+        for signal in ("attitude", "body_rate"):
+            np.testing.assert_allclose(file[f"setpoint_{signal}"], SIGNALS[signal], atol=1e-6, err_msg=signal)

@@ -5,11 +5,14 @@ import json
 import h5py
 import numpy as np
 import pytest
+import yaml
+from scipy.spatial.transform import Rotation
 
 from cpfls_cli.config.load import load_study
 from cpfls_cli.flights.playback import flights_to_play
 from cpfls_cli.flights.recordings import read_flights
 from tests.builders.studies import VEHICLE
+from tests.builders.unknown_logs import FLIP, NED, flight, quaternion, ulog_of_flight
 
 CONFIG = """\
 import:
@@ -83,3 +86,46 @@ def test_a_flight_without_them_has_none(cpfls, flown, tmp_path):
     assert cpfls("import", config, log, "-o", flight).exit_code == 0
     (played,) = flights_to_play([flight], load_study(config))
     assert played.playback.setpoints == {}
+
+
+def ahead(values, samples=10):
+    """What was asked for a tenth of a second before it was flown."""
+    return np.vstack([values[samples:], np.repeat(values[-1:], samples, axis=0)])
+
+
+def test_init_proposes_the_setpoints_of_px4_and_import_takes_them(cpfls, tmp_path):
+    own = flight(seconds=20.0)
+    wished = Rotation.from_matrix(NED @ own.rotation.as_matrix()[10:] @ FLIP)
+    columns = ahead(own.position) @ NED.T
+    attitude = np.vstack([quaternion(wished), np.repeat(quaternion(wished)[-1:], 10, axis=0)])
+    thrust = np.column_stack([0 * own.time, 0 * own.time, -0.4 - 0.1 * np.sin(own.time)])
+    asked = {
+        "trajectory_setpoint": ("float[3] position", 20, columns),
+        "vehicle_attitude_setpoint": ("float[4] q_d;float[3] thrust_body", 5, np.hstack([attitude, thrust])),
+    }
+    log, config, made = tmp_path / "log.ulg", tmp_path / "study.yaml", tmp_path / "flight.h5"
+    log.write_bytes(ulog_of_flight(own, asked=asked))
+    said = cpfls("init", log, "-o", config, "--mass", "0.8", "--arm", "0.16")
+    assert said.exit_code == 0, said.stderr
+    assert "the attitude follows it" in " ".join(said.stdout.split())
+    signals = yaml.safe_load(config.read_text())["import"]["signals"]
+    assert signals["setpoint_thrust"] == {
+        "columns": ["vehicle_attitude_setpoint.thrust_body[2]"],
+        "unit": "1",
+        "sign": [-1],
+        "required": False,
+    }
+    result = cpfls("import", config, log, "-o", made, "--json")
+    assert result.exit_code == 0, result.stderr
+    summary = json.loads(result.stdout)
+    samples = summary["samples"]
+    assert summary["setpoints"] == {"position": samples, "attitude": samples, "thrust": samples}
+    with h5py.File(made) as file:
+        first = round(100 * summary["span_s"][0])
+        held = np.arange(first, first + samples) // 20 * 20
+        np.testing.assert_allclose(file["setpoint_position"], ahead(own.position)[held], atol=1e-5)
+        held = np.arange(first, first + samples) // 5 * 5
+        turned = Rotation.from_euler("ZYX", file["setpoint_attitude"][()][:, ::-1])
+        away = Rotation.from_euler("ZYX", ahead(own.angles)[held][:, ::-1]) * turned.inv()
+        assert away.magnitude().max() < 1e-5
+        np.testing.assert_allclose(file["setpoint_thrust"], -thrust[held, 2], atol=1e-6)

@@ -15,11 +15,12 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import floors, system
 from cpfls_cli.gap.balance.weak_flight import WeakFlight, weak_flight
 from cpfls_cli.gap.next_flight.rivals import physical_values
-from cpfls_cli.gap.next_flight.room import Room, squared_speeds
+from cpfls_cli.gap.next_flight.room import Room
 from cpfls_cli.gap.next_flight.separation import SizedEffect
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.simulation.measured import measure, noisy
+from cpfls_cli.simulation.room_left import squared_speeds
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.planning import Trajectory
 from cpfls_cli.vehicle.settings import VehicleSettings

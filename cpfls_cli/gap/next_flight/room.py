@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.rigid_body import body_torque, inertia_tensor
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.rounding import at_most
-from cpfls_cli.simulation.inverse import collective_thrust
+from cpfls_cli.simulation.room_left import ROTOR_SHARE, hover_squared, rotor_load
 from cpfls_cli.trajectory.harmonics import HarmonicPath, harmonic_trajectory, random_path
 from cpfls_cli.trajectory.planning import Trajectory
 from cpfls_cli.trajectory.settings import TrajectorySettings
-from cpfls_cli.vehicle.rotors import rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 TILT_MAX = np.radians(35.0)
 """Largest tilt where the settings leave it open."""
 
-_ROTOR_SHARE = 0.85
-"""Of the largest speed of a rotor, and of the way down from hovering to rest, in squares: the rest is for control."""
 # Half of a turn to either side shows every heading.
 _MOST_YAW = np.pi
 # Of the fastest wave: between them a load is at most 1 % larger.
@@ -105,10 +100,8 @@ class Room:
         loads = [_taken(signals[key.split("_", 1)[0]], limit) for key, limit in self.settings.limits.given.items()]
         tilt = np.arccos(np.clip(np.prod(np.cos(planned.attitude[:, :2]), axis=1), -1, 1)).max()
         loads.append(float(tilt) / (self.settings.tilt_max_rad or TILT_MAX))
-        squared, hover = squared_speeds(signals, self.vehicle), _hover(self.vehicle)
-        loads.append(float((squared / (_ROTOR_SHARE * self.vehicle.rotor_speed_max_rad_s**2)).max()))
-        loads.append(float(((hover - squared) / (_ROTOR_SHARE * hover)).max()))
-        return max(loads)
+        rotors = rotor_load(signals, self.vehicle)
+        return max(*loads, rotors.fast, rotors.slow)
 
 
 def room_of(settings: TrajectorySettings, vehicle: VehicleSettings, ground: float, period: float) -> Room:
@@ -140,8 +133,8 @@ def room_of(settings: TrajectorySettings, vehicle: VehicleSettings, ground: floa
             f"{0.5 * box[2]:g} or more, or lower next_flight.box_m"
         )
         raise SettingError("next_flight.height_m", message)
-    hover = _hover(vehicle)
-    most = _ROTOR_SHARE * vehicle.rotor_speed_max_rad_s**2
+    hover = hover_squared(vehicle)
+    most = ROTOR_SHARE * vehicle.rotor_speed_max_rad_s**2
     if (hover >= most).any():
         raise ComputationError(
             f"vehicle.rotor_speed_max_rad_s = {vehicle.rotor_speed_max_rad_s:g}: hovering takes "
@@ -149,28 +142,6 @@ def room_of(settings: TrajectorySettings, vehicle: VehicleSettings, ground: floa
             "thrust factors and the largest rotor speed"
         )
     return Room(half, np.array([0.0, 0.0, ground + asked.height_m]), settings, vehicle, period)
-
-
-def squared_speeds(planned: Mapping[str, Array], vehicle: VehicleSettings) -> Array:
-    """Compute the squared rotor speeds that a planned motion asks for.
-
-    Returns
-    -------
-    array, shape (time, rotor), rad^2/s^2
-        Negative where no rotor can.
-    """
-    q, qd, qdd = (planned[name] for name in ("attitude", "attitude_rate", "attitude_acceleration"))
-    about_body = body_torque(q, qd, qdd, inertia_tensor(vehicle))
-    thrust = collective_thrust(vehicle, about_body, planned["acceleration"])
-    squared: Array = rotor_demand(vehicle, thrust, about_body).squared_speed
-    return squared
-
-
-def _hover(vehicle: VehicleSettings) -> Array:
-    """Squared rotor speeds of hovering, shape (rotor,), rad^2/s^2."""
-    weight = np.array([vehicle.mass_kg * vehicle.gravity_m_s2])
-    squared: Array = rotor_demand(vehicle, weight, np.zeros((1, 3))).squared_speed[0]
-    return squared
 
 
 def _taken(values: Array, limit: float | tuple[float, float, float]) -> float:

@@ -75,6 +75,8 @@ def test_a_log_without_rotors_states_its_torque(name):
     found = maps(recognition)
     assert found["attitude"] == ("ctrlLee_rpyx", "rad", None)
     assert found["body_torque"] == ("ctrlLee_torquex", "N m", None)
+    assert found["setpoint_position"] == ("ctrltargetZ_x", "m", None)
+    assert found["setpoint_velocity"] == ("ctrltargetZ_vx", "m/s", None)
     assert recognition.signal("body_torque").sure == "guess"
 
 
@@ -87,7 +89,11 @@ def test_a_card_of_a_crazyflie_is_read_without_a_word_of_config():
         # The pitch rate of the controller is that of the nose up: x accelerates against its integral in all 15 logs.
         "body_rate": ("fixedFrequency.controller.r_roll", "rad/s", (1.0, -1.0, 1.0)),
         "position": ("fixedFrequency.stateEstimate.x", "m", None),
+        "setpoint_attitude": ("fixedFrequency.controller.roll", "deg", (1.0, -1.0, 1.0)),
+        "setpoint_body_rate": ("fixedFrequency.controller.rollRate", "deg/s", (1.0, -1.0, 1.0)),
     }
+    # What it asks of yaw is full of jumps.
+    assert "yawRate is not followed" in recognition.signal("setpoint_body_rate").rivals[0].reason
 
 
 def test_what_is_written_imports_the_flight(tmp_path):

@@ -164,3 +164,10 @@ def test_a_flight_holds_its_setpoints_and_counts_where_they_are_known():
     assert record.setpoint_thrust.shape == (SAMPLES,)
     # The first value goes back by import.gap_s, and no further.
     assert record.setpoints_known == {"position": SAMPLES, "thrust": SAMPLES - 11}
+
+
+def test_on_a_clock_that_was_computed_a_setpoint_is_not_a_row_late():
+    time = 1e-6 * np.round(1e6 * (17.3 + np.arange(4000) / 300))
+    values = np.arange(len(time), dtype=float)
+    clock = time[0] + float(np.median(np.diff(time))) * np.arange(1000)
+    np.testing.assert_array_equal(hold_asked(time, values, clock, 0.1)[:50], values[:50])

@@ -11,7 +11,7 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.source import Sources
-from cpfls_cli.pages.vehicle_model import found_vehicle_section, remainder_curves, warnings
+from cpfls_cli.pages.vehicle_model import WHAT_TO_FLY, found_vehicle_section, remainder_curves, warnings
 from cpfls_cli.report.content import Plot, Table
 from cpfls_cli.validation.trust import Trust, capped
 from tests.builders.forms import source_of_record
@@ -101,6 +101,7 @@ def test_flights_that_show_the_loop_are_said_first_and_leave_no_good_word():
     said = next(line for line in warnings(replace(record, loop=loop, found=numbers)) if "loop" in line)
     assert "torque explains 45 % of the roll acceleration and 47 % of the pitch acceleration" in said
     assert "Ixx 0.21 to 2.6 times and Iyy 0.23 to 2.4 times what was found" in said
+    assert said.endswith(f": {WHAT_TO_FLY}")
     for trust in (Trust.SIMULATION, Trust.CONTROL):
         assert capped(trust, (), loop=True) == Trust.LOOP
     assert capped(Trust.DO_NOT_USE, (), loop=True) == Trust.DO_NOT_USE

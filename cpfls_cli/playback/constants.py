@@ -1,0 +1,338 @@
+"""Constants of a vehicle from what moves it and knows nothing of its gusts: balances in bands, with instruments.
+
+Torque and force of a model are held against what the motion takes, averaged over smooth windows of several lengths. An
+autopilot answers gusts with torque, so torque and gust go together, and least squares finds a mixture of vehicle and
+autopilot. The same balance in another run of the same path has the same torque asked for, and another gust: it is the
+instrument, and what is left of a balance must not go with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import contiguous, half_width, jackknife_covariance, jackknife_error, mean_error
+from cpfls_cli.playback.balances import BANDS, BANDS_HZ, FOLDS, OVERLAP, Balances, Sums
+from cpfls_cli.playback.fit import Fitted, Uncertainty
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.groups import JointNumbers
+from cpfls_cli.playback.instruments import Instruments
+from cpfls_cli.playback.kernels import Airflow
+from cpfls_cli.playback.parameters import DRAG, INERTIA, LEARNED, LOG_INERTIA, FreeNumbers, blocks_of, needs_velocity
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+_FEWEST_BLOCKS = 8
+_EXPLAINED = 0.9
+"""Share of what comes again that a model has to explain: below it lacks an effect in that band."""
+_NOT_TRIED = ("wind", "slow_actuation")
+"""Air of a flight, and a number that answers for whatever is slow: neither is a constant of the vehicle."""
+_STEPS, _SETTLED = 12, 1e-3
+"""Of an estimate, and natural sizes of a step that is none any more."""
+_LEAST = 1e-6
+"""Of the power of a band that is never taken for what comes again."""
+_FARTHEST = 1.0
+"""Natural sizes of a step."""
+_KNOWN = 2.0
+"""Ratio of the ends of an interval from which on a moment of inertia is not known."""
+_STRONG = 10.0
+"""F statistic of an instrument below which it is weak, and its interval no interval."""
+_APART = 3.0
+"""Standard errors by which bands may differ on a moment of inertia."""
+_WORTH = 3.0
+"""Standard errors by which a block has to lower what is left of balances kept aside."""
+
+
+class Explained(NamedTuple):
+    """What a model explains of the rotation that comes again, by band and body axis.
+
+    Attributes
+    ----------
+    share : array, shape (band, 3)
+        ``1 - sum r r' / sum h h'`` over runs and others, r what is left and h what the rotation takes.
+    used : array of bool, shape (band,)
+        Whether the constants rest on it.
+    bands_hz : tuple of (float, float)
+        Ends of the bands, about.
+    """
+
+    share: Array
+    used: BoolArray
+    bands_hz: tuple[tuple[float, float], ...] = BANDS_HZ
+
+
+@dataclass(frozen=True)
+class Constants:
+    """Constants that instruments tell.
+
+    Attributes
+    ----------
+    fitted : Fitted
+    spread : Uncertainty
+    explained : Explained
+    """
+
+    fitted: Fitted
+    spread: Uncertainty
+    explained: Explained
+
+    @property
+    def tells(self) -> bool:
+        """Whether the moments of inertia about roll and pitch are known to a factor of two."""
+        deviation = np.sqrt(np.diag(self.spread.covariance))
+        index = self.fitted.free.index
+        places = [index[name] for name in LOG_INERTIA[:2] if name in index]
+        half = half_width(deviation[places], self.spread.blocks)
+        return bool(self.spread.determined[places].all() and (2 * half <= np.log(_KNOWN)).all())
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Balances at values of the numbers, the bands in which they are estimated, and numbers that are held."""
+
+    free: JointNumbers
+    sums: Sums
+    values: Array
+    bands: BoolArray
+    held: Collection[str]
+
+    @cached_property
+    def places(self) -> IntArray:
+        """Numbers that are estimated."""
+        return np.flatnonzero([number.name not in self.held for number in self.free.numbers])
+
+    @cached_property
+    def weights(self) -> Array:
+        """Inverse variance of what does not come again, shape (band, 3), for windows that overlap."""
+        own, crossed = (each.sum(axis=0)[:, :, 0, 0] for each in (self.sums.own, self.sums.crossed))
+        count = self.sums.windows.sum(axis=0)[:, None]
+        left = np.maximum(own - np.maximum(crossed, 0.0), _LEAST * own) / count
+        return np.where(self.bands[:, None], (1 - OVERLAP) / np.maximum(left, np.finfo(float).tiny), 0.0)
+
+    @cached_property
+    def weighed(self) -> Array:
+        """Products with other runs, weighed and summed over bands and axes, shape (block, 2 + number, 2 + number)."""
+        return np.asarray(np.einsum("ka,bkapq->bpq", self.weights, self.sums.crossed))
+
+    def weigh(self, sums: Array) -> Array:
+        """Weigh products, and sum them over blocks, bands and axes, shape (2 + number, 2 + number)."""
+        return np.asarray(np.einsum("ka,kapq->pq", self.weights, sums.sum(axis=0)))
+
+    def information(self, weighed: Array) -> Array:
+        """Add what was believed before to weighed sums, shape (number, number)."""
+        return np.asarray(weighed[1:-1, 1:-1] + np.diag(1.0 / self.free.spreads**2))
+
+    def step(self, weighed: Array, places: IntArray | None = None) -> Array:
+        """Estimate numbers, all but those held or some, as steps in natural sizes; 0 for others, shape (number,)."""
+        places = self.places if places is None else places
+        before = (self.values - self.free.starts) / self.free.scales / self.free.spreads**2
+        step = np.zeros(len(self.values))
+        rows = np.ix_(places, places)
+        step[places] = -np.linalg.solve(self.information(weighed)[rows], (weighed[1:-1, 0] + before)[places])
+        return step
+
+    @property
+    def named(self) -> dict[str, float]:
+        """Values of the numbers, by name."""
+        return self.free.named(self.values)
+
+    def left(self, places: IntArray) -> Array:
+        """Sum what comes again and is left, of blocks kept aside in turn, shape (block,)."""
+        total, parts = self.weighed.sum(axis=0), contiguous(len(self.weighed), FOLDS)
+        left = np.zeros(len(self.weighed))
+        for fold in range(FOLDS):
+            aside = parts == fold
+            moved = np.concatenate([[1.0], self.step(total - self.weighed[aside].sum(axis=0), places), [0.0]])
+            left[aside] = np.einsum("p,bpq,q->b", moved, self.weighed[aside], moved)
+        return left
+
+
+def find_constants(
+    vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], given: Instruments, leave_out: Sequence[str] = ()
+) -> Constants | None:
+    """Estimate the constants of a vehicle from flights that repeat each other, or whose setpoints are known.
+
+    Numbers that are not known are free, and the moments of inertia; blocks of others join one by one while they lower
+    what is left of balances that were kept aside. Slower bands join the faster ones while the model explains 90 % of
+    the rotation in them that comes again, and agree with them on the moments of inertia: where they do not, the model
+    lacks something there, which no constant may stand for.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+        Where to begin.
+    flights : sequence of PlaybackFlight
+        With rotor speeds.
+    given : Instruments
+        Of these flights.
+    leave_out : sequence of str
+        Blocks that are not tried.
+
+    Returns
+    -------
+    Constants or None
+        None where nothing tells how the flights were moved apart from gusts, or for too short a time.
+
+    References
+    ----------
+    Söderström and Stoica 2002 (instrumental variables in closed loop); Pintelon and Schoukens 2012 (repeats).
+    """
+    tried = _tried(vehicle, flights, leave_out)
+    blocks = [block for block in (*vehicle.unknown, *tried) if block == INERTIA or block in vehicle.unknown]
+    setting = _Setting(vehicle, flights, given)
+    begun = setting.balances(blocks)
+    if not begun.path:
+        return None
+    # Of drag factor and moment of inertia about yaw only the ratio is known: both would drift along it.
+    held = (DRAG,) if {DRAG, LOG_INERTIA[2]} <= set(begun.free.index) else ()
+    found = None
+    for slowest in range(len(BANDS)):
+        bands = np.array([number <= slowest or number >= len(BANDS) for number in range(len(begun.bands))])
+        problem = _settled(begun, bands, {}, held)
+        if len(problem.sums.crossed) < _FEWEST_BLOCKS:
+            return None
+        problem = _chosen(setting, problem, tried)
+        share, error = _explained(problem.sums)
+        if found is not None and not _agree(found, problem):
+            break
+        if slowest and not (share[slowest, :2] + error[slowest, :2] >= _EXPLAINED).all():
+            break
+        found = problem
+    return None if found is None else _constants(found)
+
+
+def _agree(fast: _Problem, more: _Problem) -> bool:
+    """Tell whether a slower band leaves the moments of inertia about roll and pitch where the faster ones have them."""
+    moments = np.array([[each.named[name] for name in LOG_INERTIA[:2]] for each in (fast, more)])
+    left_out = [_left_out(each)[:, [each.free.index[name] for name in LOG_INERTIA[:2]]] for each in (fast, more)]
+    scale = fast.free.scales[[fast.free.index[name] for name in LOG_INERTIA[:2]]]
+    error = jackknife_error((left_out[1] - left_out[0]) * scale)
+    return bool((np.abs(moments[1] - moments[0]) <= _APART * error).all())
+
+
+def _left_out(problem: _Problem) -> Array:
+    """Estimate numbers without each block, as steps in natural sizes, shape (block, number)."""
+    total = problem.weighed.sum(axis=0)
+    return np.array([problem.step(total - block) for block in problem.weighed])
+
+
+class _Setting(NamedTuple):
+    """What constants are sought in."""
+
+    vehicle: VehicleSettings
+    flights: Sequence[PlaybackFlight]
+    given: Instruments
+
+    def balances(self, blocks: Sequence[str]) -> Balances:
+        """Take the balances with the numbers of some blocks."""
+        chosen = tuple(block for block in blocks if block not in self.vehicle.unknown)
+        return Balances(FreeNumbers(self.vehicle, chosen, Airflow(np.zeros(0), 0)), self.flights, self.given)
+
+
+def _tried(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], leave_out: Sequence[str]) -> tuple[str, ...]:
+    """List the blocks that are constants of a vehicle and that the flights can tell of."""
+    translates = all(flight.translates for flight in flights)
+    return tuple(
+        block
+        for block in blocks_of(vehicle)
+        if block not in (*leave_out, *LEARNED, *_NOT_TRIED) and (translates or not needs_velocity(block))
+    )
+
+
+def _chosen(setting: _Setting, problem: _Problem, tried: Sequence[str]) -> _Problem:
+    """Add the block that lowers most what is left, and estimate again, until none does."""
+    while True:
+        taken = _blocks(problem.free)
+        others = [block for block in tried if block not in taken]
+        best = _best_block(setting.balances([*taken, *others]), problem, taken)
+        if best is None:
+            return problem
+        more = _settled(setting.balances([*taken, best]), problem.bands, problem.named, problem.held)
+        told = _f_statistics(more) >= _STRONG
+        if not told[[more.free.numbers[place].block == best for place in more.places]].any():
+            return problem
+        problem = more
+
+
+def _best_block(balances: Balances, problem: _Problem, taken: Sequence[str]) -> str | None:
+    """Find the block with which least is left of what was kept aside; None where none is worth it."""
+    free = JointNumbers(balances.free)
+    values = free.values({number.name: number.absent for number in free.numbers} | problem.named)
+    every = _Problem(free, balances.sums(values), values, problem.bands, problem.held)
+    left, found = every.left(_of_blocks(every, taken)), []
+    for block in dict.fromkeys(number.block for number in free.numbers):
+        if block not in taken:
+            gain = left - every.left(_of_blocks(every, [*taken, block]))
+            if gain.mean() > _WORTH * mean_error(gain):
+                found.append((gain.sum(), block))
+    return max(found)[1] if found else None
+
+
+def _of_blocks(problem: _Problem, blocks: Sequence[str]) -> IntArray:
+    """Give the estimated numbers of some blocks."""
+    return np.array([place for place in problem.places if problem.free.numbers[place].block in blocks], dtype=np.int64)
+
+
+def _settled(balances: Balances, bands: BoolArray, known: Mapping[str, float], held: Collection[str]) -> _Problem:
+    """Step to the numbers at which nothing that is left goes with other runs, within bounds; some are held."""
+    free = JointNumbers(balances.free)
+    values = free.values(known)
+    for _ in range(_STEPS):
+        problem = _Problem(free, balances.sums(values), values, bands, held)
+        step = np.clip(problem.step(problem.weighed.sum(axis=0)), -_FARTHEST, _FARTHEST)
+        moved = np.clip(values + step * free.scales, free.lows, free.highs)
+        if (np.abs(moved - values) <= _SETTLED * free.scales).all():
+            break
+        values = moved
+    return problem
+
+
+def _blocks(free: JointNumbers) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(number.block for number in free.numbers))
+
+
+def _explained(sums: Sums) -> tuple[Array, Array]:
+    """Compute the share of the rotation that comes again that a model explains, and its error, shape (band, 3)."""
+
+    def share(crossed: Array) -> Array:
+        return np.asarray(1.0 - crossed[..., 0, 0] / crossed[..., -1, -1])
+
+    crossed = sums.crossed[:, : len(BANDS)]
+    return share(crossed.sum(axis=0)), jackknife_error(share(crossed.sum(axis=0) - crossed))
+
+
+def _constants(problem: _Problem) -> Constants:
+    """Gather the numbers of a solved problem, and how far they scatter over the blocks of the path.
+
+    What instruments hardly tell scatters by what was believed before, however it scatters over the blocks.
+    """
+    free, places, total = problem.free, problem.places, problem.weighed.sum(axis=0)
+    told = np.zeros(len(free.numbers), dtype=bool)
+    told[places] = _f_statistics(problem) >= _STRONG
+    if DRAG in problem.held and (yaw := free.index.get(LOG_INERTIA[2])) is not None:
+        told[yaw] = False
+    without = _left_out(problem)
+    covariance = np.diag(np.where(told, 0.0, free.spreads**2)) + jackknife_covariance(without)
+    share, _ = _explained(problem.sums)
+    fitted = Fitted(free, problem.values, float(1 - share[0, :2].mean()), problem.information(total))
+    spread = Uncertainty(covariance * np.outer(free.scales, free.scales), len(without), told)
+    return Constants(fitted, spread, Explained(share, problem.bands[: len(BANDS)]))
+
+
+def _f_statistics(problem: _Problem) -> Array:
+    """Tell how strongly other runs tell each number apart from all others, the F statistic, shape (estimated,)."""
+    rows = np.ix_(1 + problem.places, 1 + problem.places)
+    crossed, own, others = (
+        problem.weigh(sums)[rows] for sums in (problem.sums.crossed, problem.sums.own, problem.sums.others)
+    )
+    # Each number's column without what other columns have of it, as other runs say.
+    apart = np.linalg.pinv(crossed)
+    told = np.einsum("pk,pq,qk->k", apart, crossed, apart)
+    noisy = np.einsum("pk,pq,qk->k", apart, own, apart) * np.einsum("pk,pq,qk->k", apart, others, apart)
+    share = np.minimum(np.where(told > 0, told**2, 0.0) / np.maximum(noisy, np.finfo(float).tiny), 1 - _LEAST)
+    windows = (1 - OVERLAP) * problem.sums.windows[:, problem.bands].sum()
+    return np.asarray(windows * share / (1 - share))
