@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
 from cpfls_cli.artifacts.output import refuse_own, write_text
 from cpfls_cli.artifacts.replay import VEHICLE, contradictions_of
-from cpfls_cli.artifacts.response import NO_INSTRUMENTS, ResponseRecord
+from cpfls_cli.artifacts.response import ResponseRecord
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.replay import model_notes
@@ -22,9 +22,11 @@ from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.pages.response import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import seen_warnings
+from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
-from cpfls_cli.response.flown import no_instruments, vehicle_responses
+from cpfls_cli.response.flown import given_by, vehicle_responses
 
 _DIGITS = 9
 
@@ -52,21 +54,33 @@ def run(job: Job, flights: Sequence[Path], model: Path | None, table: Path | Non
     given = flights_to_play(flights, job.study)
     if job.dry_run:
         return nothing_written(job)
-    responses = vehicle_responses(judged, given, no_instruments)
+    found = instruments([flight.playback for flight in given])
+    responses = vehicle_responses(judged, given, given_by(found))
     warnings = [
         *seen_twice((inputs[role] for role in roles), ()),
         *seen_warnings(name, learned_by(model), known_by(roles, inputs)),
         *(warning for flight in given for warning in flight.warnings),
         *model_notes(name, judged, given),
+        *_left_out(found, given),
     ]
     flown = [flight.name for flight in given]
-    made = ResponseRecord.of(name, flown, NO_INSTRUMENTS, responses, warnings, contradictions_of(given))
+    made = ResponseRecord.of(name, flown, found.kind, responses, warnings, contradictions_of(given))
     record = finish(job, made, inputs)
     written: tuple[Text, ...] = ()
     if table is not None:
         write_text(table, _csv(record))
         written = (Text(f"{table}: written, the curves as CSV"),)
     return Outcome(record.summary, (*answer(source_of(job, record)), *written))
+
+
+def _left_out(found: Instruments, flights: Sequence[LoggedFlight]) -> Iterator[str]:
+    """Say which flights hold no instrument beside others that do: they tell nothing of the vehicle."""
+    repeated = {number for path in found.repeats.paths() for number in path}
+    for number, flight in enumerate(flights):
+        if found.kind == "repeats" and number not in repeated:
+            yield f"{flight.name}: no other of these flights flies its path, so its response to torque is left out"
+        elif found.kind == "setpoints" and found.setpoints[number] is None:
+            yield f"{flight.name}: holds no setpoint from outside of its loops, so its response to torque is left out"
 
 
 def _csv(record: ResponseRecord) -> str:
