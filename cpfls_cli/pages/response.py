@@ -42,6 +42,8 @@ _REMEDY = (
 )
 _AUDIBLE_DB, _AUDIBLE_DEG = 1.0, 7.6
 """Differences that are told: with these J is 20 each."""
+_NAMED = 4
+"""Flights that are named in a caption; more stand beside it."""
 _TICKS_HZ = tuple(digit * 10.0**power for power in range(-2, 3) for digit in (1, 2, 5))
 _ROOM_DB, _ROOM_DEG = 12.0, 45.0
 _MODEL: dict[str, Any] = {**style_of(1), "linewidth": 1.6, "zorder": 3}
@@ -155,8 +157,9 @@ def _table(record: ResponseRecord, index: int) -> Table:
                 _median(100 * record.random_error[row][judged]),
             ]
         )
+    flown = joined(record.flown) if len(record.flown) <= _NAMED else f"{len(record.flown)} flights"
     caption = (
-        f"Frequency responses of {joined(record.flown)} and of the model along the same flights. J adds up differences "
+        f"Frequency responses of {flown} and of the model along the same flights. J adds up differences "
         f"in decibels and degrees over the band of {_clear(record)} (Tischler and Remple): up to {GOOD:g} is good, up "
         f"to {ACCEPTABLE:g} acceptable."
     )
