@@ -26,7 +26,7 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
-from cpfls_cli.response.flown import given_by, vehicle_responses
+from cpfls_cli.response.flown import vehicle_responses
 
 _DIGITS = 9
 
@@ -54,17 +54,17 @@ def run(job: Job, flights: Sequence[Path], model: Path | None, table: Path | Non
     given = flights_to_play(flights, job.study)
     if job.dry_run:
         return nothing_written(job)
-    found = instruments([flight.playback for flight in given])
-    responses = vehicle_responses(judged, given, given_by(found))
+    moved_by = instruments([flight.playback for flight in given])
+    responses = vehicle_responses(judged, given, moved_by.beside)
     warnings = [
         *seen_twice((inputs[role] for role in roles), ()),
         *seen_warnings(name, learned_by(model), known_by(roles, inputs)),
         *(warning for flight in given for warning in flight.warnings),
         *model_notes(name, judged, given),
-        *_left_out(found, given),
+        *_left_out(moved_by, given),
     ]
     flown = [flight.name for flight in given]
-    made = ResponseRecord.of(name, flown, found.kind, responses, warnings, contradictions_of(given))
+    made = ResponseRecord.of(name, flown, moved_by.kind, responses, warnings, contradictions_of(given))
     record = finish(job, made, inputs)
     written: tuple[Text, ...] = ()
     if table is not None:
@@ -73,13 +73,13 @@ def run(job: Job, flights: Sequence[Path], model: Path | None, table: Path | Non
     return Outcome(record.summary, (*answer(source_of(job, record)), *written))
 
 
-def _left_out(found: Instruments, flights: Sequence[LoggedFlight]) -> Iterator[str]:
+def _left_out(moved_by: Instruments, flights: Sequence[LoggedFlight]) -> Iterator[str]:
     """Say which flights hold no instrument beside others that do: they tell nothing of the vehicle."""
-    repeated = {number for path in found.repeats.paths() for number in path}
+    repeated = {number for path in moved_by.repeats.paths() for number in path}
     for number, flight in enumerate(flights):
-        if found.kind == "repeats" and number not in repeated:
+        if moved_by.kind == "repeats" and number not in repeated:
             yield f"{flight.name}: no other of these flights flies its path, so its response to torque is left out"
-        elif found.kind == "setpoints" and found.setpoints[number] is None:
+        elif moved_by.kind == "setpoints" and moved_by.setpoints[number] is None:
             yield f"{flight.name}: holds no setpoint from outside of its loops, so its response to torque is left out"
 
 

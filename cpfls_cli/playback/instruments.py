@@ -49,6 +49,24 @@ class Instruments:
             return "repeats"
         return "setpoints" if self.names else "none"
 
+    def beside(self, values: Sequence[Array]) -> list[Array | None]:
+        """Give the instruments of each flight: of repeats what other runs have there, else what was asked of it.
+
+        Parameters
+        ----------
+        values : sequence of array, shape (time,)
+            Of each flight, at its samples.
+
+        Returns
+        -------
+        list of array, shape (time, column), or None
+            NaN where no other run is; None for a flight without instruments.
+        """
+        if self.kind != "repeats":
+            return list(self.setpoints)
+        places = self.repeats.beside
+        return [self.repeats.others(number, values)[:, None] if place else None for number, place in enumerate(places)]
+
 
 def instruments(flights: Sequence[PlaybackFlight]) -> Instruments:
     """Find what moves flights from outside of their loops: other runs of their paths, and setpoints.

@@ -16,7 +16,6 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.playback.flight import LoggedFlight
-from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import Hold, RotorResponse
 from cpfls_cli.playback.table import rotor_weights
@@ -53,16 +52,6 @@ class VehicleResponse(NamedTuple):
 def no_instruments(inputs: Sequence[Array]) -> Sequence[Array | None]:
     """Give none: what is estimated is then the response of vehicle and autopilot together."""
     return [None] * len(inputs)
-
-
-def given_by(found: Instruments) -> InstrumentSource:
-    """Take what flights hold: of repeats the mean of what the other runs have, else setpoints, else none."""
-
-    def of_repeats(inputs: Sequence[Array]) -> Sequence[Array | None]:
-        return [found.repeats.others(number, inputs)[:, None] for number in range(len(inputs))]
-
-    by_kind = {"repeats": of_repeats, "setpoints": lambda _: found.setpoints}
-    return by_kind.get(found.kind, no_instruments)
 
 
 def vehicle_responses(

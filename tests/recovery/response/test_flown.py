@@ -9,7 +9,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.playback.instruments import Repeats, instruments
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.response.flown import given_by, specific_force, vehicle_responses
+from cpfls_cli.response.flown import specific_force, vehicle_responses
 from tests.builders.gusty_flights import GUSTS, SMALL, Flight, gusty_flights, logged
 
 SECONDS = 40.0
@@ -27,13 +27,13 @@ def by_repeats(flights):
     """Take the same path flown again."""
     found = instruments([flight.playback for flight in flights])
     assert found.kind == "repeats"
-    return given_by(found)
+    return found.beside
 
 
 def by_setpoints(flights):
     """Take what the path asks for; no flight is held to repeat another."""
     found = instruments([flight.playback for flight in flights])
-    return given_by(replace(found, repeats=Repeats(({},) * len(flights), {})))
+    return replace(found, repeats=Repeats(({},) * len(flights), {})).beside
 
 
 def by_name(responses):
