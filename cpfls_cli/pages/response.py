@@ -77,7 +77,7 @@ def response_box(record: ResponseRecord) -> Box:
     if record.contradiction:
         others = map(sentence, record.contradiction[1:])
         return Box("RESPONSE", contradicted(record.contradiction[0]), [*others, *told], "warning")
-    if not record.instrumented:
+    if not record.has_instruments:
         return Box("RESPONSE", sentence(f"{name}: {_LOOP}"), [_REMEDY, *told], "warning")
     if not judged:
         return Box(
@@ -169,7 +169,7 @@ def _table(record: ResponseRecord, index: int) -> Table:
 
 def _clear(record: ResponseRecord) -> str:
     """Say what a response has to have to be judged."""
-    averaged = ", or of a random error of less than 10 %" if record.instrumented else ""
+    averaged = ", or of a random error of less than 10 %" if record.has_instruments else ""
     return f"a coherence above {COHERENT:g}{averaged}"
 
 
@@ -210,7 +210,7 @@ def bode_figure(name: str, record: ResponseRecord, row: int) -> Plot:
         upper.set_ylabel(f"dB ({unit})")
         middle.set_ylabel("degrees")
         lower.plot(record.frequency, record.coherence_output[row], label="output", **MEASURED)
-        if record.is_of_vehicle(row) and record.instrumented:
+        if record.instrumented[row]:
             lower.plot(record.frequency, record.coherence_input[row], label="input", **HELD)
             lower.plot(record.frequency, record.clearness[row], label="by random error", **_MODEL)
             legend_above(lower)
@@ -252,7 +252,7 @@ def _curves(axes: Axes, record: ResponseRecord, row: int, part: str, half: Array
     if shown.any():
         band(axes, frequency, clear - half, clear + half, color="#c9c9c9", label="95 %")
     axes.plot(*_unbroken(frequency, measured), label="not excited", **_UNEXCITED)
-    if record.is_of_vehicle(row) and record.instrumented:
+    if record.instrumented[row]:
         axes.plot(*_unbroken(frequency, np.where(shown, direct, np.nan)), label="without instruments", **HELD)
     axes.plot(*_unbroken(frequency, clear), label="vehicle", **MEASURED)
     axes.plot(*_unbroken(frequency, np.where(shown, model, np.nan)), label="model", **_MODEL)
