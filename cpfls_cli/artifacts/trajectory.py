@@ -58,10 +58,12 @@ class ExcitedGroup:
 
     axis: tuple[str, ...] = dataset("axis", "roll, pitch, yaw or vertical", "excited")
     crest: Array = dataset("crest", "crest factor of the signal of each, peak over root mean square", "excited")
+    size: Array = dataset("size", "largest angle, as planned", "excited", units="rad")
+    limit: tuple[str, ...] = dataset(
+        "limit", "limit of the vehicle that made it smaller than asked for; empty where none did", "excited"
+    )
     signal: str = dataset("signal", "multisine, sweep-linear or sweep-logarithmic")
     band: Array = dataset("band", "lowest and highest frequency", "2", units="Hz")
-    size: float = dataset("size", "largest angle, as planned", units="rad")
-    limit: str = dataset("limit", "limit of the vehicle that made it smaller than asked for; empty where none did")
     attitude: Array = dataset("attitude", "roll, pitch, yaw that it adds", "time", "axis", units="rad", frame=EULER)
     position: Array = dataset("position", "position that it adds", "time", "axis", units="m", frame=WORLD)
     acceleration: Array = dataset(
@@ -83,8 +85,8 @@ class ExcitedGroup:
             crest=np.array(room.added.crest),
             signal=asked.signal,
             band=np.array(asked.band_hz),
-            size=room.added.size,
-            limit=room.limit,
+            size=room.added.sizes,
+            limit=room.limits,
             **added,
         )
 
@@ -93,11 +95,11 @@ class ExcitedGroup:
         """What is excited, for machines."""
         return {
             "axes": list(self.axis),
+            "size_rad": self.size.tolist(),
+            "limit": list(self.limit),
+            "crest_factor": self.crest.tolist(),
             "signal": self.signal,
             "band_hz": self.band.tolist(),
-            "size_rad": self.size,
-            "limit": self.limit,
-            "crest_factor": self.crest.tolist(),
             "max_displacement_m": float(np.linalg.norm(self.position, axis=1).max()),
         }
 

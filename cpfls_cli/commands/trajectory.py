@@ -157,7 +157,7 @@ def _flight(job: Job, settings: TrajectorySettings) -> Flight:
     def at(sample_time: float) -> PlannedRotation:
         finer = plan(replace(settings, sample_time_s=sample_time), gravity)
         if room is not None:
-            finer = added_motion(settings.excite, finer, gravity).of_size(room.added.size).onto(finer, gravity)
+            finer = added_motion(settings.excite, finer, gravity).of_sizes(room.added.sizes).onto(finer, gravity)
         return repeated(finer, twice, gravity)
 
     without = repeated(plain, settings, gravity)

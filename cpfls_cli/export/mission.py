@@ -196,8 +196,8 @@ def system_id_lines(excited: ExcitedGroup, axis: str, run: float, hover: float) 
     low, high = (float(value) for value in excited.band)
     length = run / (1 if excited.signal == "multisine" else len(excited.axis))
     fade = fade_time(low, length)
-    thrust = axis == "vertical"
-    magnitude = hover * tan(excited.size) if thrust else degrees(excited.size) * 2 * pi * low
+    thrust, size = axis == "vertical", float(excited.size[excited.axis.index(axis)])
+    magnitude = hover * tan(size) if thrust else degrees(size) * 2 * pi * low
     _refuse_record(length, low, high)
     values = {
         "SID_AXIS": SYSTEM_ID_AXES[axis],

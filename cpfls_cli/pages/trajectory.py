@@ -82,25 +82,23 @@ _SIGNALS = {
 def _excited_blocks(excited: ExcitedGroup) -> Iterator[Block]:
     """Say what a test signal excites, in which band, how far it moves the vehicle, and what made it smaller."""
     low, high = excited.band
-    angle, moved = np.degrees(excited.size), np.linalg.norm(excited.position, axis=1).max()
-    crest = joined(number(value, 2) for value in excited.crest)
+    moved = np.linalg.norm(excited.position, axis=1).max()
     away = f"; it moves the vehicle by up to {number(moved, 2)} m" if moved else ""
-    tilts = [axis for axis in excited.axis if axis != "vertical"]
-    of_vertical = f"of vertical as much acceleration as a tilt by {number(angle, 3)} degrees has"
-    size = [f"{number(angle, 3)} degrees at most"] if tilts else []
-    size += [of_vertical] if "vertical" in excited.axis else []
     signal, apart = _SIGNALS[excited.signal]
-    apart = apart if len(excited.axis) > 1 else ""
+    angles = [number(float(size), 3) for size in np.degrees(excited.size)]
+    pairs = joined(f"{axis} {angle}" for axis, angle in zip(excited.axis, angles, strict=True))
     yield Text(
-        f"Excited: {joined(excited.axis)}, by {signal}{apart} from {low:g} to {high:g} Hz, "
-        f"{', '.join(size)}, at equal rates in the band (crest factor {crest}){away}."
+        f"Excited: {joined(excited.axis)}, by {signal}{apart if len(excited.axis) > 1 else ''} from {low:g} to "
+        f"{high:g} Hz, {angles[0] if len(set(angles)) == 1 else pairs} degrees at most"
+        f"{_VERTICAL if 'vertical' in excited.axis else ''}, at equal rates in the band (crest factor "
+        f"{number(excited.crest.max(), 2)}){away}."
     )
-    if excited.limit:
-        yield Text(
-            f"The excitation is smaller than asked for: more than {number(angle, 3)} degrees would be beyond the limit "
-            f"of {excited.limit}",
-            "warning",
-        )
+    for limit in filter(None, dict.fromkeys(excited.limit)):
+        axes = joined(axis for axis, reached in zip(excited.axis, excited.limit, strict=True) if reached == limit)
+        yield Text(f"The excitation of {axes} is smaller than asked for, at the limit of {limit}", "warning")
+
+
+_VERTICAL = ", of vertical with as much acceleration as such a tilt"
 
 
 def mission_blocks(files: Iterable[Path], forms: Sequence[str], record: TrajectoryRecord) -> list[Block]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,10 +20,10 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 ROTOR_SHARE = 0.85
 """Of the largest speed of a rotor, and of the way down from hovering to rest, in squares: the rest is for control."""
 
-_HALVINGS = 10
-"""Of a bisection, to a thousandth of the size."""
+_HALVINGS = 12
+"""Of a bisection, to a four-thousandth of the size."""
 
-_LEAST_SHARE = 0.1
+_LEAST_SHARE = 0.02
 """Of the size asked for: less is refused."""
 
 
@@ -85,18 +85,19 @@ class RoomLeft:
     ----------
     added : AddedMotion
         Of the size asked for, or smaller.
-    limit : str
-        The limit that more would break, with its key; empty where all fits.
+    limits : tuple of str
+        The limit that more of each axis would break, with its key; empty where all fits.
     """
 
     added: AddedMotion
-    limit: str
+    limits: tuple[str, ...]
 
 
 def room_left(path: Trajectory, added: AddedMotion, settings: TrajectorySettings, vehicle: VehicleSettings) -> RoomLeft:
-    """Find the largest size of an excitation, up to its own, that keeps tilt, rotors and velocity within limits.
+    """Find the largest sizes of an excitation, up to its own, that keep tilt, rotors and velocity within limits.
 
-    Rotors keep some of what they have for control, unless the path alone already takes more.
+    First of each axis alone, then of all together, by one factor. Rotors keep some of what they have for control,
+    unless the path alone already takes more.
 
     Parameters
     ----------
@@ -106,25 +107,37 @@ def room_left(path: Trajectory, added: AddedMotion, settings: TrajectorySettings
     Raises
     ------
     SettingError
-        If next to nothing fits; it names the key.
+        If next to nothing of an axis fits; it names the key.
     """
-    alone = rotor_load(vars(path), vehicle)
-    whole = _exceeded(path, added, settings, vehicle, alone)
-    if not whole:
-        return RoomLeft(added, "")
-    low, high, limit = 0.0, 1.0, whole
+    load = rotor_load(vars(path), vehicle)
+
+    def exceeded(sizes: Array) -> str:
+        return _exceeded(path, added.of_sizes(sizes), settings, vehicle, load)
+
+    alone = [_largest(added.sizes * one, exceeded) for one in np.eye(len(added.axes))]
+    together, shared = _largest(np.sum([sizes for sizes, _ in alone], axis=0), exceeded)
+    limits = tuple(shared or limit for _, limit in alone)
+    for axis, size, asked, limit in zip(added.axes, together, added.sizes, limits, strict=True):
+        if size < _LEAST_SHARE * asked:
+            raise SettingError(
+                "excite.size_rad",
+                f"there is room for {np.degrees(size):.2g} degrees of {axis} only: {limit}; lower the top of "
+                f"excite.band_hz, leave {axis} out, fly a gentler path, or ask for less",
+            )
+    return RoomLeft(added.of_sizes(together), limits)
+
+
+def _largest(sizes: Array, exceeded: Callable[[Array], str]) -> tuple[Array, str]:
+    """Find the largest share of sizes that exceeds nothing, by bisection, and the limit that more would."""
+    limit = exceeded(sizes)
+    if not limit:
+        return sizes, ""
+    low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        exceeded = _exceeded(path, added.of_size(middle * added.size), settings, vehicle, alone)
-        low, high, limit = (low, middle, exceeded) if exceeded else (middle, high, limit)
-    if low < _LEAST_SHARE:
-        degrees = np.degrees(low * added.size)
-        raise SettingError(
-            "excite.size_rad",
-            f"leaves room for {degrees:.2g} degrees only: {limit}; lower the top of excite.band_hz, fly a gentler "
-            "path, or ask for less",
-        )
-    return RoomLeft(added.of_size(low * added.size), limit)
+        broken = exceeded(middle * sizes)
+        low, high, limit = (low, middle, broken) if broken else (middle, high, limit)
+    return low * sizes, limit
 
 
 def _exceeded(

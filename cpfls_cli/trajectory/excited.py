@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import ceil, comb, tan
+from math import ceil, comb
 
 import numpy as np
 
@@ -43,29 +43,41 @@ _STEADY_YAW = 0.01
 
 @dataclass(frozen=True)
 class AddedMotion:
-    """A motion that excites chosen axes, to be added to a path; time is the first axis of a curve.
+    """A motion that excites chosen axes, to be added to a path.
 
     Attributes
     ----------
-    motion : array, shape (7, time, 3), m and s, world frame
-        Position and its derivatives up to the pop.
-    heading : array, shape (3, time), rad and s
-        Yaw, its rate and its acceleration.
-    size : float, rad
-        Largest tilt that it asks for in hover about each axis, and largest yaw.
+    axes : tuple of str
+    signals : array, shape (excited, 7, time)
+        Signal of each axis, of peak 1: an angle of yaw, or the double integral of an acceleration; with derivatives.
+    directions : array, shape (excited, 3), m/s^2, world frame
+        Acceleration for a tilt of tangent 1; zero of yaw.
+    sizes : array, shape (excited,), rad
+        Largest tilt that each asks for in hover, and largest yaw.
     crest : tuple of float
-        Crest factor of each excited axis, peak over root mean square between the fades.
+        Crest factor of each, peak over root mean square, without the fades.
     """
 
-    motion: Array
-    heading: Array
-    size: float
+    axes: tuple[str, ...]
+    signals: Array
+    directions: Array
+    sizes: Array
     crest: tuple[float, ...]
 
-    def of_size(self, size: float) -> AddedMotion:
-        """Make it smaller or larger; the size in rad."""
-        motion, heading = tan(size) / tan(self.size) * self.motion, size / self.size * self.heading
-        return replace(self, motion=motion, heading=heading, size=size)
+    @property
+    def motion(self) -> Array:
+        """Position that it adds and its derivatives up to the pop, shape (7, time, 3), m and s, world frame."""
+        return np.asarray(np.einsum("a,adt,ax->dtx", np.tan(self.sizes), self.signals, self.directions))
+
+    @property
+    def heading(self) -> Array:
+        """Yaw that it adds, its rate and its acceleration, shape (3, time), rad and s."""
+        turning = ~self.directions.any(axis=1)
+        return np.asarray(np.einsum("a,adt->dt", self.sizes * turning, self.signals[:, :3]))
+
+    def of_sizes(self, sizes: Array) -> AddedMotion:
+        """Make it smaller or larger; the sizes in rad, shape (excited,)."""
+        return replace(self, sizes=sizes)
 
     def onto(self, path: Trajectory, gravity: float) -> Trajectory:
         """Add it to a path, which it was made for.
@@ -107,18 +119,15 @@ def added_motion(settings: ExciteSettings, path: Trajectory, gravity: float) -> 
         key of the section `trajectory`.
     """
     _refuse_turning(settings, path)
-    motion, heading = np.zeros((_DERIVATIVES, len(path.time), 3)), np.zeros((3, len(path.time)))
-    crest = []
+    signals, crest = [], []
     for number, axis in enumerate(settings.axes):
         lift = 0 if axis == "yaw" else 2
         signal = _of_axis(settings, number, path.time, path.duration, lift)
-        signal = signal / np.abs(signal[lift]).max()
+        signals.append(signal / np.abs(signal[lift]).max())
         crest.append(_crest(settings, number, path.duration))
-        if axis == "yaw":
-            heading += settings.size_rad * signal[:3]
-        else:
-            motion += gravity * tan(settings.size_rad) * signal[:, :, None] * _direction(axis, float(path.yaw[0]))
-    return AddedMotion(motion, heading, settings.size_rad, tuple(crest))
+    directions = gravity * np.array([_direction(axis, float(path.yaw[0])) for axis in settings.axes])
+    sizes = np.full(len(settings.axes), settings.size_rad)
+    return AddedMotion(settings.axes, np.stack(signals), directions, sizes, tuple(crest))
 
 
 def _refuse_turning(settings: ExciteSettings, path: Trajectory) -> None:
@@ -129,9 +138,10 @@ def _refuse_turning(settings: ExciteSettings, path: Trajectory) -> None:
 
 
 def _direction(axis: str, yaw: float) -> Array:
-    """World vector of the acceleration that an axis is excited by, shape (3,): to the right, ahead or up."""
+    """Direction in space that an axis is excited in, shape (3,): to the right, ahead or up; none of yaw."""
     sine, cosine = np.sin(yaw), np.cos(yaw)
-    return np.array({"roll": (sine, -cosine, 0.0), "pitch": (cosine, sine, 0.0), "vertical": (0.0, 0.0, 1.0)}[axis])
+    ways = {"roll": (sine, -cosine, 0.0), "pitch": (cosine, sine, 0.0), "vertical": (0.0, 0.0, 1.0)}
+    return np.array(ways.get(axis, (0.0, 0.0, 0.0)))
 
 
 def _of_axis(settings: ExciteSettings, number: int, time: Array, duration: float, lift: int) -> Array:

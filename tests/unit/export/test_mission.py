@@ -175,7 +175,7 @@ def test_parameters_keep_to_the_ranges_of_ardupilot_and_sweep_the_band(shaken):
     time = np.arange(0, 20.0, 0.0025)
     rate = chirp_of(given, time)
     angle = np.cumsum(rate) * 0.0025
-    assert np.abs(angle - angle.mean()).max() == pytest.approx(degrees(shaken.excited.size), rel=0.15)
+    assert np.abs(angle - angle.mean()).max() == pytest.approx(degrees(shaken.excited.size[0]), rel=0.15)
     power = np.abs(np.fft.rfft(rate)) ** 2
     frequency = np.fft.rfftfreq(len(time), 0.0025)
     inside = (frequency > 0.3) & (frequency < 2.2)
@@ -185,7 +185,7 @@ def test_parameters_keep_to_the_ranges_of_ardupilot_and_sweep_the_band(shaken):
 def test_thrust_is_a_share_of_the_largest(shaken):
     given = parameters(system_id_lines(shaken.excited, "vertical", 20.0, 0.3))
     assert given["SID_AXIS"] == 13
-    assert given["SID_MAGNITUDE"] == pytest.approx(0.3 * tan(shaken.excited.size), rel=1e-5)
+    assert given["SID_MAGNITUDE"] == pytest.approx(0.3 * tan(shaken.excited.size[1]), rel=1e-5)
 
 
 @pytest.mark.parametrize(
