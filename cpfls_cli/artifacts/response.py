@@ -77,7 +77,7 @@ class ResponseRecord(Record):
         "response",
     )
     instrumented: BoolArray = dataset(
-        "instrumented", "1 where it was estimated with instruments: not where a flight lacks what it takes", "response"
+        "instrumented", "1 where it was estimated with instruments, which they have to move, in all flights", "response"
     )
     frequency: Array = dataset(
         "frequency", "frequencies, evenly spread on a logarithmic scale", "frequency", units="Hz"
@@ -213,6 +213,10 @@ class ResponseRecord(Record):
     def is_of_vehicle(self, index: int) -> bool:
         """Tell whether a response is of the vehicle: speeds that follow their command feel no gust."""
         return bool(self.instrumented[index]) or self.name[index] == ROTOR_SPEED
+
+    def is_modelled(self, index: int) -> bool:
+        """Tell whether the model has the response: no model of a vehicle says what follows a setpoint."""
+        return bool(np.isfinite(self.model.magnitude[index]).any())
 
     def word(self, index: int) -> str:
         """Judge the model by one response: good, acceptable, not-acceptable; not-judged where nothing shows it."""

@@ -73,6 +73,8 @@ def response_box(record: ResponseRecord) -> Box:
     words = {name: record.word(index) for index, name in enumerate(record.name)}
     judged = [name for name, word in words.items() if word != NOT_JUDGED]
     off = [name for name in judged if words[name] == NOT_ACCEPTABLE]
+    left = [each for row, each in enumerate(record.name) if words[each] == NOT_JUDGED and record.is_modelled(row)]
+    open_ = f"; not judged: {joined(left)}" if left else ""
     name = "the vehicle of the config" if record.played == VEHICLE else record.played
     if record.contradiction:
         others = map(sentence, record.contradiction[1:])
@@ -84,8 +86,11 @@ def response_box(record: ResponseRecord) -> Box:
             "RESPONSE", sentence(f"{name} cannot be judged: these flights excite nothing enough"), told, "warning"
         )
     if off:
-        return Box("RESPONSE", sentence(f"{name} does not answer as the vehicle does: {joined(off)}"), told, "warning")
-    return Box("RESPONSE", sentence(f"{name} answers its rotors as the vehicle does: {joined(judged)}"), told, "good")
+        return Box(
+            "RESPONSE", sentence(f"{name} does not answer as the vehicle does: {joined(off)}{open_}"), told, "warning"
+        )
+    title = sentence(f"{name} answers its rotors as the vehicle does: {joined(judged)}{open_}")
+    return Box("RESPONSE", title, told, "note" if left else "good")
 
 
 def _told(record: ResponseRecord, index: int) -> str:
@@ -100,8 +105,9 @@ def _told(record: ResponseRecord, index: int) -> str:
     parts = record.deviations(index)
     right = len(parts) == 1 and parts[0].right
     details = "right throughout" if right else ", ".join(map(_deviation, parts))
-    of_loop = f"{word_of(word)}, " if record.is_of_vehicle(index) else "of the loop: "
-    return f"{name}: {of_loop}J = {number(float(record.cost[index]), 3)} {where}; {details}"
+    alone = "of the loop: " if not record.has_instruments else "not moved by the instruments, so of the loop: "
+    judged = f"{word_of(word)}, " if record.is_of_vehicle(index) else alone
+    return f"{name}: {judged}J = {number(float(record.cost[index]), 3)} {where}; {details}"
 
 
 def _behind(record: ResponseRecord, index: int) -> str:

@@ -26,8 +26,8 @@ _SURE_WINDOWS = 33
 _STRONG = 10.0
 """F statistic from which on instruments are strong (Staiger and Stock 1997): weaker ones give the loop again."""
 _MOST_POINTS = 20
-_FEWEST_POINTS = 4
-"""Of a band that is judged: a sixth of a decade."""
+_FEWEST_POINTS = 8
+"""Of a band that is judged: an octave."""
 _DIP = 2
 """Points in which the coherence may dip without ending a band."""
 _PHASE = 0.01745

@@ -55,7 +55,7 @@ def test_a_model_that_is_off_is_told_where():
         roll=estimate(), pitch=estimate(STRONG_BELOW), yaw=estimate(LATE_ABOVE), thrust=estimate(1, 0.4, error=0.3)
     )
     box = response_box(record)
-    assert box.title == "vehicle.h5 does not answer as the vehicle does: pitch and yaw."
+    assert box.title == "vehicle.h5 does not answer as the vehicle does: pitch and yaw; not judged: thrust."
     assert box.tone == "warning"
     assert "2.5 times too strong from 0.18 to 0.91 Hz, right from 1.0 to 15 Hz" in box.sentences[1]
     assert "right from 0.18 to 4.6 Hz, 40° too late (13 ms) from 5.1 to 15 Hz" in box.sentences[2]
@@ -130,6 +130,7 @@ def test_files_of_a_newer_program_keep_their_word():
 def test_a_response_that_one_flight_lacks_is_not_judged_beside_others():
     record = record_of(roll=estimate(), thrust=estimate(2.0, instrumented=False))
     box = response_box(record)
-    assert box.title == "vehicle.h5 answers its rotors as the vehicle does: roll."
-    assert box.sentences[1].startswith("Thrust: of the loop: J = ")
+    assert box.title == "vehicle.h5 answers its rotors as the vehicle does: roll; not judged: thrust."
+    assert box.tone == "note"
+    assert box.sentences[1].startswith("Thrust: not moved by the instruments, so of the loop: J = ")
     assert record.summary["responses"]["thrust"]["instrumented"] is False

@@ -47,6 +47,9 @@ def test_the_band_is_the_widest_of_coherence_with_short_dips():
     assert judged_band(response(1.0, coherence)) == slice(10, 30)
     coherence[[17, 18]] = 0.3
     assert judged_band(response(1.0, coherence)) == slice(19, 30)
+    coherence[26:] = 0.0
+    # Less than an octave is no band.
+    assert judged_band(response(1.0, coherence)) is None
     assert judged_band(response(1.0, 0.59)) is None
     assert mismatch(response(1.0, 0.59)).band is None
     assert np.isnan(mismatch(response(1.0, 0.59)).cost)
