@@ -76,6 +76,9 @@ class ResponseRecord(Record):
         "speed: from its command; roll rate, roll angle and others alike: from its setpoint",
         "response",
     )
+    instrumented: BoolArray = dataset(
+        "instrumented", "1 where it was estimated with instruments, which they have to move, in all flights", "response"
+    )
     frequency: Array = dataset(
         "frequency", "frequencies, evenly spread on a logarithmic scale", "frequency", units="Hz"
     )
@@ -157,6 +160,7 @@ class ResponseRecord(Record):
             flown=tuple(flown),
             instruments=instruments,
             name=tuple(each.name for each in responses),
+            instrumented=np.array([each.instrumented for each in estimates]),
             frequency=frequency,
             measured=CurveGroup.of(spread([each.gain for each in estimates])),
             model=CurveGroup.of(spread(models)),
@@ -180,8 +184,8 @@ class ResponseRecord(Record):
         )
 
     @property
-    def instrumented(self) -> bool:
-        """Whether the responses are of the vehicle; without instruments they are of vehicle and autopilot together."""
+    def has_instruments(self) -> bool:
+        """Whether there are any; without, all responses are of vehicle and autopilot together."""
         return self.instruments != NO_INSTRUMENTS
 
     @property
@@ -199,14 +203,20 @@ class ResponseRecord(Record):
         """The coherence that counts, shape (response, frequency); see `cpfls_cli.response.mismatch.clearness`."""
         return np.array(
             [
-                clearness(coherence, error, self.instrumented and name != ROTOR_SPEED)
-                for name, coherence, error in zip(self.name, self.coherence, self.random_error, strict=True)
+                clearness(coherence, error, averages, bool(instrumented))
+                for coherence, error, averages, instrumented in zip(
+                    self.coherence, self.random_error, self.averages, self.instrumented, strict=True
+                )
             ]
         )
 
     def is_of_vehicle(self, index: int) -> bool:
         """Tell whether a response is of the vehicle: speeds that follow their command feel no gust."""
-        return self.instrumented or self.name[index] == ROTOR_SPEED
+        return bool(self.instrumented[index]) or self.name[index] == ROTOR_SPEED
+
+    def is_modelled(self, index: int) -> bool:
+        """Tell whether the model has the response: no model of a vehicle says what follows a setpoint."""
+        return bool(np.isfinite(self.model.magnitude[index]).any())
 
     def word(self, index: int) -> str:
         """Judge the model by one response: good, acceptable, not-acceptable; not-judged where nothing shows it."""
@@ -255,6 +265,7 @@ class ResponseRecord(Record):
         band = self.band[index]
         return {
             "word": self.word(index),
+            "instrumented": bool(self.instrumented[index]),
             "cost": float(self.cost[index]),
             "band_hz": band.tolist() if np.isfinite(band).all() else None,
             "deviations": [each._asdict() for each in self.deviations(index)],

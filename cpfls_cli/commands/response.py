@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,8 @@ from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.pages.response import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import seen_warnings
-from cpfls_cli.playback.instruments import instruments
+from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.response.flown import vehicle_responses
@@ -60,6 +61,7 @@ def run(job: Job, flights: Sequence[Path], model: Path | None, table: Path | Non
         *seen_warnings(name, learned_by(model), known_by(roles, inputs)),
         *(warning for flight in given for warning in flight.warnings),
         *model_notes(name, judged, given),
+        *_left_out(moved_by, given),
     ]
     flown = [flight.name for flight in given]
     made = ResponseRecord.of(name, flown, moved_by.kind, responses, warnings, contradictions_of(given))
@@ -69,6 +71,16 @@ def run(job: Job, flights: Sequence[Path], model: Path | None, table: Path | Non
         write_text(table, _csv(record))
         written = (Text(f"{table}: written, the curves as CSV"),)
     return Outcome(record.summary, (*answer(source_of(job, record)), *written))
+
+
+def _left_out(moved_by: Instruments, flights: Sequence[LoggedFlight]) -> Iterator[str]:
+    """Say which flights hold no instrument beside others that do: they tell nothing of the vehicle."""
+    repeated = {number for path in moved_by.repeats.paths() for number in path}
+    for number, flight in enumerate(flights):
+        if moved_by.kind == "repeats" and number not in repeated:
+            yield f"{flight.name}: no other of these flights flies its path, so its response to torque is left out"
+        elif moved_by.kind == "setpoints" and moved_by.setpoints[number] is None:
+            yield f"{flight.name}: holds no setpoint from outside of its loops, so its response to torque is left out"
 
 
 def _csv(record: ResponseRecord) -> str:

@@ -42,6 +42,8 @@ _REMEDY = (
 )
 _AUDIBLE_DB, _AUDIBLE_DEG = 1.0, 7.6
 """Differences that are told: with these J is 20 each."""
+_NAMED = 4
+"""Flights that are named in a caption; more stand beside it."""
 _TICKS_HZ = tuple(digit * 10.0**power for power in range(-2, 3) for digit in (1, 2, 5))
 _ROOM_DB, _ROOM_DEG = 12.0, 45.0
 _MODEL: dict[str, Any] = {**style_of(1), "linewidth": 1.6, "zorder": 3}
@@ -71,19 +73,24 @@ def response_box(record: ResponseRecord) -> Box:
     words = {name: record.word(index) for index, name in enumerate(record.name)}
     judged = [name for name, word in words.items() if word != NOT_JUDGED]
     off = [name for name in judged if words[name] == NOT_ACCEPTABLE]
+    left = [each for row, each in enumerate(record.name) if words[each] == NOT_JUDGED and record.is_modelled(row)]
+    open_ = f"; not judged: {joined(left)}" if left else ""
     name = "the vehicle of the config" if record.played == VEHICLE else record.played
     if record.contradiction:
         others = map(sentence, record.contradiction[1:])
         return Box("RESPONSE", contradicted(record.contradiction[0]), [*others, *told], "warning")
-    if not record.instrumented:
+    if not record.has_instruments:
         return Box("RESPONSE", sentence(f"{name}: {_LOOP}"), [_REMEDY, *told], "warning")
     if not judged:
         return Box(
             "RESPONSE", sentence(f"{name} cannot be judged: these flights excite nothing enough"), told, "warning"
         )
     if off:
-        return Box("RESPONSE", sentence(f"{name} does not answer as the vehicle does: {joined(off)}"), told, "warning")
-    return Box("RESPONSE", sentence(f"{name} answers its rotors as the vehicle does: {joined(judged)}"), told, "good")
+        return Box(
+            "RESPONSE", sentence(f"{name} does not answer as the vehicle does: {joined(off)}{open_}"), told, "warning"
+        )
+    title = sentence(f"{name} answers its rotors as the vehicle does: {joined(judged)}{open_}")
+    return Box("RESPONSE", title, told, "note" if left else "good")
 
 
 def _told(record: ResponseRecord, index: int) -> str:
@@ -98,8 +105,9 @@ def _told(record: ResponseRecord, index: int) -> str:
     parts = record.deviations(index)
     right = len(parts) == 1 and parts[0].right
     details = "right throughout" if right else ", ".join(map(_deviation, parts))
-    of_loop = f"{word_of(word)}, " if record.is_of_vehicle(index) else "of the loop: "
-    return f"{name}: {of_loop}J = {number(float(record.cost[index]), 3)} {where}; {details}"
+    alone = "of the loop: " if not record.has_instruments else "not moved by the instruments, so of the loop: "
+    judged = f"{word_of(word)}, " if record.is_of_vehicle(index) else alone
+    return f"{name}: {judged}J = {number(float(record.cost[index]), 3)} {where}; {details}"
 
 
 def _behind(record: ResponseRecord, index: int) -> str:
@@ -155,8 +163,9 @@ def _table(record: ResponseRecord, index: int) -> Table:
                 _median(100 * record.random_error[row][judged]),
             ]
         )
+    flown = joined(record.flown) if len(record.flown) <= _NAMED else f"{len(record.flown)} flights"
     caption = (
-        f"Frequency responses of {joined(record.flown)} and of the model along the same flights. J adds up differences "
+        f"Frequency responses of {flown} and of the model along the same flights. J adds up differences "
         f"in decibels and degrees over the band of {_clear(record)} (Tischler and Remple): up to {GOOD:g} is good, up "
         f"to {ACCEPTABLE:g} acceptable."
     )
@@ -166,7 +175,7 @@ def _table(record: ResponseRecord, index: int) -> Table:
 
 def _clear(record: ResponseRecord) -> str:
     """Say what a response has to have to be judged."""
-    averaged = ", or of a random error of less than 10 %" if record.instrumented else ""
+    averaged = ", or of a random error of less than 10 %" if record.has_instruments else ""
     return f"a coherence above {COHERENT:g}{averaged}"
 
 
@@ -207,7 +216,7 @@ def bode_figure(name: str, record: ResponseRecord, row: int) -> Plot:
         upper.set_ylabel(f"dB ({unit})")
         middle.set_ylabel("degrees")
         lower.plot(record.frequency, record.coherence_output[row], label="output", **MEASURED)
-        if record.is_of_vehicle(row) and record.instrumented:
+        if record.instrumented[row]:
             lower.plot(record.frequency, record.coherence_input[row], label="input", **HELD)
             lower.plot(record.frequency, record.clearness[row], label="by random error", **_MODEL)
             legend_above(lower)
@@ -249,7 +258,7 @@ def _curves(axes: Axes, record: ResponseRecord, row: int, part: str, half: Array
     if shown.any():
         band(axes, frequency, clear - half, clear + half, color="#c9c9c9", label="95 %")
     axes.plot(*_unbroken(frequency, measured), label="not excited", **_UNEXCITED)
-    if record.is_of_vehicle(row) and record.instrumented:
+    if record.instrumented[row]:
         axes.plot(*_unbroken(frequency, np.where(shown, direct, np.nan)), label="without instruments", **HELD)
     axes.plot(*_unbroken(frequency, clear), label="vehicle", **MEASURED)
     axes.plot(*_unbroken(frequency, np.where(shown, model, np.nan)), label="model", **_MODEL)

@@ -19,7 +19,7 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import Hold, RotorResponse
 from cpfls_cli.playback.table import rotor_weights
-from cpfls_cli.response.mismatch import ROTOR_SPEED, Mismatch, mismatch
+from cpfls_cli.response.mismatch import ROTOR_SPEED, Mismatch, judged_band, mismatch
 from cpfls_cli.response.spectra import Channel, FrequencyResponse, Stretch, frequency_response
 
 ROTATION = ("roll", "pitch", "yaw")
@@ -62,7 +62,7 @@ def vehicle_responses(
     The input is what the rotors of the model give at the logged speeds, without lag, delay and effects. The model's
     output is its acceleration along the measured motion, with all of them, through the same windows and instruments:
     what a window does to a curve it does to both. A command of the rotors knows no gust that the speeds do not know, so
-    the response of the speeds needs no instruments.
+    the response of the speeds needs no instruments. What instruments do not move is estimated without.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def vehicle_responses(
             own = [_with_instrument(*pair) for pair in zip(own, given, strict=True)]
         found[name] = [part for parts in own for part in parts]
     period = flights[0].parts[0].period
-    estimates = {name: frequency_response(parts, period) for name, parts in found.items()}
+    estimates = {name: _estimate(parts, period) for name, parts in found.items()}
     known = [VehicleResponse(name, each, mismatch(each)) for name, each in estimates.items() if each is not None]
     if not known:
         longest = max(len(part) for flight in flights for part in flight.parts) * period
@@ -96,6 +96,14 @@ def vehicle_responses(
             "too short for a frequency response; give longer flights"
         )
     return tuple(known)
+
+
+def _estimate(parts: Sequence[Stretch], period: float) -> FrequencyResponse | None:
+    """Estimate a response with its instruments; without them where they do not move it, which then is said."""
+    found = frequency_response(parts, period)
+    if found is not None and (not found.instrumented or judged_band(found) is not None):
+        return found
+    return frequency_response([part._replace(instrument=None) for part in parts], period)
 
 
 def _alike(given: Sequence[Array | None]) -> list[Array | None]:

@@ -23,9 +23,11 @@ ACCEPTABLE, GOOD = 100.0, 50.0
 
 _SURE_WINDOWS = 33
 """With which a coherence of 0.6 leaves a random error of 10 %."""
+_STRONG = 10.0
+"""F statistic from which on instruments are strong (Staiger and Stock 1997): weaker ones give the loop again."""
 _MOST_POINTS = 20
-_FEWEST_POINTS = 4
-"""Of a band that is judged: a sixth of a decade."""
+_FEWEST_POINTS = 8
+"""Of a band that is judged: an octave."""
 _DIP = 2
 """Points in which the coherence may dip without ending a band."""
 _PHASE = 0.01745
@@ -76,20 +78,22 @@ class Mismatch(NamedTuple):
     deviations: tuple[Deviation, ...]
 
 
-def clearness(coherence: Array, random_error: Array, instrumented: bool) -> Array:
+def clearness(coherence: Array, random_error: Array, averages: Array, instrumented: bool) -> Array:
     """Give the coherence that counts: with instruments that of 33 windows with the same random error, where it is more.
 
     What gusts add to a flight takes coherence away, however many repeats average them out; a coherence of 0.6 stands
-    for the random error of 10 % that it usually leaves. Without instruments it is the share that may be the loop's.
+    for the random error of 10 % that it usually leaves. So it is where instruments are strong. Without instruments it
+    is the share that may be the loop's.
 
     Parameters
     ----------
-    coherence, random_error : array, shape (..., frequency)
+    coherence, random_error, averages : array, shape (..., frequency)
         See `FrequencyResponse`.
     """
     if not instrumented:
         return coherence
-    return np.asarray(np.fmax(coherence, 1 / (1 + 2 * _SURE_WINDOWS * random_error**2)))
+    strong = (averages - 1) * coherence > _STRONG * (1 - coherence)
+    return np.asarray(np.where(strong, np.fmax(coherence, 1 / (1 + 2 * _SURE_WINDOWS * random_error**2)), coherence))
 
 
 def judged_band(response: FrequencyResponse) -> slice | None:

@@ -125,7 +125,7 @@ class FrequencyResponse:
     @property
     def clearness(self) -> Array:
         """The coherence that counts, shape (frequency,)."""
-        return clearness(self.coherence, self.random_error, self.instrumented)
+        return clearness(self.coherence, self.random_error, self.averages, self.instrumented)
 
 
 def frequency_response(stretches: Sequence[Stretch], period: float) -> FrequencyResponse | None:
@@ -333,9 +333,10 @@ def _random_error(spectra: _Spectra) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         gain = spectra.zy / spectra.zu
         rest = spectra.yy - 2 * (gain.conj() * spectra.uy).real + np.abs(gain) ** 2 * spectra.uu
-        strength = np.abs(spectra.zu) ** 2 / spectra.zz
+        strength = spectra.uu * _coherence(spectra.zu, spectra.zz, spectra.uu, spectra.averages)
         found = np.sqrt(np.maximum(rest, 0.0) / (2 * spectra.averages * np.abs(gain) ** 2 * strength))
-    return np.asarray(found)
+    # Where nothing of the input is the instrument's anything is possible.
+    return np.asarray(np.where(strength == 0.0, np.inf, found))
 
 
 def _of_spectra(frequency: Array, spectra: _Spectra, instrumented: bool) -> FrequencyResponse:

@@ -192,5 +192,6 @@ def logged(flight, vehicle):
         velocity=motion.velocity,
         position=motion.position,
         rotor_speed=flight.speed,
+        setpoints=flight.setpoints,
     )
     return LoggedFlight(flight.name, (signals,), flight.hold, "measured rotor speeds", ())

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from cpfls_cli.artifacts.response import ResponseRecord
 from cpfls_cli.artifacts.store import read_record, write_record
@@ -59,6 +60,24 @@ def flight_table(seed, scale=1.0, samples=3000):
     columns |= {f"w{n}": speed[:, n - 1] for n in range(1, 5)} | {f"c{n}": command[:, n - 1] for n in range(1, 5)}
     columns |= {"fx": 0 * time, "fy": 0 * time, "fz": lift}
     return columns | {"ps": asked[:, 0], "qs": asked[:, 1], "rs": asked[:, 2]}
+
+
+def gusty_table(path, draw):
+    """Columns of a log of one of the paths above in gusts of its own, which its rotors answer late."""
+    still, rng = flight_table(path), np.random.default_rng([7, draw])
+    samples = len(still["t"])
+    gusts = lfilter([0.05], [1, -0.98], rng.standard_normal((samples, 3)), axis=0)
+    answered = lfilter([0.1], [1, -0.9], gusts, axis=0)
+    speed = np.column_stack([still[f"w{n}"] for n in range(1, 5)])
+    torque = -INERTIA * answered * [1.0, 1.0, 0.1]
+    squared = speed**2 + np.linalg.solve(ALLOCATION, np.column_stack([np.zeros(samples), torque]).T).T
+    turned = 0.01 * np.cumsum((gusts - answered) * [1.0, 1.0, 0.1], axis=0)
+    rates = {name: still[name] + turned[:, axis] for axis, name in enumerate("pqr")}
+    return (
+        {name: still[name] for name in ("t", "fx", "fy", "fz")}
+        | rates
+        | {f"w{n}": np.sqrt(squared[:, n - 1]) for n in range(1, 5)}
+    )
 
 
 def save(path, columns):
@@ -209,3 +228,20 @@ def test_air_that_a_flight_does_not_know_is_still(cpfls, folder, tmp_path):
     told = json.loads(result.stdout)
     assert "vehicle.h5 depends on the velocity through the air, which is taken as 0 in light.csv" in told["warnings"]
     assert told["responses"]["roll"]["cost"] < 5.0
+
+
+def test_repeats_of_a_path_show_the_vehicle(cpfls, folder, tmp_path):
+    """Gusts that are answered hide the body in each flight; what comes again in all of them does not."""
+    logs = [save(tmp_path / f"run{draw}.csv", gusty_table(1, draw)) for draw in range(4)]
+    words = ("response", folder / "study.yaml", "-o", tmp_path / "r.h5", "--json", "--force")
+    alone = json.loads(cpfls(*words, logs[0]).stdout)
+    assert alone["instruments"] == "none"
+    together = cpfls(*words, *logs, folder / "heavy.csv")
+    assert together.exit_code == 0, together.stderr
+    told = json.loads(together.stdout)
+    assert told["instruments"] == "repeats"
+    assert any(warning.startswith("heavy.csv: no other of these flights") for warning in told["warnings"])
+    for name in ("roll", "pitch"):
+        own = told["responses"][name]
+        assert own["word"] == "good"
+        assert own["cost"] < 0.2 * alone["responses"][name]["cost"]

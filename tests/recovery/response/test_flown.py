@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
+from cpfls_cli.playback.instruments import Repeats, instruments
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.response.flown import specific_force, vehicle_responses
-from tests.builders.gusty_flights import EVERY, GUSTS, SMALL, STEP_S, Flight, gusty_flights, logged, path_of
+from tests.builders.gusty_flights import GUSTS, SMALL, Flight, gusty_flights, logged
 
 SECONDS = 40.0
 RIGHT = VehicleModel(vehicle=SMALL.vehicle)
@@ -22,25 +23,27 @@ def flights():
     return [logged(flight, SMALL.vehicle) for flight in flown]
 
 
-def by_repeats(inputs):
-    """The mean of the other flights."""
-    return [((sum(inputs) - own) / (len(inputs) - 1))[:, None] for own in inputs]
+def by_repeats(flights):
+    """Take the same path flown again."""
+    found = instruments([flight.playback for flight in flights])
+    assert found.kind == "repeats"
+    return found.beside
 
 
-def by_setpoints(inputs):
-    """The acceleration that the path asks for."""
-    asked = path_of(Flight(SMALL, path=0, reach=10.0), round(SECONDS / STEP_S))[::EVERY, 6:]
-    return [asked for _ in inputs]
+def by_setpoints(flights):
+    """Take what the path asks for; no flight is held to repeat another."""
+    found = instruments([flight.playback for flight in flights])
+    return replace(found, repeats=Repeats(({},) * len(flights), {})).beside
 
 
 def by_name(responses):
     return {each.name: each for each in responses}
 
 
-@pytest.mark.parametrize("instruments", [by_repeats, by_setpoints])
-def test_the_right_model_is_good(flights, instruments):
-    found = by_name(vehicle_responses(RIGHT, flights, instruments))
-    assert list(found) == ["roll", "pitch", "yaw", "thrust"]
+@pytest.mark.parametrize("source", [by_repeats, by_setpoints])
+def test_the_right_model_is_good(flights, source):
+    found = by_name(vehicle_responses(RIGHT, flights, source(flights)))
+    assert list(found)[:4] == ["roll", "pitch", "yaw", "thrust"]
     for name in ("roll", "pitch", "thrust"):
         low, high = found[name].mismatch.band
         assert low < 1.0
@@ -48,7 +51,8 @@ def test_the_right_model_is_good(flights, instruments):
         assert found[name].mismatch.cost < 8.0
         assert all(each.right for each in found[name].mismatch.deviations)
     # Nothing turns the vehicle about yaw but gusts, and that is said.
-    assert found["yaw"].mismatch.band is None
+    assert found["roll"].estimate.instrumented
+    assert not found["yaw"].estimate.instrumented
 
 
 def test_without_instruments_gusts_are_taken_for_the_vehicle(flights):
@@ -62,7 +66,7 @@ def test_without_instruments_gusts_are_taken_for_the_vehicle(flights):
 def test_a_body_of_another_weight_is_seen(flights, factor):
     inertia = tuple(factor * value for value in SMALL.inertia)
     wrong = VehicleModel(vehicle=replace(SMALL.vehicle, inertia_kg_m2=(*inertia, 0.0, 0.0, 0.0)))
-    found = by_name(vehicle_responses(wrong, flights, by_repeats))
+    found = by_name(vehicle_responses(wrong, flights, by_repeats(flights)))
     for name in ("roll", "pitch"):
         (only,) = found[name].mismatch.deviations
         assert not only.right
@@ -72,7 +76,7 @@ def test_a_body_of_another_weight_is_seen(flights, factor):
 
 def test_a_lag_that_is_not_there_is_seen(flights):
     slow = VehicleModel(vehicle=SMALL.vehicle, response=RotorResponse(lag_s=0.03))
-    found = by_name(vehicle_responses(slow, flights, by_repeats))["roll"].mismatch
+    found = by_name(vehicle_responses(slow, flights, by_repeats(flights)))["roll"].mismatch
     last = found.deviations[-1]
     assert not last.right
     middle = np.sqrt(last.low * last.high)
@@ -113,7 +117,7 @@ def test_a_flight_in_parts_is_one_flight(flights):
     whole = flights[0].parts[0]
     halves = [slice(0, 1900), slice(2100, len(whole))]
     cut = [replace(f, parts=tuple(_part(f.parts[0], half) for half in halves)) for f in flights]
-    found = by_name(vehicle_responses(RIGHT, cut, by_repeats))
+    found = by_name(vehicle_responses(RIGHT, cut, by_repeats(cut)))
     assert found["roll"].mismatch.cost < 10.0
 
 

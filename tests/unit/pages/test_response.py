@@ -18,7 +18,7 @@ from tests.builders.forms import in_all_forms, phrases, source_of_record, words
 FREQUENCY = 10.0 ** (np.arange(-18, 29) / 24)
 
 
-def estimate(ratio=1.0, coherence=0.95, lag_s=0.0, model=True, error=0.02):
+def estimate(ratio=1.0, coherence=0.95, lag_s=0.0, model=True, error=0.02, instrumented=True):
     gain = 5.0 / (1 + 2j * np.pi * FREQUENCY * lag_s) * np.ones_like(FREQUENCY)
     return FrequencyResponse(
         frequency=FREQUENCY,
@@ -29,7 +29,7 @@ def estimate(ratio=1.0, coherence=0.95, lag_s=0.0, model=True, error=0.02):
         coherence_output=np.broadcast_to(coherence, FREQUENCY.shape),
         random_error=np.broadcast_to(error, FREQUENCY.shape),
         averages=np.full(len(FREQUENCY), 12.0),
-        instrumented=True,
+        instrumented=instrumented,
     )
 
 
@@ -55,7 +55,7 @@ def test_a_model_that_is_off_is_told_where():
         roll=estimate(), pitch=estimate(STRONG_BELOW), yaw=estimate(LATE_ABOVE), thrust=estimate(1, 0.4, error=0.3)
     )
     box = response_box(record)
-    assert box.title == "vehicle.h5 does not answer as the vehicle does: pitch and yaw."
+    assert box.title == "vehicle.h5 does not answer as the vehicle does: pitch and yaw; not judged: thrust."
     assert box.tone == "warning"
     assert "2.5 times too strong from 0.18 to 0.91 Hz, right from 1.0 to 15 Hz" in box.sentences[1]
     assert "right from 0.18 to 4.6 Hz, 40° too late (13 ms) from 5.1 to 15 Hz" in box.sentences[2]
@@ -66,7 +66,9 @@ def test_a_model_that_is_off_is_told_where():
 
 
 def test_without_instruments_nothing_is_judged():
-    record = record_of("none", roll=estimate(), rotor_speed=estimate(1.0, lag_s=0.05))
+    record = record_of(
+        "none", roll=estimate(instrumented=False), rotor_speed=estimate(1.0, lag_s=0.05, instrumented=False)
+    )
     box = response_box(record)
     assert box.title == "vehicle.h5: not judged: these flights show the loop, not the vehicle."
     assert "fly the same path several times" in box.sentences[0]
@@ -92,7 +94,10 @@ def test_a_contradiction_comes_first():
 
 @pytest.mark.parametrize("instruments", ["repeats", "none"])
 def test_the_report_says_what_the_command_says(instruments):
-    source = source_of_record(record_of(instruments, roll=estimate(), pitch=estimate(STRONG_BELOW)), "response.h5")
+    source = source_of_record(
+        record_of(instruments, roll=estimate(), pitch=estimate(STRONG_BELOW, instrumented=instruments != "none")),
+        "response.h5",
+    )
     blocks = tuple(answer(source))
     said = [phrase for block in blocks if not isinstance(block, Table) for phrase in phrases(block)]
     for form, text in in_all_forms(source, blocks).items():
@@ -118,5 +123,14 @@ def test_bode_plots_hold_the_curves():
 
 def test_files_of_a_newer_program_keep_their_word():
     record = replace(record_of(roll=estimate()), instruments="balloons")
-    assert record.instrumented
+    assert record.has_instruments
     assert response_box(record).tone == "good"
+
+
+def test_a_response_that_one_flight_lacks_is_not_judged_beside_others():
+    record = record_of(roll=estimate(), thrust=estimate(2.0, instrumented=False))
+    box = response_box(record)
+    assert box.title == "vehicle.h5 answers its rotors as the vehicle does: roll; not judged: thrust."
+    assert box.tone == "note"
+    assert box.sentences[1].startswith("Thrust: not moved by the instruments, so of the loop: J = ")
+    assert record.summary["responses"]["thrust"]["instrumented"] is False

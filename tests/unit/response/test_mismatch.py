@@ -21,7 +21,7 @@ def response(ratio, coherence=1.0, error=0.01, model=True, instrumented=False):
         coherence_input=np.ones_like(FREQUENCY),
         coherence_output=whole,
         random_error=np.full(len(FREQUENCY), error),
-        averages=np.full(len(FREQUENCY), 20.0),
+        averages=np.full(len(FREQUENCY), 50.0),
         instrumented=instrumented,
     )
 
@@ -47,6 +47,9 @@ def test_the_band_is_the_widest_of_coherence_with_short_dips():
     assert judged_band(response(1.0, coherence)) == slice(10, 30)
     coherence[[17, 18]] = 0.3
     assert judged_band(response(1.0, coherence)) == slice(19, 30)
+    coherence[26:] = 0.0
+    # Less than an octave is no band.
+    assert judged_band(response(1.0, coherence)) is None
     assert judged_band(response(1.0, 0.59)) is None
     assert mismatch(response(1.0, 0.59)).band is None
     assert np.isnan(mismatch(response(1.0, 0.59)).cost)
@@ -95,5 +98,12 @@ def test_many_repeats_make_up_for_little_coherence():
     assert judged_band(enough) == slice(0, 49)
     assert judged_band(response(1.0, 0.2, 0.01)) is None
     expected = np.sqrt((1 - 0.6) / (2 * 33 * 0.6))
-    assert clearness(np.array(0.0), np.array(expected), True) == pytest.approx(0.6)
+    assert clearness(np.array(0.4), np.array(expected), np.array(33.0), True) == pytest.approx(0.6)
     assert mismatch(response(1.0, 0.2, 0.09, instrumented=True)).cost == 0.0
+
+
+def test_weak_instruments_make_up_for_nothing():
+    """They give the loop again, as sure of itself as it is: F = (n - 1) g^2 / (1 - g^2) has to be above 10."""
+    weak, strong = (clearness(np.array(g), np.array(0.01), np.array(101.0), True) for g in (0.08, 0.1))
+    assert weak == 0.08
+    assert strong > 0.98
