@@ -14,6 +14,7 @@ from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
 from cpfls_cli.artifacts.parameters import parameters_of
 from cpfls_cli.artifacts.replay import HeldOutGroup, trust_by_playback
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, record, rows_of
+from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.validation.trust import Trust, capped
 
 if TYPE_CHECKING:
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
     from cpfls_cli.playback.loop import LoopBounds
     from cpfls_cli.playback.structure import Choice
     from cpfls_cli.playback.vehicle import FoundVehicle
+
+
+_EXPLAINED = 0.9
+"""Share of what comes again that constants have to explain, as of what torque has to explain in `playback/loop.py`."""
 
 
 @record
@@ -120,7 +125,9 @@ class InstrumentsGroup:
 
     kind: str = dataset("kind", "repeats or setpoints")
     setpoint: tuple[str, ...] = dataset("setpoint", "signals asked for from outside of the loop", "setpoint")
-    first: IntArray = dataset("first", "a flight that repeats another, counted from 0", "repeat", least=0)
+    first: IntArray = dataset(
+        "first", "a run that repeats another: a flight, or a part of one, counted from 0", "repeat", least=0
+    )
     second: IntArray = dataset("second", "the other", "repeat", least=0)
     likeness: Array = dataset("likeness", "correlation of the two along their path", "repeat")
     low: Array = dataset("low", "lower end, about", "band", units="Hz")
@@ -128,6 +135,8 @@ class InstrumentsGroup:
     explained: Array = dataset(
         "explained", "share of the rotation that comes again that the constants explain", "band", "axis", frame=BODY
     )
+    total: Array = dataset("total", "the same in all used bands, weighed by what they tell", "axis", frame=BODY)
+    error: Array = dataset("error", "standard error of that", "axis", frame=BODY)
     used: BoolArray = dataset("used", "1 where the constants rest on the band; others lack an effect", "band")
 
     @classmethod
@@ -144,12 +153,19 @@ class InstrumentsGroup:
             high=ends[:, 1],
             explained=constants.explained.share,
             used=constants.explained.used,
+            total=constants.explained.total,
+            error=constants.explained.error,
         )
 
     @property
     def runs(self) -> int:
-        """Flights that repeat another."""
+        """Runs that repeat another."""
         return len({*self.first.tolist(), *self.second.tolist()})
+
+    @property
+    def lacks(self) -> bool:
+        """Whether less than 90 % of what comes again about roll or pitch is explained, by more than chance."""
+        return self.lacks_below is not None or bool((self.total + self.error < _EXPLAINED)[:2].any())
 
     @property
     def lacks_below(self) -> float | None:
@@ -163,13 +179,15 @@ class InstrumentsGroup:
             "kind": self.kind,
             "setpoints": list(self.setpoint),
             "repeats": [
-                {"flights": [int(first), int(second)], "correlation": float(alike)}
+                {"runs": [int(first), int(second)], "correlation": float(alike)}
                 for first, second, alike in zip(self.first, self.second, self.likeness, strict=True)
             ],
             "bands": [
                 {"hz": [float(low), float(high)], "explained": explained.tolist(), "used": bool(used)}
                 for low, high, explained, used in zip(self.low, self.high, self.explained, self.used, strict=True)
             ],
+            "explained": self.total.tolist(),
+            "explained_error": self.error.tolist(),
         }
 
 
@@ -265,8 +283,11 @@ class VehicleRecord(ModelRecord):
         against = self.contradiction or ()
         if self.instruments is None:
             return capped(self.forecast_verdict, against, loop=self.loop.shown)
-        lacking = self.instruments.lacks_below is not None or bool(self.found.at_bound[self.found.value != 0].any())
-        return capped(Trust.LACKING if lacking else Trust.SIMULATION, against)
+        numbers = dict(zip(self.found.name, zip(self.found.determined, self.found.at_bound, strict=True), strict=True))
+        moments = [numbers.get(f"inertia.{name}", (True, False)) for name in INERTIA_PARAMETERS[:2]]
+        if any(not determined or at_bound for determined, at_bound in moments):
+            return capped(Trust.NOT_JUDGED, against)
+        return capped(Trust.LACKING if self.instruments.lacks else Trust.SIMULATION, against)
 
     @property
     def forecast_verdict(self) -> Trust:

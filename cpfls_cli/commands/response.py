@@ -75,12 +75,13 @@ def run(job: Job, flights: Sequence[Path], model: Path | None, table: Path | Non
 
 def _left_out(moved_by: Instruments, flights: Sequence[LoggedFlight]) -> Iterator[str]:
     """Say which flights hold no instrument beside others that do: they tell nothing of the vehicle."""
-    repeated = {number for path in moved_by.repeats.paths() for number in path}
+    lacks = {
+        "repeats": "no other of these flights flies its path",
+        "setpoints": "it holds no setpoint from outside of its loops",
+    }
     for number, flight in enumerate(flights):
-        if moved_by.kind == "repeats" and number not in repeated:
-            yield f"{flight.name}: no other of these flights flies its path, so its response to torque is left out"
-        elif moved_by.kind == "setpoints" and moved_by.setpoints[number] is None:
-            yield f"{flight.name}: holds no setpoint from outside of its loops, so its response to torque is left out"
+        if moved_by.kind in lacks and number not in moved_by.flights:
+            yield f"{flight.name}: {lacks[moved_by.kind]}, so its response to torque is left out"
 
 
 def _csv(record: ResponseRecord) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.parameters import (
     CENTRE,
     DELAY,
@@ -146,29 +146,34 @@ def instrument_words(record: VehicleRecord, given: InstrumentsGroup) -> Iterator
     """Say what the constants rest on, how much of what comes again they explain, and where they lack something."""
     if given.kind == "repeats":
         alike = f"{number(float(given.likeness.min()), 2)} to {number(float(given.likeness.max()), 2)}"
-        told = f"{given.runs} flights that repeat each other (correlation {alike})"
+        told = f"{given.runs} runs that repeat each other (correlation {alike})"
     else:
         told = f"what was asked for from outside of the loop ({joined(given.setpoint)})"
     yield (
         f"The constants rest on {told}: gusts do not come again, what the vehicle does comes again. From "
         f"{number(float(given.low[given.used].min()), 2)} to {number(float(given.high[given.used].max()), 2)} Hz they "
-        f"explain {_explained_words(given, given.used)} acceleration that comes again."
+        f"explain {_share_words(given.total, given.error)} acceleration that comes again."
     )
     below = given.lacks_below
     if below is not None:
         yield (
-            f"Below {number(below, 2)} Hz they explain {_explained_words(given, ~given.used)}: the vehicle does "
-            "something there that no constant may stand for; `cpfls gap` looks for it."
+            f"Below {number(below, 2)} Hz they explain less, or the body would be another one: the vehicle does "
+            "something there that no constant may stand for; `cpfls response` shows it, `cpfls gap` looks for it."
         )
+    if record.trust == Trust.NOT_JUDGED:
+        yield "They do not tell the moments of inertia about roll and pitch yet: fly more runs, or larger ones."
     held = [row["name"] for row in rows_of(record.found) if row["at_bound"] and row["value"] != 0]
     if held:
         yield f"{joined(held)}: on a bound of what is tried, so these are not the vehicle's own numbers yet."
 
 
-def _explained_words(given: InstrumentsGroup, bands: BoolArray) -> str:
-    """Give the least share in some bands about roll and pitch."""
-    shares = np.clip(given.explained[bands].min(axis=0), 0.0, 1.0)
-    return f"{whole_percent(float(shares[0]))} of the roll and {whole_percent(float(shares[1]))} of the pitch"
+def _share_words(share: Array, error: Array) -> str:
+    """Give shares about roll and pitch with their errors."""
+    roll, pitch = (
+        f"{whole_percent(float(np.clip(value, 0.0, 1.0)))} (± {whole_percent(float(within))})"
+        for value, within in zip(share[:2], error[:2], strict=True)
+    )
+    return f"{roll} of the roll and {pitch} of the pitch"
 
 
 def loop_words(record: VehicleRecord) -> str:

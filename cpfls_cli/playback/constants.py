@@ -56,12 +56,16 @@ class Explained(NamedTuple):
         ``1 - sum r r' / sum h h'`` over runs and others, r what is left and h what the rotation takes.
     used : array of bool, shape (band,)
         Whether the constants rest on it.
+    total, error : array, shape (3,)
+        Share in all bands that they rest on, weighed by what they tell, and its standard error.
     bands_hz : tuple of (float, float)
         Ends of the bands, about.
     """
 
     share: Array
     used: BoolArray
+    total: Array
+    error: Array
     bands_hz: tuple[tuple[float, float], ...] = BANDS_HZ
 
 
@@ -183,7 +187,7 @@ def find_constants(
     """
     tried = _tried(vehicle, flights, leave_out)
     blocks = [block for block in (*vehicle.unknown, *tried) if block == INERTIA or block in vehicle.unknown]
-    setting = _Setting(vehicle, flights, given)
+    setting = _Setting(vehicle, given.flown, given)
     begun = setting.balances(blocks)
     if not begun.path:
         return None
@@ -349,7 +353,18 @@ def _constants(setting: _Setting, problem: _Problem) -> Constants:
     share, _ = _explained(everywhere)
     fitted = Fitted(free, problem.values, float(1 - share[0, :2].mean()), problem.information(total))
     spread = Uncertainty(covariance * np.outer(free.scales, free.scales), len(without), told)
-    return Constants(fitted, spread, Explained(share, problem.bands[: len(BANDS)]))
+    return Constants(fitted, spread, Explained(share, problem.bands[: len(BANDS)], *_explained_in_all(problem)))
+
+
+def _explained_in_all(problem: _Problem) -> tuple[Array, Array]:
+    """Compute the share of what comes again that is explained in all used bands together, and its error, (3,)."""
+    bands = slice(0, len(BANDS))
+    crossed = np.einsum("ka,bkapq->bapq", problem.weights[bands], problem.sums.crossed[:, bands])
+
+    def share(sums: Array) -> Array:
+        return np.asarray(1.0 - sums[..., 0, 0] / sums[..., -1, -1])
+
+    return share(crossed.sum(axis=0)), jackknife_error(share(crossed.sum(axis=0) - crossed))
 
 
 def _f_statistics(problem: _Problem) -> Array:

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import combinations
-from typing import Literal
+from dataclasses import dataclass, replace
+from itertools import combinations, pairwise
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.kernels import MeasuredMotion
 
-_ALIKE = 0.5
-"""Correlation from which on two flights fly the same path. Paths that have nothing to do with each other stay below
-0.3 at every shift, runs of one path lie above 0.6."""
+_ALIKE = (0.7, 0.5)
+"""Correlation of changes of the rates, and of the velocity, from which on two flights fly the same path. Velocities of
+paths that have nothing to do with each other stay below 0.3 at every shift; changes of a few sines come nearer."""
 _COMMON_S = 8.0
 """That two flights have in common at least: shorter, unlike paths may look alike."""
+_SAME, _FARTHEST = 0.98, 0.6
+"""Correlation of what was asked of a flight with itself from which on it is asked its path again, and the share of the
+flight up to which that is sought."""
 _COARSE_HZ = 20.0
 """Of the search over all shifts, which paths do not exceed."""
 _PIECE_S, _DRIFT_S = 5.0, 0.15
@@ -25,19 +29,41 @@ _OUTSIDE = ("sticks", "position", "velocity")
 """Setpoints from outside of all loops, the outermost first; attitude, rates and thrust are asked for by loops."""
 
 
-@dataclass(frozen=True)
-class Instruments:
-    """What tells of each flight how it was moved, apart from its gusts.
+class Run(NamedTuple):
+    """A flight, or a part of one that flies its path again and again.
 
     Attributes
     ----------
+    flight : int
+        Number of the flight that it is cut out of.
+    part : slice
+        Samples of that flight.
+    """
+
+    flight: int
+    part: slice
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """What tells of each run how it was moved, apart from its gusts.
+
+    Attributes
+    ----------
+    runs : tuple of Run
+        In the order of the flights.
+    flown : tuple of PlaybackFlight
+        Each run as a flight.
     repeats : Repeats
+        Of the runs.
     setpoints : tuple of array, shape (time, column), or None
-        For each flight what was asked from outside of its loops, where it is known.
+        For each run what was asked from outside of its loops, where it is known.
     names : tuple of str
         Those setpoints, over all flights.
     """
 
+    runs: tuple[Run, ...]
+    flown: tuple[PlaybackFlight, ...]
     repeats: Repeats
     setpoints: tuple[Array | None, ...]
     names: tuple[str, ...]
@@ -48,6 +74,13 @@ class Instruments:
         if self.repeats.likeness:
             return "repeats"
         return "setpoints" if self.names else "none"
+
+    @property
+    def flights(self) -> frozenset[int]:
+        """Numbers of the flights that have instruments."""
+        if self.kind == "repeats":
+            return frozenset(self.runs[number].flight for path in self.repeats.paths() for number in path)
+        return frozenset(run.flight for run, asked in zip(self.runs, self.setpoints, strict=True) if asked is not None)
 
     def beside(self, values: Sequence[Array]) -> list[Array | None]:
         """Give the instruments of each flight: of repeats what other runs have there, else what was asked of it.
@@ -62,10 +95,20 @@ class Instruments:
         list of array, shape (time, column), or None
             NaN where no other run is; None for a flight without instruments.
         """
-        if self.kind != "repeats":
-            return list(self.setpoints)
-        places = self.repeats.beside
-        return [self.repeats.others(number, values)[:, None] if place else None for number, place in enumerate(places)]
+        cut = [values[run.flight][run.part] for run in self.runs]
+        found: list[Array | None] = []
+        for flight, own in enumerate(values):
+            columns: Array | None = None
+            for number, run in enumerate(self.runs):
+                if run.flight != flight or flight not in self.flights:
+                    continue
+                asked = self.setpoints[number]
+                known = self.repeats.others(number, cut)[:, None] if self.kind == "repeats" else asked
+                if known is not None:
+                    columns = np.full((len(own), known.shape[1]), np.nan) if columns is None else columns
+                    columns[run.part] = known
+            found.append(columns)
+        return found
 
 
 def instruments(flights: Sequence[PlaybackFlight]) -> Instruments:
@@ -76,13 +119,63 @@ def instruments(flights: Sequence[PlaybackFlight]) -> Instruments:
     flights : sequence of PlaybackFlight
         Of one sampling period.
     """
-    outside = [_outside(flight) for flight in flights]
+    runs = tuple(Run(number, part) for number, flight in enumerate(flights) for part in _runs(flight))
+    flown = tuple(_cut(flights[run.flight], run.part) for run in runs)
+    outside = [_outside(flight) for flight in flown]
     columns = [
         np.hstack([flight.setpoints[name] for name in names]) if names else None
-        for flight, names in zip(flights, outside, strict=True)
+        for flight, names in zip(flown, outside, strict=True)
     ]
     asked = dict.fromkeys(name for names in outside for name in names)
-    return Instruments(repeats(flights), tuple(columns), tuple(asked))
+    return Instruments(runs, flown, repeats(flown), tuple(columns), tuple(asked))
+
+
+def _runs(flight: PlaybackFlight) -> list[slice]:
+    """Cut a flight where what was asked of it begins again; one that is asked its path once stays whole."""
+    part, step = _longest(flight), _step(flight.motion.period)
+    again = 0
+    if "position" in flight.setpoints:
+        asked = _coarse(flight.setpoints["position"][part], step)
+        again = step * _again(asked - asked.mean(axis=0), flight.motion.period * step)
+    if not again:
+        return [slice(0, len(flight))]
+    begins = [*range(part.start, part.stop - again // 2, again), part.stop]
+    # What is left at the end is no run where it is short.
+    return [slice(first, min(last, first + again)) for first, last in pairwise(begins)]
+
+
+def _again(path: Array, length: float) -> int:
+    """Find after how many coarse samples a path begins again; 0 where it does not."""
+    shifts = range(round(_COMMON_S / length), round(_FARTHEST * len(path)))
+    alike = np.array([_correlation(path[:-shift], path[shift:]) for shift in shifts])
+    if not len(alike) or alike.max() < _SAME:
+        return 0
+    first = int(np.flatnonzero(alike >= _SAME)[0])
+    return shifts[first + int(np.argmax(alike[first : first + round(1 / length)]))]
+
+
+def _correlation(one: Array, other: Array) -> float:
+    return float(np.sum(one * other) / np.sqrt(max(np.sum(one**2) * np.sum(other**2), np.finfo(float).tiny)))
+
+
+def _cut(flight: PlaybackFlight, part: slice) -> PlaybackFlight:
+    """Take a part of a flight as a flight."""
+    if part == slice(0, len(flight)):
+        return flight
+    motion = MeasuredMotion(*(each[part] for each in flight.motion[:-1]), flight.motion.period)
+    stretches = [
+        slice(max(each.start, part.start) - part.start, min(each.stop, part.stop) - part.start)
+        for each in flight.stretches
+    ]
+    return replace(
+        flight,
+        motion=motion,
+        speed=flight.speed[part],
+        stretches=tuple(each for each in stretches if each.stop - each.start > 1),
+        wrench=None if flight.wrench is None else flight.wrench[part],
+        specific_force=None if flight.specific_force is None else flight.specific_force[part],
+        setpoints={name: values[part] for name, values in flight.setpoints.items()},
+    )
 
 
 def _outside(flight: PlaybackFlight) -> tuple[str, ...]:
@@ -145,8 +238,8 @@ class Repeats:
 def repeats(flights: Sequence[PlaybackFlight]) -> Repeats:
     """Find flights that fly the same path, and align them.
 
-    Velocities, or rates where there are none, are correlated over all shifts; then rates piece by piece, and a straight
-    line through the shifts is taken, so that clocks may drift.
+    Velocities and changes of the rates are correlated over all shifts; then rates piece by piece, and a
+    straight line through the shifts is taken, so that clocks may drift.
 
     Parameters
     ----------
@@ -155,11 +248,15 @@ def repeats(flights: Sequence[PlaybackFlight]) -> Repeats:
     """
     found: tuple[dict[int, Array], ...] = tuple({} for _ in flights)
     likeness = {}
-    paths = [_path(flight) for flight in flights]
+    paths = [_paths(flight) for flight in flights]
     for one, other in combinations(range(len(flights)), 2):
-        shift, alike = _best_shift(paths[one], paths[other], flights[one].motion.period)
-        if alike >= _ALIKE:
-            likeness[one, other] = alike
+        shifts = [
+            _best_shift(*pair, flights[one].motion.period) for pair in zip(paths[one], paths[other], strict=False)
+        ]
+        beyond = [alike - least for (_, alike), least in zip(shifts, _ALIKE, strict=False)]
+        best = int(np.argmax(beyond))
+        if beyond[best] >= 0:
+            shift, likeness[one, other] = shifts[best]
             found[one][other] = _aligned(flights[one], flights[other], shift)
             found[other][one] = _inverse(found[one][other], len(flights[other]))
     return Repeats(found, likeness)
@@ -169,13 +266,23 @@ def _longest(flight: PlaybackFlight) -> slice:
     return max(flight.stretches, key=lambda part: part.stop - part.start)
 
 
-def _path(flight: PlaybackFlight) -> Array:
-    """Give what shows the path, at the coarse rate, without mean, shape (time, 3)."""
-    motion, part = flight.motion, _longest(flight)
-    values = (motion.velocity if flight.has_velocity else motion.rate)[part]
-    step = _step(motion.period)
-    coarse = values[: len(values) // step * step].reshape(-1, step, 3).mean(axis=1)
-    return np.asarray(coarse - coarse.mean(axis=0))
+def _paths(flight: PlaybackFlight) -> list[Array]:
+    """Give what shows the path, at the coarse rate: how the rates change, and the velocity; shapes (time, column)."""
+    shown = [_changes(flight)]
+    if flight.has_velocity:
+        velocity = _coarse(flight.motion.velocity[_longest(flight)], _step(flight.motion.period))
+        shown.append(velocity - velocity.mean(axis=0))
+    return shown
+
+
+def _changes(flight: PlaybackFlight) -> Array:
+    """Give changes of roll and pitch rate: gusts are slower than what is asked for, and yaw is mostly theirs."""
+    return np.diff(_coarse(flight.motion.rate[_longest(flight), :2], _step(flight.motion.period)), axis=0)
+
+
+def _coarse(values: Array, step: int) -> Array:
+    """Average signals over a few samples each, shape (time, column)."""
+    return np.asarray(values[: len(values) // step * step].reshape(-1, step, values.shape[1]).mean(axis=1))
 
 
 def _step(period: float) -> int:
@@ -187,7 +294,7 @@ def _best_shift(one: Array, other: Array, period: float) -> tuple[float, float]:
     from scipy.signal import correlate
 
     length = period * _step(period)
-    product = sum(correlate(other[:, axis], one[:, axis], method="fft") for axis in range(3))
+    product = sum(correlate(other[:, axis], one[:, axis], method="fft") for axis in range(one.shape[1]))
     ones, others = (np.concatenate([[0.0], np.cumsum((each**2).sum(axis=1))]) for each in (one, other))
     shifts = np.arange(-(len(one) - 1), len(other))
     first, last = np.maximum(0, -shifts), np.minimum(len(one), len(other) - shifts)

@@ -50,6 +50,25 @@ def test_runs_are_aligned_though_their_clocks_drift():
     assert known.mean() > 0.9
 
 
+def test_a_flight_that_is_asked_its_path_again_is_cut_into_its_runs():
+    """One log holds all runs of a mission; each is an instrument for the others, and for the flight."""
+    whole = _flown(1, seconds=60.0)
+    motion = whole.motion
+    # From the last place of a run back to the first, as fast as a mission would.
+    again = [np.concatenate([values[:1500]] * 4) for values in motion[:-1]]
+    flight = replace(whole, motion=MeasuredMotion(*again, PERIOD), setpoints={"position": again[0]})
+    found = instruments([flight, _flown(2)])
+    assert [run.flight for run in found.runs] == [0, 0, 0, 0, 1]
+    assert [run.part.start for run in found.runs[:4]] == pytest.approx([0, 1500, 3000, 4500], abs=10)
+    assert found.repeats.paths() == ((0, 1, 2, 3),)
+    assert found.flights == {0}
+    beside, none = found.beside([flight.motion.rate[:, 0], motion.rate[:, 0]])
+    assert none is None
+    known = np.isfinite(beside[:, 0])
+    assert known.mean() > 0.9
+    assert np.corrcoef(beside[known, 0], flight.motion.rate[known, 0])[0, 1] > 0.95
+
+
 def test_what_other_runs_have_at_the_same_place_is_averaged():
     flights = [_flown(1), _flown(1, late=0.5), _flown(1, late=1.25)]
     repeats = instruments(flights).repeats
