@@ -11,7 +11,6 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.kernels import MeasuredMotion
 
 _ALIKE = (0.7, 0.5)
 """Correlation of changes of the rates, and of the velocity, from which on two flights fly the same path. Velocities of
@@ -162,7 +161,13 @@ def _cut(flight: PlaybackFlight, part: slice) -> PlaybackFlight:
     """Take a part of a flight as a flight."""
     if part == slice(0, len(flight)):
         return flight
-    motion = MeasuredMotion(*(each[part] for each in flight.motion[:-1]), flight.motion.period)
+    motion = flight.motion
+    motion = motion._replace(
+        position=motion.position[part],
+        velocity=motion.velocity[part],
+        rotation=motion.rotation[part],
+        rate=motion.rate[part],
+    )
     stretches = [
         slice(max(each.start, part.start) - part.start, min(each.stop, part.stop) - part.start)
         for each in flight.stretches

@@ -78,3 +78,14 @@ def test_the_summary_names_what_the_model_has():
     assert list(summary["effects"]) == [one.name for one in MODELS["quad"].effects]
     assert summary["remainder"] == [0, 2, 5]
     assert summary["not_held"] == []
+
+
+def test_a_forecast_stands_beside_the_vehicle_with_parts_of_its_own(tmp_path):
+    """Its axes are as long as they like, and replays take it where others take the vehicle."""
+    record = replace(record_of(MODELS["plain"]), forecast=VehicleGroup.of(MODELS["quad"]))
+    write_record(tmp_path / "vehicle.h5", record)
+    assert check_artifact(read_artifact(tmp_path / "vehicle.h5")) == []
+    again = read_record(tmp_path / "vehicle.h5", VehicleRecord)
+    assert not vehicle_model(again.vehicle).effects
+    assert [one.name for one in vehicle_model(again.forecast).effects] == [one.name for one in MODELS["quad"].effects]
+    assert again.forecast.remainder.rows.tolist() == MODELS["quad"].remainder.rows.tolist()

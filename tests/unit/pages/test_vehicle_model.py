@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.parameters import parameters_of, vehicle_section
-from cpfls_cli.artifacts.vehicle_model import FoundNumbersGroup, LoopGroup, TradesGroup
+from cpfls_cli.artifacts.vehicle_model import FoundNumbersGroup, InstrumentsGroup, LoopGroup, TradesGroup
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.source import Sources
-from cpfls_cli.pages.vehicle_model import WHAT_TO_FLY, found_vehicle_section, remainder_curves, warnings
+from cpfls_cli.pages.vehicle_model import WHAT_TO_FLY, found_vehicle_section, grounds, remainder_curves, warnings
 from cpfls_cli.report.content import Plot, Table
 from cpfls_cli.validation.trust import Trust, capped
 from tests.builders.forms import source_of_record
@@ -106,3 +106,54 @@ def test_flights_that_show_the_loop_are_said_first_and_leave_no_good_word():
         assert capped(trust, (), loop=True) == Trust.LOOP
     assert capped(Trust.DO_NOT_USE, (), loop=True) == Trust.DO_NOT_USE
     assert capped(Trust.SIMULATION, ("rates are mirrored",), loop=True) == Trust.DO_NOT_USE
+
+
+def _told(record, **given):
+    """The same vehicle with constants that repeats tell."""
+    numbers = replace(record.found, determined=np.ones(2, dtype=bool), at_bound=np.zeros(2, dtype=bool))
+    group = InstrumentsGroup(
+        kind="repeats",
+        setpoint=(),
+        first=np.array([0, 0, 1]),
+        second=np.array([1, 2, 2]),
+        likeness=np.array([0.9, 0.95, 0.97]),
+        low=np.array([2.0, 1.0]),
+        high=np.array([6.0, 3.0]),
+        explained=np.full((2, 3), 0.97),
+        used=np.ones(2, dtype=bool),
+        total=np.full(3, 0.98),
+        error=np.full(3, 0.01),
+    )
+    return replace(record, found=numbers, instruments=replace(group, **given), forecast=record.vehicle)
+
+
+def test_constants_that_repeats_tell_are_judged_by_what_comes_again_and_not_by_a_forecast():
+    shown = replace(record_of(whole()).loop, shown=True)
+    record = _told(replace(record_of(whole()), loop=shown))
+    assert record.held_out is None
+    assert record.forecast_verdict == Trust.NOT_JUDGED
+    assert record.verdict == Trust.SIMULATION
+    first, second, *_ = grounds(record)
+    assert "3 runs that repeat each other (correlation 0.90 to 0.97)" in first
+    assert "From 1.0 to 6.0 Hz they explain 98 % (± 1 %) of the roll" in first
+    assert "`cpfls replay` plays" in second
+    assert not any("loop, not the vehicle" in line for line in warnings(record))
+
+
+@pytest.mark.parametrize(
+    ("given", "found", "trust"),
+    [
+        ({"total": np.array([0.98, 0.7, 0.98])}, {}, Trust.LACKING),
+        ({"used": np.array([True, False])}, {}, Trust.LACKING),
+        ({}, {"determined": np.array([False, True])}, Trust.NOT_JUDGED),
+        ({}, {"at_bound": np.array([True, False])}, Trust.NOT_JUDGED),
+    ],
+)
+def test_constants_that_lack_something_are_not_good(given, found, trust):
+    record = _told(record_of(whole()), **given)
+    record = replace(record, found=replace(record.found, **found))
+    assert record.verdict == trust
+    assert replace(record, contradiction=("rates are mirrored",)).verdict == Trust.DO_NOT_USE
+    said = " ".join(grounds(record))
+    assert ("Below 2.0 Hz they explain less" in said) == ("used" in given)
+    assert ("They do not tell the moments of inertia" in said) == (trust == Trust.NOT_JUDGED)
