@@ -10,7 +10,7 @@ from cpfls_cli.artifacts.replay import ReplayRecord
 from cpfls_cli.config.unknown import require_known
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
-from cpfls_cli.flights.models import is_vehicle, learned_by, read_model
+from cpfls_cli.flights.models import holds_forecast, is_vehicle, learned_by, read_model
 from cpfls_cli.flights.playback import flights_to_play, played, repairs_of
 from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.pages.replay import answer
@@ -21,6 +21,8 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.replay import ReplayOptions, replay
 from cpfls_cli.report.numbers import joined
 from cpfls_cli.report.outcome import Outcome, nothing_written
+
+_FORECAST = "{}: its forecast along logged rotor speeds is played, loop and all; its constants are another model"
 
 
 def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) -> Outcome:
@@ -50,6 +52,7 @@ def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) 
         *seen_twice((inputs[role] for role in roles), ()),
         *seen_warnings(model.name, learned_by(model), known_by(roles, inputs)),
         *(warning for flight in given for warning in flight.warnings),
+        *([_FORECAST.format(model.name)] if holds_forecast(model) else []),
         *model_notes(model.name, to_play, given),
     ]
     record = finish(job, ReplayRecord.of(model.name, options, given, pairs, errors, warnings), inputs)

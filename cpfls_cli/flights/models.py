@@ -10,7 +10,7 @@ from cpfls_cli.artifacts.learned import LearnedFlight
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.replay import VEHICLE
-from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
@@ -39,6 +39,12 @@ def read_model(path: Path, study: Study, *, forecast: bool = False) -> VehicleMo
     record = read_of_vehicle(path, ModelRecord, study)
     apart = record.forecast if forecast and isinstance(record, VehicleRecord) else None
     return rebuilt(path, record if apart is None else replace(record, vehicle=apart))
+
+
+def holds_forecast(path: Path) -> bool:
+    """Tell whether a model holds a forecast along logged rotor speeds beside the vehicle."""
+    known = not is_vehicle(path) and holds(path, VehicleRecord)
+    return known and read_record(path, VehicleRecord).forecast is not None
 
 
 def learned_by(path: Path | None) -> tuple[LearnedFlight, ...]:

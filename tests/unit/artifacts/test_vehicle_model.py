@@ -12,9 +12,10 @@ from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
 from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.store import read_artifact, read_record, write_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.models import rebuilt
+from cpfls_cli.flights.models import holds_forecast, read_model, rebuilt
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from tests.builders import exported_models
 from tests.builders.vehicle_models import HEXA, QUAD, record_of, remainder, whole
@@ -86,6 +87,10 @@ def test_a_forecast_stands_beside_the_vehicle_with_parts_of_its_own(tmp_path):
     write_record(tmp_path / "vehicle.h5", record)
     assert check_artifact(read_artifact(tmp_path / "vehicle.h5")) == []
     again = read_record(tmp_path / "vehicle.h5", VehicleRecord)
+    study = Study()
+    assert holds_forecast(tmp_path / "vehicle.h5")
+    assert not read_model(tmp_path / "vehicle.h5", study).effects
+    assert read_model(tmp_path / "vehicle.h5", study, forecast=True).effects
     assert not vehicle_model(again.vehicle).effects
     assert [one.name for one in vehicle_model(again.forecast).effects] == [one.name for one in MODELS["quad"].effects]
     assert again.forecast.remainder.rows.tolist() == MODELS["quad"].remainder.rows.tolist()
