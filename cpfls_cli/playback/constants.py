@@ -29,8 +29,8 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 _FEWEST_BLOCKS = 8
 _EXPLAINED = 0.9
 """Share of what comes again that a model has to explain: below it lacks an effect in that band."""
-_NOT_TRIED = ("wind", "slow_actuation")
-"""Air of a flight, and a number that answers for whatever is slow: neither is a constant of the vehicle."""
+_NOT_TRIED = "slow_actuation"
+"""It answers for whatever is slow, and is no constant of the vehicle."""
 _STEPS, _SETTLED = 12, 1e-2
 """Of an estimate, and natural sizes of a step that is none any more."""
 _LEAST = 1e-6
@@ -265,7 +265,7 @@ def _tried(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], leave_ou
     return tuple(
         block
         for block in blocks_of(vehicle)
-        if block not in (*leave_out, *LEARNED, *_NOT_TRIED) and (translates or not needs_velocity(block))
+        if block not in (*leave_out, *LEARNED, _NOT_TRIED) and (translates or not needs_velocity(block))
     )
 
 

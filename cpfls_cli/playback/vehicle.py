@@ -164,14 +164,14 @@ def find_vehicle(
     flown = {flight.group for flight in flights}
     groups = tuple(Group(group.name, group.differs or OF_A_WEIGHT) for group in settings.groups if group.name in flown)
     fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fits[0], groups)
-    given = instruments(own)
-    constants = find_constants(begun, own, given, settings.leave_out)
+    loop, given = loop_bounds(fitted.model, own), instruments(own)
+    # Where nothing is left unexplained nothing can mislead, and the fit takes more from the flights.
+    constants = find_constants(begun, own, given, settings.leave_out) if loop.shows_loop else None
     if constants is not None and constants.tells:
         solved, spread, forecast = constants.fitted, constants.spread, fitted.model
     else:
         solved, spread, forecast = fitted, uncertainty(fitted, windows), None
     model = solved.model
-    loop = loop_bounds(model, own)
     numbers = (*sensed, *bodily(begun, tuple(found_numbers(solved, spread))))
     return FoundVehicle(
         model,
