@@ -108,6 +108,12 @@ class Balances:
             if asked is not None and not self.given.repeats.beside[number]
         }
 
+    @property
+    def longest_s(self) -> float:
+        """Length of the longest stretch of a flight that has instruments."""
+        parts = [part for number in self.path for part in self.flights[number].stretches]
+        return float(max(part.stop - part.start for part in parts) * self.flights[0].motion.period)
+
     @cached_property
     def block_s(self) -> float:
         """Length of the blocks of the paths: shorter than usual on short paths, so that there are enough."""

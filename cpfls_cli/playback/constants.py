@@ -25,8 +25,11 @@ from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.parameters import DRAG, INERTIA, LEARNED, LOG_INERTIA, FreeNumbers, blocks_of, needs_velocity
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES
 
 _FEWEST_BLOCKS = 8
+_LONGEST_S = 8.0
+"""Length from which on a run tells something in all bands."""
 _EXPLAINED = 0.9
 """Share of what comes again that a model has to explain: below it lacks an effect in that band."""
 _NOT_TRIED = "slow_actuation"
@@ -179,17 +182,21 @@ def find_constants(
     Returns
     -------
     Constants or None
-        None where nothing tells how the flights were moved apart from gusts, or for too short a time.
+        None where nothing tells how the flights were moved apart from gusts, for too short a time or too slow a log,
+        and where the inertia is not to be sought.
 
     References
     ----------
     Söderström and Stoica 2002 (instrumental variables in closed loop); Pintelon and Schoukens 2012 (repeats).
     """
+    periods = {flight.motion.period for flight in given.flown}
+    if len(periods) > 1 or FEWEST_SAMPLES * max(periods) > BANDS[0][0]:
+        return None
     tried = _tried(vehicle, flights, leave_out)
     blocks = [block for block in (*vehicle.unknown, *tried) if block == INERTIA or block in vehicle.unknown]
     setting = _Setting(vehicle, given.flown, given)
     begun = setting.balances(blocks)
-    if not begun.path:
+    if not begun.path or LOG_INERTIA[0] not in begun.free.index or begun.longest_s < _LONGEST_S:
         return None
     # Of drag factor and moment of inertia about yaw only the ratio is known: both would drift along it.
     held = {DRAG} if {DRAG, LOG_INERTIA[2]} <= set(begun.free.index) else set()

@@ -17,7 +17,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import contiguous, half_width, jackknife_error
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.weak_form.windows import windows
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, windows
 
 _BANDS = ((0.15, 0.4), (0.3, 0.8), (0.6, 1.6))
 """Windows in s; the longer average taken from the shorter leaves a band: about 2 to 6, 1 to 3, 0.5 to 1.5 Hz.
@@ -25,8 +25,6 @@ _BANDS = ((0.15, 0.4), (0.3, 0.8), (0.6, 1.6))
 Together they span what an autopilot answers late and what it answers in time, whatever its bandwidth.
 """
 _OVERLAP = 0.75
-_FEWEST_SAMPLES = 8
-"""Of the shorter window: fewer do not follow its curve."""
 _BLOCK_S = 4.0
 """Longer than what rotors and rotation remember of each other."""
 _FEWEST_BLOCKS = 4
@@ -116,7 +114,7 @@ def _sums(model: VehicleModel, flight: PlaybackFlight, short_s: float, long_s: f
     The last two are noise: white noise is as large in windows of alternating sign, where motion vanishes.
     """
     period = flight.motion.period
-    if short_s < _FEWEST_SAMPLES * period:
+    if short_s < FEWEST_SAMPLES * period:
         return
     band = windows(period, short_s, _OVERLAP).less(windows(period, long_s, _OVERLAP))
     noise = band.alternating()

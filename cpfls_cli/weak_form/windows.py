@@ -12,8 +12,8 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 
-# Of a window: fewer do not follow its curve.
-_FEWEST_SAMPLES = 8
+FEWEST_SAMPLES = 8
+"""Of a window: fewer do not follow its curve."""
 FEWEST_WINDOWS = 16
 """Windows below which a flight tells too little."""
 _SAME_RATE = 1e-3
@@ -100,9 +100,9 @@ def windows(period: float, window_s: float, overlap: float) -> Windows:
     Weak form of differential equations: Shinbrot 1957 (modulating functions); Messenger and Bortz 2021.
     """
     samples = round(window_s / period)
-    if samples < _FEWEST_SAMPLES:
+    if samples < FEWEST_SAMPLES:
         raise InputError(
-            f"gap.window_s = {window_s:g}: holds {samples} samples at {1 / period:.4g} Hz; at least {_FEWEST_SAMPLES}"
+            f"gap.window_s = {window_s:g}: holds {samples} samples at {1 / period:.4g} Hz; at least {FEWEST_SAMPLES}"
         )
     phase = np.pi * (np.arange(samples) + 0.5) / samples
     shape = np.sin(phase) ** 4
@@ -132,7 +132,7 @@ class WindowSettings(Protocol):
 
 def fitting_windows(period: float, settings: WindowSettings) -> Windows:
     """Make windows as long as asked for, or as long as a slow log needs."""
-    return windows(period, max(settings.window_s, _FEWEST_SAMPLES * period), settings.overlap)
+    return windows(period, max(settings.window_s, FEWEST_SAMPLES * period), settings.overlap)
 
 
 def common_windows(recordings: Sequence[Recording], settings: WindowSettings) -> Windows:

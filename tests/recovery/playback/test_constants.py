@@ -67,3 +67,16 @@ def test_what_instruments_do_not_tell_is_not_determined(constants):
 def test_flights_without_instruments_have_no_constants(flights):
     alone = [replace(flight, setpoints={}) for flight in flights["setpoints"]]
     assert find_constants(SMALL.vehicle, alone, instruments(alone)) is None
+
+
+@pytest.mark.parametrize("left_out", ["short", "slow", "inertia"])
+def test_flights_that_cannot_be_asked_have_no_constants(flights, left_out):
+    """Two seconds, a log of 25 Hz, and an inertia that is not to be sought."""
+    (first, *_) = flights["setpoints"]
+    if left_out == "slow":
+        first = replace(first, motion=first.motion._replace(period=0.04))
+    if left_out == "short":
+        first = replace(first, stretches=(slice(0, 200),))
+    known = replace(SMALL.vehicle, unknown=())
+    blocks = ("inertia",) if left_out == "inertia" else ()
+    assert find_constants(known, [first], instruments([first]), blocks) is None
