@@ -33,8 +33,8 @@ _OF_FORCE = (*BANDS[1:3], (1.2, None))
 """Forces are seen in slower motion, and the longest windows keep the mean: the weight."""
 _BLOCK_S, _LEAST_BLOCK_S, _BLOCKS = 4.0, 2.0, 9
 """Longer than what gusts remember and the longest windows see; the shortest, and how many a short path is cut into."""
-_LAG_S, _LAGS = 0.05, 10
-"""What was asked for is answered within half a second."""
+_ANSWERED_S, _OF_WINDOW = 0.5, 0.25
+"""What was asked for is answered within half a second; it is looked at every so often, share of a window."""
 _RIDGE = 1e-6
 """Of predictions, so that setpoints that hardly differ from each other do no harm."""
 _NEAR = 1e-4
@@ -178,11 +178,9 @@ class Balances:
 
     @cached_property
     def asked(self) -> dict[int, Array]:
-        """What was asked of each flight that no other repeats, now and until half a second ago."""
-        period = self.flights[0].motion.period
-        lags = [round(lag * _LAG_S / period) for lag in range(_LAGS)]
+        """What was asked of each flight that no other repeats."""
         return {
-            number: np.hstack([_late(asked, lag) for lag in lags])
+            number: asked
             for number, asked in enumerate(self.given.setpoints)
             if asked is not None and not self.given.repeats.beside[number]
         }
@@ -284,7 +282,14 @@ class Balances:
         """
         if not own:
             return {}
-        asked = np.concatenate([_averaged(band, self.flights[number], self.asked[number]) for number in own])
+        apart = round(_OF_WINDOW * band.hop / (1 - OVERLAP))
+        lags = range(0, max(round(_ANSWERED_S / band.period), 2 * apart) + 1, apart)
+        asked = np.concatenate(
+            [
+                _averaged(band, self.flights[number], np.hstack([_late(self.asked[number], lag) for lag in lags]))
+                for number in own
+            ]
+        )
         size = asked.std(axis=0)
         asked = np.hstack([np.ones((len(asked), 1)), asked / np.where(size > 0, size, 1.0)])
         balances = np.concatenate(list(own.values()))

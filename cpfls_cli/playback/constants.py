@@ -9,7 +9,7 @@ instrument, and what is left of a balance must not go with it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -121,13 +121,19 @@ class _Problem:
         return np.where(self.bands[:, None], (1 - OVERLAP) / np.maximum(left, np.finfo(float).tiny), 0.0)
 
     @cached_property
+    def reliance(self) -> Array:
+        """Share of what other runs say of the motion that is so, shape (band, 3): the rest is their own gusts."""
+        crossed, others = (each.sum(axis=0)[:, :, -1, -1] for each in (self.sums.crossed, self.sums.others))
+        return np.asarray(np.clip(crossed / np.where(others > 0, others, np.inf), 0.0, 1.0))
+
+    @cached_property
     def weighed(self) -> Array:
         """Products with other runs, weighed and summed over bands and axes, shape (block, 2 + number, 2 + number)."""
-        return np.asarray(np.einsum("ka,bkapq->bpq", self.weights, self.sums.crossed))
+        return np.asarray(np.einsum("ka,bkapq->bpq", self.weights * self.reliance, self.sums.crossed))
 
-    def weigh(self, sums: Array) -> Array:
-        """Weigh products, and sum them over blocks, bands and axes, shape (2 + number, 2 + number)."""
-        return np.asarray(np.einsum("ka,kapq->pq", self.weights, sums.sum(axis=0)))
+    def weigh(self, sums: Array, power: int) -> Array:
+        """Weigh products, with so many of other runs, and sum all of them, shape (2 + number, 2 + number)."""
+        return np.asarray(np.einsum("ka,kapq->pq", self.weights * self.reliance**power, sums.sum(axis=0)))
 
     def information(self, weighed: Array) -> Array:
         """Add what was believed before to weighed sums, shape (number, number)."""
@@ -322,9 +328,13 @@ def _settled(
     free = setting.free(blocks)
     values = free.values(known)
     problem = setting.problem(free, values, bands, held)
-    weak = problem.places[_f_statistics(problem) < _STRONG]
-    values[weak] = free.values({name: free.numbers[place].absent for name, place in free.index.items()})[weak]
-    held = held | {free.numbers[place].name for place in weak}
+    absent = free.values({name: free.numbers[place].absent for name, place in free.index.items()})
+    # The weakest first: apart from a number that nothing tells, nothing tells the others either.
+    while len(problem.places) and (strength := _f_statistics(problem)).min() < _STRONG:
+        weakest = int(problem.places[np.argmin(strength)])
+        values[weakest] = absent[weakest]
+        held = held | {free.numbers[weakest].name}
+        problem = replace(problem, held=held)
     for _ in range(_STEPS):
         problem = setting.problem(free, values, bands, held)
         step = np.clip(problem.step(problem.weighed.sum(axis=0)), -_FARTHEST, _FARTHEST)
@@ -381,8 +391,9 @@ def _explained_in_all(problem: _Problem) -> tuple[Array, Array]:
 def _f_statistics(problem: _Problem) -> Array:
     """Tell how strongly other runs tell each number apart from all others, the F statistic, shape (estimated,)."""
     rows = np.ix_(1 + problem.places, 1 + problem.places)
+    sums = problem.sums
     crossed, own, others = (
-        problem.weigh(sums)[rows] for sums in (problem.sums.crossed, problem.sums.own, problem.sums.others)
+        problem.weigh(each, power)[rows] for each, power in ((sums.crossed, 1), (sums.own, 0), (sums.others, 2))
     )
     # Each number's column without what other columns have of it, as other runs say.
     apart = np.linalg.pinv(crossed)

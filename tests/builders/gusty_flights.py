@@ -62,7 +62,7 @@ class Truth(NamedTuple):
         return VehicleSettings(mass_kg=self.mass, inertia_kg_m2=inertia, rotors=rotors, rotor_speed_max_rad_s=1e4)
 
 
-SMALL = Truth(0.045, (3.7e-5, 4.2e-5, 6.6e-5), 0.0325, 2.0e-8, 1.2e-10, 0.02, 3e-6, 0.02)
+SMALL = Truth(0.045, (3.7e-5, 4.2e-5, 6.6e-5), 0.046, 2.0e-8, 1.2e-10, 0.02, 3e-6, 0.02)
 LARGE = Truth(1.5, (0.018, 0.02, 0.034), 0.17, 8.5e-6, 1.36e-7, 0.03, 3e-3, 0.3)
 
 
