@@ -21,6 +21,13 @@ NO_INSTRUMENTS = "none"
 NOT_JUDGED, NOT_ACCEPTABLE = "not-judged", "not-acceptable"
 
 
+def response_word(cost: float) -> str:
+    """Judge a model by its cost J: good, acceptable, not-acceptable; not-judged where it is not known."""
+    if not np.isfinite(cost):
+        return NOT_JUDGED
+    return "good" if at_most(cost, GOOD) else "acceptable" if at_most(cost, ACCEPTABLE) else NOT_ACCEPTABLE
+
+
 @record
 class CurveGroup:
     """Complex gains by response and frequency, as decibels and degrees."""
@@ -220,10 +227,7 @@ class ResponseRecord(Record):
 
     def word(self, index: int) -> str:
         """Judge the model by one response: good, acceptable, not-acceptable; not-judged where nothing shows it."""
-        cost = float(self.cost[index])
-        if not (np.isfinite(cost) and self.is_of_vehicle(index)):
-            return NOT_JUDGED
-        return "good" if at_most(cost, GOOD) else "acceptable" if at_most(cost, ACCEPTABLE) else NOT_ACCEPTABLE
+        return response_word(float(self.cost[index])) if self.is_of_vehicle(index) else NOT_JUDGED
 
     def deviations(self, index: int) -> list[Deviation]:
         """List where the model is right and where it is off in one response, from low to high frequencies."""

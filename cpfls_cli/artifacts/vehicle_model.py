@@ -13,8 +13,10 @@ from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
 from cpfls_cli.artifacts.parameters import parameters_of
 from cpfls_cli.artifacts.replay import HeldOutGroup, trust_by_playback
+from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, response_word
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, record, rows_of
 from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.response.mismatch import ROTATION, THRUST
 from cpfls_cli.validation.trust import Trust, capped
 
 if TYPE_CHECKING:
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from cpfls_cli.playback.loop import LoopBounds
     from cpfls_cli.playback.structure import Choice
     from cpfls_cli.playback.vehicle import FoundVehicle
+    from cpfls_cli.response.flown import VehicleResponse
 
 
 _EXPLAINED = 0.9
@@ -192,6 +195,58 @@ class InstrumentsGroup:
 
 
 @record
+class ResponsesGroup:
+    """How far the model is from the frequency responses that its flights show (see `cpfls response`)."""
+
+    name: tuple[str, ...] = dataset("name", "roll, pitch, yaw, thrust", "response")
+    cost: Array = dataset("cost", "J; not finite where the flights do not show it", "response", gaps=True)
+    low: Array = dataset("low", "from this frequency", "response", units="Hz", gaps=True)
+    high: Array = dataset("high", "to this one", "response", units="Hz", gaps=True)
+
+    @classmethod
+    def of(cls, responses: Sequence[VehicleResponse], *, instrumented: bool) -> Self:
+        """Arrange those about the body axes and of thrust; only those that instruments move, where they have to."""
+        own = [
+            each
+            for each in responses
+            if each.name in (*ROTATION, THRUST) and (each.estimate.instrumented or not instrumented)
+        ]
+        ends = np.array([each.mismatch.band or (np.nan, np.nan) for each in own]).reshape(-1, 2)
+        costs = np.array([each.mismatch.cost for each in own])
+        return cls(name=tuple(each.name for each in own), cost=costs, low=ends[:, 0], high=ends[:, 1])
+
+    @property
+    def _turning(self) -> list[str]:
+        """Words on roll and pitch, where there are any."""
+        costs = zip(self.name, self.cost.tolist(), strict=True)
+        return [response_word(cost) for name, cost in costs if name in ROTATION[:2]]
+
+    @property
+    def off(self) -> bool:
+        """Whether the model is not acceptable about roll or pitch."""
+        return NOT_ACCEPTABLE in self._turning
+
+    @property
+    def judged(self) -> bool:
+        """Whether roll and pitch are judged, both."""
+        return len(self._turning) == len(ROTATION[:2]) and NOT_JUDGED not in self._turning
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The responses for machines."""
+        return {
+            name: {
+                "word": response_word(cost),
+                "cost": cost if np.isfinite(cost) else None,
+                "band_hz": [low, high] if np.isfinite(low) else None,
+            }
+            for name, cost, low, high in zip(
+                self.name, self.cost.tolist(), self.low.tolist(), self.high.tolist(), strict=True
+            )
+        }
+
+
+@record
 class VehicleRecord(ModelRecord):
     """The artifact `cpfls/model` of a vehicle found in flights."""
 
@@ -204,6 +259,7 @@ class VehicleRecord(ModelRecord):
     structure: StructuresTriedGroup = group("structure")
     loop: LoopGroup = group("loop")
     instruments: InstrumentsGroup | None = group("instruments", default=None)
+    response: ResponsesGroup | None = group("response", default=None)
     forecast: VehicleGroup | None = group("forecast", default=None, apart=True)
     held_out: HeldOutGroup | None = group("held_out", default=None)
     share: SharesGroup = group("share")
@@ -230,6 +286,7 @@ class VehicleRecord(ModelRecord):
         warnings: Sequence[str],
         contradictions: Sequence[str] | None = None,
         learned: LearnedGroup | None = None,
+        responses: Sequence[VehicleResponse] = (),
         *,
         commanded: bool,
     ) -> Self:
@@ -247,6 +304,7 @@ class VehicleRecord(ModelRecord):
             structure=StructuresTriedGroup.of(found.choice),
             loop=LoopGroup.of(found.loop),
             instruments=None if found.constants is None else InstrumentsGroup.of(found.instruments, found.constants),
+            response=ResponsesGroup.of(responses, instrumented=found.loop.shows_loop) if responses else None,
             forecast=None if found.forecast is None else VehicleGroup.of(replace(found.forecast, commanded=commanded)),
             held_out=held_out,
             share=SharesGroup(
@@ -278,16 +336,25 @@ class VehicleRecord(ModelRecord):
     def verdict(self) -> Trust:
         """How far to trust its constants, where the flights neither contradict themselves nor show the loop.
 
-        Where instruments tell them, by what they explain of the motion that comes again; else by playback.
+        Where instruments tell them, by what they explain of the motion that comes again; else by playback. No word is
+        good where the frequency response about roll or pitch is off.
         """
         against = self.contradiction or ()
+        off = self.response is not None and self.response.off
         if self.instruments is None:
-            return capped(self.forecast_verdict, against, loop=self.loop.shown)
+            return capped(self.forecast_verdict, against, loop=self.loop.shown, lacks=off)
+        lacks = off or self.instruments.lacks
+        seen = lacks or (self.response is not None and self.response.judged)
+        if not (seen and self.tells_turning):
+            return capped(Trust.NOT_JUDGED, against)
+        return capped(Trust.SIMULATION, against, lacks=lacks)
+
+    @property
+    def tells_turning(self) -> bool:
+        """Whether the moments of inertia about roll and pitch are determined, or known, and on no bound."""
         numbers = dict(zip(self.found.name, zip(self.found.determined, self.found.at_bound, strict=True), strict=True))
         moments = [numbers.get(f"inertia.{name}", (True, False)) for name in INERTIA_PARAMETERS[:2]]
-        if any(not determined or at_bound for determined, at_bound in moments):
-            return capped(Trust.NOT_JUDGED, against)
-        return capped(Trust.LACKING if self.instruments.lacks else Trust.SIMULATION, against)
+        return all(determined and not at_bound for determined, at_bound in moments)
 
     @property
     def forecast_verdict(self) -> Trust:
@@ -319,6 +386,7 @@ class VehicleRecord(ModelRecord):
                 },
             },
             "instruments": None if self.instruments is None else self.instruments.summary,
+            "response": None if self.response is None else self.response.summary,
             "structures": rows_of(self.structure),
             "held_out": None if self.held_out is None else self.held_out.summary,
             "shares": {row.pop("name"): row for row in rows_of(self.share)},

@@ -33,6 +33,7 @@ from cpfls_cli.playback.vehicle import FoundVehicle, find_vehicle
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.numbers import joined
 from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.response.flown import VehicleResponse, vehicle_responses
 from cpfls_cli.search.resumable import Watch
 from cpfls_cli.search.vehicle_search import VehicleCheckpoint, begin_vehicle_search
 
@@ -101,7 +102,15 @@ def run(
         commanded = any(flight.parts[0].commanded for flight in training)
         samples = [sum(map(len, flight.parts)) for flight in training]
         parts = LearnedGroup.parts(learned, [(own, own) for own in samples])
-        found_vehicle = VehicleRecord.of(vehicle, judged, warnings, contradictions_of(read), parts, commanded=commanded)
+        found_vehicle = VehicleRecord.of(
+            vehicle,
+            judged,
+            warnings,
+            contradictions_of(read),
+            parts,
+            _responses(vehicle, training),
+            commanded=commanded,
+        )
         record = finish(job, found_vehicle, inputs)
     written: tuple[Text, ...] = ()
     if record.complete:
@@ -168,6 +177,18 @@ def _judged(vehicle: FoundVehicle, flights: Sequence[LoggedFlight], job: Job) ->
         pairs, _horizon(job, flights[0]), 1, lambda done: job.progress(done, 1, "plays back the flights held out")
     )
     return HeldOutGroup.judged(pairs, errors)
+
+
+def _responses(vehicle: FoundVehicle, flights: Sequence[LoggedFlight]) -> tuple[VehicleResponse, ...]:
+    """Estimate frequency responses beside those of the model; none where the flights tell of the loop alone."""
+    own = [flight for flight in flights if not flight.group]
+    if vehicle.constants is None and vehicle.loop.shows_loop:
+        return ()
+    try:
+        return vehicle_responses(vehicle.model, own, vehicle.instruments.beside)
+    except InputError:
+        # Stretches that are too short for a window; the flights' inputs were checked before.
+        return ()
 
 
 def _grouped(

@@ -24,7 +24,7 @@ from cpfls_cli.artifacts.parameters import (
 )
 from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.spec import rows_of
-from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, VehicleRecord
+from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, ResponsesGroup, VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.inertia import INERTIA_PARAMETERS
@@ -34,6 +34,7 @@ from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Facts, Heading, Listing, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent, whole_percent
+from cpfls_cli.response.mismatch import ACCEPTABLE
 from cpfls_cli.validation.trust import Trust
 
 if TYPE_CHECKING:
@@ -88,6 +89,8 @@ def title(record: VehicleRecord) -> str:
 def grounds(record: VehicleRecord) -> Iterator[str]:
     """Say what a vehicle is good for, and how well it predicts what it was not fitted to."""
     yield from _judged_words(record)
+    if record.instruments is None and record.response is not None:
+        yield from response_words(record.response)
     if record.forecast is not None:
         yield (
             "Beside these constants the file holds a forecast along logged rotor speeds, loop and all, which `cpfls "
@@ -160,11 +163,30 @@ def instrument_words(record: VehicleRecord, given: InstrumentsGroup) -> Iterator
             f"Below {number(below, 2)} Hz they explain less, or the body would be another one: the vehicle does "
             "something there that no constant may stand for; `cpfls response` shows it, `cpfls gap` looks for it."
         )
-    if record.trust == Trust.NOT_JUDGED:
+    if record.response is not None:
+        yield from response_words(record.response)
+    if not record.tells_turning:
         yield "They do not tell the moments of inertia about roll and pitch yet: fly more runs, or larger ones."
+    elif record.trust == Trust.NOT_JUDGED:
+        yield (
+            "The flights do not show the frequency responses of roll and pitch clearly enough to judge the model by "
+            f"them: fly with faster turns, as {WHAT_TO_FLY} plans them."
+        )
     held = [row["name"] for row in rows_of(record.found) if row["at_bound"] and row["value"] != 0]
     if held:
         yield f"{joined(held)}: on a bound of what is tried, so these are not the vehicle's own numbers yet."
+
+
+def response_words(given: ResponsesGroup) -> Iterator[str]:
+    """Say how far the model's frequency responses are from those of the flights."""
+    judged = [
+        f"{row['name']} {number(row['cost'], 2)} ({number(row['low'], 2)} to {number(row['high'], 2)} Hz)"
+        for row in rows_of(given)
+        if np.isfinite(row["cost"])
+    ]
+    if judged:
+        off = "; it lacks an effect there, `cpfls response` shows where" if given.off else ""
+        yield f"Cost J of its frequency responses, {ACCEPTABLE:g} at most is acceptable: {', '.join(judged)}{off}."
 
 
 def _share_words(share: Array, error: Array) -> str:

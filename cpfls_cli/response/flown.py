@@ -19,11 +19,8 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import Hold, RotorResponse
 from cpfls_cli.playback.table import rotor_weights
-from cpfls_cli.response.mismatch import ROTOR_SPEED, Mismatch, judged_band, mismatch
+from cpfls_cli.response.mismatch import ROTATION, ROTOR_SPEED, THRUST, Mismatch, judged_band, mismatch
 from cpfls_cli.response.spectra import Channel, FrequencyResponse, Stretch, frequency_response
-
-ROTATION = ("roll", "pitch", "yaw")
-THRUST = "thrust"
 
 InstrumentSource = Callable[[Sequence[Array]], Sequence[Array | None]]
 """Gives the instruments of each flight, shape (time, column), NaN where there are none, for the inputs of all flights.

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     # Who reads what was found waits for nothing that finds it.
     from cpfls_cli.response.spectra import FrequencyResponse
 
-ROTOR_SPEED = "rotor speed"
-"""Name of the response of the rotors' speeds to their commands."""
+ROTATION, THRUST, ROTOR_SPEED = ("roll", "pitch", "yaw"), "thrust", "rotor speed"
+"""Names of the responses of rotation and specific force, and of that of the rotors' speeds to their commands."""
 
 COHERENT = 0.6
 """Coherence above which a response is judged (Tischler and Remple)."""
