@@ -32,6 +32,8 @@ _LONGEST_S = 8.0
 """Length from which on a run tells something in all bands."""
 _EXPLAINED = 0.9
 """Share of what comes again that a model has to explain: below it lacks an effect in that band."""
+_FLAT = 0.85
+"""Izz over the sum of Ixx and Iyy of a multirotor: 1 for a flat body, and no body has more."""
 _NOT_TRIED = "slow_actuation"
 """It answers for whatever is slow, and is no constant of the vehicle."""
 _STEPS, _SETTLED = 12, 1e-2
@@ -339,10 +341,19 @@ def _settled(
         problem = setting.problem(free, values, bands, held)
         step = np.clip(problem.step(problem.weighed.sum(axis=0)), -_FARTHEST, _FARTHEST)
         moved = np.clip(values + step * free.scales, free.lows, free.highs)
+        if LOG_INERTIA[2] in held and INERTIA in setting.vehicle.unknown:
+            moved[free.index[LOG_INERTIA[2]]] = _of_a_flat_body(free, moved)
         if (np.abs(moved - values) <= _SETTLED * free.scales).all():
             break
         values = moved
     return problem
+
+
+def _of_a_flat_body(free: JointNumbers, values: Array) -> float:
+    """Give the number of Izz that goes with those of Ixx and Iyy: a wrong one would turn the body as it rolls."""
+    started = np.array(free.base.vehicle.inertia_kg_m2[:3])
+    roll, pitch = started[:2] * np.exp(values[[free.index[name] for name in LOG_INERTIA[:2]]])
+    return float(np.log(_FLAT * (roll + pitch) / started[2]))
 
 
 def _blocks(free: JointNumbers) -> tuple[str, ...]:

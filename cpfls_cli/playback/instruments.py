@@ -24,8 +24,11 @@ _COARSE_HZ = 20.0
 """Of the search over all shifts, which paths do not exceed."""
 _PIECE_S, _DRIFT_S = 5.0, 0.15
 """Pieces that are aligned by themselves, and how far: clocks drift, and no run is as late everywhere."""
-_OUTSIDE = ("sticks", "position", "velocity")
-"""Setpoints from outside of all loops, the outermost first; attitude, rates and thrust are asked for by loops."""
+_OUTSIDE = (("sticks",), ("position", "velocity"))
+"""Setpoints from outside of all loops, of each kind the first; attitude, rates and thrust are asked for by loops.
+
+A velocity may be what a loop of position asks for: that answers gusts so slowly that it misleads by less than chance.
+"""
 
 
 class Run(NamedTuple):
@@ -184,12 +187,9 @@ def _cut(flight: PlaybackFlight, part: slice) -> PlaybackFlight:
 
 
 def _outside(flight: PlaybackFlight) -> tuple[str, ...]:
-    """Name the setpoints of a flight that move and do not answer its state.
-
-    A velocity alone may be what a loop of position asks for.
-    """
-    known = [name for name in _OUTSIDE if name in flight.setpoints and np.ptp(flight.setpoints[name], axis=0).any()]
-    return () if known == ["velocity"] else tuple(known)
+    """Name the setpoints of a flight that move and do not answer its state."""
+    moves = [name for name, asked in flight.setpoints.items() if np.ptp(asked, axis=0).any()]
+    return tuple(known[0] for kind in _OUTSIDE if (known := [name for name in kind if name in moves]))
 
 
 @dataclass(frozen=True)

@@ -88,9 +88,10 @@ def test_setpoints_from_outside_of_the_loops_are_instruments_and_others_are_none
     flight = _flown(1)
     position, still = flight.motion.position, np.zeros((len(flight), 3))
     asked = {"position": position, "velocity": position, "attitude": position, "body_rate": position}
-    assert instruments([replace(flight, setpoints=asked)]).names == ("position", "velocity")
-    # A velocity alone may be what a loop of position asks for; what does not move tells nothing.
-    for others in ({"velocity": position}, {"position": still}, {"attitude": position, "thrust": position[:, :1]}):
+    assert instruments([replace(flight, setpoints=asked)]).names == ("position",)
+    assert instruments([replace(flight, setpoints=asked | {"position": still})]).names == ("velocity",)
+    # What does not move tells nothing, and loops ask for attitude and thrust.
+    for others in ({"position": still}, {"attitude": position, "thrust": position[:, :1]}):
         assert instruments([replace(flight, setpoints=others)]).kind == "none"
     found = instruments([replace(flight, setpoints={"sticks": position}), _flown(2)])
     assert found.kind == "setpoints"
