@@ -67,8 +67,8 @@ class Balances:
     def bands(self) -> tuple[tuple[Windows, slice], ...]:
         """Windows, and the rows of torque or force that they are laid over."""
         period = self.flights[0].motion.period
-        turning = [(_band(period, *band), slice(0, 3)) for band in BANDS]
-        pushed = [(_band(period, *band), slice(3, 6)) for band in _OF_FORCE]
+        turning = [(band_windows(period, *band), slice(0, 3)) for band in BANDS]
+        pushed = [(band_windows(period, *band), slice(3, 6)) for band in _OF_FORCE]
         return tuple(turning + pushed if self.translates else turning)
 
     @property
@@ -82,15 +82,9 @@ class Balances:
 
         A flight that no other repeats has a path of its own, where it is known what was asked of it.
         """
-        found, beside = {}, self.given.repeats.beside
-        for number, asked in enumerate(self.given.setpoints):
-            if asked is not None:
-                found[number] = number, np.arange(len(asked), dtype=float)
-        for group in self.given.repeats.paths():
-            for number in group:
-                own = np.arange(len(self.flights[number]), dtype=float)
-                found[number] = group[0], beside[number].get(group[0], own)
-        return found
+        repeated = {number for group in self.given.repeats.paths() for number in group}
+        known = [number for number, asked in enumerate(self.given.setpoints) if asked is not None or number in repeated]
+        return {number: self.given.repeats.path(number, len(self.flights[number])) for number in known}
 
     @cached_property
     def terms(self) -> dict[int, Array]:
@@ -119,7 +113,7 @@ class Balances:
         """Length of the blocks of the paths: shorter than usual on short paths, so that there are enough."""
         numbers = {first for first, _ in self.path.values()}
         total = sum(len(self.flights[number]) for number in numbers) * self.flights[0].motion.period
-        return min(_BLOCK_S, max(total / _BLOCKS, _LEAST_BLOCK_S))
+        return block_length(total)
 
     def sums(self, values: Array, bands: BoolArray) -> Sums:
         """Sum products at values of the numbers, shape (number,), in some bands; 0 in others."""
@@ -176,6 +170,17 @@ class Balances:
         return dict(zip(own, np.split(expected.reshape(balances.shape), ends), strict=True))
 
 
+def block_length(seconds: float) -> float:
+    """Choose how long the blocks of paths of so many seconds are, s."""
+    return min(_BLOCK_S, max(seconds / _BLOCKS, _LEAST_BLOCK_S))
+
+
+def band_windows(period: float, short_s: float, long_s: float | None) -> Windows:
+    """Make windows that leave a band: what short ones see less what long ones do; all of it without long ones."""
+    short = windows(period, short_s, OVERLAP)
+    return short if long_s is None else short.less(windows(period, long_s, OVERLAP))
+
+
 def _late(values: Array, samples: int) -> Array:
     """Hold signals back by whole samples, shape (time, column)."""
     return np.concatenate([np.repeat(values[:1], samples, axis=0), values[: len(values) - samples]])
@@ -204,11 +209,6 @@ def _averaged(band: Windows, flight: PlaybackFlight, values: Array) -> Array:
     """Lay windows over signals, shape (window, column)."""
     parts = [values[stretch] for stretch in flight.stretches if band.count(stretch.stop - stretch.start)]
     return np.concatenate([np.zeros((0, values.shape[1])), *(band.average(part) for part in parts)])
-
-
-def _band(period: float, short_s: float, long_s: float | None) -> Windows:
-    short = windows(period, short_s, OVERLAP)
-    return short if long_s is None else short.less(windows(period, long_s, OVERLAP))
 
 
 def _products(one: Array, other: Array) -> Array:
