@@ -23,6 +23,7 @@ from cpfls_cli.pages.effects import (
     wrong_numbers,
 )
 from cpfls_cli.pages.gap import channel_unit, channel_words
+from cpfls_cli.pages.repeats import NOT_SPLIT, again_box
 from cpfls_cli.pages.replay import prediction_words, signal_scale
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Table, Text, Tone
@@ -63,6 +64,8 @@ def first_screen(record: DiagnosisRecord, index: int) -> Iterator[Block]:
     index : int
         Number of the diagnosis on its page.
     """
+    if record.again_before is not None and not record.contradiction:
+        yield again_box(record.again_before, record.again_after, model_words(record))
     yield verdict_box(record)
     yield Facts(list(_facts(record)))
     yield _held_out_table(record, index)
@@ -147,6 +150,8 @@ def _beside(record: DiagnosisRecord) -> Iterator[tuple[str, str]]:
         yield "What it is", f"{capitalised(effect_title(effect.name))}: {effect.sentence}"
     if record.verdict != GapVerdict.AMBIGUOUS:
         yield from (("To tell", flight) for flight in _telling_flights(record))
+    if record.again_before is None and record.largest_gap is not None:
+        yield "Gusts", NOT_SPLIT
     yield "Fitted to", ", ".join(record.flights.names(TRAINING))
     yield "Held out", ", ".join(record.flights.names(HELD_OUT))
     yield "Why", sentence(record.split)

@@ -177,7 +177,7 @@ def test_extension_refits_and_shrinks_the_unseen_gap():
     before, after = (found.unseen.size(each).floors[:3] for each in (found.unseen.before, found.unseen.after))
     assert (before > 3).all()
     assert (after < 1.4).all()
-    shown = before_after(held, found.unseen, found.model, SETTINGS)
+    shown = before_after(held, held, found.unseen, found.model, SETTINGS)
     assert shown.picture.flight == 0
     error = {name: np.ptp(getattr(shown.picture, name) - shown.picture.measured) for name in ("before", "after")}
     assert error["after"] < 0.3 * error["before"]
