@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 _SURE = 1 - 0.05 / 36
 """Confidence from which on something comes again: 36 numbers are looked at, and chance shall pass none in 95 %."""
+OPEN = 0.5
+"""Share of a gap up to which it has to be known that no more comes again, to say that it does not."""
 _TOLD = 0.2
 """Standard error of an explained share above which it says nothing: hardly any motion comes again there."""
 
@@ -152,6 +154,16 @@ class ComesAgainGroup:
         return float(np.clip(np.nan_to_num(bound), 0.0, 1.0))
 
     @property
+    def nothing(self) -> bool:
+        """Whether it is known that nothing of a gap comes again but a part that does not matter."""
+        return not self.channels and self.most <= OPEN
+
+    @property
+    def most(self) -> float:
+        """Largest share of the gap of a channel that may come again."""
+        return max((self.at_most(channel) for channel in self.known), default=0.0)
+
+    @property
     def does_not(self) -> Array:
         """Root mean square of what is neither again nor noise of the sensors, rad/s^2 and m/s^2, shape (channel,)."""
         noise = np.nan_to_num(self.noise[:, 0])
@@ -171,6 +183,7 @@ class ComesAgainGroup:
         }
         return {
             "flights": list(self.flights),
+            "nothing": self.nothing,
             "runs": self.runs,
             "paths": self.paths,
             "bands_hz": np.column_stack([self.low, self.high]).tolist(),

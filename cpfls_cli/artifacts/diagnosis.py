@@ -387,6 +387,12 @@ class DiagnosisRecord(Record):
         return LargestGap(channels, "", np.nan, np.nan, np.nan, share)
 
     @property
+    def only_gusts(self) -> bool:
+        """Whether a gap is left of which it is known that it does not come again."""
+        left = above_noise(self.gap.after_floors).any() and not self.contradiction
+        return bool(left) and self.again_after is not None and self.again_after.nothing
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """Notes on the diagnosis itself, without what the sensors say about each other."""
         told = {*self.audit.warning, *self.audit.note, *self.contradiction, *(self.difference or ())}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.comes_again import ComesAgainGroup, Part
+from cpfls_cli.artifacts.comes_again import OPEN, ComesAgainGroup, Part
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.pages.gap import channel_words
 from cpfls_cli.report.canvas import GREY, in_columns, legend_over, plot
@@ -25,9 +25,8 @@ NOT_SPLIT = (
     "No two of these flights repeat a path, so the gap cannot be split into what comes again (an effect that the model "
     f"lacks) and what does not (gusts, noise). To fly: {WHAT_TO_FLY}"
 )
+NO_EFFECT = "What is left does not come again: no effect of the vehicle explains it."
 _TITLE = "What comes again"
-_OPEN = 0.5
-"""Share of a gap up to which it has to be known that no more comes again, to say that it does not."""
 _TELLS = 0.05
 """Share of a motion that a model has to explain for that to be told."""
 _COLUMNS = 3
@@ -66,12 +65,11 @@ def again_box(before: ComesAgainGroup, after: ComesAgainGroup | None = None, eff
 
 def _nothing(again: ComesAgainGroup, what: str) -> str:
     """Say that nothing comes again, if that is known."""
-    most = max(again.at_most(channel) for channel in again.known)
-    if most > _OPEN:
-        return f"whether {what} comes again these runs do not tell: up to {whole_percent(most)} of it may"
+    most = whole_percent(again.most)
+    if not again.nothing:
+        return f"whether {what} comes again these runs do not tell: up to {most} of it may"
     return (
-        f"{what} does not come again (at most {whole_percent(most)} of it): gusts or noise, and no effect of the "
-        "vehicle explains it"
+        f"{what} does not come again (at most {most} of it): gusts or noise, and no effect of the vehicle explains it"
     )
 
 
@@ -89,7 +87,7 @@ def _channel_sentence(before: ComesAgainGroup, channel: int, after: ComesAgainGr
     said = "; ".join(_part_words(before, channel, part, after) for part in before.parts(channel))
     if not said:
         most = before.at_most(channel)
-        said = f"{'nothing comes' if most <= _OPEN else 'it is open what comes'} again (at most {whole_percent(most)})"
+        said = f"{'nothing comes' if most <= OPEN else 'nothing surely comes'} again (at most {whole_percent(most)})"
     rest = _rest(before if after is None else after, channel)
     return f"{sentence(f'{channel_words(CHANNELS[channel])}: {said}')} The rest: {rest}."
 
@@ -108,7 +106,7 @@ def _part_words(again: ComesAgainGroup, channel: int, part: Part, after: ComesAg
     words = f"{whole_percent(again.share_in(channel, part))} comes again {_where(part)}"
     if after is not None:
         left = float(np.nansum(after.again[channel, part.bands]) / np.nansum(again.again[channel, part.bands]))
-        words += f", {whole_percent(float(np.clip(left, 0.0, 1.0)))} of which the effects leave"
+        words += f", of which {whole_percent(float(np.clip(left, 0.0, 1.0)))} is left"
     explained = again.explained[channel, part.bands]
     if (explained > _TELLS).all():
         low, high = (whole_percent(float(each)) for each in (explained.min(), explained.max()))

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.artifacts.gap_flights import FlightsGroup
+from cpfls_cli.config.study import Study
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.extended import plain
@@ -116,3 +118,20 @@ def test_pairs_with_a_flight_that_no_fit_has_seen_are_preferred():
     assert RepeatedRuns.of(runs).pairs == ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))
     assert RepeatedRuns.of(runs, 1).pairs == ((0, 2), (1, 2), (2, 0), (2, 1))
     assert len(RepeatedRuns.of([*runs, run(1, 0)], 1).pairs) == 6
+
+
+def test_runs_within_one_flight_are_found_by_what_was_asked_for_and_kept_with_the_flight():
+    """A mission of `--repeat` is one log; the artifact of a comparison keeps the setpoint for `diagnose`."""
+    part = slice(0, 1300)
+    signals = [run(0, draw).signals for draw in range(3)]
+    rate, torque = (
+        np.concatenate([getattr(each, name)[part] for each in signals]) for name in ("body_rate", "stated_torque")
+    )
+    asked = np.tile(sines(5, 1.0)[0][part], (3, 1))
+    time = 0.01 * np.arange(len(rate))
+    whole = Signals(time=time, body_rate=rate, vehicle=VEHICLE, stated_torque=torque, setpoints={"position": asked})
+    flight = Recording("mission", whole)
+    assert len(RepeatedRuns.of([flight]).pairs) == 6
+    (kept,) = FlightsGroup.of([flight], ["given"]).recordings(Study())
+    assert RepeatedRuns.of([kept]).pairs == RepeatedRuns.of([flight]).pairs
+    assert RepeatedRuns.of([replace(flight, signals=replace(whole, setpoints={}))]) is None

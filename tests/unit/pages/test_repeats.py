@@ -9,7 +9,8 @@ from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.pages.diagnosis import answer
 from cpfls_cli.pages.disagreement import answer as answer_of_disagreement
-from cpfls_cli.pages.repeats import NOT_SPLIT, WHAT_TO_FLY, again_blocks, again_box
+from cpfls_cli.pages.first_screen import next_steps, verdict_box
+from cpfls_cli.pages.repeats import NO_EFFECT, NOT_SPLIT, WHAT_TO_FLY, again_blocks, again_box
 from cpfls_cli.report.content import Box, Facts, Heading, Plot, Table, Text
 from tests.builders import gap_artifacts as made
 from tests.builders.forms import source_of_record
@@ -52,7 +53,7 @@ def test_where_nothing_comes_again_no_effect_explains_the_gap():
 def test_what_runs_do_not_tell_is_open():
     box = again_box(made.comes_again(NOTHING, error=0.5))
     assert box.title == "Whether the gap comes again these runs do not tell: up to 100 % of it may."
-    assert "it is open what comes again" in box.sentences[0]
+    assert "nothing surely comes again" in box.sentences[0]
 
 
 def test_chance_is_not_taken_for_an_effect():
@@ -79,7 +80,7 @@ def test_what_effects_leave_is_told(after, words):
     box = again_box(made.comes_again(PITCH), made.comes_again(after), "with damping")
     assert box.sentences[-1].startswith(words)
     left = "50 %" if after.any() else "0 %"
-    assert f"50 % comes again from 0.25 to 1.5 Hz, {left} of which the effects leave" in box.sentences[1]
+    assert f"50 % comes again from 0.25 to 1.5 Hz, of which {left} is left" in box.sentences[1]
 
 
 def test_the_split_leads_the_answer():
@@ -91,6 +92,16 @@ def test_the_split_leads_the_answer():
     compared = replace(DisagreementRecord.of_data(*_parts(made.disagreement())), again=groups["again_before"])
     boxes = [block.label for block in answer_of_disagreement(source_of_record(compared)) if isinstance(block, Box)]
     assert boxes == ["REPEATS", "GAP"]
+
+
+@pytest.mark.parametrize("floors", [2.0, 1.0])
+def test_a_gap_that_does_not_come_again_is_said_beside_the_verdict(floors):
+    """And what to do next is no search for an effect; within the noise nothing is left."""
+    given = made.diagnosis(**{"verdict": "UNEXPLAINED", "named": (), "gap/after_floors": np.full(6, floors)})
+    groups = {"again_before": made.comes_again(NOTHING), "again_after": made.comes_again(NOTHING)}
+    record = replace(DiagnosisRecord.of_data(*_parts(given)), **groups)
+    assert (NO_EFFECT in verdict_box(record).sentences) == (floors > 1.5)
+    assert next_steps(record)[0].startswith("Nothing on the model" if floors > 1.5 else "Look at what is left")
 
 
 def test_without_repeats_one_line_says_what_to_fly():
