@@ -11,7 +11,7 @@ from cpfls_cli.artifacts.comes_again import OPEN, ComesAgainGroup, Part
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.pages.gap import channel_words
 from cpfls_cli.report.canvas import GREY, in_columns, legend_over, plot
-from cpfls_cli.report.content import Block, Box, Heading, Plot, Table, Text
+from cpfls_cli.report.content import Block, Box, Folded, Heading, Plot, Table, Text
 from cpfls_cli.report.numbers import joined, number, plain, sentence, whole_percent
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def again_blocks(
     yield Heading(_TITLE)
     yield Text(_explanation(before))
     yield again_figure(f"comes-again-{label}-{index}", before, after)
-    yield _table(f"comes-again-{label}-{index}-table", before, after)
+    yield Folded("By channel and band", [_table(f"comes-again-{label}-{index}-table", before, after)])
 
 
 def _explanation(again: ComesAgainGroup) -> str:
@@ -154,22 +154,36 @@ def _explanation(again: ComesAgainGroup) -> str:
 
 
 def _table(name: str, before: ComesAgainGroup, after: ComesAgainGroup | None) -> Table:
-    rows = []
-    for channel in before.known:
-        for band in range(len(before.low)):
-            values = [_share(before, channel, band), *([] if after is None else [_share(after, channel, band)])]
-            where = "all" if band == 0 else f"{plain(before.low[band])} to {plain(before.high[band])}"
-            gap = float(np.sqrt(before.total[channel, band]) / before.resists[channel])
-            explained = whole_percent(float(before.explained[channel, band]))
-            first = channel_words(CHANNELS[channel])
-            rows.append([first, where, number(gap, 2), _unit(channel), *values, explained])
-    header = ["Channel", "Band, Hz", "Gap", "Unit", "Comes again", *([] if after is None else ["After"]), "Explained"]
+    groups = [before] if after is None else [before, after]
+    rows = [
+        [
+            channel_words(CHANNELS[channel]),
+            f"{plain(before.low[band])} to {plain(before.high[band])}" if band else "all",
+            _unit(channel),
+            *(entry for group in groups for entry in _entries(group, channel, band)),
+        ]
+        for channel in before.known
+        for band in range(len(before.low))
+    ]
+    columns = ["Gap", "Comes again", "Explained"]
+    header = [
+        "Channel",
+        "Band, Hz",
+        "Unit",
+        *columns,
+        *(f"After: {each.lower()}" for each in columns if after is not None),
+    ]
     caption = (
         "The gap over the moment of inertia or the mass, the share of it that comes again, with 95 % of its scatter "
         f"over {before.blocks.min()} to {before.blocks.max()} blocks of the path, and the share of the motion that "
         "comes again that the model explains."
     )
-    return Table(name, caption, header, rows, frozenset({0, 1, 3}))
+    return Table(name, caption, header, rows, frozenset({0, 1, 2}))
+
+
+def _entries(again: ComesAgainGroup, channel: int, band: int) -> tuple[str, str, str]:
+    gap = float(np.sqrt(again.total[channel, band]) / again.resists[channel])
+    return number(gap, 2), _share(again, channel, band), whole_percent(float(again.explained[channel, band]))
 
 
 def _share(again: ComesAgainGroup, channel: int, band: int) -> str:
@@ -200,8 +214,8 @@ def again_figure(name: str, before: ComesAgainGroup, after: ComesAgainGroup | No
     beside = "" if after is None else " Left bars: the model as given; right bars: with the effects."
     caption = (
         "Of the torque and force that the motion takes, by band of frequency: what comes again in other runs of the "
-        "path and is explained by the model, what comes again and is not, and what does not come again. The last two, "
-        f"and noise, are the gap.{beside}"
+        "path and is explained by the model, what comes again and is not, and what does not come again. All but "
+        f"the first are the gap.{beside}"
     )
     rows = -(-len(channels) // _COLUMNS)
     return plot(name, caption, "What comes again of torque and force, by channel and band", 1.0 + 1.9 * rows, draw)

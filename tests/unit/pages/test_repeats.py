@@ -11,7 +11,7 @@ from cpfls_cli.pages.diagnosis import answer
 from cpfls_cli.pages.disagreement import answer as answer_of_disagreement
 from cpfls_cli.pages.first_screen import next_steps, verdict_box
 from cpfls_cli.pages.repeats import NO_EFFECT, NOT_SPLIT, WHAT_TO_FLY, again_blocks, again_box
-from cpfls_cli.report.content import Box, Facts, Heading, Plot, Table, Text
+from cpfls_cli.report.content import Box, Facts, Folded, Heading, Plot, Text
 from tests.builders import gap_artifacts as made
 from tests.builders.forms import source_of_record
 
@@ -115,15 +115,17 @@ def test_without_repeats_one_line_says_what_to_fly():
 
 
 def test_bars_hold_all_and_the_table_every_band():
-    heading, text, plot, table = again_blocks(made.comes_again(PITCH), made.comes_again(NOTHING), 1, "diagnosed")
-    assert (type(heading), type(text), type(plot), type(table)) == (Heading, Text, Plot, Table)
+    heading, text, plot, folded = again_blocks(made.comes_again(PITCH), made.comes_again(NOTHING), 1, "diagnosed")
+    assert (type(heading), type(text), type(plot), type(folded)) == (Heading, Text, Plot, Folded)
     assert text.text.startswith("4 runs of one path (one.csv and two.csv)")
     panels = plot.picture.panels
     assert len(panels) == 6
     before = [series.y for series in panels[1].series if len(series.y) == 5]
     assert len(before) == 8
+    (table,) = folded.tables
     assert len(table.rows) == 36
-    assert table.rows[9] == ["torque about y (pitch)", "0.5 to 1.5", "4.0", "rad/s²", "40 ± 4 %", "0 ± 4 %", "90 %"]
+    assert table.rows[9][:3] == ["torque about y (pitch)", "0.5 to 1.5", "rad/s²"]
+    assert table.rows[9][3:] == ["4.0", "40 ± 4 %", "90 %", "4.0", "0 ± 4 %", "100 %"]
     assert "<svg" in plot.picture.svg
 
 
