@@ -2,15 +2,17 @@
 
     python benchmarks/instruments.py [DRAWS]
 
-Two vehicles of 45 g and 1.5 kg in three levels of gusts, on a path with sines of up to 5 Hz, 40 s long: flown four
-times without setpoints in the log, or three paths once with the position that was asked for. The search begins at
-moments twice too large. Nothing of the package flies them.
+Two vehicles of 45 g and 1.5 kg in three levels of gusts, 40 s a flight: two paths flown four times each without
+setpoints in the log, or three paths once with the position that was asked for; paths of 0.8 Hz at most, and with sines
+of up to 5 Hz. The search begins at moments twice too large. Nothing of the package flies them.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -29,41 +31,52 @@ from cpfls_cli.playback.instruments import Repeats, instruments
 from cpfls_cli.playback.parameters import LOG_INERTIA
 from tests.builders.gusty_flights import CALM, GUSTS, LARGE, SMALL, STORM, Flight, Truth, gusty_flights
 
-DRAWS = 6
+DRAWS = 20
 VEHICLES = {"45 g": SMALL, "1.5 kg": LARGE}
-RUNS, PATHS, REACH_HZ, SECONDS = 4, 3, 5.0, 40.0
+RUNS, REPEATED, PATHS, SECONDS = 4, 2, 3, 40.0
+REACHES_HZ = (0.0, 5.0)
+KINDS = ("repeats", "setpoints")
 
 
 def main(draws: int) -> None:
     rows = []
     for name, truth in VEHICLES.items():
         for gusts in (CALM, GUSTS, STORM):
-            for kind in ("repeats", "setpoints"):
-                found = [_found(truth, kind, _flown(truth, gusts, kind, draw)) for draw in range(draws)]
-                ratio, half, told = (np.array([each[part] for each in found]) for part in range(3))
-                inside = np.abs(np.log(ratio)) <= half
-                rows.append(
-                    [
-                        name,
-                        ", ".join(f"{gust:g}" for gust in gusts),
-                        kind,
-                        *(_ends(ratio[told[:, axis], axis]) for axis in range(2)),
-                        f"{100 * np.median(half[told]):.1f}" if told.any() else "—",
-                        f"{int(inside[told].sum())} of {int(told.sum())}",
-                        f"{int(told.sum())} of {told.size}",
-                    ]
-                )
-    header = ["vehicle", "gusts, rad/s²", "instrument", "Ixx", "Iyy", "interval ±, %", "holds the truth", "determined"]
-    table("instruments", header, rows)
+            for reach in REACHES_HZ:
+                for kind in KINDS:
+                    found = [_found(truth, kind, flown) for flown in _flown(truth, gusts, kind, draws, reach)]
+                    rows.append([name, ", ".join(f"{gust:g}" for gust in gusts), f"{reach or 0.8:g}", kind])
+                    rows[-1] += _cells(*(np.array([each[part] for each in found]) for part in range(3)))
+                    print(" | ".join(rows[-1]), file=sys.stderr, flush=True)
+    header = ["vehicle", "gusts, rad/s²", "path up to, Hz", "instrument", "Ixx", "Iyy", "interval ±, %"]
+    table("instruments", [*header, "holds the truth", "determined"], rows)
 
 
-def _flown(truth: Truth, gusts: tuple[float, float, float], kind: str, draw: int) -> list[PlaybackFlight]:
-    """Fly one path again and again, or several once."""
-    if kind == "repeats":
-        asked = [Flight(truth, gusts, draw, RUNS * draw + run, reach=REACH_HZ) for run in range(RUNS)]
-        return [replace(flight, setpoints={}) for flight in gusty_flights(asked, SECONDS)]
-    asked = [Flight(truth, gusts, PATHS * draw + path, draw, reach=REACH_HZ) for path in range(PATHS)]
-    return list(gusty_flights(asked, SECONDS))
+def _cells(ratio: Array, half: Array, told: BoolArray) -> list[str]:
+    inside = np.abs(np.log(ratio)) <= half
+    return [
+        *(_ends(ratio[told[:, axis], axis]) for axis in range(2)),
+        f"{100 * np.median(half[told]):.1f}" if told.any() else "—",
+        f"{int(inside[told].sum())} of {int(told.sum())}",
+        f"{int(told.sum())} of {told.size}",
+    ]
+
+
+def _flown(
+    truth: Truth, gusts: tuple[float, float, float], kind: str, draws: int, reach: float
+) -> Iterator[list[PlaybackFlight]]:
+    """Fly paths again and again, or several once; another set of paths and gusts for each draw."""
+    paths, runs = (REPEATED, RUNS) if kind == "repeats" else (PATHS, 1)
+    asked = [
+        Flight(truth, gusts, paths * draw + path, runs * draw + run, reach=reach)
+        for draw in range(draws)
+        for path in range(paths)
+        for run in range(runs)
+    ]
+    flown = gusty_flights(asked, SECONDS)
+    for _ in range(draws):
+        own = list(islice(flown, paths * runs))
+        yield [replace(flight, setpoints={}) for flight in own] if kind == "repeats" else own
 
 
 def _found(truth: Truth, kind: str, flights: list[PlaybackFlight]) -> tuple[Array, Array, BoolArray]:

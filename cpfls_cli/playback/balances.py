@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
-from operator import add
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import contiguous
 from cpfls_cli.effects.polynomial import state_terms
+from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric_columns
 from cpfls_cli.playback.evaluation import Evaluated, VehicleAt
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.playback.parameters import FreeNumbers
+from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.weak_form.windows import Windows, windows
 
 BANDS = ((0.15, 0.4), (0.3, 0.8), (0.6, 1.6), (1.2, 3.2))
@@ -38,14 +41,13 @@ _NEAR = 1e-4
 """Step of a derivative by what the rotors' response has, in natural sizes."""
 
 
-@dataclass(frozen=True)
-class Sums:
-    """Products of a balance and its derivatives with those of other runs, by block of the path, band and axis.
+class Sums(NamedTuple):
+    """Products of balances with those of other runs, by block of the path, band and axis.
 
     Attributes
     ----------
-    crossed, own, others : array, shape (block, band, 3, 2 + number, 2 + number)
-        With other runs, with itself, and of other runs; what is left comes first, what the motion takes last.
+    crossed, own, others : array, shape (block, band, 3, column, column)
+        With other runs, with itself, and of other runs.
     windows : array, shape (block, band)
     """
 
@@ -54,22 +56,99 @@ class Sums:
     others: Array
     windows: Array
 
+    def combined(self, columns: Array) -> Sums:
+        """Combine columns, shape (axis, column, combination)."""
+        crossed, own, others = (columns.swapaxes(-1, -2) @ each @ columns for each in self[:3])
+        return Sums(crossed, own, others, self.windows)
 
-@dataclass(frozen=True)
+
+class _Factors(NamedTuple):
+    """What weights of torque and force multiply: a term of the motion and one of the rotors, by index.
+
+    Attributes
+    ----------
+    torque : tuple of (str, int, int)
+        First the number of the rotors' response that they are differentiated by; empty for none.
+    force : tuple of (str, int, int, int)
+        Last the body axis along which it acts.
+    """
+
+    torque: tuple[tuple[str, int, int], ...]
+    force: tuple[tuple[str, int, int, int], ...]
+
+    @classmethod
+    def of(cls, evaluated: Evaluated) -> _Factors:
+        """List what the weights of a vehicle and their derivatives touch."""
+        given = [each for each in evaluated.derivatives if each is not None]
+        touched = [("", np.any([evaluated.at.table, *given], axis=0))]
+        touched += [(name, evaluated.at.table != 0) for name in _of_response(evaluated)]
+        torque = tuple((by, m, r) for by, each in touched for m, r in np.argwhere(each[:3].any(axis=0)).tolist())
+        force = tuple((by, m, r, axis) for by, each in touched for axis, m, r in np.argwhere(each[3:]).tolist())
+        return cls(torque, force)
+
+    def hold(self, other: _Factors) -> bool:
+        """Tell whether all of another are here."""
+        return {*other.torque} <= {*self.torque} and {*other.force} <= {*self.force}
+
+    def columns(self, evaluated: Evaluated) -> tuple[Array, Array]:
+        """Give what is left of the balances of torque and force, its derivatives, and what the motion takes.
+
+        Returns
+        -------
+        array, shape (3, 6 + torque, 2 + number)
+            Of the entries of the inertia, and of the factors of torque.
+        array, shape (1, 1 + force, 2 + number)
+            Of the mass, and of the factors of force.
+        """
+        at, numbers = evaluated.at, evaluated.at.free.numbers
+        rows, columns = zip(*INERTIA_ENTRIES, strict=True)
+        torque = np.zeros((3, len(rows) + len(self.torque), 2 + len(numbers)))
+        force = np.zeros((1, 1 + len(self.force), 2 + len(numbers)))
+        torque[:, : len(rows), [0, -1]] = at.inertia[rows, columns][:, None]
+        force[:, 0, [0, -1]] = at.free.vehicle.mass_kg
+        weights = [("", 0, at.table)]
+        for place, (number, slope) in enumerate(zip(numbers, evaluated.derivatives, strict=True), start=1):
+            torque[:, : len(rows), place] = number.scale * evaluated.inertia_derivatives[place - 1][rows, columns]
+            by, table = (number.name, at.table) if slope is None else ("", slope)
+            weights.append((by, place, number.scale * table))
+        for by, place, table in weights:
+            for row, (name, motion, spun) in enumerate(self.torque, start=len(rows)):
+                if name == by:
+                    torque[:, row, place] = table[:3, motion, spun]
+            for row, (name, motion, spun, axis) in enumerate(self.force, start=1):
+                if name == by:
+                    force[:, row, place] = table[3 + axis, motion, spun]
+        return torque, force
+
+
+class _Signals(NamedTuple):
+    """What is balanced along a flight: what changes, shape (time, changing), and what acts, shape (time, acting)."""
+
+    changing: Array
+    acting: Array
+
+
+_Laid = Callable[[Array, Array], Array]
+"""From averages of changes and of what acts, shapes (window, column), to columns by axis (window, axis, column)."""
+
+
+@dataclass
 class Balances:
-    """Balances of flights, and what of them comes from outside of the loop."""
+    """Balances of flights, and what of them comes from outside of the loop.
 
-    free: FreeNumbers
+    Both sides are linear in the inertia, the mass and the weights of torque and force. So products are taken of what
+    these multiply, and again only where the rotors' response has changed.
+    """
+
     flights: Sequence[PlaybackFlight]
     given: Instruments
+    _last: tuple[RotorResponse, _Factors, Sums, Sums] | None = field(default=None, init=False)
 
     @cached_property
-    def bands(self) -> tuple[tuple[Windows, slice], ...]:
-        """Windows, and the rows of torque or force that they are laid over."""
+    def bands(self) -> tuple[Windows, ...]:
+        """Windows of torque, then of force."""
         period = self.flights[0].motion.period
-        turning = [(band_windows(period, *band), slice(0, 3)) for band in BANDS]
-        pushed = [(band_windows(period, *band), slice(3, 6)) for band in _OF_FORCE]
-        return tuple(turning + pushed if self.translates else turning)
+        return tuple(band_windows(period, *band) for band in (*BANDS, *(_OF_FORCE if self.translates else ())))
 
     @property
     def translates(self) -> bool:
@@ -115,28 +194,71 @@ class Balances:
         total = sum(len(self.flights[number]) for number in numbers) * self.flights[0].motion.period
         return block_length(total)
 
-    def sums(self, values: Array, bands: BoolArray) -> Sums:
-        """Sum products at values of the numbers, shape (number,), in some bands; 0 in others."""
-        evaluated, size = Evaluated.of(self.free, values), 2 + len(self.free.numbers)
-        sides = {number: _sides(evaluated, self.flights[number], terms) for number, terms in self.terms.items()}
-        known = [sides.get(number, np.zeros((len(flight), 0))) for number, flight in enumerate(self.flights)]
-        others = {number: self.given.repeats.others(number, known) for number in self.path if number not in self.asked}
-        found = [
-            self._of_band(band, rows, sides, others) if used else {}
-            for (band, rows), used in zip(self.bands, bands, strict=True)
+    def sums(self, free: FreeNumbers, values: Array) -> Sums:
+        """Sum products at values of the numbers, shape (number,), in their natural sizes.
+
+        Returns
+        -------
+        Sums
+            First column: what is left; then derivatives by each number; last what the motion takes.
+        """
+        evaluated = Evaluated.of(free, values)
+        wanted, response = _Factors.of(evaluated), evaluated.at.response
+        if self._last is None or self._last[0] != response or not self._last[1].hold(wanted):
+            self._last = response, wanted, *self._summed(evaluated, wanted)
+        _, factors, *sums = self._last
+        turned, pushed = (
+            each.combined(columns) for each, columns in zip(sums, factors.columns(evaluated), strict=True)
+        )
+        return Sums(*(np.concatenate(pair, axis=1) for pair in zip(turned, pushed, strict=True)))
+
+    def _summed(self, evaluated: Evaluated, factors: _Factors) -> tuple[Sums, Sums]:
+        """Sum products of all columns of torque, and of force."""
+        rotors = {number: _rotor_terms_by(evaluated, self.flights[number]) for number in self.path}
+
+        def along(number: int, listed: Sequence[tuple[str, int, int]]) -> Array:
+            terms = self.terms[number]
+            return np.stack([terms[:, motion] * rotors[number][by][:, spun] for by, motion, spun in listed], axis=1)
+
+        turning = self._products(
+            self.bands[: len(BANDS)],
+            {number: _of_torque(self.flights[number], along(number, factors.torque)) for number in self.path},
+            _turned,
+        )
+        pushing: list[_ByBand] = []
+        for axis in range(3 if self.translates else 0):
+            listed, axes = [each[:3] for each in factors.force], [each[3] for each in factors.force]
+            signals = {}
+            for number in self.path:
+                flight = self.flights[number]
+                pushes = flight.motion.rotation[:, axis, axes] * along(number, listed)
+                signals[number] = _of_force(flight, axis, evaluated.at.free.vehicle.gravity_m_s2, pushes)
+            pushing.append(self._products(self.bands[len(BANDS) :], signals, _pushed))
+        names = sorted(set().union(*turning, *(each for by_band in pushing for each in by_band)))
+        size = len(INERTIA_ENTRIES) + len(factors.torque), 1 + len(factors.force)
+        return _arranged([turning], names, size[0]), _arranged(pushing, names, size[1])
+
+    def _products(self, bands: Sequence[Windows], signals: Mapping[int, _Signals], laid: _Laid) -> _ByBand:
+        """Sum products by band, path and block."""
+        whole = [
+            np.hstack(signals[number]) if number in signals else np.zeros((len(flight), 0))
+            for number, flight in enumerate(self.flights)
         ]
-        empty = np.zeros((3, size, size)), np.zeros((3, size, size)), np.zeros((3, size, size)), 0
-        blocks = [[each.get(name, empty) for each in found] for name in sorted(set().union(*found))]
-        return Sums(*(np.array([[band[part] for band in block] for block in blocks]) for part in range(4)))
+        changing = next(iter(signals.values())).changing.shape[1]
+        beside = {}
+        for number in self.path:
+            if number not in self.asked:
+                others = self.given.repeats.others(number, whole)
+                beside[number] = _Signals(others[:, :changing], others[:, changing:])
+        return [self._of_band(band, signals, beside, laid) for band in bands]
 
     def _of_band(
-        self, band: Windows, rows: slice, sides: Mapping[int, Array], others: Mapping[int, Array]
-    ) -> dict[tuple[int, int], tuple[Array, Array, Array, int]]:
-        """Sum products in a band, by path and block: as in `Sums`, and how many windows."""
-        own = {number: _laid(band, self.flights[number], values[:, :, rows]) for number, values in sides.items()}
-        there = {number: _laid(band, self.flights[number], values[:, :, rows]) for number, values in others.items()}
+        self, band: Windows, signals: Mapping[int, _Signals], others: Mapping[int, _Signals], laid: _Laid
+    ) -> dict[tuple[int, int], _Products]:
+        own = {number: _laid(band, self.flights[number], each, laid) for number, each in signals.items()}
+        there = {number: _laid(band, self.flights[number], each, laid) for number, each in others.items()}
         there |= self._expected(band, {number: own[number] for number in self.asked})
-        found: dict[tuple[int, int], tuple[Array, Array, Array, int]] = {}
+        found: dict[tuple[int, int], _Products] = {}
         for number, (first, path) in self.path.items():
             flight, here, beside = self.flights[number], own[number], there[number]
             place = path[_middles(band, flight)]
@@ -144,9 +266,9 @@ class Balances:
             block = np.where(known, place * flight.motion.period // self.block_s, -1)
             for each in np.unique(block[known]):
                 mine, theirs = here[block == each], beside[block == each]
-                sums = _products(theirs, mine), _products(mine, mine), _products(theirs, theirs), len(mine)
+                sums = _Products(_product(theirs, mine), _product(mine, mine), _product(theirs, theirs), len(mine))
                 before = found.get((first, int(each)))
-                found[first, int(each)] = sums if before is None else tuple(map(add, before, sums))
+                found[first, int(each)] = sums if before is None else before.plus(sums)
         return found
 
     def _expected(self, band: Windows, own: dict[int, Array]) -> dict[int, Array]:
@@ -168,6 +290,42 @@ class Balances:
             expected[aside] = asked[aside] @ np.linalg.solve(square, rest.T @ flat[parts != fold])
         ends = np.cumsum([len(each) for each in own.values()])[:-1]
         return dict(zip(own, np.split(expected.reshape(balances.shape), ends), strict=True))
+
+
+class _Products(NamedTuple):
+    """Products of columns by axis, shape (axis, column, column), as in `Sums`, and how many windows."""
+
+    crossed: Array
+    own: Array
+    others: Array
+    windows: int
+
+    def plus(self, other: _Products) -> _Products:
+        """Add others."""
+        return _Products(
+            self.crossed + other.crossed,
+            self.own + other.own,
+            self.others + other.others,
+            self.windows + other.windows,
+        )
+
+
+_ByBand = Sequence[Mapping[tuple[int, int], _Products]]
+"""By band: products by path and block."""
+
+
+def _arranged(axes: Sequence[_ByBand], names: Sequence[tuple[int, int]], size: int) -> Sums:
+    """Arrange products of all axes at once, or of one after the other; 0 where there are none."""
+    bands = len(axes[0]) if axes else 0
+    crossed, own, others = (np.zeros((len(names), bands, 3, size, size)) for _ in range(3))
+    counts = np.zeros((len(names), bands))
+    for axis, by_band in enumerate(axes):
+        rows = slice(None) if len(axes) == 1 else slice(axis, axis + 1)
+        for (band, found), (place, name) in product(enumerate(by_band), enumerate(names)):
+            if name in found:
+                crossed[place, band, rows], own[place, band, rows], others[place, band, rows], count = found[name]
+                counts[place, band] = count
+    return Sums(crossed, own, others, counts)
 
 
 def block_length(seconds: float) -> float:
@@ -197,22 +355,53 @@ def _middles(band: Windows, flight: PlaybackFlight) -> IntArray:
     )
 
 
-def _laid(band: Windows, flight: PlaybackFlight, sides: Array) -> Array:
-    """Lay windows over what both sides of a balance differ by, shape (window, 3, 2 + number)."""
-    parts = [sides[stretch] for stretch in flight.stretches if band.count(stretch.stop - stretch.start)]
-    return np.concatenate(
-        [np.zeros((0, *sides.shape[2:])), *(band.derivative(part[:, 0]) - band.average(part[:, 1]) for part in parts)]
-    )
+def _laid(band: Windows, flight: PlaybackFlight, signals: _Signals, laid: _Laid) -> Array:
+    """Lay windows over what is balanced, shape (window, axis, column)."""
+    changed = [band.derivative(signals.changing[part]) for part in _long(band, flight)]
+    acted = [band.average(signals.acting[part]) for part in _long(band, flight)]
+    none = (np.zeros((0, each.shape[1])) for each in signals)
+    return laid(*(np.concatenate([empty, *parts]) for empty, parts in zip(none, (changed, acted), strict=True)))
+
+
+def _long(band: Windows, flight: PlaybackFlight) -> list[slice]:
+    return [stretch for stretch in flight.stretches if band.count(stretch.stop - stretch.start)]
+
+
+def _turned(changed: Array, acted: Array) -> Array:
+    """Arrange what each entry of the inertia takes of the rotation, and what turns against it."""
+    entries = len(INERTIA_ENTRIES)
+    takes = symmetric_columns(changed) + acted[:, : 3 * entries].reshape(-1, 3, entries)
+    turns = -acted[:, None, 3 * entries :]
+    return np.concatenate([takes, np.repeat(turns, 3, axis=1)], axis=2)
+
+
+def _pushed(changed: Array, acted: Array) -> Array:
+    """Arrange what the mass takes, its weight with it, and what pushes against it."""
+    return np.concatenate([changed + acted[:, :1], -acted[:, 1:]], axis=1)[:, None]
+
+
+def _of_torque(flight: PlaybackFlight, turns: Array) -> _Signals:
+    """Arrange rates, the gyroscopic torque of each entry of the inertia, and what turns."""
+    rate = flight.motion.rate
+    gyroscopic = np.cross(rate[:, :, None], symmetric_columns(rate), axis=1)
+    return _Signals(rate, np.hstack([gyroscopic.reshape(len(rate), -1), turns]))
+
+
+def _of_force(flight: PlaybackFlight, axis: int, gravity: float, pushes: Array) -> _Signals:
+    """Arrange velocity along an axis of the world, gravity along it, and what pushes."""
+    weight = np.full((len(flight), 1), gravity if axis == 2 else 0.0)
+    return _Signals(flight.motion.velocity[:, [axis]], np.hstack([weight, pushes]))
 
 
 def _averaged(band: Windows, flight: PlaybackFlight, values: Array) -> Array:
     """Lay windows over signals, shape (window, column)."""
-    parts = [values[stretch] for stretch in flight.stretches if band.count(stretch.stop - stretch.start)]
-    return np.concatenate([np.zeros((0, values.shape[1])), *(band.average(part) for part in parts)])
+    return np.concatenate(
+        [np.zeros((0, values.shape[1])), *(band.average(values[part]) for part in _long(band, flight))]
+    )
 
 
-def _products(one: Array, other: Array) -> Array:
-    """Sum products over windows, shapes (window, 3, number) to (3, number, number)."""
+def _product(one: Array, other: Array) -> Array:
+    """Sum products over windows, shapes (window, axis, column) to (axis, column, column)."""
     return np.asarray(one.transpose(1, 2, 0) @ other.transpose(1, 0, 2))
 
 
@@ -229,47 +418,19 @@ def _rotor_terms(at: VehicleAt, flight: PlaybackFlight) -> Array:
     return terms
 
 
-def _sides(evaluated: Evaluated, flight: PlaybackFlight, terms: Array) -> Array:
-    """Evaluate both sides of the balance and their derivatives by each number in its natural size.
-
-    Returns
-    -------
-    array, shape (time, 2, 6, 2 + number)
-        Momentum, of rotation in the body frame and of translation in the world's; torque and force that change it. The
-        last column is what the motion alone takes.
-    """
-    at, motion = evaluated.at, flight.motion
-    numbers, mass = at.free.numbers, at.free.vehicle.mass_kg
-    rotor, slopes = _rotor_terms(at, flight), np.array([number.scale for number in numbers])
-    sides = np.zeros((len(flight), 2, 6, 2 + len(numbers)))
-    momentum = motion.rate @ at.inertia
-    sides[:, 0, :3, -1], sides[:, 0, 3:, -1] = momentum, mass * motion.velocity
-    sides[:, 1, :3, -1] = -np.cross(motion.rate, momentum)
-    sides[:, 1, 5, -1] = -mass * at.free.vehicle.gravity_m_s2
-    weights = np.stack(
-        [at.table, *(np.zeros_like(at.table) if each is None else each for each in evaluated.derivatives)]
-    )
-    wrench = _wrenches(weights, terms, rotor)
-    for place, number in enumerate(numbers):
-        if evaluated.derivatives[place] is None:
-            ahead = at.values.copy()
-            ahead[place] += _NEAR * number.scale
-            change = (_rotor_terms(VehicleAt(at.free, ahead), flight) - rotor) / (_NEAR * number.scale)
-            wrench[:, :, 1 + place] = _wrenches(at.table[None], terms, change)[:, :, 0]
-        turned = evaluated.inertia_derivatives[place]
-        if turned.any():
-            momentum = motion.rate @ turned
-            sides[:, 0, :3, 1 + place] = momentum
-            wrench[:, :3, 1 + place] -= np.cross(motion.rate, momentum)
-    sides[:, 1, :3, :-1] = wrench[:, :3]
-    sides[:, 1, 3:, :-1] = motion.rotation @ wrench[:, 3:]
-    sides[..., 1:-1] *= slopes
-    sides[..., 0] += sides[..., -1]
-    return sides
+def _of_response(evaluated: Evaluated) -> list[str]:
+    """Name the numbers of the rotors' response."""
+    pairs = zip(evaluated.at.free.numbers, evaluated.derivatives, strict=True)
+    return [number.name for number, slope in pairs if slope is None]
 
 
-def _wrenches(weights: Array, terms: Array, rotor: Array) -> Array:
-    """Evaluate many weights at once, shape (number, 6, terms, 1 + 4 rotors) to (time, 6, number)."""
-    motion, spun = np.nonzero(weights.any(axis=(0, 1)))
-    found = (terms[:, motion] * rotor[:, spun]) @ weights[:, :, motion, spun].reshape(-1, len(motion)).T
-    return np.asarray(found.reshape(len(terms), len(weights), 6).swapaxes(1, 2))
+def _rotor_terms_by(evaluated: Evaluated, flight: PlaybackFlight) -> dict[str, Array]:
+    """Evaluate the terms of the rotors, and their derivatives by each number of their response, by name."""
+    at = evaluated.at
+    found = {"": _rotor_terms(at, flight)}
+    for name in _of_response(evaluated):
+        ahead, place = at.values.copy(), at.free.index[name]
+        step = _NEAR * at.free.numbers[place].scale
+        ahead[place] += step
+        found[name] = (_rotor_terms(VehicleAt(at.free, ahead), flight) - found[""]) / step
+    return found

@@ -194,13 +194,13 @@ def find_constants(
         return None
     tried = _tried(vehicle, flights, leave_out)
     blocks = [block for block in (*vehicle.unknown, *tried) if block == INERTIA or block in vehicle.unknown]
-    setting = _Setting(vehicle, given.flown, given)
-    begun = setting.balances(blocks)
-    if not begun.path or LOG_INERTIA[0] not in begun.free.index or begun.longest_s < _LONGEST_S:
+    setting = _Setting(vehicle, Balances(given.flown, given))
+    balances, free = setting.balances, setting.free(blocks)
+    if not balances.path or LOG_INERTIA[0] not in free.index or balances.longest_s < _LONGEST_S:
         return None
     # Of drag factor and moment of inertia about yaw only the ratio is known: both would drift along it.
-    held = {DRAG} if {DRAG, LOG_INERTIA[2]} <= set(begun.free.index) else set()
-    problem = _problem(setting, np.ones(len(begun.bands), dtype=bool), blocks, tried, held)
+    held = {DRAG} if {DRAG, LOG_INERTIA[2]} <= set(free.index) else set()
+    problem = _problem(setting, np.ones(len(balances.bands), dtype=bool), blocks, tried, held)
     if len(problem.sums.crossed) < _FEWEST_BLOCKS:
         return None
     for slowest in range(len(BANDS) - 1, 0, -1):
@@ -210,14 +210,14 @@ def find_constants(
         if not _tells(fast) or (_agree(fast, problem) and _explains(problem, slowest)):
             break
         problem = fast
-    return _constants(setting, problem)
+    return _constants(problem)
 
 
 def _problem(
     setting: _Setting, bands: BoolArray, blocks: Sequence[str], tried: Sequence[str], held: Set[str]
 ) -> _Problem:
     """Estimate what is asked for in some bands, and choose what else is worth it."""
-    return _chosen(setting, _settled(setting.balances(blocks), bands, {}, held), tried)
+    return _chosen(setting, _settled(setting, blocks, bands, {}, held), tried)
 
 
 def _tells(problem: _Problem) -> bool:
@@ -257,13 +257,16 @@ class _Setting(NamedTuple):
     """What constants are sought in."""
 
     vehicle: VehicleSettings
-    flights: Sequence[PlaybackFlight]
-    given: Instruments
+    balances: Balances
 
-    def balances(self, blocks: Sequence[str]) -> Balances:
-        """Take the balances with the numbers of some blocks."""
+    def free(self, blocks: Sequence[str]) -> JointNumbers:
+        """Give the numbers of some blocks."""
         chosen = tuple(block for block in blocks if block not in self.vehicle.unknown)
-        return Balances(FreeNumbers(self.vehicle, chosen, Airflow(np.zeros(0), 0)), self.flights, self.given)
+        return JointNumbers(FreeNumbers(self.vehicle, chosen, Airflow(np.zeros(0), 0)))
+
+    def problem(self, free: JointNumbers, values: Array, bands: BoolArray, held: Set[str]) -> _Problem:
+        """Take the balances at values of the numbers."""
+        return _Problem(free, self.balances.sums(free.base, values), values, bands, held)
 
 
 def _tried(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], leave_out: Sequence[str]) -> tuple[str, ...]:
@@ -281,20 +284,20 @@ def _chosen(setting: _Setting, problem: _Problem, tried: Sequence[str]) -> _Prob
     while True:
         taken = _blocks(problem.free)
         others = [block for block in tried if block not in taken]
-        best = _best_block(setting.balances([*taken, *others]), problem, taken)
+        best = _best_block(setting, problem, taken, others)
         if best is None:
             return problem
-        more = _settled(setting.balances([*taken, best]), problem.bands, problem.named, problem.held & {DRAG})
+        more = _settled(setting, [*taken, best], problem.bands, problem.named, problem.held & {DRAG})
         if not len(_of_blocks(more, [best])):
             return problem
         problem = more
 
 
-def _best_block(balances: Balances, problem: _Problem, taken: Sequence[str]) -> str | None:
+def _best_block(setting: _Setting, problem: _Problem, taken: Sequence[str], others: Sequence[str]) -> str | None:
     """Find the block with which least is left of what was kept aside; None where none is worth it."""
-    free = JointNumbers(balances.free)
+    free = setting.free([*taken, *others])
     values = free.values({number.name: number.absent for number in free.numbers} | problem.named)
-    every = _Problem(free, balances.sums(values, problem.bands), values, problem.bands, problem.held)
+    every = setting.problem(free, values, problem.bands, problem.held)
     left, found = every.left(_of_blocks(every, taken)), []
     for block in dict.fromkeys(number.block for number in free.numbers):
         if block not in taken:
@@ -309,19 +312,21 @@ def _of_blocks(problem: _Problem, blocks: Sequence[str]) -> IntArray:
     return np.array([place for place in problem.places if problem.free.numbers[place].block in blocks], dtype=np.int64)
 
 
-def _settled(balances: Balances, bands: BoolArray, known: Mapping[str, float], held: Set[str]) -> _Problem:
+def _settled(
+    setting: _Setting, blocks: Sequence[str], bands: BoolArray, known: Mapping[str, float], held: Set[str]
+) -> _Problem:
     """Step to the numbers at which nothing that is left goes with other runs, within bounds.
 
     What instruments hardly tell is held with the numbers that are held anyway, where it was believed to be.
     """
-    free = JointNumbers(balances.free)
+    free = setting.free(blocks)
     values = free.values(known)
-    problem = _Problem(free, balances.sums(values, bands), values, bands, held)
+    problem = setting.problem(free, values, bands, held)
     weak = problem.places[_f_statistics(problem) < _STRONG]
     values[weak] = free.values({name: free.numbers[place].absent for name, place in free.index.items()})[weak]
     held = held | {free.numbers[place].name for place in weak}
     for _ in range(_STEPS):
-        problem = _Problem(free, balances.sums(values, bands), values, bands, held)
+        problem = setting.problem(free, values, bands, held)
         step = np.clip(problem.step(problem.weighed.sum(axis=0)), -_FARTHEST, _FARTHEST)
         moved = np.clip(values + step * free.scales, free.lows, free.highs)
         if (np.abs(moved - values) <= _SETTLED * free.scales).all():
@@ -344,7 +349,7 @@ def _explained(sums: Sums) -> tuple[Array, Array]:
     return share(crossed.sum(axis=0)), jackknife_error(share(crossed.sum(axis=0) - crossed))
 
 
-def _constants(setting: _Setting, problem: _Problem) -> Constants:
+def _constants(problem: _Problem) -> Constants:
     """Gather the numbers of a solved problem, and how far they scatter over the blocks of the path.
 
     What instruments hardly tell scatters by what was believed before, however it scatters over the blocks.
@@ -356,8 +361,7 @@ def _constants(setting: _Setting, problem: _Problem) -> Constants:
         told[yaw] = False
     without = _left_out(problem)
     covariance = np.diag(np.where(told, 0.0, free.spreads**2)) + jackknife_covariance(without)
-    everywhere = setting.balances(_blocks(problem.free)).sums(problem.values, np.ones_like(problem.bands))
-    share, _ = _explained(everywhere)
+    share, _ = _explained(problem.sums)
     fitted = Fitted(free, problem.values, float(1 - share[0, :2].mean()), problem.information(total))
     spread = Uncertainty(covariance * np.outer(free.scales, free.scales), len(without), told)
     return Constants(fitted, spread, Explained(share, problem.bands[: len(BANDS)], *_explained_in_all(problem)))
