@@ -236,9 +236,12 @@ def _with_errors(sums: Array) -> Array:
 def _shares(sums: Array) -> Array:
     """Compute the means of `ComesAgain` and the shares that follow from sums, shapes (..., 4, 6) to (..., 5, 6)."""
     own, crossed, taken, count = np.moveaxis(sums, -2, 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        values = own / count, crossed / count, taken / count, crossed / own, 1 - crossed / taken
-    return np.stack(values, axis=-2)
+    total, again, moved = (_ratio(each, count) for each in (own, crossed, taken))
+    return np.stack([total, again, moved, _ratio(crossed, own), 1 - _ratio(crossed, taken)], axis=-2)
+
+
+def _ratio(above: Array, below: Array) -> Array:
+    return np.divide(above, below, out=np.full_like(above, np.nan), where=below != 0)
 
 
 def _different(recordings: Sequence[Recording]) -> Iterator[int]:
