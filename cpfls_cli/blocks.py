@@ -47,9 +47,15 @@ def mean_error(values: Array) -> Array:
     return np.asarray(np.std(values, axis=0, ddof=1) / np.sqrt(len(values)))
 
 
-def half_width(error: Array, blocks: int) -> Array:
-    """Compute half of a 95 % interval from a standard error that so many blocks tell, by Student's t."""
+def half_width(error: Array, blocks: int | IntArray, confidence: float = _CONFIDENCE) -> Array:
+    """Compute half of an interval, 95 % two-sided, from a standard error that so many blocks tell, by Student's t.
+
+    Parameters
+    ----------
+    confidence : float
+        Probability of its upper end, below 1.
+    """
     # Slow to load for who cuts blocks alone.
     from scipy.special import stdtrit
 
-    return np.asarray(stdtrit(blocks - 1, _CONFIDENCE) * error)
+    return np.asarray(stdtrit(blocks - 1, confidence) * error)

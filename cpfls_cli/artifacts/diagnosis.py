@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.audit import AuditGroup
+from cpfls_cli.artifacts.comes_again import ComesAgainGroup
 from cpfls_cli.artifacts.gap_effects import (
     GapChangeGroup,
     NamedEffectsGroup,
@@ -281,6 +282,8 @@ class DiagnosisRecord(Record):
         default=None,
     )
     learned: LearnedGroup | None = group("learned", default=None)
+    again_before: ComesAgainGroup | None = group("comes_again_before", default=None)
+    again_after: ComesAgainGroup | None = group("comes_again_after", default=None)
 
     @classmethod
     def of(
@@ -336,6 +339,8 @@ class DiagnosisRecord(Record):
             flights=FlightsGroup.of([*training, *held], [TRAINING] * len(training) + [HELD_OUT] * len(held)),
             difference=diagnosis.differences,
             shares=np.array([diagnosis.shares.get(kind, np.nan) for kind in KINDS]),
+            again_before=ComesAgainGroup.of(change.again_before),
+            again_after=ComesAgainGroup.of(change.again_after),
         )
 
     @property
@@ -382,6 +387,12 @@ class DiagnosisRecord(Record):
         return LargestGap(channels, "", np.nan, np.nan, np.nan, share)
 
     @property
+    def only_gusts(self) -> bool:
+        """Whether a gap is left of which it is known that it does not come again."""
+        left = above_noise(self.gap.after_floors).any() and not self.contradiction
+        return bool(left) and self.again_after is not None and self.again_after.nothing
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """Notes on the diagnosis itself, without what the sensors say about each other."""
         told = {*self.audit.warning, *self.audit.note, *self.contradiction, *(self.difference or ())}
@@ -405,6 +416,9 @@ class DiagnosisRecord(Record):
             "where": where and where._asdict(),
             "gap_before": self.gap.summary_before,
             "gap_after": self.gap.summary_after,
+            "comes_again": self.again_before
+            and self.again_after
+            and {"before": self.again_before.summary, "after": self.again_after.summary},
             "playback": self.playback and self.playback.summary,
             "whiteness": self.whiteness and self.whiteness.summary,
             "torque_alone": rows_of(self.torque_alone),

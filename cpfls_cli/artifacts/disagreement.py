@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.audit import AuditGroup
+from cpfls_cli.artifacts.comes_again import ComesAgainGroup
 from cpfls_cli.artifacts.gap_effects import StretchGroup, above_noise, gap_summary
 from cpfls_cli.artifacts.gap_flights import FlightsGroup, NotExcitedGroup
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, LearnedGroup, learned_in
@@ -173,6 +174,7 @@ class DisagreementRecord(Record):
     warning: tuple[str, ...] = dataset("warning", "what to know about the flights", "warning")
     base: VehicleGroup = group("base")
     flights: FlightsGroup = group("")
+    again: ComesAgainGroup | None = group("comes_again", default=None)
     learned: LearnedGroup | None = group("learned", default=None)
 
     @classmethod
@@ -205,6 +207,7 @@ class DisagreementRecord(Record):
             warning=(*disagreement.audit.filtered, *warnings),
             base=VehicleGroup.of(base),
             flights=FlightsGroup.of(recordings, ["given"] * len(recordings)),
+            again=ComesAgainGroup.of(disagreement.again),
         )
 
     @property
@@ -224,6 +227,7 @@ class DisagreementRecord(Record):
         return {
             "flights": names,
             "gap": {**gap_summary(self.gap.rms, self.gap.floors), "share": self.gap.share.tolist()},
+            "comes_again": self.again and self.again.summary,
             "stretches": [
                 {"flight": names[flight], "start_s": start, "end_s": end, "channel": channel, "rms_floors": floors}
                 for flight, start, end, channel, floors in self.stretch.first(len(self.stretch.channel))

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 RIGID_BODY = "rigid-body"
 """Kind of a base that is the rigid body of the vehicle."""
 
+_ASKED = "setpoint_"
+"""Before the name of a signal that was asked for."""
+
 TRAINING, HELD_OUT = "training", "held-out"
 """Roles of the flights of a diagnosis."""
 
@@ -135,13 +138,23 @@ class SignalsGroup:
     voltage: Array | None = dataset(
         "voltage", "of the battery, as a share of the full one", "sample", gaps=True, default=None
     )
+    setpoint_position: Array | None = dataset(
+        "setpoint_position",
+        "position that was asked for, by which runs in one flight are found",
+        "sample",
+        "axis",
+        units="m",
+        frame=WORLD,
+        gaps=True,
+        default=None,
+    )
 
     @classmethod
     def of(cls, recordings: Sequence[Recording]) -> Self:
         """Put the signals of flights one after another."""
         lengths = [len(recording.signals) for recording in recordings]
         joined = {
-            field.name: _joined([getattr(recording.signals, field.name) for recording in recordings], lengths)
+            field.name: _joined([_signal(recording.signals, field.name) for recording in recordings], lengths)
             for field in fields(cls)
         }
         return cls(**joined)  # type: ignore[arg-type]  # every flight has time and rates
@@ -154,7 +167,14 @@ class SignalsGroup:
         # A flight that lacks a signal lacks all of it.
         whole = {name: values for name, values in known.items() if np.isfinite(values).all()}
         ground = study.gap.ground_height_m
-        return Signals(vehicle=study.vehicle, commanded=commanded, ground_height_m=ground, **whole)
+        asked = {name: whole.pop(_ASKED + name) for name in ("position",) if _ASKED + name in whole}
+        return Signals(vehicle=study.vehicle, commanded=commanded, ground_height_m=ground, setpoints=asked, **whole)
+
+
+def _signal(signals: Signals, name: str) -> Array | None:
+    """Give a signal, or what was asked for, by the name of its dataset."""
+    asked = name.removeprefix(_ASKED)
+    return getattr(signals, name) if asked == name else signals.setpoints.get(asked)
 
 
 def _joined(parts: Sequence[Array | None], lengths: Sequence[int]) -> Array | None:

@@ -105,7 +105,7 @@ def diagnosed(
     rng = generator(study, "diagnose")
     result = diagnose(split.training, split.held_out, study.gap, rng, model=model, progress=progress)
     extended = result.model(model)
-    change = before_after(split.held_out, result.held_out, extended, study.gap)
+    change = before_after(split.training, split.held_out, result.held_out, extended, study.gap)
     flights = (split.training, split.held_out, split.sentence)
     record = DiagnosisRecord.of(result, change, extended, *flights, warnings, base)
     return result.diagnosis, record

@@ -8,10 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
 from cpfls_cli.gap.extended import ExtendedModel, plain
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.playback import PlayedPair, WorstStretch, errors_by_horizon, played_pairs, worst_stretch
+from cpfls_cli.gap.preparation import Preparation
+from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
 from cpfls_cli.gap.residual.views import GapStretch, Whiteness, stretches, whiteness
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.whole_vehicle import whole_vehicle
@@ -60,6 +63,8 @@ class BeforeAfter:
         Between windows without common samples.
     run : WorstStretch
         Free runs over the stretch in which the model as given was worst.
+    again_before, again_after : ComesAgain or None
+        What of the gap comes again, of training flights too; None where no flight repeats another.
     """
 
     centres: Array
@@ -72,17 +77,23 @@ class BeforeAfter:
     lag_s: float
     picture: StretchCurves
     run: WorstStretch
+    again_before: ComesAgain | None
+    again_after: ComesAgain | None
 
 
 def before_after(
-    held: Sequence[Recording], unseen: HeldOut, model: ExtendedModel, settings: GapSettings
+    training: Sequence[Recording],
+    held: Sequence[Recording],
+    unseen: HeldOut,
+    model: ExtendedModel,
+    settings: GapSettings,
 ) -> BeforeAfter:
     """Compare a model with effects with the model as given on held-out flights.
 
     Parameters
     ----------
-    held : sequence of Recording
-        Held-out flights.
+    training, held : sequence of Recording
+        Flights that the effects were found in, and that they are judged on.
     unseen : HeldOut
         Their residuals.
     """
@@ -106,7 +117,22 @@ def before_after(
         stride * windows.hop * windows.period,
         _picture(held, found[0], windows, model, settings),
         worst_stretch(played),
+        *_again(training, held, model, settings),
     )
+
+
+def _again(
+    training: Sequence[Recording], held: Sequence[Recording], model: ExtendedModel, settings: GapSettings
+) -> tuple[ComesAgain | None, ComesAgain | None]:
+    """Split the gap of the model as given, of signals as logged, and of the model with effects where paths repeat."""
+    recordings = [*training, *held]
+    repeated = RepeatedRuns.of(recordings, len(held))
+    if repeated is None or model.audit is None:
+        return None, None
+    prepared = Preparation(common_windows(recordings, settings), model.base, settings, model.audit)
+    given, known = plain(model.base), system(prepared.repaired(recordings), model.chosen)
+    before = repeated.split(given.system(prepared.logged(recordings)), given.linear)
+    return before, repeated.split(known, model.linear)
 
 
 def _picture(

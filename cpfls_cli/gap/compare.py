@@ -17,6 +17,7 @@ from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import NotExcited
 from cpfls_cli.gap.playback import PlayedPair, errors_by_horizon, played_pairs
 from cpfls_cli.gap.residual.dependence import Dependence, joined_states, rank_dependence, state_signals
+from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
 from cpfls_cli.gap.residual.views import GapStretch, HeatMap, heat_map, stretches
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.whole_vehicle import with_effects
@@ -57,6 +58,8 @@ class Disagreement:
         None where no two signals tell anything.
     played : list of PlayedPair
         The model alone.
+    again : ComesAgain or None
+        None where no flight repeats another.
     """
 
     audit: Audit
@@ -73,6 +76,7 @@ class Disagreement:
     not_excited: tuple[NotExcited, ...]
     played: list[PlayedPair]
     playback: Replay
+    again: ComesAgain | None
 
     @property
     def floors(self) -> Array:
@@ -128,6 +132,7 @@ def compare(
     effects = [effect for name, effect in CATALOGUE.items() if name not in settings.ignore]
     repairing = replace(model, repairs=audited)
     played = played_pairs(recordings, repairing, repairing)
+    repeated = RepeatedRuns.of(recordings)
     return Disagreement(
         audited,
         rms,
@@ -143,6 +148,7 @@ def compare(
         not_excited(hypothesis, effects, floor),
         played,
         errors_by_horizon(played, settings.horizon_s),
+        None if repeated is None else repeated.split(hypothesis, extended.linear),
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord, PictureGroup, RunGroup
 from cpfls_cli.gap.settings import CLEAR
-from cpfls_cli.pages.disagreement import verdict_box as disagreement_box
+from cpfls_cli.pages.disagreement import lead
 from cpfls_cli.pages.effects import (
     coefficients_table,
     effect_title,
@@ -37,6 +37,7 @@ from cpfls_cli.pages.gap import (
     marked,
 )
 from cpfls_cli.pages.model import trust_box
+from cpfls_cli.pages.repeats import again_blocks
 from cpfls_cli.pages.replay import beside_rivals, playback_figure
 from cpfls_cli.pages.sensors import sensor_warnings, sensors_answer, unseen_answer
 from cpfls_cli.pages.source import Source, Sources
@@ -74,7 +75,7 @@ def gap_blocks(sources: Sources) -> Iterator[Block]:
     answered = {diagnosis.made_from("disagreement") for diagnosis in sources.diagnoses}
     for disagreement in sources.disagreements:
         if disagreement.sha256 not in answered:
-            yield disagreement_box(disagreement)
+            yield from lead(disagreement)
     diagnoses = [diagnosis.record for diagnosis in sources.diagnoses]
     yield from notes_on_flights([*diagnoses, *(disagreement.record for disagreement in sources.disagreements)])
 
@@ -95,6 +96,7 @@ def _forces_decide(record: DiagnosisRecord) -> Iterator[Text]:
 def diagnosis_blocks(diagnosis: Source[DiagnosisRecord], index: int) -> Iterator[Block]:
     """Show what a diagnosis rests on; its verdict stands in the summary."""
     record = diagnosis.record
+    yield from again_blocks(record.again_before, record.again_after, index, "diagnosed")
     yield Heading(f"Measured and simulated, {diagnosis.label}")
     after, run = model_words(record), record.run
     if run is None:

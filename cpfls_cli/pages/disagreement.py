@@ -12,6 +12,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.disagreement import DependenceGroup, DisagreementRecord, HeatMapGroup
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.pages.gap import channel_unit, channel_words
+from cpfls_cli.pages.repeats import NOT_SPLIT, again_blocks, again_box
 from cpfls_cli.pages.replay import beside_rivals, playback_figure
 from cpfls_cli.pages.sensors import contradicted, sensors_answer, settled_channels, unseen_answer
 from cpfls_cli.pages.source import Source
@@ -53,13 +54,28 @@ _SIGNAL_UNITS = {
 def answer(disagreement: Source[DisagreementRecord]) -> Iterator[Block]:
     """Say where a model and flights disagree, what the flights cannot show, and what to distrust."""
     record = disagreement.record
-    yield verdict_box(disagreement)
+    yield from lead(disagreement)
     yield from settled_channels(record.audit)
     yield from where(disagreement)
+    yield from _not_split(record)
     yield from _playback_text(record)
     yield from unseen_answer(record.not_excited)
     yield from sensors_answer(record.audit)
     yield from (Text(warning, "warning") for warning in record.warning)
+
+
+def lead(disagreement: Source[DisagreementRecord]) -> Iterator[Box]:
+    """Say what comes again of the gap where flights repeat each other, and how large it is."""
+    record = disagreement.record
+    if record.again is not None and not record.audit.contradiction:
+        yield again_box(record.again)
+    yield verdict_box(disagreement)
+
+
+def _not_split(record: DisagreementRecord) -> Iterator[Text]:
+    """Say of a gap that it cannot be split, and what to fly."""
+    if record.again is None and record.gap.above_noise.any():
+        yield Text(NOT_SPLIT)
 
 
 def where(disagreement: Source[DisagreementRecord]) -> Iterator[Block]:
@@ -100,6 +116,8 @@ def disagreement_blocks(disagreement: Source[DisagreementRecord], index: int) ->
     yield _axes_table(record, index)
     if not record.gap.known:
         return
+    yield from _not_split(record)
+    yield from again_blocks(record.again, None, index, "compared")
     yield Heading("When")
     yield residual_figure(f"gap-over-time-{index}", record)
     yield from _stretches(record, index)

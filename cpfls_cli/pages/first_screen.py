@@ -23,6 +23,7 @@ from cpfls_cli.pages.effects import (
     wrong_numbers,
 )
 from cpfls_cli.pages.gap import channel_unit, channel_words
+from cpfls_cli.pages.repeats import NO_EFFECT, NOT_SPLIT, again_box
 from cpfls_cli.pages.replay import prediction_words, signal_scale
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Table, Text, Tone
@@ -43,6 +44,7 @@ _TONES: dict[str, Tone] = {
 }
 _ENERGY = {"feeds": ", feeds energy into the motion", "drains": ", drains energy from the motion"}
 _USE = "take the model with it, extended.h5, that `cpfls gap` and `cpfls extend` write"
+_GUSTS = "nothing on the model: what is left are gusts or noise; fly in still air, or more runs, to see what is smaller"
 _PLAN = "`cpfls trajectory CONFIG --for diagnosis.h5 -o path.h5` plans such a flight"
 _NEXT: dict[str, str] = {
     GapVerdict.NAMED: _USE,
@@ -63,6 +65,8 @@ def first_screen(record: DiagnosisRecord, index: int) -> Iterator[Block]:
     index : int
         Number of the diagnosis on its page.
     """
+    if record.again_before is not None and not record.contradiction:
+        yield again_box(record.again_before, record.again_after, model_words(record))
     yield verdict_box(record)
     yield Facts(list(_facts(record)))
     yield _held_out_table(record, index)
@@ -74,6 +78,7 @@ def verdict_box(record: DiagnosisRecord) -> Box:
     """Say what a diagnosis found, and how much of it."""
     named = [effect_sentence(effect) for effect in record.effects.named]
     named += [closest_sentence(effect) for effect in record.effects.closest]
+    named += [NO_EFFECT] if record.only_gusts else []
     label = record.verdict.replace("_", " ")
     return Box(label, _headline(record), named, _TONES.get(record.verdict, "note"))
 
@@ -147,6 +152,8 @@ def _beside(record: DiagnosisRecord) -> Iterator[tuple[str, str]]:
         yield "What it is", f"{capitalised(effect_title(effect.name))}: {effect.sentence}"
     if record.verdict != GapVerdict.AMBIGUOUS:
         yield from (("To tell", flight) for flight in _telling_flights(record))
+    if record.again_before is None and record.largest_gap is not None:
+        yield "Gusts", NOT_SPLIT
     yield "Fitted to", ", ".join(record.flights.names(TRAINING))
     yield "Held out", ", ".join(record.flights.names(HELD_OUT))
     yield "Why", sentence(record.split)
@@ -222,7 +229,7 @@ def next_steps(record: DiagnosisRecord) -> list[str]:
     """Say what to do next, in sentences."""
     if record.contradiction:
         return ["Correct what is wrong, in the section `import` of the config or in `vehicle`, and run this again."]
-    usual = _NEXT.get(record.verdict)
+    usual = _GUSTS if record.only_gusts and record.verdict == GapVerdict.UNEXPLAINED else _NEXT.get(record.verdict)
     first = [f"to tell {flight}" for flight in _telling_flights(record)]
     # A rival that was not tried wants a signal, and two that do what one does another log; else a flight is planned.
     rivals = record.alternative.rows()

@@ -28,6 +28,7 @@ from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, ResponsesGroup, 
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.pages.replay import beside_rivals, errors_table, horizon_figure, playback_words
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.playback.table import wrench_of
@@ -73,9 +74,6 @@ _FLIGHTS = {
     **dict.fromkeys(CENTRE, "climb and descend with much and little thrust: what an offset turns grows with thrust"),
 }
 """What would tell a constant that the flights do not."""
-
-WHAT_TO_FLY = "cpfls trajectory CONFIG --hover 30 --excite roll,pitch --repeat 4 -o mission.h5"
-"""Plans what tells the vehicle from the loop."""
 
 _FAR = 3.0
 """Factor from the stated number from which on a found one is called effective, and no property of a part."""

@@ -148,7 +148,7 @@ class Balances:
     def bands(self) -> tuple[Windows, ...]:
         """Windows of torque, then of force."""
         period = self.flights[0].motion.period
-        return tuple(_band(period, *band) for band in (*BANDS, *(_OF_FORCE if self.translates else ())))
+        return tuple(band_windows(period, *band) for band in (*BANDS, *(_OF_FORCE if self.translates else ())))
 
     @property
     def translates(self) -> bool:
@@ -161,15 +161,9 @@ class Balances:
 
         A flight that no other repeats has a path of its own, where it is known what was asked of it.
         """
-        found, beside = {}, self.given.repeats.beside
-        for number, asked in enumerate(self.given.setpoints):
-            if asked is not None:
-                found[number] = number, np.arange(len(asked), dtype=float)
-        for group in self.given.repeats.paths():
-            for number in group:
-                own = np.arange(len(self.flights[number]), dtype=float)
-                found[number] = group[0], beside[number].get(group[0], own)
-        return found
+        repeated = {number for group in self.given.repeats.paths() for number in group}
+        known = [number for number, asked in enumerate(self.given.setpoints) if asked is not None or number in repeated]
+        return {number: self.given.repeats.path(number, len(self.flights[number])) for number in known}
 
     @cached_property
     def terms(self) -> dict[int, Array]:
@@ -196,7 +190,7 @@ class Balances:
         """Length of the blocks of the paths: shorter than usual on short paths, so that there are enough."""
         numbers = {first for first, _ in self.path.values()}
         total = sum(len(self.flights[number]) for number in numbers) * self.flights[0].motion.period
-        return min(_BLOCK_S, max(total / _BLOCKS, _LEAST_BLOCK_S))
+        return block_length(total)
 
     def sums(self, free: FreeNumbers, values: Array) -> Sums:
         """Sum products at values of the numbers, shape (number,), in their natural sizes.
@@ -339,6 +333,17 @@ def _arranged(axes: Sequence[_ByBand], names: Sequence[tuple[int, int]], size: i
     return Sums(crossed, own, others, counts)
 
 
+def block_length(seconds: float) -> float:
+    """Choose how long the blocks of paths of so many seconds are, s."""
+    return min(_BLOCK_S, max(seconds / _BLOCKS, _LEAST_BLOCK_S))
+
+
+def band_windows(period: float, short_s: float, long_s: float | None) -> Windows:
+    """Make windows that leave a band: what short ones see less what long ones do; all of it without long ones."""
+    short = windows(period, short_s, OVERLAP)
+    return short if long_s is None else short.less(windows(period, long_s, OVERLAP))
+
+
 def _late(values: Array, samples: int) -> Array:
     """Hold signals back by whole samples, shape (time, column)."""
     return np.concatenate([np.repeat(values[:1], samples, axis=0), values[: len(values) - samples]])
@@ -398,11 +403,6 @@ def _averaged(band: Windows, flight: PlaybackFlight, values: Array) -> Array:
     return np.concatenate(
         [np.zeros((0, values.shape[1])), *(band.average(values[part]) for part in _long(band, flight))]
     )
-
-
-def _band(period: float, short_s: float, long_s: float | None) -> Windows:
-    short = windows(period, short_s, OVERLAP)
-    return short if long_s is None else short.less(windows(period, long_s, OVERLAP))
 
 
 def _product(one: Array, other: Array) -> Array:

@@ -239,6 +239,45 @@ class Repeats:
         none = count == 0
         return np.where(_column(none, own), np.nan, total / _column(np.maximum(count, 1), own))
 
+    def at(self, number: int, other: int, values: Array) -> Array:
+        """Give what another run has at the same places of the path.
+
+        Parameters
+        ----------
+        number, other : int
+            Of the flight, and of one that repeats it.
+        values : array, shape (time, ...)
+            Of the other, at its samples.
+
+        Returns
+        -------
+        array, shape (time, ...)
+            At the samples of the flight; NaN where the other is not.
+        """
+        place = self.beside[number][other]
+        inside = np.isfinite(place)
+        found = np.full((len(place), *values.shape[1:]), np.nan)
+        found[inside] = _between(values, place[inside])
+        return found
+
+    def path(self, number: int, length: int) -> tuple[int, Array]:
+        """Give the flight that gives a path its time, and its sample at each sample of a flight.
+
+        Parameters
+        ----------
+        number, length : int
+            Of the flight, and of its samples.
+
+        Returns
+        -------
+        first : int
+            The flight itself where no other repeats it.
+        place : array, shape (time,)
+            NaN where the first is not.
+        """
+        first = next((group[0] for group in self.paths() if number in group), number)
+        return first, self.beside[number].get(first, np.arange(length, dtype=float))
+
 
 def repeats(flights: Sequence[PlaybackFlight]) -> Repeats:
     """Find flights that fly the same path, and align them.

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from cpfls_cli.artifacts.comes_again import ComesAgainGroup
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
@@ -246,3 +247,25 @@ def without(artifact, *groups):
     """Leave out optional datasets."""
     kept = {path: values for path, values in artifact.data.items() if path.split("/")[0] not in groups}
     return Artifact(artifact.spec, artifact.header, kept)
+
+
+def comes_again(share, *, error=0.02, gap=4.0, noise=0.1, taken=8.0):
+    """What of gaps comes again, shares by channel and band, of rad/s^2 and m/s^2 about a body of 1 kg m^2 and 1 kg."""
+    share = np.array(share, dtype=float)
+    total = np.full(share.shape, gap**2)
+    low, high = [0.0, 2.0, 1.0, 0.5, 0.25, 0.0], [6.0, 6.0, 3.0, 1.5, 0.75, 0.25]
+    return ComesAgainGroup(
+        low=np.array(low),
+        high=np.array(high),
+        total=total,
+        again=share * total,
+        noise=np.full(share.shape, noise**2),
+        taken=np.full(share.shape, taken**2),
+        share_error=np.full(share.shape, error),
+        explained_error=np.full(share.shape, 0.05),
+        resists=np.ones(6),
+        flights=("one.csv", "two.csv"),
+        runs=4,
+        paths=1,
+        blocks=np.full(6, 12),
+    )

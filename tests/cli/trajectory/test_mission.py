@@ -10,7 +10,7 @@ from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.config.yaml_text import parse_yaml, to_yaml
-from cpfls_cli.pages.vehicle_model import WHAT_TO_FLY
+from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from tests.builders.studies import VEHICLE
 
 HOVER = ("--hover", "8", "--excite", "roll,pitch", "--band", "0.7,3", "--size", "2", "--repeat", "4")

@@ -10,8 +10,9 @@ from cpfls_cli.artifacts.vehicle_model import FoundNumbersGroup, InstrumentsGrou
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.pages.model import answer
+from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.pages.source import Sources
-from cpfls_cli.pages.vehicle_model import WHAT_TO_FLY, found_vehicle_section, grounds, remainder_curves, warnings
+from cpfls_cli.pages.vehicle_model import found_vehicle_section, grounds, remainder_curves, warnings
 from cpfls_cli.report.content import Plot, Table
 from cpfls_cli.validation.trust import Trust, capped
 from tests.builders.forms import source_of_record

@@ -1,0 +1,93 @@
+"""What of a gap comes again in gusts, beside the truth of the same paths in still air, and how often gusts alone do.
+
+    python benchmarks/repeated_gaps.py [DRAWS]
+
+A vehicle of 45 g on two paths a draw, each flown four times for 40 s: with a drag and a damping that the model does not
+know, in gusts and in still air, and with neither, in gusts.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.shared.measure import pin_threads, table
+
+pin_threads()
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cpfls_cli.artifacts.comes_again import ComesAgainGroup
+from cpfls_cli.blocks import half_width
+from cpfls_cli.gap.balance.weak_flight import weak_flight
+from cpfls_cli.gap.extended import plain
+from cpfls_cli.gap.residual.repeated import RepeatedRuns
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.weak_form.windows import Recording, common_windows
+from tests.builders.gusty_flights import CALM, GUSTS, SMALL, Flight, gusty_flights, logged
+
+DRAWS = 6
+RUNS = 4
+CHANNELS = ("roll", "pitch", "yaw", "x", "y", "z")
+MODELLED = [0, 1, 2, 5]
+"""Channels of which the model explains anything: forces along x and y it has none."""
+SETS = {
+    "gusts": (SMALL._replace(drag=0.1, damping=6e-5), GUSTS),
+    "calm": (SMALL._replace(drag=0.1, damping=6e-5), CALM),
+    "gusts alone": (SMALL._replace(drag=0.0, damping=0.0), GUSTS),
+}
+
+
+def main(draws: int) -> None:
+    each = [
+        (truth, gusts, 2 * draw + path) for draw in range(draws) for truth, gusts in SETS.values() for path in (0, 1)
+    ]
+    flown = gusty_flights([Flight(*one, run) for one in each for run in range(RUNS)], seconds=40.0)
+    found = [{name: split([next(flown) for _ in range(2 * RUNS)]) for name in SETS} for _ in range(draws)]
+    gusty, calm, alone = ([one[name] for one in found] for name in SETS)
+    shares, inside, passed = [], [], []
+    for there, truth in zip(gusty, calm, strict=True):
+        expected = truth.again / (truth.again + there.total - there.again)
+        inside.append(np.abs(there.share - expected) < there.share_half)
+        off = np.abs(there.explained - truth.explained) < half_width(there.explained_error, there.blocks)
+        passed.append(off[MODELLED])
+        shares.append([there.share, expected, there.explained, truth.explained])
+    told = np.array(shares).transpose(1, 2, 3, 0)
+    rows = []
+    for channel, name in enumerate(CHANNELS):
+        for band, (low, high) in enumerate(zip(gusty[0].low, gusty[0].high, strict=True)):
+            spans = [_span(values[channel, band]) for values in told]
+            rows.append([name, f"{low:g} to {high:g}", *spans, f"{np.mean([i[channel, band] for i in inside]):.2f}"])
+    header = ("axis", "Hz", "comes again", "truth of it", "explained", "in still air", "inside")
+    table("repeated_gaps", header, rows)
+    known = np.isfinite(told[2] + told[3])[MODELLED]
+    print(f"\nshares within their intervals: {np.mean(inside):.3f} of {np.size(inside)}")
+    print(f"explained within theirs: {np.sum(passed) / known.sum():.3f} of {known.sum()}")
+    print(f"gusts alone: {sum(one.sure.sum() for one in alone)} of {sum(one.sure.size for one in alone)} come again")
+    print("the rest, rad/s^2 and m/s^2:", *(_span(np.array([one.does_not[c] for one in alone])) for c in range(6)))
+
+
+def split(flown: Sequence[PlaybackFlight]) -> ComesAgainGroup:
+    """Split what a model without drag and damping leaves of flights."""
+    recordings = [Recording(flight.name, logged(flight, SMALL.vehicle).parts[0]) for flight in flown]
+    windows, model = common_windows(recordings, GapSettings()), plain(None)
+    flights = [weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings]
+    repeated = RepeatedRuns.of(recordings)
+    found = None if repeated is None else repeated.split(model.system(flights), model.linear)
+    again = ComesAgainGroup.of(found)
+    assert again is not None, "each path is flown again"
+    return again
+
+
+def _span(values: np.ndarray) -> str:
+    known = values[np.isfinite(values)]
+    return f"{known.min():.2f} to {known.max():.2f}" if len(known) else "—"
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else DRAWS)

@@ -1,0 +1,88 @@
+"""`cpfls gap` on flights that repeat a path in gusts: what comes again leads page, terminal and JSON."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import yaml
+
+from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
+from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.rotations import euler_angles
+from tests.builders.command_line import undrawn
+from tests.builders.gusty_flights import GUSTS, SMALL, Flight, gusty_flights
+
+COLUMNS = {
+    "attitude": (["phi", "theta", "psi"], "rad"),
+    "body_rate": (["wx", "wy", "wz"], "rad/s"),
+    "velocity": (["vx", "vy", "vz"], "m/s"),
+    "rotor_speed": (["m1", "m2", "m3", "m4"], "rad/s"),
+}
+
+
+def config():
+    """The vehicle without its drag, and without its damping."""
+    rotors = [
+        {
+            "position_m": list(rotor.position_m),
+            "spin": rotor.spin,
+            "thrust_factor_n_s2": rotor.thrust_factor_n_s2,
+            "drag_factor_n_m_s2": rotor.drag_factor_n_m_s2,
+        }
+        for rotor in SMALL.vehicle.rotors
+    ]
+    vehicle = {"mass_kg": SMALL.mass, "inertia_kg_m2": list(SMALL.inertia), "rotors": rotors}
+    signals = {name: {"columns": columns, "unit": unit} for name, (columns, unit) in COLUMNS.items()}
+    read = {"time_column": "t", "signals": signals, "torque_source": None, "rate_hz": None, "lowpass_hz": None}
+    return {
+        "seed": 1,
+        "vehicle": vehicle | {"rotor_speed_max_rad_s": 1e4},
+        "import": read | {"spike_deviations": None},
+        "gap": {"shifts": 39, "effects_max": 1},
+    }
+
+
+@pytest.fixture(scope="module")
+def found(cpfls, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("repeats")
+    paths = [folder / f"run-{draw}.csv" for draw in range(3)]
+    truth = SMALL._replace(drag=0.1)
+    for path, flown in zip(paths, gusty_flights([Flight(truth, GUSTS, 0, n) for n in range(3)], 24.0), strict=True):
+        motion = flown.motion
+        time = motion.period * np.arange(len(flown))
+        parts = (time, euler_angles(motion.rotation), motion.rate, motion.velocity, flown.speed)
+        header = ",".join(["t", *(name for names, _ in COLUMNS.values() for name in names)])
+        np.savetxt(path, np.column_stack(parts), delimiter=",", header=header, comments="", fmt="%.9g")
+    study = folder / "study.yaml"
+    study.write_text(yaml.safe_dump(config()))
+    with undrawn():
+        result = cpfls("gap", study, *paths, "-o", folder / "gap")
+    assert result.exit_code == 0, result.stderr
+    summary = json.loads((folder / "gap" / "gap.json").read_text())
+    return SimpleNamespace(folder=folder / "gap", stdout=result.stdout, summary=summary)
+
+
+def test_what_comes_again_stands_first(found):
+    assert found.stdout.startswith("REPEATS: Of the gap in the force along")
+    assert "comes again: the model lacks an effect there." in found.stdout.splitlines()[0]
+    assert "Torque about x (roll): nothing comes again" in found.stdout
+    assert "--repeat" not in found.stdout
+
+
+def test_machines_read_the_same_of_all_flights_and_of_pairs_with_the_held_out_one(found):
+    compared, before = found.summary["disagreement"]["comes_again"], found.summary["comes_again"]["before"]
+    assert (compared["runs"], compared["paths"], before["runs"]) == (3, 1, 3)
+    for told in (compared, before):
+        assert told["channels"]["force x"]["share"][0] > 0.7
+        assert all(told["channels"]["force x"]["comes_again"][:5])
+        assert not any(told["channels"]["torque x"]["comes_again"])
+    record = read_record(found.folder / "diagnosis.h5", DiagnosisRecord)
+    assert record.again_before.share[3, 0] == pytest.approx(before["channels"]["force x"]["share"][0])
+
+
+def test_the_report_shows_it_in_a_picture(found):
+    page = (found.folder / "report.html").read_text()
+    assert "comes-again-diagnosed-1" in page
+    assert "comes-again-compared-1" in page
+    assert page.index("REPEATS") < page.index("What comes again")
