@@ -8,8 +8,9 @@ grow with frequency, and that of the rotor speeds.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, half_width, mean_error
+from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.instruments import Instruments
@@ -36,9 +38,11 @@ _MEMORY_S = (0.05, 8.0)
 _BEGIN_S = (0.2, 1.0)
 _EDGE = 1.02
 """Factor from a bound of the memory within which it lies on the bound."""
-_FEWEST_BLOCKS = 8
-_KNOWN, _LASTING = 2.0, 4.0
-"""Ratio of the ends of an interval up to which a size is known, and a memory."""
+_FEWEST_BLOCKS, _BLOCKS, _LEAST_BLOCK_S = 8, 16, 4.0
+"""Below the first their scatter says nothing. Flights are cut into the second, unless blocks are longer than pieces then
+or shorter than the last, which is what a piece mostly sees."""
+_KNOWN, _SEEN = 3.0, 0.1
+"""Ratio of the ends of an interval up to which a size is known, and the least share of what is left that it has."""
 _LAG_S, _LAGS, _FOLDS, _RIDGE = 0.1, 5, 5, 1e-6
 """What was asked for is answered within half a second; parts that are predicted by the others."""
 _FAR, _NOISE, _AT_END = 12.0, 3.0, 1e-3
@@ -52,9 +56,10 @@ class FoundGusts:
     Attributes
     ----------
     size, low, high : array, shape (axis,), N m and N
-        Standard deviation; where none is known, NaN, 0, and the size of all that is left.
+        Standard deviation; where none is known, NaN, 0, and the size of all that is left. NaN where the body is not
+        known either.
     memory, memory_low, memory_high : array, shape (axis,), s
-        NaN where no size is known; at its ends where it is not known either.
+        NaN where no size is known.
     told_by : {"repeats", "setpoints", "none"}
         What told gusts from what the model lacks.
     """
@@ -137,7 +142,9 @@ class _Band(NamedTuple):
         return np.concatenate([np.zeros(0, dtype=np.int64), *found]).astype(np.int64)
 
 
-def find_gusts(model: VehicleModel, given: Instruments) -> FoundGusts | None:
+def find_gusts(
+    model: VehicleModel, given: Instruments, determined: Mapping[str, bool] = MappingProxyType({})
+) -> FoundGusts | None:
     """Find sizes and memories of gusts in flights of a vehicle that is known.
 
     The power of what does not come again is ``s^2 G(w; m) + a A(w) + b B(w)``: that of a Gauss-Markov process of size s
@@ -150,6 +157,9 @@ def find_gusts(model: VehicleModel, given: Instruments) -> FoundGusts | None:
         Its constants have to be those of the vehicle: a wrong body is answered with gusts.
     given : Instruments
         Of flights with rotor speeds. Without any all that is left is counted, and no size is known.
+    determined : mapping of str to bool
+        Of numbers of the model that were sought. Nothing is known about an axis whose moment of inertia is not
+        determined, and of forces where the thrust factor is not.
 
     Returns
     -------
@@ -172,8 +182,10 @@ def find_gusts(model: VehicleModel, given: Instruments) -> FoundGusts | None:
     runs = min((len(beside) + 1 for beside in given.repeats.beside if beside), default=1)
     # Runs of a path are compared with each other, so what they tell of a gust is told several times.
     shared = np.sqrt(2 * runs / (2 * runs - 1)) if told_by == "repeats" else 1.0
-    axes = [_Axis(band, powers.power[:, axis], powers.count) for axis in range(powers.power.shape[1])]
+    axes = [_Axis(band, power, powers.count) for power in powers.power.swapaxes(0, 1)]
     columns = np.array([axis.bound() if told_by == "none" else axis.found(shared) for axis in axes])
+    bodies = [f"inertia.{name}" for name in INERTIA_PARAMETERS[:3]] + ["thrust_factor"] * 3
+    columns[[not determined.get(name, True) for name in bodies[: len(axes)]]] = np.nan
     return FoundGusts(*columns.T, told_by=told_by)
 
 
@@ -190,11 +202,13 @@ def _powers(model: VehicleModel, given: Instruments, band: _Band) -> tuple[_Powe
         beside = _expected(given, left, band)
     else:
         beside = [np.zeros_like(own) for own in left]
+    seen = sum(float(np.ptp(band.starts(flight))) * flight.motion.period for flight in given.flown if len(flight))
+    block_s = min(_PIECE_S, max(seen / _BLOCKS, _LEAST_BLOCK_S))
     power, count = [], []
     for flight, own, known in zip(given.flown, left, beside, strict=True):
         there = np.isfinite(known).all(axis=(1, 2))
         products = (own * np.conj(own - known)).real[there]
-        block = band.starts(flight)[there] * flight.motion.period // _PIECE_S
+        block = band.starts(flight)[there] * flight.motion.period // block_s
         for each in np.unique(block):
             power.append(products[block == each].sum(axis=0))
             count.append(int((block == each).sum()))
@@ -284,8 +298,9 @@ class _Axis:
         half = half_width(shared * self._errors(*fit) * [0.5, 1.0], len(self._count))
         size, memory = float(np.exp(0.5 * fit.numbers[0])), float(np.exp(fit.numbers[1]))
         inside = _EDGE * _MEMORY_S[0] < memory < _MEMORY_S[1] / _EDGE
-        if not inside or 2 * half[0] > np.log(_KNOWN):
-            return self.bound()
+        everything = self.bound()
+        if not inside or 2 * half[0] > np.log(_KNOWN) or size**2 < _SEEN * everything[2] ** 2:
+            return everything
         ends = np.clip([memory * np.exp(-half[1]), memory * np.exp(half[1])], *_MEMORY_S)
         return np.array([size, size * np.exp(-half[0]), size * np.exp(half[0]), memory, *ends])
 
@@ -336,5 +351,6 @@ class _Axis:
         scores = (self._power / expected - self._count[:, None]) @ slopes.T / self._count.sum()
         moved = np.linalg.lstsq(slopes @ slopes.T, scores.T, rcond=None)[0]
         errors, blocks = np.full(len(numbers), np.inf), len(self._count)
-        errors[free] = np.sqrt(blocks / (blocks - 1) * (moved**2).sum(axis=1))
+        # Slopes at the numbers that are fitted to them scatter less than at the true ones.
+        errors[free] = np.sqrt(blocks / (blocks - free.sum()) * (moved**2).sum(axis=1))
         return errors[:2]
