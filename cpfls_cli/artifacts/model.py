@@ -190,7 +190,8 @@ class GustsGroup:
     @classmethod
     def of(cls, gusts: Gusts) -> Self:
         """Arrange gusts."""
-        return cls(gusts.size[:3], gusts.memory[:3], gusts.size[3:], gusts.memory[3:])
+        (torque, force), (turning, pushing) = (values.reshape(2, 3) for values in gusts)
+        return cls(torque=torque, torque_memory=turning, force=force, force_memory=pushing)
 
     def gusts(self) -> Gusts:
         """Rebuild them."""

@@ -39,8 +39,8 @@ _BEGIN_S = (0.2, 1.0)
 _EDGE = 1.02
 """Factor from a bound of the memory within which it lies on the bound."""
 _FEWEST_BLOCKS, _BLOCKS, _LEAST_BLOCK_S = 8, 16, 4.0
-"""Below the first their scatter says nothing. Flights are cut into the second, unless blocks are longer than pieces then
-or shorter than the last, which is what a piece mostly sees."""
+"""Below the first their scatter says nothing. Flights are cut into the second, unless blocks get longer than pieces or
+shorter than the last, which is what a piece mostly sees."""
 _KNOWN, _SEEN = 3.0, 0.1
 """Ratio of the ends of an interval up to which a size is known, and the least share of what is left that it has."""
 _LAG_S, _LAGS, _FOLDS, _RIDGE = 0.1, 5, 5, 1e-6
