@@ -22,6 +22,7 @@ from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.models import read_model
+from cpfls_cli.pages.disturbance import still_air_text
 from cpfls_cli.pages.flight import answer, autopilot_text
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trajectory import violation_sentence
@@ -129,7 +130,7 @@ def _closed_loop(
     errors = _path_errors(flight)
     effects = {} if record.effects is None else record.effects.by_name
     silent = model is not None and model.gusts is not None and not job.study.simulation.closed_loop.gusts
-    calm = [Text("in still air; the model holds the gusts of its flights: --gusts plays them")] if silent else []
+    calm = [still_air_text()] if silent else []
     clipped = (Text(f"{violation_sentence(one, time)}; clipped", "warning") for one in flight.violations)
     return Outcome(
         _summary(flight, record) | {"tracking": errors, "effects": effects},

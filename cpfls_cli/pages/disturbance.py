@@ -27,6 +27,11 @@ def gust_blocks(record: VehicleRecord, index: int) -> Iterator[Block]:
         yield _table(axes, record, index)
 
 
+def still_air_text() -> Text:
+    """Say of a flight that the gusts which its model holds were not played."""
+    return Text("flown in still air; the model holds the gusts of its flights: --gusts plays them")
+
+
 def gust_words(axes: list[GustAxis], told_by: str) -> str:
     """Tell sizes and memories by axis, and what no gust exceeds."""
     known = [_size(axis) for axis in axes if np.isfinite(axis.size)]

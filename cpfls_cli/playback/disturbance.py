@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
@@ -25,6 +26,8 @@ from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.playback.loop import wrench_during
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.weak_form.windows import Windows, windows
+
+_Complex = npt.NDArray[np.complex128]
 
 _PIECE_S, _SHORTEST_S = 8.0, 3.0
 """Pieces whose power is taken by frequency: several times what gusts remember; the shortest that tell anything."""
@@ -89,11 +92,12 @@ class _Powers(NamedTuple):
     ----------
     power : array, shape (block, axis, frequency)
         Sums over the pieces of a block, squared units of torque and force.
-    count : array, shape (block,)
+    pieces : array, shape (block,)
+        How many there are.
     """
 
     power: Array
-    count: IntArray
+    pieces: IntArray
 
 
 class _Band(NamedTuple):
@@ -109,20 +113,21 @@ class _Band(NamedTuple):
 
     pieces: Windows
     turns: Array
-    weight: Array
-    slope: Array
+    weight: _Complex
+    slope: _Complex
 
     @classmethod
     def of(cls, period: float, length_s: float) -> _Band:
         pieces = windows(period, length_s, _OVERLAP)
         size = len(pieces.weight)
         top = min(_TOP_HZ, _TOP_SHARE / period)
-        turns = 2 * np.pi * np.arange(int(top * size * period) + 1) / (size * period)
+        turns = np.asarray(2 * np.pi / (size * period) * np.arange(int(top * size * period) + 1), dtype=float)
         wave = np.exp(-1j * period * np.outer(np.arange(size), turns))
         slope = pieces.slope[:, None] - 1j * turns * pieces.weight[:, None]
-        return cls(pieces, turns, pieces.weight[:, None] * wave, slope * wave)
+        kernels = [np.asarray(kernel * wave, dtype=np.complex128) for kernel in (pieces.weight[:, None], slope)]
+        return cls(pieces, turns, *kernels)
 
-    def laid(self, flight: PlaybackFlight, values: Array, kernel: Array) -> Array:
+    def laid(self, flight: PlaybackFlight, values: Array, kernel: _Complex) -> Array:
         """Lay a kernel over values, shape (time, column) to (piece, column, frequency)."""
         parts = [
             sliding_window_view(values[part], len(kernel), axis=0)[:: self.pieces.hop] @ kernel
@@ -171,27 +176,29 @@ def find_gusts(
     Whittle 1953; White 1982 (errors from the scatter of slopes); Uhlenbeck and Ornstein 1930.
     """
     period = given.flown[0].motion.period
-    longest = max(part.stop - part.start for flight in given.flown for part in flight.stretches) * period
+    longest = max((part.stop - part.start for flight in given.flown for part in flight.stretches), default=0) * period
     length = min(_PIECE_S, _RUN_SHARE * longest)
     if length < _SHORTEST_S or any(flight.motion.period != period for flight in given.flown):
         return None
     band = _Band.of(period, length)
-    powers, told_by = _powers(model, given, band)
-    if len(powers.count) < _FEWEST_BLOCKS:
+    powers, told_by = _powers(model, given, band), given.kind
+    if len(powers.pieces) < _FEWEST_BLOCKS:
         return None
     runs = min((len(beside) + 1 for beside in given.repeats.beside if beside), default=1)
     # Runs of a path are compared with each other, so what they tell of a gust is told several times.
     shared = np.sqrt(2 * runs / (2 * runs - 1)) if told_by == "repeats" else 1.0
-    axes = [_Axis(band, power, powers.count) for power in powers.power.swapaxes(0, 1)]
+    axes = [_Axis(band, power, powers.pieces) for power in powers.power.swapaxes(0, 1)]
     columns = np.array([axis.bound() if told_by == "none" else axis.found(shared) for axis in axes])
     bodies = [f"inertia.{name}" for name in INERTIA_PARAMETERS[:3]] + ["thrust_factor"] * 3
     columns[[not determined.get(name, True) for name in bodies[: len(axes)]]] = np.nan
-    return FoundGusts(*columns.T, told_by=told_by)
+    size, low, high, memory, memory_low, memory_high = columns.T
+    return FoundGusts(size, low, high, memory, memory_low, memory_high, told_by)
 
 
-def _powers(model: VehicleModel, given: Instruments, band: _Band) -> tuple[_Powers, str]:
-    """Take the power of what does not come again, by block of a run, and say what told it."""
-    sides = [_sides(model, flight) for flight in given.flown]
+def _powers(model: VehicleModel, given: Instruments, band: _Band) -> _Powers:
+    """Take the power of what does not come again, by block of a run."""
+    rows = 6 if all(flight.translates for flight in given.flown) else 3
+    sides = [_sides(model, flight)[..., :rows] for flight in given.flown]
     left = [band.left(flight, own) for flight, own in zip(given.flown, sides, strict=True)]
     if given.kind == "repeats":
         beside = [
@@ -202,21 +209,22 @@ def _powers(model: VehicleModel, given: Instruments, band: _Band) -> tuple[_Powe
         beside = _expected(given, left, band)
     else:
         beside = [np.zeros_like(own) for own in left]
-    seen = sum(float(np.ptp(band.starts(flight))) * flight.motion.period for flight in given.flown if len(flight))
+    period = given.flown[0].motion.period
+    seen = sum(len(own) for own in left) * band.pieces.hop * period
     block_s = min(_PIECE_S, max(seen / _BLOCKS, _LEAST_BLOCK_S))
     power, count = [], []
     for flight, own, known in zip(given.flown, left, beside, strict=True):
         there = np.isfinite(known).all(axis=(1, 2))
         products = (own * np.conj(own - known)).real[there]
-        block = band.starts(flight)[there] * flight.motion.period // block_s
+        block = band.starts(flight)[there] * period // block_s
         for each in np.unique(block):
             power.append(products[block == each].sum(axis=0))
             count.append(int((block == each).sum()))
-    return _Powers(np.array(power), np.array(count, dtype=np.int64)), given.kind
+    return _Powers(np.array(power), np.array(count, dtype=np.int64))
 
 
 def _sides(model: VehicleModel, flight: PlaybackFlight) -> Array:
-    """Evaluate momentum, and torque and force that change it, body frame, shape (time, 2, 3 or 6)."""
+    """Evaluate momentum, and torque and force that change it, body frame, shape (time, 2, 6)."""
     motion, inertia, mass = flight.motion, model.body.inertia, model.vehicle.mass_kg
     velocity = np.einsum("tji,tj->ti", motion.rotation, motion.velocity)
     momentum = np.hstack([motion.rate @ inertia, mass * velocity])
@@ -227,7 +235,7 @@ def _sides(model: VehicleModel, flight: PlaybackFlight) -> Array:
     sides[:, 1, :3] -= np.cross(motion.rate, momentum[:, :3])
     sides[:, 1, 3:] -= np.cross(motion.rate, momentum[:, 3:])
     sides[:, 1, 3:] -= mass * model.vehicle.gravity_m_s2 * motion.rotation[:, 2]
-    return sides if flight.translates else sides[..., :3]
+    return sides
 
 
 def _expected(given: Instruments, left: Sequence[Array], band: _Band) -> list[Array]:
@@ -236,7 +244,9 @@ def _expected(given: Instruments, left: Sequence[Array], band: _Band) -> list[Ar
     A delay of what was asked for is a turn of its phase.
     """
     late = np.exp(-1j * _LAG_S * np.outer(np.arange(_LAGS), band.turns))
-    numbers = [number for number, asked in enumerate(given.setpoints) if asked is not None]
+    numbers = [number for number, own in enumerate(left) if given.setpoints[number] is not None and len(own)]
+    if not numbers:
+        return [np.nan * own for own in left]
     asked = np.concatenate(
         [band.laid(given.flown[number], np.asarray(given.setpoints[number]), band.weight) for number in numbers]
     )
