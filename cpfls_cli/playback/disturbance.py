@@ -148,7 +148,11 @@ class _Band(NamedTuple):
 
 
 def find_gusts(
-    model: VehicleModel, given: Instruments, determined: Mapping[str, bool] = MappingProxyType({})
+    model: VehicleModel,
+    given: Instruments,
+    determined: Mapping[str, bool] = MappingProxyType({}),
+    *,
+    told: bool = True,
 ) -> FoundGusts | None:
     """Find sizes and memories of gusts in flights of a vehicle that is known.
 
@@ -165,6 +169,9 @@ def find_gusts(
     determined : mapping of str to bool
         Of numbers of the model that were sought. Nothing is known about an axis whose moment of inertia is not
         determined, and of forces where the thrust factor is not.
+    told : bool
+        Whether instruments told the constants too. Those of a fit may be mixed with the loop, even where torque
+        explains nearly all of the rotation, by as much as the gusts are: then they are not asked, and there is a bound.
 
     Returns
     -------
@@ -181,7 +188,8 @@ def find_gusts(
     if length < _SHORTEST_S or any(flight.motion.period != period for flight in given.flown):
         return None
     band = _Band.of(period, length)
-    powers, told_by = _powers(model, given, band), given.kind
+    told_by = given.kind if told else "none"
+    powers = _powers(model, given, band, told_by)
     if len(powers.pieces) < _FEWEST_BLOCKS:
         return None
     runs = min((len(beside) + 1 for beside in given.repeats.beside if beside), default=1)
@@ -195,17 +203,17 @@ def find_gusts(
     return FoundGusts(size, low, high, memory, memory_low, memory_high, told_by)
 
 
-def _powers(model: VehicleModel, given: Instruments, band: _Band) -> _Powers:
+def _powers(model: VehicleModel, given: Instruments, band: _Band, told_by: str) -> _Powers:
     """Take the power of what does not come again, by block of a run."""
     rows = 6 if all(flight.translates for flight in given.flown) else 3
     sides = [_sides(model, flight)[..., :rows] for flight in given.flown]
     left = [band.left(flight, own) for flight, own in zip(given.flown, sides, strict=True)]
-    if given.kind == "repeats":
+    if told_by == "repeats":
         beside = [
             band.left(flight, given.repeats.others(number, sides)) if given.repeats.beside[number] else np.nan * own
             for number, (flight, own) in enumerate(zip(given.flown, left, strict=True))
         ]
-    elif given.kind == "setpoints":
+    elif told_by == "setpoints":
         beside = _expected(given, left, band)
     else:
         beside = [np.zeros_like(own) for own in left]

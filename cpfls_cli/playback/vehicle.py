@@ -179,11 +179,9 @@ def find_vehicle(
     numbers = (*sensed, *bodily(begun, tuple(found_numbers(solved, spread))))
     if forecast is None:
         numbers = tuple(beside_loop(numbers, loop))
-    gusts = (
-        None
-        if forecast is None and loop.shows_loop
-        else find_gusts(model, given, {number.name: number.determined for number in numbers})
-    )
+    gusts, determined = None, {number.name: number.determined for number in numbers}
+    if forecast is not None or not loop.shows_loop:
+        gusts = find_gusts(model, given, determined, told=forecast is not None)
     return FoundVehicle(
         replace(model, gusts=None if gusts is None else gusts.gusts),
         numbers,

@@ -11,6 +11,9 @@ from cpfls_cli.playback.disturbance import find_gusts
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Repeats, instruments
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.parameters import blocks_of
+from cpfls_cli.playback.settings import PlaybackSettings
+from cpfls_cli.playback.vehicle import find_vehicle
 from cpfls_cli.simulation.measured import measure
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.planning import plan
@@ -32,7 +35,7 @@ SHOVE, SHOVE_MEMORY_S = 0.06, 1.0
 def asked(truth, gusts, kind):
     if kind == "repeats":
         return [Flight(truth, gusts, path, RUNS * path + run) for path in (0, 1) for run in range(RUNS)]
-    return [Flight(truth, gusts, path, 1) for path in range(PATHS)]
+    return [Flight(truth, gusts, path, 1, reach=5.0) for path in range(PATHS)]
 
 
 def given(kind, flown):
@@ -135,3 +138,40 @@ def test_a_vehicle_simulated_in_its_own_gusts_shows_the_same(flights):
     low, high = np.log([after.low, after.memory_low]), np.log([after.high, after.memory_high])
     assert ((low < played) & (played < high)).sum() >= 9
     assert (np.abs(played - 0.5 * (low + high)) < 1.7 * 0.5 * (high - low)).all()
+
+
+@pytest.fixture(scope="module")
+def found(flights):
+    """Vehicles with all but the inertia known: by runs of a path, by nothing, and by nothing on a path that shakes."""
+    repeats, shaken = flights["45 g", "repeats"].flown, flights["45 g", "setpoints"].flown
+    vehicle = replace(SMALL.vehicle, unknown=("inertia",))
+    settings = PlaybackSettings(
+        leave_out=tuple(blocks_of(vehicle)), search_windows=20, folds=2, population=2, generations=0
+    )
+
+    def find(flown):
+        unasked = [replace(flight, setpoints={}) for flight in flown]
+        return find_vehicle(vehicle, unasked, settings, np.random.default_rng(1), lambda *_: None)
+
+    return {"repeats": find(repeats), "alone": find([repeats[0], repeats[RUNS]]), "shaken": find(shaken)}
+
+
+def test_a_vehicle_that_instruments_tell_holds_its_gusts(found):
+    by_runs = found["repeats"]
+    assert by_runs.gusts.told_by == "repeats"
+    assert by_runs.model.gusts.size[:2] / SMALL.inertia[:2] == pytest.approx(GUSTS[:2], rel=0.25)
+
+
+def test_beside_the_loop_no_size_is_said(found):
+    assert found["alone"].loop.shows_loop
+    assert found["alone"].gusts is None
+    assert found["alone"].model.gusts is None
+
+
+def test_a_body_that_the_loop_may_have_part_in_has_gusts_with_a_bound(found):
+    """Torque explains nearly all of the rotation, and the moments are still 10 to 30 % off."""
+    shaken = found["shaken"]
+    assert not shaken.loop.shows_loop
+    assert shaken.gusts.told_by == "none"
+    assert shaken.model.gusts is None
+    assert (shaken.gusts.high[:2] / SMALL.inertia[:2] > GUSTS[:2]).all()
