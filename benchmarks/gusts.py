@@ -1,11 +1,10 @@
 """Sizes and memories of gusts, found over true, and how often their intervals hold the truth.
 
-    python benchmarks/gusts.py [DRAWS] [found]
+    python benchmarks/gusts.py [DRAWS]
 
 Two vehicles of 45 g and 1.5 kg in three levels of gusts, on a path with sines of up to 5 Hz, 40 s long: flown four
 times without setpoints in the log, or three paths once with the position that was asked for. The body is the true one,
-but for damping and drag, which no model here has; with `found` it is the one that instruments tell, moments of inertia
-sought from twice too large. Nothing of the package flies them.
+but for damping and drag, which no model here has. Nothing of the package flies them.
 """
 
 from __future__ import annotations
@@ -23,14 +22,12 @@ pin_threads()
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.playback.constants import find_constants
 from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
 from cpfls_cli.playback.instruments import Instruments, Repeats, instruments
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.vehicle import found_numbers
 from tests.builders.gusty_flights import CALM, GUSTS, LARGE, MEMORY_S, SMALL, STORM, Flight, Truth, gusty_flights
 
-DRAWS = 6
+DRAWS = 2
 VEHICLES = {"45 g": SMALL, "1.5 kg": LARGE}
 RUNS, PATHS, REACH_HZ, SECONDS = 4, 3, 5.0, 40.0
 SHOVE, SHOVE_MEMORY_S = 0.06, 1.0
@@ -38,12 +35,13 @@ SHOVE, SHOVE_MEMORY_S = 0.06, 1.0
 PARTS = {"roll, pitch": slice(0, 2), "yaw": slice(2, 3), "force": slice(3, 6)}
 
 
-def main(draws: int, *, found: bool) -> None:
+def main(draws: int) -> None:
     rows = []
     for name, truth in VEHICLES.items():
         for gusts in (CALM, GUSTS, STORM):
             for kind in ("repeats", "setpoints"):
-                drawn = [_found(truth, gusts, kind, draw, found=found) for draw in range(draws)]
+                model = VehicleModel(vehicle=truth.vehicle)
+                drawn = [find_gusts(model, _flown(truth, gusts, kind, draw)) for draw in range(draws)]
                 rows += [_row(name, truth, gusts, kind, part, [each for each in drawn if each]) for part in PARTS]
     header = ["vehicle", "gusts", "instrument", "axes", "size", "holds", "memory", "holds", "told", "bound"]
     table("gusts", header, rows)
@@ -76,21 +74,6 @@ def _over(value: Array, low: Array, high: Array, true: Array, told: Array) -> li
     return [f"{ratio.mean():.2f} ({ratio.min():.2f} to {ratio.max():.2f})", f"{inside.sum()} of {inside.size}"]
 
 
-def _found(truth: Truth, gusts: tuple[float, float, float], kind: str, draw: int, *, found: bool) -> FoundGusts | None:
-    """Fly, and find the gusts; None where the body is not found."""
-    given, model, determined = _flown(truth, gusts, kind, draw), VehicleModel(vehicle=truth.vehicle), {}
-    if found:
-        heavy = (*(2 * moment for moment in truth.inertia), 0.0, 0.0, 0.0)
-        begun = replace(truth.vehicle, inertia_kg_m2=heavy, unknown=("inertia",))
-        constants = find_constants(begun, given.flown, given)
-        if constants is None or not constants.tells:
-            return None
-        model = constants.fitted.model
-        numbers = found_numbers(constants.fitted, constants.spread)
-        determined = {number.name: number.determined for number in numbers}
-    return find_gusts(model, given, determined)
-
-
 def _flown(truth: Truth, gusts: tuple[float, float, float], kind: str, draw: int) -> Instruments:
     """Fly one path again and again, or several once; nothing but what is named tells what was asked."""
     if kind == "repeats":
@@ -102,6 +85,4 @@ def _flown(truth: Truth, gusts: tuple[float, float, float], kind: str, draw: int
 
 
 if __name__ == "__main__":
-    words = sys.argv[1:]
-    counts = [int(word) for word in words if word.isdigit()]
-    main(counts[0] if counts else DRAWS, found="found" in words)
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else DRAWS)
