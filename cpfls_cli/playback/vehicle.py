@@ -179,8 +179,9 @@ def find_vehicle(
     numbers = (*sensed, *bodily(begun, tuple(found_numbers(solved, spread))))
     if forecast is None:
         numbers = tuple(beside_loop(numbers, loop))
-    gusts, determined = None, {number.name: number.determined for number in numbers}
+    gusts: FoundGusts | None = None
     if forecast is not None or not loop.shows_loop:
+        determined = {number.name: number.determined for number in numbers}
         gusts = find_gusts(model, given, determined, told=forecast is not None)
     return FoundVehicle(
         replace(model, gusts=None if gusts is None else gusts.gusts),
