@@ -12,6 +12,7 @@ from cpfls_cli.artifacts.audit import AuditGroup
 from cpfls_cli.artifacts.learned import LearnedFlight, LearnedGroup, learned_in
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
+from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
@@ -178,6 +179,36 @@ class RemainderGroup:
 
 
 @record
+class GustsGroup:
+    """Random torque and force of its flights, as Gauss-Markov processes: roll, pitch, yaw, then along x, y, z."""
+
+    torque: Array = dataset("torque", "standard deviation; 0 for none", "axis", units="N m", frame=BODY)
+    torque_memory: Array = dataset("torque_memory", "time in which a gust falls to 37 %", "axis", units="s", frame=BODY)
+    force: Array = dataset("force", "standard deviation; 0 for none", "axis", units="N", frame=BODY)
+    force_memory: Array = dataset("force_memory", "time in which a gust falls to 37 %", "axis", units="s", frame=BODY)
+
+    @classmethod
+    def of(cls, gusts: Gusts) -> Self:
+        """Arrange gusts."""
+        (torque, force), (turning, pushing) = (values.reshape(2, 3) for values in gusts)
+        return cls(torque=torque, torque_memory=turning, force=force, force_memory=pushing)
+
+    def gusts(self) -> Gusts:
+        """Rebuild them."""
+        return Gusts(np.append(self.torque, self.force), np.append(self.torque_memory, self.force_memory))
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The gusts for machines."""
+        return {
+            "torque_n_m": self.torque.tolist(),
+            "torque_memory_s": self.torque_memory.tolist(),
+            "force_n": self.force.tolist(),
+            "force_memory_s": self.force_memory.tolist(),
+        }
+
+
+@record
 class InertiaFunctionsGroup:
     """Inertia over attitude by fuzzy systems, all that is needed to evaluate it, and where it was found."""
 
@@ -253,6 +284,7 @@ class VehicleGroup:
     )
     inertia_functions: InertiaFunctionsGroup | None = group("inertia_functions", default=None)
     repair: AuditGroup | None = group("repair", default=None)
+    gusts: GustsGroup | None = group("gusts", default=None)
 
     @classmethod
     def of(cls, model: VehicleModel) -> Self:
@@ -270,6 +302,7 @@ class VehicleGroup:
             # What is written was identified.
             inertia_functions=None if functions is None else InertiaFunctionsGroup.of(functions),
             repair=None if model.repairs is None else AuditGroup.of(model.repairs),
+            gusts=None if model.gusts is None else GustsGroup.of(model.gusts),
         )
 
     def vehicle(self) -> VehicleSettings:
@@ -302,6 +335,7 @@ class VehicleGroup:
             "effects": {name: self.effect.linear_of(name).tolist() for name in self.effect.name},
             "remainder": None if self.remainder is None else self.remainder.rows.tolist(),
             "steady_wind_m_s": [0.0, 0.0, 0.0] if self.wind is None else self.wind.tolist(),
+            "gusts": None if self.gusts is None else self.gusts.summary,
         }
 
 

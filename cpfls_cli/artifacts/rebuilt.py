@@ -42,6 +42,7 @@ def vehicle_model(group: VehicleGroup) -> VehicleModel:
         commanded=group.response.commanded,
         hold=None if group.response.hold == USUAL else group.response.hold,  # type: ignore[arg-type]
         repairs=None if group.repair is None else audit(group.repair),
+        gusts=None if group.gusts is None else group.gusts.gusts(),
     )
 
 

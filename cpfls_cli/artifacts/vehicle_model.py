@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.artifacts.disturbance import DisturbanceGroup
 from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
 from cpfls_cli.artifacts.parameters import parameters_of
@@ -277,6 +278,7 @@ class VehicleRecord(ModelRecord):
     contradiction: tuple[str, ...] | None = dataset(
         "contradiction", "what of the flights contradicts itself or the vehicle", "contradiction", default=None
     )
+    disturbance: DisturbanceGroup | None = group("disturbance", default=None)
 
     @classmethod
     def of(
@@ -320,6 +322,7 @@ class VehicleRecord(ModelRecord):
             guess=found.guessed or None,
             difference=columns_of(DifferencesGroup, found.differences) if found.differences else None,
             contradiction=None if contradictions is None else tuple(contradictions),
+            disturbance=None if found.gusts is None else DisturbanceGroup.of(found.gusts),
         )
 
     @property
@@ -387,6 +390,9 @@ class VehicleRecord(ModelRecord):
             },
             "instruments": None if self.instruments is None else self.instruments.summary,
             "response": None if self.response is None else self.response.summary,
+            "disturbance": None
+            if self.disturbance is None
+            else self.disturbance.summary(self.vehicle.inertia, self.vehicle.mass),
             "structures": rows_of(self.structure),
             "held_out": None if self.held_out is None else self.held_out.summary,
             "shares": {row.pop("name"): row for row in rows_of(self.share)},

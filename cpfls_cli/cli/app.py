@@ -299,12 +299,15 @@ def simulate(
             "NAME.coefficient=VALUE; may be repeated.",
         ),
     ] = None,
+    gusts: Annotated[
+        bool, typer.Option("--gusts", help="Fly in the gusts that the model of `cpfls vehicle` holds, in closed loop.")
+    ] = False,
     *,
     common: Common,
 ) -> None:
     """Fly a trajectory: exactly, in closed loop with effects that a model lacks, or with a model that controls it."""
     with messages_for_errors():
-        asked = _of("simulate").option_overrides(mode, effect or [])
+        asked = _of("simulate").option_overrides(mode, effect or [], gusts=gusts)
         common = replace(common, overrides=[*(common.overrides or []), *asked])
 
     _run("simulate", config, output, common, lambda command, job: command.run(job, trajectory, model, mode))

@@ -31,7 +31,9 @@ def info(path: Path) -> Outcome:
     if artifact.spec.format != ModelRecord.FORMAT.name:
         return Outcome(summary, description(artifact))
     model = read_record(path, ModelRecord)
-    return Outcome(summary | model.provenance, description(artifact, trust_facts(model)))
+    gusts = model.vehicle.gusts
+    told = model.provenance | ({} if gusts is None else {"gusts": gusts.summary})
+    return Outcome(summary | told, description(artifact, trust_facts(model)))
 
 
 def description(artifact: Outline, more: Sequence[tuple[str, str]] = ()) -> tuple[Block, ...]:

@@ -22,6 +22,7 @@ from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.models import read_model
+from cpfls_cli.pages.disturbance import still_air_text
 from cpfls_cli.pages.flight import answer, autopilot_text
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trajectory import violation_sentence
@@ -30,7 +31,7 @@ from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.simulation.inverse import SimulatedFlight, simulate
 from cpfls_cli.simulation.measured import MeasuredFlight, measure
-from cpfls_cli.simulation.model import simulated_effects, with_effects
+from cpfls_cli.simulation.model import played_gusts, simulated_effects, with_effects
 from cpfls_cli.simulation.settings import Mode
 
 _MOVED = ("position", "velocity", "acceleration")
@@ -75,6 +76,7 @@ def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None 
     flown = None if model is None else read_model(model, job.study)
     with settings_of("simulation", job.study):
         with_effects(flown, simulated_effects(job.study.simulation.closed_loop.effects, job.study.vehicle))
+        played_gusts(flown, job.study.simulation.closed_loop.gusts)
     if job.dry_run:
         return nothing_written(job)
     if closed:
@@ -127,10 +129,12 @@ def _closed_loop(
     record = finish(job, FlightRecord.of_simulation(signals, flight.noise_std, flight.effects), inputs)
     errors = _path_errors(flight)
     effects = {} if record.effects is None else record.effects.by_name
+    silent = model is not None and model.gusts is not None and not job.study.simulation.closed_loop.gusts
+    calm = [still_air_text()] if silent else []
     clipped = (Text(f"{violation_sentence(one, time)}; clipped", "warning") for one in flight.violations)
     return Outcome(
         _summary(flight, record) | {"tracking": errors, "effects": effects},
-        (autopilot_text(**errors), *answer(source_of(job, record)), *clipped),
+        (autopilot_text(**errors), *calm, *answer(source_of(job, record)), *clipped),
     )
 
 
@@ -156,8 +160,8 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def option_overrides(mode: str | None, effects: Sequence[str]) -> list[str]:
-    """Write ``--mode`` and ``--effect`` as overrides of the config, so that the artifact's config has them too.
+def option_overrides(mode: str | None, effects: Sequence[str], *, gusts: bool = False) -> list[str]:
+    """Write ``--mode``, ``--effect`` and ``--gusts`` as overrides of the config, which its artifact then holds.
 
     Parameters
     ----------
@@ -165,6 +169,8 @@ def option_overrides(mode: str | None, effects: Sequence[str]) -> list[str]:
         None keeps that of the config.
     effects : sequence of str
         ``NAME=VALUE[,VALUE...]`` or ``NAME.coefficient=VALUE`` each.
+    gusts : bool
+        Flown in closed loop, where no other mode is given.
 
     Returns
     -------
@@ -179,7 +185,9 @@ def option_overrides(mode: str | None, effects: Sequence[str]) -> list[str]:
     given: dict[str, list[float] | dict[str, float]] = {}
     for text in effects:
         _add_effect(text, given)
+    mode = "closed-loop" if gusts and mode is None else mode
     chosen = [] if mode is None else [f"simulation.mode={mode}"]
+    chosen += ["simulation.closed_loop.gusts=true"] if gusts else []
     # JSON is YAML, and numbers keep all their digits.
     return [*chosen, *(f"simulation.closed_loop.effects.{name}={json.dumps(value)}" for name, value in given.items())]
 

@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from cpfls_cli.artifacts.model import GustsGroup
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import VERTICAL
 from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.effects.polynomial import FACTORS
 from cpfls_cli.export.points import PERIOD
-from cpfls_cli.export.sheet import EXPORTER, Sheet, base_of, rule_labels
+from cpfls_cli.export.sheet import EXPORTER, GUST_RECIPE, Sheet, base_of, rule_labels
 from cpfls_cli.export.source import (
     airflow_order,
     airflow_peaks,
@@ -26,6 +27,7 @@ from cpfls_cli.export.source import (
 from cpfls_cli.export.text import strict_json
 from cpfls_cli.fuzzy.membership import Z_FUNCTION
 from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric
+from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.regressor.structure import Block
 
 FORMAT, VERSION = "cpfls/model-json", 2
@@ -139,6 +141,7 @@ def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
         "terms_of_motion": sheet.terms,
         "terms_of_rotors": sheet.rotor_terms,
         "factors_of_products": FACTORS.tolist(),
+        "gusts": None if sheet.model.gusts is None else _gusts(sheet.model.gusts),
         "weights": {name: column.tolist() for name, column in sheet.weights._asdict().items()},
         "learned": None
         if sheet.remainder is None
@@ -151,6 +154,10 @@ def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
         "reference_runs": [run_of(run) for run in runs],
     }
     return strict_json({**document, **sheet.evidence})
+
+
+def _gusts(gusts: Gusts) -> dict[str, Any]:
+    return {**GustsGroup.of(gusts).summary, "frame": BODY, "how_to_play": GUST_RECIPE}
 
 
 def _structure(model: InertiaFunctions) -> dict[str, Any]:

@@ -28,6 +28,13 @@ EXPORTER = __version__
 
 DO_NOT_USE = "DO NOT USE: this is the verdict on the model, which was exported all the same."
 
+GUST_RECIPE = (
+    "Torque and force of gusts act on the body beside those of the model, about and along its axes. Each is x, at "
+    "first size * n, and after every step h: x = k x + size sqrt(1 - k^2) n, k = exp(-h / memory), n a new normal "
+    "number."
+)
+"""How to play gusts, which no equation of an export holds."""
+
 _SEED = 1
 _ROWS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
 
@@ -199,6 +206,12 @@ class Sheet:
         if self.remainder is not None:
             rows = ", ".join(_ROWS[row] for row in self.remainder.rows)
             yield f"Learned, without a name: {rows} over the direction of the airflow."
+        if model.gusts is not None:
+            size, memory = (", ".join(f"{value:.4g}" for value in values) for values in model.gusts)
+            yield (
+                f"Gusts of its flights, not played here, {', '.join(_ROWS)}: standard deviations {size} (N m, N); "
+                f"memories {memory} s. {GUST_RECIPE}"
+            )
         if self.identified is not None:
             yield _inertia_in_words(self.identified, fuzzy=self.rules is not None)
 

@@ -263,6 +263,7 @@ def _common_words(sheet: Sheet, told: Sequence[str]) -> dict[str, Any]:
         "mass": number(vehicle.mass_kg),
         "gravity": number(vehicle.gravity_m_s2),
         **{name.removesuffix("_s"): number(value) for name, value in response_of(sheet).items()},
+        "gusts": [[number(value) for value in values] for values in sheet.model.gusts or ()],
         "order": airflow_order(sheet),
         "period": number(PERIOD),
         **({} if rules is None else _structure_words(rules)),

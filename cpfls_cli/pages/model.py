@@ -123,6 +123,9 @@ def facts(record: ModelRecord) -> list[tuple[str, str]]:
         rows.append(("Learned, without a name", f"{size} coefficients over the direction of the airflow"))
     if vehicle.wind is not None:
         rows.append(("Steady wind of its flights, m/s", " ".join(number(value, 3) for value in vehicle.wind)))
+    if vehicle.gusts is not None:
+        rows.append(("Gusts of its flights, N m", " ".join(number(value, 3) for value in vehicle.gusts.torque)))
+        rows.append(("Their force, N", " ".join(number(value, 3) for value in vehicle.gusts.force)))
     if repair is not None and (repair.settled or repair.faults):
         rows.append(("Taken out of the sensors first", " ".join((*repair.settled, *repair.faults))))
     return rows

@@ -28,6 +28,7 @@ from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, ResponsesGroup, 
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.pages.disturbance import gust_blocks
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.pages.replay import beside_rivals, errors_table, horizon_figure, playback_words
 from cpfls_cli.pages.source import Source, Sources, section_of_each
@@ -116,6 +117,7 @@ def details(vehicle: Source[VehicleRecord]) -> Iterator[Block]:
     yield from _differences_table(record, 1)
     yield from _constants(record, 1)
     yield from _numbers_table(vehicle, 1)
+    yield from gust_blocks(record, 1)
     yield _section_to_paste(record)
     yield from (Text(warning, "warning") for warning in warnings(record))
 
@@ -382,6 +384,7 @@ def _section(found: Source[VehicleRecord], index: int) -> Iterator[Block]:
     yield from _differences_table(record, index)
     yield from _constants(record, index)
     yield from _numbers_table(found, index)
+    yield from gust_blocks(record, index)
     yield _section_to_paste(record)
     yield from (Text(warning, "warning") for warning in warnings(record))
     yield _structures_table(record, index)

@@ -124,7 +124,7 @@ def _sums(model: VehicleModel, flight: PlaybackFlight, short_s: float, long_s: f
             continue
         rate = flight.motion.rate[stretch]
         momentum = rate @ model.body.inertia
-        torque = _torque(model, flight, stretch)
+        torque = wrench_during(model, flight, stretch)[:, :3]
         turning = band.derivative(momentum) + band.average(np.cross(rate, momentum))
         seen, unseen = band.average(torque), noise.average(torque)
         products = np.stack([seen**2, seen * turning, turning**2, unseen**2, noise.derivative(momentum) ** 2], axis=2)
@@ -133,9 +133,9 @@ def _sums(model: VehicleModel, flight: PlaybackFlight, short_s: float, long_s: f
         yield from (products[number == block].sum(axis=0) for block in range(blocks))
 
 
-def _torque(model: VehicleModel, flight: PlaybackFlight, stretch: slice) -> Array:
-    """Evaluate the torque of rotors and effects at the samples of a stretch, shape (time, 3), N m."""
+def wrench_during(model: VehicleModel, flight: PlaybackFlight, stretch: slice) -> Array:
+    """Evaluate torque and force of rotors and effects at the samples of a stretch, shape (time, 6), N m and N, body."""
     motion = flight.motion
     air = np.einsum("tji,tj->ti", motion.rotation[stretch], motion.velocity[stretch] - np.array(model.wind))
     rotor = model.response.terms_at_samples(flight.speed[stretch], motion.period, flight.hold)
-    return model.table.wrench(air, motion.rate[stretch], rotor)[:, :3]
+    return model.table.wrench(air, motion.rate[stretch], rotor)

@@ -18,6 +18,7 @@ from cpfls_cli.effects.registry import CENTRE_OF_MASS, effect
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.inertia import symmetric
+from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.kernels import MOST_COLUMNS, Body, airflow_terms
 from cpfls_cli.playback.rotors import Hold, RotorResponse
 from cpfls_cli.playback.table import (
@@ -123,6 +124,8 @@ class VehicleModel:
         What a command is between samples, where the response was found so; None: as a flight is usually taken.
     repairs : Audit or None
         Faults of the sensors, which are taken out of signals first.
+    gusts : Gusts or None
+        In its flights, as far as they are known; no part of what the model forecasts.
     """
 
     vehicle: VehicleSettings
@@ -135,6 +138,7 @@ class VehicleModel:
     commanded: bool = False
     hold: Hold | None = None
     repairs: Audit | None = None
+    gusts: Gusts | None = None
 
     @property
     def rotors(self) -> int:

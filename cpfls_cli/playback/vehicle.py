@@ -13,6 +13,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.inertia import INERTIA_PARAMETERS, beyond_any_body
 from cpfls_cli.playback.constants import Constants, find_constants
+from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
 from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import OF_A_WEIGHT, Group, JointNumbers
@@ -129,6 +130,8 @@ class FoundVehicle:
         What instruments tell; the model and its numbers are then these.
     forecast : VehicleModel or None
         What forecasts the flights, loop and all, where the model is the vehicle alone.
+    gusts : FoundGusts or None
+        Where the numbers are those of the vehicle; the model holds what is known of them.
     """
 
     model: VehicleModel
@@ -146,6 +149,7 @@ class FoundVehicle:
     instruments: Instruments
     constants: Constants | None = None
     forecast: VehicleModel | None = None
+    gusts: FoundGusts | None = None
 
 
 def find_vehicle(
@@ -173,9 +177,15 @@ def find_vehicle(
         solved, spread, forecast = fitted, uncertainty(fitted, windows), None
     model = solved.model
     numbers = (*sensed, *bodily(begun, tuple(found_numbers(solved, spread))))
+    if forecast is None:
+        numbers = tuple(beside_loop(numbers, loop))
+    gusts: FoundGusts | None = None
+    if forecast is not None or not loop.shows_loop:
+        determined = {number.name: number.determined for number in numbers}
+        gusts = find_gusts(model, given, determined, told=forecast is not None)
     return FoundVehicle(
-        model,
-        tuple(beside_loop(numbers, loop)) if forecast is None else numbers,
+        replace(model, gusts=None if gusts is None else gusts.gusts),
+        numbers,
         *_shares(model, own),
         tuple(_trades(solved, spread)),
         choice,
@@ -188,6 +198,7 @@ def find_vehicle(
         given,
         None if forecast is None else constants,
         forecast,
+        gusts,
     )
 
 

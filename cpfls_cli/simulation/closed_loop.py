@@ -235,6 +235,8 @@ class Loop:
     state : array, shape (state,)
     change : array, shape (state,)
         Derivative of the state in the step before.
+    push : array, shape (step, 6), N m and N, body frame
+        Of gusts, in the middle of each step.
     """
 
     autopilot: Autopilot
@@ -243,6 +245,7 @@ class Loop:
     plant: Plant
     state: Array
     change: Array
+    push: Array
 
     def advance(self, number: int) -> LoopStep:
         """Take one step.
@@ -256,7 +259,7 @@ class Loop:
         # The plan has the start before the middle of each step.
         wrench = _wrench(self.autopilot, number + 1, middle)
         rotors = self.actuators.advance(self.mixer.command(wrench))
-        self.change = self.plant.derivative(middle, rotors)
+        self.change = self.plant.derivative(middle, rotors, self.push[number])
         self.state = self.state + self.actuators.step * self.change
         return LoopStep(self.change, rotors, self.mixer.demand(wrench))
 
@@ -294,6 +297,7 @@ def fly(
     model: VehicleModel | None,
     effects: SimulatedEffects,
     progress: Callable[[float, int], None],
+    push: Array | None = None,
 ) -> SimulatedMotion:
     """Integrate a closed-loop flight along a planned motion.
 
@@ -310,6 +314,8 @@ def fly(
         That the autopilot does not know.
     progress : callable
         Takes steps done and steps in all.
+    push : array, shape (step, 6), N m and N, body frame, or None
+        Torque and force of gusts in the middle of each step of `clock_of`.
 
     Raises
     ------
@@ -317,7 +323,8 @@ def fly(
         If the plan is not sampled uniformly, or the vehicle leaves the path or overturns.
     """
     clock = clock_of(time, settings.integration_rate_hz)
-    flight = _loop(vehicle, settings, model, effects, planned, time, clock)
+    push = np.zeros((clock.steps, 6)) if push is None else push
+    flight = _loop(vehicle, settings, model, effects, planned, time, clock, push)
     states, steps = [flight.state], []
     # A vehicle that is lost may reach infinity before the next sample, where it is told.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -370,6 +377,7 @@ def _loop(
     planned: Mapping[str, Array],
     time: Array,
     clock: Clock,
+    push: Array,
 ) -> Loop:
     """Set up the loop at the start of the plan, with the rotors at their commanded speed."""
     autopilot = Autopilot(vehicle, settings, reference(planned, time, clock.instants))
@@ -386,10 +394,10 @@ def _loop(
     turning = rigid_turning(inertia_tensor(flown)) if fuzzy is None else identified_turning(fuzzy)
     wrench = effect_wrench(effects, instant(flown, state, speed))
     plant = Plant(flown, turning, wrench, carried, None if model is None or model.is_rigid_body else model)
-    change = plant.derivative(state, Rotors.settled(speed))
+    change = plant.derivative(state, Rotors.settled(speed), push[0])
     response = RotorResponse() if model is None else model.response
     chain = actuators(effects, response, vehicle, settings, speed, clock.step, float(time[-1] - time[0]))
-    return Loop(autopilot, mix, chain, plant, state, change)
+    return Loop(autopilot, mix, chain, plant, state, change, push)
 
 
 def _wrench(autopilot: Autopilot, number: int, state: Array) -> Array:

@@ -11,8 +11,8 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.hooks import TrueMotion
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.simulation.closed_loop import SimulatedMotion, asked, fly
-from cpfls_cli.simulation.model import SimulatedEffects, in_table, simulated_effects, with_effects
+from cpfls_cli.simulation.closed_loop import SimulatedMotion, asked, clock_of, fly
+from cpfls_cli.simulation.model import SimulatedEffects, in_table, played_gusts, simulated_effects, with_effects
 from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, POSITION, VELOCITY
 from cpfls_cli.simulation.settings import SimulationSettings
 from cpfls_cli.vehicle.rotors import RotorViolation, body_wrench, violations
@@ -66,7 +66,7 @@ def measure(
     vehicle : VehicleSettings
         As its model has it.
     rng : numpy.random.Generator
-        Source of the noise.
+        Source of gusts, then of noise.
     progress : callable
         Takes steps done and steps in all.
     model : VehicleModel or None
@@ -77,13 +77,17 @@ def measure(
     InputError
         If there is no such effect.
     SettingError
-        If an effect has values that are missing or impossible.
+        If an effect has values that are missing or impossible, or gusts are asked for that no model holds.
     ComputationError
         If the plan is not sampled uniformly, or the vehicle leaves the path or overturns.
     """
     given = simulated_effects(settings.closed_loop.effects, vehicle)
     held, effects = with_effects(model, given)
-    motion = fly(time, planned, vehicle, settings.closed_loop, held, effects, progress)
+    gusts, push = played_gusts(model, settings.closed_loop.gusts), None
+    if gusts is not None:
+        clock = clock_of(time, settings.closed_loop.integration_rate_hz)
+        push = gusts.drawn(rng, clock.step, clock.steps)
+    motion = fly(time, planned, vehicle, settings.closed_loop, held, effects, progress, push)
     signals, noise_std = _logged(time, motion, vehicle, settings, effects, rng)
     setpoints = asked(time, planned, vehicle, settings.closed_loop, motion.state)
     signals |= {f"setpoint_{name}": values for name, values in setpoints.items()}

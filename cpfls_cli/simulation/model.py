@@ -12,6 +12,7 @@ from cpfls_cli.effects.effect import Coefficient, Effect, Shape
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import SettingError
+from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -148,6 +149,24 @@ def with_effects(model: VehicleModel | None, asked: SimulatedEffects) -> tuple[V
     effects = SimulatedEffects((*own.listed, *asked.listed))
     _refuse_conflict(effects)
     return held, effects
+
+
+def played_gusts(model: VehicleModel | None, asked: bool) -> Gusts | None:
+    """Give the gusts of a model where they are asked for.
+
+    Raises
+    ------
+    SettingError
+        If it holds none.
+    """
+    if not asked:
+        return None
+    if model is None or model.gusts is None:
+        raise SettingError(
+            "closed_loop.gusts",
+            "no gusts are known; give --model a vehicle of `cpfls vehicle` whose flights told them, or leave it out",
+        )
+    return model.gusts
 
 
 def late_effects(response: RotorResponse) -> list[tuple[Effect, float]]:

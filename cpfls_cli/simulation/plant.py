@@ -118,8 +118,14 @@ class Plant:
     carried: tuple[CarriedBody, ...]
     whole: VehicleModel | None = None
 
-    def derivative(self, state: Array, rotors: Rotors) -> Array:
-        """Differentiate the state, shape (state,)."""
+    def derivative(self, state: Array, rotors: Rotors, push: Array) -> Array:
+        """Differentiate the state, shape (state,).
+
+        Parameters
+        ----------
+        push : array, shape (6,), N m and N, body frame
+            Of gusts.
+        """
         body_rate = state[BODY_RATE]
         signals = instant(self.vehicle, state, rotors.speed)
         by_rotors = signals.wrench[0]
@@ -127,7 +133,7 @@ class Plant:
             squared = rotors.speed**2
             terms = np.concatenate([[1.0], rotors.speed, squared, rotors.acceleration, rotors.slow - squared])
             by_rotors = self.whole.table.wrench(signals.air_velocity, signals.body_rate, terms[None])[0]
-        wrench = np.asarray(by_rotors) + self.wrench.direct(signals)
+        wrench = np.asarray(by_rotors) + self.wrench.direct(signals) + push
         inertial = self.turning(state[ATTITUDE], body_rate)
         torque = wrench[:3] - inertial.direct + self.wrench.rotor_coupling @ rotors.acceleration
         acceleration = signals.rotation[0] @ wrench[3:] / self.vehicle.mass_kg

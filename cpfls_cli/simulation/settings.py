@@ -45,6 +45,10 @@ class ClosedLoopSettings(Settings):
         dict[str, tuple[float, ...] | dict[str, float]],
         Doc("effects to fly by name (`cpfls effects`): a list of coefficients, then shapes, or values by name"),
     ] = field(default_factory=dict)
+    gusts: Annotated[
+        bool,
+        Doc("play the gusts that the model of `--model` holds, which `cpfls vehicle` found in its flights"),
+    ] = False
     rotor_time_constant_s: Annotated[
         float, Gt(0), Doc("time in which the rotors reach 63 % of a step, s; the effect motor_lag replaces it")
     ] = 0.05
@@ -142,13 +146,15 @@ class SimulationSettings(Settings):
         Raises
         ------
         SettingError
-            If effects, or noise of sensors that it lacks, are asked of a mode, or noise both of body and of
+            If effects, gusts, or noise of sensors that it lacks, are asked of a mode, or noise both of body and of
             generalised torque, of which one follows from the other.
         """
         for key in ("noise", "relative_noise"):
             self._check_noise(key, {str(name) for name in getattr(self, key)})
         if self.mode != "closed-loop" and self.closed_loop.effects:
             raise SettingError("closed_loop.effects", "effects are flown in closed loop only; add --mode closed-loop")
+        if self.mode != "closed-loop" and self.closed_loop.gusts:
+            raise SettingError("closed_loop.gusts", "gusts are flown in closed loop only; add --mode closed-loop")
 
     def _check_noise(self, key: str, signals: set[str]) -> None:
         if "body_torque" in signals and "torque" in {*self.noise, *self.relative_noise}:

@@ -1,6 +1,7 @@
 """A whole vehicle flies, predicts and is compared: nothing of its model is left out on the way."""
 
 import json
+import runpy
 from dataclasses import asdict, replace
 
 import h5py
@@ -13,6 +14,7 @@ from cpfls_cli.artifacts.store import read_record, write_record
 from cpfls_cli.commands import verify_export
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
+from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.rotors import RotorResponse
 from tests.builders.artifacts import edited
@@ -361,3 +363,67 @@ def test_an_exported_vehicle_is_flown_back(cpfls, refuse, vehicle, flight, noisy
     for more in ([], ["--dry-run"]):
         (line,) = refuse("verify-export", vehicle, flight.with_name("none.h5"), "--format", "sdf", *more)
         assert line == f"{flight.with_name('none.h5')}: no such file"
+
+
+@pytest.fixture(scope="module")
+def gusty(written):
+    gusts = Gusts(np.array([0.02, 0.03, 0.01, 0.2, 0.2, 0.2]), np.array([0.3, 1.0, 0.5, 1.0, 1.0, 1.0]))
+    return written("gusty.h5", replace(WHOLE, gusts=gusts))
+
+
+def test_gusts_of_a_model_are_played_where_they_are_asked_for(cpfls, config, path, folder, gusty, vehicle):
+    def flown(name, *options, model=gusty):
+        slow = ("--set", "simulation.closed_loop.integration_rate_hz=100")
+        result = cpfls("simulate", config, path, "--model", model, "-o", folder / name, *slow, *options)
+        assert result.exit_code == 0, result.stderr
+        return (folder / name).read_bytes(), read_record(folder / name, FlightRecord).body_rate, result.stdout
+
+    once, shaken, said = flown("gusts.h5", "--gusts")
+    again, _, _ = flown("gusts-again.h5", "--gusts")
+    other, _, _ = flown("gusts-other.h5", "--gusts", "--set", "seed=2")
+    _, still, calm = flown("no-gusts.h5")
+    _, before, nothing = flown("no-gusts-known.h5", model=vehicle)
+    assert once == again != other
+    np.testing.assert_array_equal(still, before)
+    assert np.abs(shaken - still).max() > 0.1
+    assert "--gusts plays them" in calm
+    assert "gusts" not in said + nothing
+
+
+def test_gusts_that_nobody_knows_are_refused(refuse, config, path, folder, vehicle):
+    for words in (("--model", vehicle), ()):
+        (message,) = refuse("simulate", config, path, "--gusts", *words, "-o", folder / "x.h5")
+        assert "simulation.closed_loop.gusts = true: no gusts are known; give --model" in message
+    (message,) = refuse(
+        "simulate", config, path, "--mode", "inverse", "--set", "simulation.closed_loop.gusts=true", "-o", folder / "x"
+    )
+    assert "gusts are flown in closed loop only" in message
+
+
+def test_gusts_are_told_by_info_and_exported(cpfls, gusty, folder):
+    told = json.loads(cpfls("info", gusty, "--json").stdout)["gusts"]
+    assert told["torque_n_m"] == [0.02, 0.03, 0.01]
+    assert told["force_memory_s"] == [1.0, 1.0, 1.0]
+    assert cpfls("export", gusty, "-o", folder / "gusty.json").exit_code == 0
+    exported = json.loads((folder / "gusty.json").read_text())
+    assert told.items() <= exported["gusts"].items()
+    assert "x = k x" in exported["gusts"]["how_to_play"]
+
+
+def test_code_holds_gusts_and_says_how_to_play_them(cpfls, gusty, folder):
+    """The recipe keeps the size, and after its memory 37 % of a gust."""
+    for form in ("gusty.py", "gusty.c"):
+        result = cpfls("export", gusty, "-o", folder / form, "--force")
+        assert result.exit_code == 0, result.stderr
+        assert "x = k x + size sqrt(1 - k^2) n" in " ".join((folder / form).read_text().replace("#", "").split())
+    assert "_GUST_SIZE {0.02, 0.03, 0.01, 0.2, 0.2, 0.2}" in (folder / "gusty.h").read_text()
+    module = runpy.run_path(str(folder / "gusty.py"))
+    size, memory, h = module["GUST_SIZE"][0], module["GUST_MEMORY"][0], 0.01
+    k, rng = np.exp(-h / memory), np.random.default_rng(1)
+    x, seen = size * rng.standard_normal(), []
+    for n in rng.standard_normal(40_000).tolist():
+        x = k * x + size * (1 - k**2) ** 0.5 * n
+        seen.append(x)
+    assert np.std(seen) == pytest.approx(size, rel=0.07)
+    late = round(memory / h)
+    assert np.mean(np.multiply(seen[late:], seen[:-late])) == pytest.approx(size**2 / np.e, rel=0.2)

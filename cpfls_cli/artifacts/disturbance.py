@@ -1,0 +1,109 @@
+"""Gusts in flights, as an artifact of a vehicle holds them: sizes and memories by body axis, with intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.spec import dataset, record
+from cpfls_cli.playback.gusts import GUST_AXES
+
+if TYPE_CHECKING:
+    from cpfls_cli.playback.disturbance import FoundGusts
+
+
+class GustAxis(NamedTuple):
+    """Gusts about or along an axis, with 95 % intervals, in units of acceleration; NaN where not known.
+
+    Attributes
+    ----------
+    name : str
+        roll, pitch, yaw, or x, y, z.
+    """
+
+    name: str
+    size: float
+    low: float
+    high: float
+    memory: float
+    memory_low: float
+    memory_high: float
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is a torque."""
+        return self.name in GUST_AXES[:3]
+
+
+@record
+class DisturbanceGroup:
+    """Gusts in the flights that the vehicle was found in, as torque about body axes and force along them."""
+
+    told_by: str = dataset("told_by", "what told gusts from what the model lacks: repeats, setpoints or none")
+    name: tuple[str, ...] = dataset("name", "roll, pitch, yaw, x, y, z", "gust")
+    size: Array = dataset("size", "standard deviation, N m or N", "gust", units="SI", gaps=True)
+    low: Array = dataset(
+        "low", "lower end of the 95 % interval; 0 where it is not known", "gust", units="SI", gaps=True
+    )
+    high: Array = dataset("high", "upper end; no gusts above it where no size is known", "gust", units="SI", gaps=True)
+    memory: Array = dataset("memory", "time in which a gust falls to 37 %", "gust", units="s", gaps=True)
+    memory_low: Array = dataset("memory_low", "lower end of the 95 % interval", "gust", units="s", gaps=True)
+    memory_high: Array = dataset("memory_high", "upper end of the 95 % interval", "gust", units="s", gaps=True)
+
+    @classmethod
+    def of(cls, found: FoundGusts) -> Self:
+        """Arrange what was found."""
+        return cls(
+            told_by=found.told_by,
+            name=GUST_AXES[: len(found.size)],
+            size=found.size,
+            low=found.low,
+            high=found.high,
+            memory=found.memory,
+            memory_low=found.memory_low,
+            memory_high=found.memory_high,
+        )
+
+    def axes(self, inertia: Array, mass: float) -> Iterator[GustAxis]:
+        """Give each axis as the acceleration of a body.
+
+        Parameters
+        ----------
+        inertia : array, shape (6,), kg m^2
+            Moments first.
+        mass : float, kg
+        """
+        bodies = np.append(inertia[:3], [mass] * 3)
+        columns = (self.size, self.low, self.high, self.memory, self.memory_low, self.memory_high)
+        for place, name in enumerate(self.name):
+            size, low, high, *memory = (float(column[place]) for column in columns)
+            body = float(bodies[place])
+            yield GustAxis(name, size / body, low / body, high / body, *memory)
+
+    def summary(self, inertia: Array, mass: float) -> dict[str, Any]:
+        """Tell the gusts to machines; arguments are those of `axes`."""
+        columns = ("size", "low", "high", "memory", "memory_low", "memory_high")
+        return {
+            "told_by": self.told_by,
+            "axes": {
+                axis.name: {
+                    "unit": "N m" if axis.turns else "N",
+                    **{
+                        name if place < 3 else f"{name}_s": _known(getattr(self, name)[number])
+                        for place, name in enumerate(columns)
+                    },
+                    "acceleration": {
+                        "unit": "rad/s^2" if axis.turns else "m/s^2",
+                        **{name: _known(getattr(axis, name)) for name in columns[:3]},
+                    },
+                }
+                for number, axis in enumerate(self.axes(inertia, mass))
+            },
+        }
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

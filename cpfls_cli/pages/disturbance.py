@@ -1,0 +1,91 @@
+"""Gusts in the flights that a vehicle was found in: in words, and as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from cpfls_cli.artifacts.disturbance import GustAxis
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.report.content import Block, Table, Text
+from cpfls_cli.report.numbers import joined, number
+
+
+def gust_blocks(record: VehicleRecord, index: int) -> Iterator[Block]:
+    """Say how large the gusts of the flights are and how long they last, as far as that is known."""
+    if record.disturbance is None:
+        if record.loop.shown and record.instruments is None:
+            yield Text(
+                "Gusts: their sizes are not known. Beside a body that is not known, what torque leaves of the rotation "
+                "says nothing of them."
+            )
+        return
+    axes = list(record.disturbance.axes(record.vehicle.inertia, record.vehicle.mass))
+    yield Text(gust_words(axes, record.disturbance.told_by))
+    if record.vehicle.gusts is not None:
+        yield _table(axes, record, index)
+
+
+def still_air_text() -> Text:
+    """Say of a flight that the gusts which its model holds were not played."""
+    return Text("flown in still air; the model holds the gusts of its flights: --gusts plays them")
+
+
+def gust_words(axes: list[GustAxis], told_by: str) -> str:
+    """Tell sizes and memories by axis, and what no gust exceeds."""
+    known = [_size(axis) for axis in axes if np.isfinite(axis.size)]
+    least = [
+        f"{number(axis.high, 2)} {_unit(axis)} {_where(axis)}"
+        for axis in axes
+        if np.isfinite(axis.high) and not np.isfinite(axis.size)
+    ]
+    open_ = [_where(axis) for axis in axes if not np.isfinite(axis.high)]
+    said = [f"Gusts: {'; '.join(known)}."] if known else []
+    if least:
+        said.append(f"No gusts above {joined(least)}{_UNTOLD if told_by == 'none' else ''}.")
+    if open_:
+        said.append(f"Gusts {joined(open_)} are not known, because what they move is not.")
+    if known:
+        said.append("Standard deviations of what does not come again; `cpfls simulate --model --gusts` plays them.")
+    return " ".join(said)
+
+
+_UNTOLD = ": all that the model leaves, for nothing tells gusts from what it lacks"
+
+
+def _size(axis: GustAxis) -> str:
+    size = f"{number(axis.size, 2)} {_unit(axis)} {_where(axis)} ({_ends(axis.low, axis.high)})"
+    return f"{size}, lasting {number(axis.memory, 2)} s ({_ends(axis.memory_low, axis.memory_high)})"
+
+
+def _ends(low: float, high: float) -> str:
+    return f"{number(low, 2)} to {number(high, 2)}"
+
+
+def _unit(axis: GustAxis) -> str:
+    return "rad/s²" if axis.turns else "m/s²"
+
+
+def _where(axis: GustAxis) -> str:
+    return f"about {axis.name}" if axis.turns else f"along {axis.name}"
+
+
+def _table(axes: list[GustAxis], record: VehicleRecord, index: int) -> Table:
+    found = record.disturbance
+    assert found is not None, "shown only where it is"
+    rows = [
+        [
+            _where(axis),
+            "N m" if axis.turns else "N",
+            *(number(float(column[place]), 3) for column in (found.size, found.low, found.high)),
+            *(number(value, 3) for value in (axis.memory, axis.memory_low, axis.memory_high)),
+        ]
+        for place, axis in enumerate(axes)
+    ]
+    caption = (
+        "Gusts by body axis as Gauss-Markov processes, with 95 % intervals: standard deviation, and the time in which "
+        "a gust falls to 37 %."
+    )
+    header = ("Gusts", "Unit", "Size", "From", "To", "Lasting, s", "From", "To")
+    return Table(f"vehicle-gusts-{index}", caption, header, rows, frozenset({0, 1}))

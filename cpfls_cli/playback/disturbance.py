@@ -1,0 +1,374 @@
+"""How large gusts are and how long they last, by what of a balance of torque and force does not come again.
+
+Along a flight, what a model's torque and force lack of what the motion takes is gust, noise, and what the model lacks.
+The last comes again in other runs of the path, or goes with what was asked for; the first two do not. Their power by
+frequency is that of a Gauss-Markov process, with the white noise of gyroscope and velocity, which a derivative makes
+grow with frequency, and that of the rotor speeds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import contiguous, half_width, mean_error
+from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.gusts import Gusts
+from cpfls_cli.playback.instruments import Instruments
+from cpfls_cli.playback.loop import wrench_during
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.weak_form.windows import Windows, windows
+
+_Complex = npt.NDArray[np.complex128]
+
+_PIECE_S, _SHORTEST_S = 8.0, 3.0
+"""Pieces whose power is taken by frequency: several times what gusts remember; the shortest that tell anything."""
+_RUN_SHARE = 0.4
+"""Of the longest run, that a piece may take."""
+_OVERLAP = 0.75
+_TOP_HZ, _TOP_SHARE = 6.0, 0.2
+"""Highest frequency, and the share of the sampling rate that it stays below: above, rotors and sensors have a say."""
+_MEMORY_S = (0.05, 8.0)
+"""What a gust may remember: below, it is white like noise within the band; above, a piece does not see it end."""
+_BEGIN_S = (0.2, 1.0)
+_EDGE = 1.02
+"""Factor from a bound of the memory within which it lies on the bound."""
+_FEWEST_BLOCKS, _BLOCKS, _LEAST_BLOCK_S = 8, 16, 4.0
+"""Below the first their scatter says nothing. Flights are cut into the second, unless blocks get longer than pieces or
+shorter than the last, which is what a piece mostly sees."""
+_KNOWN, _SEEN = 3.0, 0.1
+"""Ratio of the ends of an interval up to which a size is known, and the least share of what is left that it has."""
+_LAG_S, _LAGS, _FOLDS, _RIDGE = 0.1, 5, 5, 1e-6
+"""What was asked for is answered within half a second; parts that are predicted by the others."""
+_FAR, _NOISE, _AT_END = 12.0, 3.0, 1e-3
+"""Logarithms: of factors by which powers may be off where they begin, noise upwards, and what is near a bound."""
+
+
+@dataclass(frozen=True)
+class FoundGusts:
+    """Sizes and memories of gusts by body axis, torque then force, with 95 % intervals.
+
+    Attributes
+    ----------
+    size, low, high : array, shape (axis,), N m and N
+        Standard deviation; where none is known, NaN, 0, and the size of all that is left. NaN where the body is not
+        known either.
+    memory, memory_low, memory_high : array, shape (axis,), s
+        NaN where no size is known.
+    told_by : {"repeats", "setpoints", "none"}
+        What told gusts from what the model lacks.
+    """
+
+    size: Array
+    low: Array
+    high: Array
+    memory: Array
+    memory_low: Array
+    memory_high: Array
+    told_by: str
+
+    @property
+    def gusts(self) -> Gusts | None:
+        """The gusts that are known, none on other axes; None where no size is."""
+        known = np.zeros(6, dtype=bool)
+        known[: len(self.size)] = np.isfinite(self.size)
+        size, memory = np.zeros(6), np.ones(6)
+        size[known], memory[known] = (each[known[: len(each)]] for each in (self.size, self.memory))
+        return Gusts(size, memory) if known.any() else None
+
+
+class _Powers(NamedTuple):
+    """Power of what does not come again.
+
+    Attributes
+    ----------
+    power : array, shape (block, axis, frequency)
+        Sums over the pieces of a block, squared units of torque and force.
+    pieces : array, shape (block,)
+        How many there are.
+    """
+
+    power: Array
+    pieces: IntArray
+
+
+class _Band(NamedTuple):
+    """Pieces of flights, and the frequencies that they are taken apart into.
+
+    Attributes
+    ----------
+    pieces : Windows
+    turns : array, shape (frequency,), rad/s
+    weight, slope : complex array, shape (sample, frequency)
+        Kernels of the average and of the derivative, which is moved onto them.
+    """
+
+    pieces: Windows
+    turns: Array
+    weight: _Complex
+    slope: _Complex
+
+    @classmethod
+    def of(cls, period: float, length_s: float) -> _Band:
+        pieces = windows(period, length_s, _OVERLAP)
+        size = len(pieces.weight)
+        top = min(_TOP_HZ, _TOP_SHARE / period)
+        turns = np.asarray(2 * np.pi / (size * period) * np.arange(int(top * size * period) + 1), dtype=float)
+        wave = np.exp(-1j * period * np.outer(np.arange(size), turns))
+        slope = pieces.slope[:, None] - 1j * turns * pieces.weight[:, None]
+        kernels = [np.asarray(kernel * wave, dtype=np.complex128) for kernel in (pieces.weight[:, None], slope)]
+        return cls(pieces, turns, *kernels)
+
+    def laid(self, flight: PlaybackFlight, values: Array, kernel: _Complex) -> Array:
+        """Lay a kernel over values, shape (time, column) to (piece, column, frequency)."""
+        parts = [
+            sliding_window_view(values[part], len(kernel), axis=0)[:: self.pieces.hop] @ kernel
+            for part in flight.stretches
+            if self.pieces.count(part.stop - part.start)
+        ]
+        return np.concatenate([np.zeros((0, values.shape[1], kernel.shape[1])), *parts])
+
+    def left(self, flight: PlaybackFlight, sides: Array) -> Array:
+        """Take what both sides of a balance differ by, shape (time, 2, axis) to (piece, axis, frequency)."""
+        return -self.laid(flight, sides[:, 0], self.slope) - self.laid(flight, sides[:, 1], self.weight)
+
+    def starts(self, flight: PlaybackFlight) -> IntArray:
+        """Give the first sample of each piece."""
+        hop, counts = self.pieces.hop, [self.pieces.count(part.stop - part.start) for part in flight.stretches]
+        found = [part.start + np.arange(count) * hop for part, count in zip(flight.stretches, counts, strict=True)]
+        return np.concatenate([np.zeros(0, dtype=np.int64), *found]).astype(np.int64)
+
+
+def find_gusts(
+    model: VehicleModel,
+    given: Instruments,
+    determined: Mapping[str, bool] = MappingProxyType({}),
+    *,
+    told: bool = True,
+) -> FoundGusts | None:
+    """Find sizes and memories of gusts in flights of a vehicle that is known.
+
+    The power of what does not come again is ``s^2 G(w; m) + a A(w) + b B(w)``: that of a Gauss-Markov process of size s
+    and memory m seen through the pieces, of white noise through their derivative, and of white noise. All four numbers
+    are fitted by Whittle's likelihood; their errors come from the scatter of its slopes over pieces of the runs.
+
+    Parameters
+    ----------
+    model : VehicleModel
+        Its constants have to be those of the vehicle: a wrong body is answered with gusts.
+    given : Instruments
+        Of flights with rotor speeds. Without any all that is left is counted, and no size is known.
+    determined : mapping of str to bool
+        Of numbers of the model that were sought. Nothing is known about an axis whose moment of inertia is not
+        determined, and of forces where the thrust factor is not.
+    told : bool
+        Whether instruments told the constants too. Those of a fit may be mixed with the loop, even where torque
+        explains nearly all of the rotation, by as much as the gusts are: then they are not asked, and there is a bound.
+
+    Returns
+    -------
+    FoundGusts or None
+        None for flights that are too short or of several rates.
+
+    References
+    ----------
+    Whittle 1953; White 1982 (errors from the scatter of slopes); Uhlenbeck and Ornstein 1930.
+    """
+    period = given.flown[0].motion.period
+    longest = max((part.stop - part.start for flight in given.flown for part in flight.stretches), default=0) * period
+    length = min(_PIECE_S, _RUN_SHARE * longest)
+    if length < _SHORTEST_S or any(flight.motion.period != period for flight in given.flown):
+        return None
+    band = _Band.of(period, length)
+    told_by = given.kind if told else "none"
+    powers = _powers(model, given, band, told_by)
+    if len(powers.pieces) < _FEWEST_BLOCKS:
+        return None
+    runs = min((len(beside) + 1 for beside in given.repeats.beside if beside), default=1)
+    # Runs of a path are compared with each other, so what they tell of a gust is told several times.
+    shared = np.sqrt(2 * runs / (2 * runs - 1)) if told_by == "repeats" else 1.0
+    axes = [_Axis(band, power, powers.pieces) for power in powers.power.swapaxes(0, 1)]
+    columns = np.array([axis.bound() if told_by == "none" else axis.found(shared) for axis in axes])
+    bodies = [f"inertia.{name}" for name in INERTIA_PARAMETERS[:3]] + ["thrust_factor"] * 3
+    columns[[not determined.get(name, True) for name in bodies[: len(axes)]]] = np.nan
+    size, low, high, memory, memory_low, memory_high = columns.T
+    return FoundGusts(size, low, high, memory, memory_low, memory_high, told_by)
+
+
+def _powers(model: VehicleModel, given: Instruments, band: _Band, told_by: str) -> _Powers:
+    """Take the power of what does not come again, by block of a run."""
+    rows = 6 if all(flight.translates for flight in given.flown) else 3
+    sides = [_sides(model, flight)[..., :rows] for flight in given.flown]
+    left = [band.left(flight, own) for flight, own in zip(given.flown, sides, strict=True)]
+    if told_by == "repeats":
+        beside = [
+            band.left(flight, given.repeats.others(number, sides)) if given.repeats.beside[number] else np.nan * own
+            for number, (flight, own) in enumerate(zip(given.flown, left, strict=True))
+        ]
+    elif told_by == "setpoints":
+        beside = _expected(given, left, band)
+    else:
+        beside = [np.zeros_like(own) for own in left]
+    period = given.flown[0].motion.period
+    seen = sum(len(own) for own in left) * band.pieces.hop * period
+    block_s = min(_PIECE_S, max(seen / _BLOCKS, _LEAST_BLOCK_S))
+    power, count = [], []
+    for flight, own, known in zip(given.flown, left, beside, strict=True):
+        there = np.isfinite(known).all(axis=(1, 2))
+        products = (own * np.conj(own - known)).real[there]
+        block = band.starts(flight)[there] * period // block_s
+        for each in np.unique(block):
+            power.append(products[block == each].sum(axis=0))
+            count.append(int((block == each).sum()))
+    return _Powers(np.array(power), np.array(count, dtype=np.int64))
+
+
+def _sides(model: VehicleModel, flight: PlaybackFlight) -> Array:
+    """Evaluate momentum, and torque and force that change it, body frame, shape (time, 2, 6)."""
+    motion, inertia, mass = flight.motion, model.body.inertia, model.vehicle.mass_kg
+    velocity = np.einsum("tji,tj->ti", motion.rotation, motion.velocity)
+    momentum = np.hstack([motion.rate @ inertia, mass * velocity])
+    sides = np.zeros((len(flight), 2, 6))
+    sides[:, 0] = momentum
+    for part in flight.stretches:
+        sides[part, 1] = wrench_during(model, flight, part)
+    sides[:, 1, :3] -= np.cross(motion.rate, momentum[:, :3])
+    sides[:, 1, 3:] -= np.cross(motion.rate, momentum[:, 3:])
+    sides[:, 1, 3:] -= mass * model.vehicle.gravity_m_s2 * motion.rotation[:, 2]
+    return sides
+
+
+def _expected(given: Instruments, left: Sequence[Array], band: _Band) -> list[Array]:
+    """Predict what is left from what was asked for, each part of the flights as the other parts tell; NaN for others.
+
+    A delay of what was asked for is a turn of its phase.
+    """
+    late = np.exp(-1j * _LAG_S * np.outer(np.arange(_LAGS), band.turns))
+    numbers = [number for number, own in enumerate(left) if given.setpoints[number] is not None and len(own)]
+    if not numbers:
+        return [np.nan * own for own in left]
+    asked = np.concatenate(
+        [band.laid(given.flown[number], np.asarray(given.setpoints[number]), band.weight) for number in numbers]
+    )
+    told = (asked[:, :, None] * late).reshape(len(asked), -1, len(band.turns)).swapaxes(1, 2)
+    told = told / np.maximum(np.sqrt((np.abs(told) ** 2).mean(axis=(0, 1))), np.finfo(float).tiny)
+    own = np.concatenate([left[number] for number in numbers])
+    expected, parts = np.zeros_like(own), contiguous(len(own), _FOLDS)
+    for axis in range(own.shape[1]):
+        weight = 1 / np.maximum((np.abs(own[:, axis]) ** 2).mean(axis=0), np.finfo(float).tiny)
+        by_piece = np.einsum("pfc,f,pfd->pcd", np.conj(told), weight, told, optimize=True).real
+        right = np.einsum("pfc,f,pf->pc", np.conj(told), weight, own[:, axis], optimize=True).real
+        for fold in range(_FOLDS):
+            square = by_piece[parts != fold].sum(axis=0)
+            square += _RIDGE * np.trace(square) / len(square) * np.eye(len(square))
+            expected[parts == fold, axis] = told[parts == fold] @ np.linalg.solve(
+                square, right[parts != fold].sum(axis=0)
+            )
+    ends = np.cumsum([len(left[number]) for number in numbers])[:-1]
+    found = dict(zip(numbers, np.split(expected, ends), strict=True))
+    return [found.get(number, np.nan * own) for number, own in enumerate(left)]
+
+
+class _Fit(NamedTuple):
+    """Numbers of a process, and which of them lie between their bounds."""
+
+    numbers: Array
+    free: BoolArray
+
+
+class _Axis:
+    """What does not come again about one axis, and the process that has this power."""
+
+    def __init__(self, band: _Band, power: Array, count: IntArray) -> None:
+        weight, period = band.pieces.weight, band.pieces.period
+        self._power, self._count = power, count
+        self._mean = power.sum(axis=0) / count.sum()
+        # Power of white noise, as acceleration and through a derivative.
+        self._noise = np.array([(np.abs(kernel) ** 2).sum(axis=0) for kernel in (band.weight, band.slope)])
+        self._lags = period * np.arange(len(weight))
+        alike = np.correlate(weight, weight, "full")[len(weight) - 1 :]
+        self._alike = np.cos(np.outer(band.turns, self._lags)) * alike * np.where(self._lags == 0, 1.0, 2.0)
+
+    def bound(self) -> Array:
+        """Give the size of all that is left, as columns of `FoundGusts`."""
+        scale = len(self._lags) * self._noise[0, 0]
+        blocks = (self._power[:, 0] + 2 * self._power[:, 1:].sum(axis=1)) / self._count / scale
+        largest = blocks.mean() + half_width(mean_error(blocks), len(blocks))
+        return np.array([np.nan, 0.0, np.sqrt(max(largest, 0.0)), np.nan, np.nan, np.nan])
+
+    def found(self, shared: float) -> Array:
+        """Give size and memory with their intervals, as columns of `FoundGusts`; the bound where they are not known.
+
+        Parameters
+        ----------
+        shared : float
+            By how much errors are larger than the scatter of blocks tells.
+        """
+        fit = self._fit()
+        half = half_width(shared * self._errors(*fit) * [0.5, 1.0], len(self._count))
+        size, memory = float(np.exp(0.5 * fit.numbers[0])), float(np.exp(fit.numbers[1]))
+        inside = _EDGE * _MEMORY_S[0] < memory < _MEMORY_S[1] / _EDGE
+        everything = self.bound()
+        if not inside or 2 * half[0] > np.log(_KNOWN) or size**2 < _SEEN * everything[2] ** 2:
+            return everything
+        ends = np.clip([memory * np.exp(-half[1]), memory * np.exp(half[1])], *_MEMORY_S)
+        return np.array([size, size * np.exp(-half[0]), size * np.exp(half[0]), memory, *ends])
+
+    def _fit(self) -> _Fit:
+        """Maximise the likelihood over logarithms of squared size, memory and the two noises."""
+        from scipy.optimize import minimize
+
+        powers = self._mean.max() / self._alike.sum(axis=1).max(), *(self._mean[-1] / self._noise[:, -1])
+        begin = np.log(np.maximum(powers, np.finfo(float).tiny))
+        low = np.array([begin[0] - _FAR, np.log(_MEMORY_S[0]), *(begin[1:] - _FAR)])
+        high = np.array([begin[0] + _FAR, np.log(_MEMORY_S[1]), *(begin[1:] + _NOISE)])
+
+        def unlikely(numbers: Array) -> tuple[float, Array]:
+            expected, slopes = self._expected(numbers)
+            short = 1 - self._mean / expected
+            return float((self._mean / expected + np.log(expected)).sum()), (slopes / expected * short).sum(axis=1)
+
+        found = [
+            minimize(
+                unlikely,
+                np.array([begin[0], np.log(memory), *(begin[1:] - 1.0)]),
+                jac=True,
+                bounds=list(zip(low, high, strict=True)),
+                method="L-BFGS-B",
+            )
+            for memory in _BEGIN_S
+        ]
+        best = min(found, key=lambda each: float(each.fun))
+        return _Fit(best.x, (best.x > low + _AT_END) & (best.x < high - _AT_END))
+
+    def _expected(self, numbers: Array) -> tuple[Array, Array]:
+        """Give the power by frequency, shape (frequency,), and its derivatives by the numbers, shape (4, frequency)."""
+        size, memory, *noises = np.exp(numbers)
+        falls = np.exp(-self._lags / memory)
+        parts = np.array(
+            [
+                size * (self._alike @ falls),
+                size * (self._alike @ (falls * self._lags / memory)),
+                *(noise * shape for noise, shape in zip(noises, self._noise, strict=True)),
+            ]
+        )
+        return parts[[0, 2, 3]].sum(axis=0), parts
+
+    def _errors(self, numbers: Array, free: BoolArray) -> Array:
+        """Compute standard errors of squared size and memory, as logarithms, by the scatter of slopes over blocks."""
+        expected, slopes = self._expected(numbers)
+        slopes = slopes[free] / expected
+        scores = (self._power / expected - self._count[:, None]) @ slopes.T / self._count.sum()
+        moved = np.linalg.lstsq(slopes @ slopes.T, scores.T, rcond=None)[0]
+        errors, blocks = np.full(len(numbers), np.inf), len(self._count)
+        # Slopes at the numbers that are fitted to them scatter less than at the true ones.
+        errors[free] = np.sqrt(blocks / (blocks - free.sum()) * (moved**2).sum(axis=1))
+        return errors[:2]

@@ -1,0 +1,51 @@
+"""Gusts: a torque and a force that nothing tells, as random processes with a size and a memory by body axis."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+
+GUST_AXES = ("roll", "pitch", "yaw", "x", "y", "z")
+"""Torque about the body axes, then force along them."""
+
+
+class Gusts(NamedTuple):
+    """A Gauss-Markov process on each body axis: ``x' = -x / memory + white noise``, of standard deviation `size`.
+
+    Attributes
+    ----------
+    size : array, shape (6,), N m and N, body frame
+        0 where there are none.
+    memory : array, shape (6,), s
+        Time in which a gust falls to 37 %.
+    """
+
+    size: Array
+    memory: Array
+
+    def drawn(self, rng: np.random.Generator, step: float, count: int) -> Array:
+        """Draw torque and force at instants a step apart, exactly, from the first on as large as at any.
+
+        Parameters
+        ----------
+        step : float, s
+        count : int
+
+        Returns
+        -------
+        array, shape (count, 6), N m and N, body frame
+
+        References
+        ----------
+        Gillespie 1996, Exact numerical simulation of the Ornstein-Uhlenbeck process.
+        """
+        from scipy.signal import lfilter
+
+        keep = np.exp(-step / self.memory)
+        white = rng.standard_normal((count, len(keep)))
+        white[1:] *= np.sqrt(1.0 - keep**2)
+        columns = [lfilter([1.0], [1.0, -each], column) for each, column in zip(keep, white.T, strict=True)]
+        return np.asarray(self.size * np.stack(columns, axis=1))
