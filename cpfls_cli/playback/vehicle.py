@@ -16,6 +16,8 @@ from cpfls_cli.playback.constants import Constants, find_constants
 from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import OF_A_WEIGHT, Group, JointNumbers
+from cpfls_cli.playback.history import Observer
+from cpfls_cli.playback.history_fit import find_history
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.loop import LoopBounds, loop_bounds
 from cpfls_cli.playback.model import VehicleModel
@@ -129,6 +131,9 @@ class FoundVehicle:
         What instruments tell; the model and its numbers are then these.
     forecast : VehicleModel or None
         What forecasts the flights, loop and all, where the model is the vehicle alone.
+    history : Observer or None
+        By which the forecast uses the past; None where that is no better on flights kept aside, is not asked for, or
+        the search was stopped.
     """
 
     model: VehicleModel
@@ -146,6 +151,7 @@ class FoundVehicle:
     instruments: Instruments
     constants: Constants | None = None
     forecast: VehicleModel | None = None
+    history: Observer | None = None
 
 
 def find_vehicle(
@@ -188,6 +194,7 @@ def find_vehicle(
         given,
         None if forecast is None else constants,
         forecast,
+        find_history(chosen, fitted, own, settings) if choice.complete and settings.history_s else None,
     )
 
 
