@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from cpfls_cli.playback.fit import Fitted, windows_of
 from cpfls_cli.playback.history import Observer, past_of
@@ -12,7 +13,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import free_runs, observed, player_of
 from cpfls_cli.playback.structure import Structure
 from tests.builders.gusty_flights import SMALL, STORM, Flight, gusty_flights
-from tests.unit.playback.test_replay import VEHICLE, flight_of
+from tests.builders.random_flights import VEHICLE, flight_of
 
 OBSERVER = Observer(
     rate=np.array([20.0, 20.0, 5.0, 9.0, 9.0, 3.0]),
@@ -57,8 +58,6 @@ def test_a_constant_push_is_observed_and_acts_on():
 
 
 def turned(rotation, vectors):
-    from scipy.spatial.transform import Rotation
-
     return rotation @ Rotation.from_rotvec(vectors).as_matrix()
 
 
