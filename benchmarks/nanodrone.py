@@ -1,6 +1,7 @@
 """Print what models predict of the nano-drone benchmark's test flights, beside the models that are published.
 
     python benchmarks/nanodrone.py DATA [--unknown]
+    python benchmarks/nanodrone.py DATA --history             a forecast that uses 0.5 s of the past, and without it
     python benchmarks/nanodrone.py DATA --write FOLDER        the prepared flights as CSV, and nothing else
 
 DATA is a clone of idsia-robotics/nanodrone-sysid-benchmark, branch model_export (commit ac439db), which has the raw
@@ -16,6 +17,10 @@ random alone; with --unknown from mass and geometry, inertia and factors of the 
 "nothing moves" has to give 0.0796, 0.3588 and 0.8777 rad/s at h = 1, 10 and 50. The benchmark says 0.3596 and 0.8837,
 since its script lays the flights end to end and holds the last windows of a flight against the beginning of the next.
 Rows "their way" are counted like that, and are what the published rows are to be set beside.
+
+With --history no structure is searched for: blocks of one that was found (`BLOCKS`) are fitted to the training flights,
+and then the observer of their forecast; both are counted as above, and as `nonlinear_benchmarks` (NanoDrone) does: runs
+from 50 samples after the begin of each flight on, errors averaged by flight. Its flights are prepared by others.
 """
 
 from __future__ import annotations
@@ -35,7 +40,7 @@ pin_threads()
 import numpy as np
 
 from benchmarks.shared.flight_csv import write_flight
-from benchmarks.shared.found_vehicles import constants_unknown, learned
+from benchmarks.shared.found_vehicles import constants_unknown, fitted_blocks, learned
 from benchmarks.shared.nanodrone_files import STATED, TEST, TRAINING, VEHICLE, flights
 from benchmarks.shared.playback_scores import (
     SHOWN,
@@ -43,9 +48,11 @@ from benchmarks.shared.playback_scores import (
     SYMBOLS,
     Runs,
     as_published,
+    by_run,
     free_runs,
     nothing_moves,
     rate_stays,
+    runs_with_past,
     score,
 )
 from cpfls_cli.errors import InputError
@@ -87,6 +94,25 @@ PUBLISHED = {
         (0.1021, 0.4292, 1.2407, 35.8353),
     ),
 }
+BLOCKS = (
+    "inertia",
+    "thrust_factor",
+    "drag_factor",
+    "lag",
+    "slow_actuation",
+    "linear_damping",
+    "quadratic_damping",
+    "rotor_plane_damping",
+    "rotor_drag",
+    "parasitic_drag",
+    "inflow",
+    "rotor_acceleration",
+    "rotor_mismatch",
+    "torque_bias",
+    "remainder",
+)
+PAST = 50
+"""Samples of the past that a forecast may use: the initialisation window of nonlinear_benchmarks."""
 COLUMNS = (
     "model",
     *(f"{SYMBOLS[signal]} {column}" for signal in SIGNALS for column in (*(f"h={h}" for h in SHOWN), "sum")),
@@ -113,6 +139,22 @@ def our_rows(
     return rows
 
 
+def rows_with_past(training: Sequence[PlaybackFlight], test: Sequence[PlaybackFlight]) -> list[list[object]]:
+    """Play a forecast back on the test flights without and with the past, counted in all ways."""
+    model, observer = fitted_blocks(VEHICLE, training, BLOCKS, PAST * test[0].motion.period)
+    runs = {
+        "nothing moves": [nothing_moves(flight) for flight in test],
+        "rate stays": [rate_stays(flight) for flight in test],
+        "without the past": [free_runs(model, flight) for flight in test],
+        "with 0.5 s of the past": [runs_with_past(model, observer, flight) for flight in test],
+    }
+    rows = [row for name, each in runs.items() for row in rows_of(name, test, each)]
+    for name, each in runs.items():
+        found = by_run(each, PAST)
+        rows.append([f"{name}, by flight", *by_signal(found.mae).ravel(), found.windows, found.diverged])
+    return rows
+
+
 def rows_of(name: str, test: Sequence[PlaybackFlight], runs: Sequence[Runs]) -> list[list[object]]:
     """Count runs within flights, and as the published script does."""
     rows: list[list[object]] = []
@@ -131,6 +173,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", type=Path, metavar="DATA", help="folder of the benchmark's files")
     parser.add_argument("--unknown", action="store_true", help="learn from mass and geometry alone")
+    parser.add_argument("--history", action="store_true", help="a forecast with the past, and without")
     parser.add_argument("--write", type=Path, metavar="FOLDER", help="write the prepared flights as CSV, and stop")
     given = parser.parse_args()
     folder, stated = given.data, constants_unknown(VEHICLE) if given.unknown else VEHICLE
@@ -146,6 +189,9 @@ def main() -> None:
             write_flight(given.write, flight)
         return
     print(f"{len(training)} training flights, {len(test)} test flights read in {perf_counter() - start:.1f} s\n")
+    if given.history:
+        table("nanodrone_history", COLUMNS, rows_with_past(training, test), digits=4)
+        return
     published = [[name, *np.ravel(values), 19347, ""] for name, values in PUBLISHED.items()]
     name = "nanodrone_unknown" if given.unknown else "nanodrone"
     table(name, COLUMNS, [*published, *our_rows(training, test, stated)], digits=4)

@@ -9,10 +9,14 @@ from time import perf_counter
 import numpy as np
 
 from cpfls_cli.config.load import validate
+from cpfls_cli.playback.fit import fit
 from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.history import Observer
+from cpfls_cli.playback.history_fit import fit_observer
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.parameters import INERTIA
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.structure import Judged, fitted_to_all
+from cpfls_cli.playback.structure import Judged, Structure, fitted_to_all, parts_of
 from cpfls_cli.playback.vehicle import find_vehicle
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -63,7 +67,8 @@ def learned(
     for number in found.numbers:
         weak = ", on a bound" if number.at_bound else "" if number.determined else ", not determined"
         print(f"  {number.name} = {number.value:.4g} ({number.low:.4g} to {number.high:.4g}) {number.unit}{weak}")
-    models = {f"vehicle, {choice.chosen.numbers} numbers": found.model}
+    # Where flights repeat each other the model is the constants, and no forecast.
+    models = {f"vehicle, {choice.chosen.numbers} numbers": found.forecast or found.model}
     for name in ("greedy", "everything") if baselines else ():
         judged = getattr(choice, name)
         clock = perf_counter()
@@ -71,6 +76,33 @@ def learned(
         print(f"  {name} fitted to all in {perf_counter() - clock:.1f} s")
         models[f"{name}, {judged.numbers} numbers"] = fitted.model
     return models
+
+
+def fitted_blocks(
+    vehicle: VehicleSettings, training: Sequence[PlaybackFlight], blocks: Sequence[str], past_s: float
+) -> tuple[VehicleModel, Observer]:
+    """Fit a forecast of given blocks, and its observer; without a search, as `learned` fits what it has chosen.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+        As stated.
+    training : sequence of PlaybackFlight
+    blocks : sequence of str
+    past_s : float, s
+        How much of the past the observer uses.
+    """
+    used, clock = PlaybackSettings(), perf_counter()
+    held = Structure(tuple(block for block in blocks if block != INERTIA))
+    windows = [each for part in parts_of(training, used) for each in part]
+    # On the body as it is first, as in a search.
+    first = fit(held.free(vehicle), windows, {}, 12, 1e-3)
+    fitted, windows = fitted_to_all(Structure(tuple(blocks)), vehicle, training, used, first)
+    print(f"{len(fitted.values)} numbers fitted in {perf_counter() - clock:.0f} s, loss {fitted.loss:.4f}")
+    clock = perf_counter()
+    observer = fit_observer(fitted, windows, past_s)
+    print(f"observer fitted in {perf_counter() - clock:.0f} s: {observer}\n")
+    return fitted.model, observer
 
 
 def _shown(judged: Sequence[Judged], total: int) -> None:

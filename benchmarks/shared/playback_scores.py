@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.playback import player
 from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.kernels import errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
 
@@ -60,6 +63,20 @@ def score(runs: Sequence[Runs]) -> Score:
     known = np.isfinite(norms).sum(axis=0)
     mae = np.where(known, np.nansum(norms, axis=0) / np.maximum(known, 1), np.nan)
     return Score(mae, len(norms), sum(run.diverged for run in runs))
+
+
+def runs_with_past(model: VehicleModel, observer: Observer, flight: PlaybackFlight) -> Runs:
+    """Play a forecast that uses the past back from every sample of a flight."""
+    starts = flight.starts(HORIZON, 1)
+    runs = player.free_runs(replace(player.player_of(model, flight), observer=observer), flight, starts, HORIZON)
+    return Runs(runs.errors, int(np.sum(runs.diverged >= 0)))
+
+
+def by_run(runs: Sequence[Runs], first: int) -> Score:
+    """Take means over the runs of each flight from a sample on, and then the mean of the flights."""
+    scores = [score([Runs(run.errors[first:], run.diverged)]) for run in runs]
+    windows, diverged = (sum(getattr(each, name) for each in scores) for name in ("windows", "diverged"))
+    return Score(np.mean([each.mae for each in scores], axis=0), windows, diverged)
 
 
 def free_runs(model: VehicleModel, flight: PlaybackFlight, every: int = 1, horizon: int = HORIZON) -> Runs:

@@ -10,12 +10,14 @@ import numpy as np
 from cpfls_cli.artifacts.audit import AuditGroup, AuditRepairGroup
 from cpfls_cli.artifacts.model import USUAL, EffectsGroup, InertiaFunctionsGroup, VehicleGroup
 from cpfls_cli.artifacts.spec import rows_of
+from cpfls_cli.artifacts.vehicle_model import HistoryGroup
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.consistency.repairs import ChannelRepair
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.effects.registry import effect
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.fuzzy.inputs import InputRange
+from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.table import Remainder
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
@@ -44,6 +46,11 @@ def vehicle_model(group: VehicleGroup) -> VehicleModel:
         repairs=None if group.repair is None else audit(group.repair),
         gusts=None if group.gusts is None else group.gusts.gusts(),
     )
+
+
+def observer(group: HistoryGroup, past_s: float) -> Observer:
+    """Rebuild the observer of a forecast that uses so much of the past."""
+    return Observer(rate=group.rate, memory_s=group.memory, past_s=past_s)
 
 
 def model_effects(group: EffectsGroup) -> tuple[ModelEffect, ...]:

@@ -142,7 +142,9 @@ class PlaybackGroup:
     flown: tuple[str, ...] = dataset("flight", "file names", "playback_flight")
     windows: int = dataset("windows", "samples from which it was played back")
     prediction: tuple[str, ...] = dataset(
-        "prediction", "as in cpfls/replay; before, after: the model as given and with the effects", "prediction"
+        "prediction",
+        "as in cpfls/replay; with-past: the same model with /history; before, after: as given and with the effects",
+        "prediction",
     )
     horizon_s: Array = dataset("horizon_s", "horizons", "horizon", units="s")
     diverged: IntArray = dataset("diverged", "windows in which a prediction ran away and was stopped", "prediction")
@@ -214,7 +216,8 @@ class HeldOutGroup(PlaybackGroup):
     def judged(cls, flights: Sequence[Played], replay: Replay) -> Self:
         """Arrange a replay without its windows, and where the model is better than what knows no model."""
         better = where_better(flights, replay.windows)
-        return cls.of(flights, replay, PREDICTIONS, better=None if better is None else RegionGroup(**vars(better)))
+        region = None if better is None else RegionGroup(**vars(better))
+        return cls.of(flights, replay, replay.predictions, better=region)
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -404,6 +407,9 @@ class ReplayRecord(Record):
     asked_s: float = dataset("asked_s", "longest horizon, as asked for", units="s")
     every: int = dataset("every", "samples from one begin to the next")
     hold: str = dataset("hold", "what is between samples, as asked for: linear, previous; usual where nothing was")
+    history_s: float | None = dataset(
+        "history_s", "how much of the flight before a start the model uses", units="s", default=None
+    )
     horizon_s: Array = dataset("horizon_s", "horizons", "horizon", units="s")
     diverged: IntArray = dataset("diverged", "windows in which a prediction ran away and was stopped", "prediction")
     body_rate: SignalErrorGroup = group("body_rate")
@@ -446,6 +452,7 @@ class ReplayRecord(Record):
             asked_s=asked.horizon_s,
             every=asked.every,
             hold=asked.hold or USUAL,
+            history_s=asked.history_s or None,
             horizon_s=period * np.arange(1, horizon + 1),
             diverged=(windows.diverged >= 0).sum(axis=1),
             flight=PlayedFlightsGroup.of(flights, played, windows),
@@ -477,6 +484,7 @@ class ReplayRecord(Record):
         """The replay for machines."""
         return {
             "played": self.played,
+            "history_s": self.history_s or 0.0,
             "horizon_s": self.horizon_s.tolist(),
             "windows": self.windows,
             "models": {name: self._prediction(index) for index, name in enumerate(self.prediction)},

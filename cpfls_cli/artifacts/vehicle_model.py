@@ -23,6 +23,7 @@ from cpfls_cli.validation.trust import Trust, capped
 if TYPE_CHECKING:
     # Reading a record does not need the compiled loops that play a vehicle back.
     from cpfls_cli.playback.constants import Constants
+    from cpfls_cli.playback.history import Observer
     from cpfls_cli.playback.instruments import Instruments
     from cpfls_cli.playback.loop import LoopBounds
     from cpfls_cli.playback.structure import Choice
@@ -248,6 +249,29 @@ class ResponsesGroup:
 
 
 @record
+class HistoryGroup:
+    """The observer by which the forecast uses the past: of a disturbance until a run starts."""
+
+    past: float = dataset("past", "how much of the flight before a start its numbers were fitted with", units="s")
+    rate: Array = dataset(
+        "rate", "at which what the model misses is taken up: torque x y z, force x y z", "6", units="1/s", frame=BODY
+    )
+    memory: Array = dataset(
+        "memory", "time constant with which the disturbance fades", "6", units="s", frame=BODY, least=0.0
+    )
+
+    @classmethod
+    def of(cls, observer: Observer) -> Self:
+        """Arrange an observer."""
+        return cls(past=observer.past_s, rate=observer.rate, memory=observer.memory_s)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The observer for machines."""
+        return {"past_s": self.past, "rate_1_s": self.rate.tolist(), "memory_s": self.memory.tolist()}
+
+
+@record
 class VehicleRecord(ModelRecord):
     """The artifact `cpfls/model` of a vehicle found in flights."""
 
@@ -262,6 +286,7 @@ class VehicleRecord(ModelRecord):
     instruments: InstrumentsGroup | None = group("instruments", default=None)
     response: ResponsesGroup | None = group("response", default=None)
     forecast: VehicleGroup | None = group("forecast", default=None, apart=True)
+    history: HistoryGroup | None = group("history", default=None)
     held_out: HeldOutGroup | None = group("held_out", default=None)
     share: SharesGroup = group("share")
     airspeed: float = dataset(
@@ -308,6 +333,7 @@ class VehicleRecord(ModelRecord):
             instruments=None if found.constants is None else InstrumentsGroup.of(found.instruments, found.constants),
             response=ResponsesGroup.of(responses, instrumented=found.loop.shows_loop) if responses else None,
             forecast=None if found.forecast is None else VehicleGroup.of(replace(found.forecast, commanded=commanded)),
+            history=None if found.history is None else HistoryGroup.of(found.history),
             held_out=held_out,
             share=SharesGroup(
                 name=tuple(share.name for share in found.shares),
@@ -393,6 +419,7 @@ class VehicleRecord(ModelRecord):
             "disturbance": None
             if self.disturbance is None
             else self.disturbance.summary(self.vehicle.inertia, self.vehicle.mass),
+            "history": None if self.history is None else self.history.summary,
             "structures": rows_of(self.structure),
             "held_out": None if self.held_out is None else self.held_out.summary,
             "shares": {row.pop("name"): row for row in rows_of(self.share)},

@@ -152,6 +152,16 @@ HorizonOption = Annotated[
     float | None,
     typer.Option("--horizon", metavar="TIME", parser=seconds, help="Longest horizon (1, 1s); without, half a second."),
 ]
+HistoryOption = Annotated[
+    float | None,
+    typer.Option(
+        "--history",
+        metavar="TIME",
+        parser=seconds,
+        help="Use so much of the flight before each start too (0.5, 0.5s), where `cpfls vehicle` found a forecast "
+        "for that.",
+    ),
+]
 EveryOption = Annotated[int, typer.Option("--every", metavar="N", min=1, help="Begin at every N-th sample.")]
 
 
@@ -435,6 +445,7 @@ def replay(
     horizon: HorizonOption = None,
     every: EveryOption = 1,
     hold: HoldOption = None,
+    history: HistoryOption = None,
     *,
     common: Common,
 ) -> None:
@@ -442,7 +453,7 @@ def replay(
 
     def call(command: Any, job: Job) -> Any:
         options = command.ReplayOptions(
-            0.5 if horizon is None else horizon, every, None if hold is None else hold.value
+            0.5 if horizon is None else horizon, every, None if hold is None else hold.value, history or 0.0
         )
         return command.run(job, model, flights, options)
 

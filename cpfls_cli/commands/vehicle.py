@@ -173,6 +173,8 @@ def _judged(vehicle: FoundVehicle, flights: Sequence[LoggedFlight], job: Job) ->
     """Play a vehicle back along flights that it was not found in, from every sample."""
     models = {"": vehicle.forecast or vehicle.model, **vehicle.others}
     pairs = [played(models[flight.group], flight, job.study.vehicle) for flight in flights]
+    if vehicle.history is not None:
+        pairs = [replace(pair, with_past=replace(pair.model, observer=vehicle.history)) for pair in pairs]
     errors = replay(
         pairs, _horizon(job, flights[0]), 1, lambda done: job.progress(done, 1, "plays back the flights held out")
     )

@@ -8,13 +8,14 @@ from pathlib import Path
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.learned import LearnedFlight
 from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.rebuilt import vehicle_model
+from cpfls_cli.artifacts.rebuilt import observer, vehicle_model
 from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
+from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import VehicleModel
 
 
@@ -39,6 +40,25 @@ def read_model(path: Path, study: Study, *, forecast: bool = False) -> VehicleMo
     record = read_of_vehicle(path, ModelRecord, study)
     apart = record.forecast if forecast and isinstance(record, VehicleRecord) else None
     return rebuilt(path, record if apart is None else replace(record, vehicle=apart))
+
+
+def read_observer(path: Path, past_s: float) -> Observer:
+    """Read the observer by which the forecast of a model uses so much of the flight before a start.
+
+    Raises
+    ------
+    InputError
+        If it holds none.
+    """
+    known = not is_vehicle(path) and holds(path, VehicleRecord)
+    held = read_record(path, VehicleRecord).history if known else None
+    if held is None:
+        raise InputError(
+            f"{path}: holds no forecast that uses the past, which --history asks for; `cpfls vehicle` finds one where "
+            "playback.history_s is above 0 and the past helps on parts of the flights kept aside; or leave out "
+            "--history"
+        )
+    return observer(held, past_s)
 
 
 def holds_forecast(path: Path) -> bool:

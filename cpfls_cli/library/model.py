@@ -137,6 +137,7 @@ class Model:
         horizon_s: float = 0.5,
         every: int = 1,
         hold: Hold | None = None,
+        history_s: float = 0.0,
     ) -> Artifact:
         """Play it back along flights from every sample, as ``cpfls replay`` does.
 
@@ -150,6 +151,8 @@ class Model:
             Begin at every n-th sample.
         hold : {"linear", "previous"}, optional
             What a rotor speed is between samples; without it, measured ones the first, commands the second.
+        history_s : float
+            How much of the flight before a start is used, s, by a forecast that ``cpfls vehicle`` found for that.
 
         Returns
         -------
@@ -161,7 +164,7 @@ class Model:
 
         if not flights:
             raise InputError("replay needs at least one flight")
-        paths, options = [_path_of(flight) for flight in flights], ReplayOptions(horizon_s, every, hold)
+        paths, options = [_path_of(flight) for flight in flights], ReplayOptions(horizon_s, every, hold, history_s)
         return self._made(lambda job: replay.run(job, self._path, paths, options))
 
     def state(

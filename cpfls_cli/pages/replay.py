@@ -21,6 +21,7 @@ from cpfls_cli.artifacts.replay import (
 from cpfls_cli.pages.gap import AXES, MEASURED, keep_in_view
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.playback.replay import WITH_PAST
 from cpfls_cli.report.canvas import (
     BASELINE,
     GREY,
@@ -41,7 +42,7 @@ from cpfls_cli.validation.trust import Trust
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_MODEL, _NOTHING, _RATE, _STATED = range(4)
+_MODEL, _NOTHING, _RATE, _STATED, _PAST = range(5)
 _WORDS = {
     "model": "the model",
     "after": "with the effects",
@@ -49,6 +50,7 @@ _WORDS = {
     "rate-stays": "rate stays",
     "stated": "stated vehicle",
     "before": "as given",
+    "with-past": "with the past",
 }
 _SIGNALS = {
     "body_rate": ("body rate", "rad/s", 1.0),
@@ -61,6 +63,7 @@ _STYLES: tuple[dict[str, Any], ...] = (
     HELD,
     BASELINE,
     {"color": GREY, "linestyle": "-", "linewidth": 0.9},
+    {**style_of(2), "linewidth": 2.0, "zorder": 4},
 )
 _PLAYED: dict[str, Any] = {**style_of(1), "linestyle": "-", "zorder": 3}
 _SHOWN_WORST = 3
@@ -112,6 +115,19 @@ def verdict_box(replay: Source[ReplayRecord]) -> Box:
 def beside_rivals(errors: ErrorsByHorizon) -> list[str]:
     """Say of each signal to which horizon a model is better than what it has to beat, one sentence each."""
     return [_sentence(errors, name, group, rival) for name, (group, rival) in _rivals(errors).items()]
+
+
+def beside_past(errors: ErrorsByHorizon, past_s: float) -> Iterator[str]:
+    """Say how much smaller errors are where the flight before each start is known as well, in one sentence, if any."""
+    if WITH_PAST not in errors.prediction:
+        return
+    totals = [(_SIGNALS[name][0], group.total[[_MODEL, _PAST]]) for name, group in errors.errors.items() if group]
+    changes = joined(
+        f"{words} {whole_percent(abs(float(1 - with_past / model)))} {'smaller' if with_past < model else 'larger'}"
+        for words, (model, with_past) in totals
+        if model > 0
+    )
+    yield f"With {number(past_s, 2)} s of the past (`cpfls replay --history`) the errors add up to: {changes}."
 
 
 def playback_words(trust: str, held: PlaybackGroup | None, contradictions: Sequence[str] | None) -> Iterator[str]:
@@ -285,8 +301,11 @@ def told_at(replay: ReplayRecord, sources: Sources) -> str | None:
 
 def _same_errors(first: ErrorsByHorizon, second: ErrorsByHorizon) -> bool:
     groups = zip(first.errors.values(), second.errors.values(), strict=True)
+    # A vehicle may be judged with the past as well, behind what a replay holds.
     return all(
-        a is b if a is None or b is None else a.mae.shape == b.mae.shape and bool(tied(a.mae, b.mae).all())
+        a is b
+        if a is None or b is None
+        else a.mae.shape[1] == b.mae.shape[1] and bool(tied(a.mae[:_PAST], b.mae[:_PAST]).all())
         for a, b in groups
     )
 
@@ -318,6 +337,7 @@ def _facts(record: ReplayRecord) -> list[tuple[str, str]]:
         ("Played back", _name(record)),
         ("Along", "; ".join(driven)),
         ("From", f"{every}, for {_seconds(record.horizon_s[-1])}"),
+        *([] if record.history_s is None else [("With the past", f"{_seconds(record.history_s)} before each start")]),
     ]
 
 

@@ -30,7 +30,7 @@ from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.disturbance import gust_blocks
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
-from cpfls_cli.pages.replay import beside_rivals, errors_table, horizon_figure, playback_words
+from cpfls_cli.pages.replay import beside_past, beside_rivals, errors_table, horizon_figure, playback_words
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, style_of
@@ -95,7 +95,9 @@ def grounds(record: VehicleRecord) -> Iterator[str]:
             "Beside these constants the file holds a forecast along logged rotor speeds, loop and all, which `cpfls "
             "replay` plays: good for forecasts of such flights, and no vehicle. What follows is said of it."
         )
-    yield from () if record.held_out is None else beside_rivals(record.held_out)
+    if record.held_out is not None:
+        yield from beside_rivals(record.held_out)
+        yield from () if record.history is None else beside_past(record.held_out, record.history.past)
     errors = dict(zip(record.structure.name, record.structure.error, strict=True))
     alone = "the constants" if _guessed(record) else "the stated vehicle"
     yield (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, jackknife_covariance
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.gauss_newton import damped_step
+from cpfls_cli.gauss_newton import minimised
 from cpfls_cli.playback.evaluation import Evaluated
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers
@@ -29,12 +29,6 @@ _LEAST = 0.1
 
 _PRIOR = 1e-5
 """Weight of what is believed before the flights, so small that it decides only what they do not tell."""
-
-_FIRST_DAMPING, _DAMPING_UP, _DAMPING_DOWN, _LEAST_DAMPING = 1e-3, 6.0, 5.0, 1e-9
-"""Share of the diagonal: nearly a Gauss-Newton step at first; raised by more than it is lowered, so that it settles."""
-
-_TRIES = 8
-"""Of one step: the damping is a million times larger then, and a step that still fails is rounding."""
 
 
 @dataclass(frozen=True)
@@ -177,12 +171,34 @@ class Fitted:
 
 
 @dataclass(frozen=True)
-class _Point:
+class FitPoint:
+    """A fit at values of its numbers; see `cpfls_cli.gauss_newton.Point`.
+
+    Attributes
+    ----------
+    loss : float
+        The objective without what was believed before.
+    """
+
     values: Array
     loss: float
     objective: float
     gradient: Array
     hessian: Array
+
+    @classmethod
+    def of(
+        cls, values: Array, loss: float, gradient: Array, hessian: Array, scale: Array, start: Array, spread: Array
+    ) -> FitPoint:
+        """Add what was believed before the flights: numbers at their starts, so far from them in their scales."""
+        away, belief = (values - start) / scale, _PRIOR / spread**2
+        return cls(
+            values,
+            loss,
+            loss + 0.5 * float(belief @ away**2),
+            gradient * scale + belief * away,
+            hessian * scale[:, None] * scale + np.diag(belief),
+        )
 
 
 def fit(
@@ -213,14 +229,7 @@ def fit(
     point = _evaluated(free, windows, np.clip(free.values(known), low, high))
     if not np.isfinite(point.objective):
         raise ComputationError("the prediction error is not finite at the stated numbers; look at the units of the log")
-    damping = _FIRST_DAMPING
-    for _ in range(steps):
-        following, damping = _better(free, windows, point, damping, (low, high))
-        if following is None:
-            break
-        decrease, point = point.objective - following.objective, following
-        if decrease < tolerance * point.objective:
-            break
+    point = minimised(partial(_evaluated, free, windows), point, free.scales, (low, high), steps, tolerance)
     return Fitted(free, point.values, point.loss, point.hessian)
 
 
@@ -249,23 +258,14 @@ class _Evaluations:
         return loss, gradient, hessian
 
 
-def _evaluated(free: JointNumbers, windows: Sequence[FitWindows], values: Array) -> _Point:
+def _evaluated(free: JointNumbers, windows: Sequence[FitWindows], values: Array) -> FitPoint:
     evaluations = _Evaluations(free, values)
     total, gradient, hessian = 0.0, np.zeros(len(values)), np.zeros((len(values), len(values)))
     for window in windows:
         loss, by_group, curvature = evaluations.sums(window, np.zeros(len(window.starts), dtype=np.int64))
         total, gradient, hessian = total + loss, gradient + by_group[0], hessian + curvature[0]
     count = sum(len(window.starts) for window in windows)
-    scale, spread = free.scales, free.spreads
-    away = (values - free.starts) / scale
-    belief = _PRIOR / spread**2
-    return _Point(
-        values,
-        total / count,
-        total / count + 0.5 * float(belief @ away**2),
-        gradient / count * scale + belief * away,
-        hessian / count * scale[:, None] * scale + np.diag(belief),
-    )
+    return FitPoint.of(values, total / count, gradient / count, hessian / count, free.scales, free.starts, free.spreads)
 
 
 def window_sums(evaluated: Evaluated, window: FitWindows, group: IntArray) -> tuple[float, Array, Array]:
@@ -299,20 +299,6 @@ def window_sums(evaluated: Evaluated, window: FitWindows, group: IntArray) -> tu
         hessian,
     )
     return float(loss), gradient, np.tril(hessian) + np.tril(hessian, -1).swapaxes(1, 2)
-
-
-def _better(
-    free: JointNumbers, windows: Sequence[FitWindows], point: _Point, damping: float, bounds: tuple[Array, Array]
-) -> tuple[_Point | None, float]:
-    """Find a point with a smaller objective, with more damping where a step fails; None where none is found."""
-    for _ in range(_TRIES):
-        room = [(bound - point.values) / free.scales for bound in bounds]
-        step = free.scales * damped_step(point.hessian, point.gradient, damping, *room)
-        following = _evaluated(free, windows, np.clip(point.values + step, *bounds))
-        if following.objective < point.objective:
-            return following, max(damping / _DAMPING_DOWN, _LEAST_DAMPING)
-        damping *= _DAMPING_UP
-    return None, damping
 
 
 @dataclass(frozen=True)
@@ -385,9 +371,13 @@ def window_errors(fitted: Fitted, window: FitWindows) -> Array:
         flight.translates,
         errors,
     )
-    weight, delta = window.loss.weight, window.loss.delta
-    root = np.sqrt(1.0 + (errors**2).sum(axis=3) / delta**2)
-    return np.asarray((weight * delta**2 * (root - 1.0)).sum(axis=(1, 2)))
+    return weighed(window.loss, errors)
+
+
+def weighed(loss: Loss, errors: Array) -> Array:
+    """Weigh the errors of runs, shape (run, horizon, 4, 3), as the fit does, shape (run,)."""
+    root = np.sqrt(1.0 + (errors**2).sum(axis=3) / loss.delta**2)
+    return np.asarray((loss.weight * loss.delta**2 * (root - 1.0)).sum(axis=(1, 2)))
 
 
 def stays_error(window: FitWindows) -> float:

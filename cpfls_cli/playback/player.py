@@ -13,6 +13,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, momentum_form
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_flight
+from cpfls_cli.playback.history import Observer, missed_wrench, past_of
 from cpfls_cli.playback.kernels import FASTEST, Body, MeasuredMotion, Terms, errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
@@ -38,6 +39,8 @@ class Player:
     fuzzy : InertiaModel or None
         Stands in the place of the inertia of `body`.
     wind : tuple of float, m/s, world frame
+    observer : Observer or None
+        What runs know of the past; None: nothing but the state that they start from. Of constant inertia alone.
     """
 
     table: WrenchTable
@@ -46,6 +49,7 @@ class Player:
     along: Array | None = None
     fuzzy: InertiaModel | None = None
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    observer: Observer | None = None
 
     def step_weights(self, part: slice) -> tuple[Terms, Array]:
         """Evaluate the weights of the terms of the motion over each step of a part of the flight.
@@ -199,6 +203,8 @@ def free_runs(player: Player, flight: PlaybackFlight, starts: IntArray, horizon:
     horizon : int
         Samples.
     """
+    if player.observer is not None:
+        return _runs_with_past(player, player.observer, flight, starts, horizon)
     first, part = int(starts[0]), slice(int(starts[0]), int(starts[-1]) + horizon + 1)
     whole = in_the_air(flight, player.wind).motion
     position, velocity, rotation, rate = (values[part] for values in whole[:4])
@@ -210,6 +216,61 @@ def free_runs(player: Player, flight: PlaybackFlight, starts: IntArray, horizon:
         return Runs(errors, moved)
     runs = _FuzzyRuns(player, player.fuzzy, motion, used, weights, flight.translates)
     return Runs(errors, runs.written(starts - first, errors))
+
+
+_BATCH = 250
+"""Runs with a past at a time: each has weights of its own, and those of so many stay in the cache."""
+
+
+def _runs_with_past(player: Player, observer: Observer, flight: PlaybackFlight, starts: IntArray, horizon: int) -> Runs:
+    """Play a model back from samples of a flight, pushed by the disturbance that was observed before each."""
+    still = in_the_air(flight, player.wind)
+    pushes = observed(player, flight, starts)
+    fading = observer.fading(still.motion.period, horizon)
+    parts = []
+    for first in range(0, len(starts), _BATCH):
+        own = starts[first : first + _BATCH]
+        begin = int(own[0])
+        used, by_sample = player.step_weights(slice(begin, int(own[-1]) + horizon + 1))
+        # One window beside the other, as each is pushed by itself.
+        samples = (own[:, None] + np.arange(horizon + 1)).ravel()
+        weights = by_sample[samples - begin].reshape(len(own), horizon + 1, *by_sample.shape[1:])
+        weights[:, :-1, :, 0] += pushes[first : first + _BATCH, None] * fading
+        position, velocity, rotation, rate = (values[samples] for values in still.motion[:4])
+        motion = MeasuredMotion(position, velocity, rotation, rate, still.motion.period)
+        errors = np.empty((len(own), horizon, 4, 3))
+        places = np.arange(len(own)) * (horizon + 1)
+        flat = weights.reshape(-1, *weights.shape[2:])
+        parts.append((errors, errors_of_runs(motion, player.body, used, flat, places, flight.translates, errors)))
+    return Runs(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+
+
+def observed(player: Player, flight: PlaybackFlight, starts: IntArray) -> Array:
+    """Observe the disturbance at each start, from samples up to it alone.
+
+    Parameters
+    ----------
+    player : Player
+        With an observer.
+    starts : array of int, shape (run,)
+        Ascending.
+
+    Returns
+    -------
+    array, shape (run, 6), N m and N, body frame
+        Where a stretch begins later than the past that is asked for, from what there is.
+    """
+    observer = player.observer
+    assert observer is not None
+    period = flight.motion.period
+    steps, known = past_of(flight, starts, observer.samples(period))
+    taken = np.arange(int(steps.min()), int(starts[-1]))
+    missed = np.zeros((len(taken) + 1, 6))
+    if len(taken):
+        single = free_runs(replace(player, observer=None), flight, taken, 1).errors[:, 0]
+        missed[:-1] = missed_wrench(flight, taken, single, player.body)
+    weights = observer.weights(period)
+    return np.asarray(np.einsum("rsa,rs,sa->ra", missed[steps - int(steps.min())], known, weights))
 
 
 def in_the_air(flight: PlaybackFlight, wind: tuple[float, float, float]) -> PlaybackFlight:

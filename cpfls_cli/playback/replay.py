@@ -19,6 +19,9 @@ MODEL, NOTHING_MOVES, RATE_STAYS, STATED = "model", "nothing-moves", "rate-stays
 PREDICTIONS = (MODEL, NOTHING_MOVES, RATE_STAYS, STATED)
 """The model; the whole state stays; rates and velocity stay; the rigid body and the rotors that the config states."""
 
+WITH_PAST = "with-past"
+"""Behind these: a model that is told of the flight before each start too, beside one that is not."""
+
 _BATCH = 100_000
 """Steps of free runs at a time, which bounds the memory."""
 
@@ -35,20 +38,30 @@ class ReplayOptions:
         Samples from one begin to the next.
     hold : {"linear", "previous"} or None
         What a speed is between samples; None for what is usual.
+    history_s : float
+        How much of the flight before a start its prediction uses, s.
     """
 
     horizon_s: float = 0.5
     every: int = 1
     hold: Hold | None = None
+    history_s: float = 0.0
 
 
 @dataclass(frozen=True)
 class Played:
-    """A flight and what is played back along it."""
+    """A flight and what is played back along it.
+
+    Attributes
+    ----------
+    with_past : Player or None
+        A model that uses the past, beside one that does not.
+    """
 
     flight: PlaybackFlight
     model: Player
     stated: Player
+    with_past: Player | None = field(default=None, kw_only=True)
 
     def runs(self, prediction: str, starts: IntArray, horizon: int) -> Runs:
         """Predict from samples of the flight.
@@ -56,7 +69,7 @@ class Played:
         Parameters
         ----------
         prediction : str
-            Of `PREDICTIONS`.
+            Of `PREDICTIONS`, or `WITH_PAST`.
         starts : array of int, shape (run,)
             Ascending.
         horizon : int
@@ -64,7 +77,10 @@ class Played:
         """
         if prediction in (NOTHING_MOVES, RATE_STAYS):
             return still_runs(self.flight, starts, horizon, rate_stays=prediction == RATE_STAYS)
-        return free_runs(self.model if prediction == MODEL else self.stated, self.flight, starts, horizon)
+        players = {MODEL: self.model, STATED: self.stated, WITH_PAST: self.with_past}
+        player = players[prediction]
+        assert player is not None, "asked for where all flights have one"
+        return free_runs(player, self.flight, starts, horizon)
 
     @property
     def knows(self) -> dict[str, bool]:
@@ -169,10 +185,13 @@ class Replay:
     ----------
     errors : mapping of str to SignalErrors or None
         By signal; None where no flight knows it.
+    predictions : tuple of str
+        `PREDICTIONS`, and `WITH_PAST` where all flights have it.
     """
 
     errors: Mapping[str, SignalErrors | None]
     windows: ReplayWindows
+    predictions: tuple[str, ...] = PREDICTIONS
 
 
 _OUTER = 0.05
@@ -220,13 +239,14 @@ class _Sums:
     """Sums over the windows so far."""
 
     horizon: int
+    predictions: tuple[str, ...]
     count: dict[str, int] = field(default_factory=lambda: dict.fromkeys(SIGNALS, 0))
     norm: Array = field(init=False)
     square: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        self.norm = np.zeros((4, len(PREDICTIONS), self.horizon))
-        self.square = np.zeros((4, len(PREDICTIONS), self.horizon, 3))
+        self.norm = np.zeros((4, len(self.predictions), self.horizon))
+        self.square = np.zeros((4, len(self.predictions), self.horizon, 3))
 
     def add(self, prediction: int, errors: Array, knows: Mapping[str, bool]) -> None:
         """Add the errors of a batch, shape (run, horizon, 4, 3)."""
@@ -270,7 +290,9 @@ def replay(
     The metric of arXiv 2512.14450: mean norms of errors by horizon, and their sums.
     """
     starts = [played.flight.starts(horizon, every) for played in flights]
-    sums, parts, done, total = _Sums(horizon), [], 0, sum(map(len, starts))
+    past = all(played.with_past is not None for played in flights)
+    predictions = (*PREDICTIONS, WITH_PAST) if past else PREDICTIONS
+    sums, parts, done, total = _Sums(horizon, predictions), [], 0, sum(map(len, starts))
     for index, played in enumerate(flights):
         size = max(1, _BATCH // horizon)
         for first in range(0, len(starts[index]), size):
@@ -279,16 +301,16 @@ def replay(
             done += len(batch)
             progress(done / total)
     joined = [np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)]
-    return Replay(sums.errors(), ReplayWindows(*joined))
+    return Replay(sums.errors(), ReplayWindows(*joined), predictions)
 
 
 def _added(sums: _Sums, played: Played, starts: IntArray, flight: int) -> tuple[IntArray, IntArray, Array, IntArray]:
     """Add a batch to the sums; give the columns of `ReplayWindows`."""
-    size = np.empty((len(PREDICTIONS), len(starts)))
+    size = np.empty((len(sums.predictions), len(starts)))
     diverged = np.empty(size.shape, dtype=np.int64)
     knows = played.knows
     model: Runs | None = None
-    for row, prediction in enumerate(PREDICTIONS):
+    for row, prediction in enumerate(sums.predictions):
         again = model if prediction == STATED and played.stated is played.model else None
         runs = again or played.runs(prediction, starts, sums.horizon)
         model = runs if prediction == MODEL else model

@@ -233,12 +233,15 @@ class _Bench:
         errors = [
             window_errors(fitted, windows) for fitted, kept in zip(fits, self.parts, strict=True) for windows in kept
         ]
-        # Whole flights are what is independent; few of them are cut.
-        pieces = -(-_FEWEST_BLOCKS // len(errors))
-        by_block = np.array([piece.mean() for each in errors for piece in np.array_split(each, min(pieces, len(each)))])
-        joined = np.concatenate(errors)
+        by_block, joined = block_errors(errors), np.concatenate(errors)
         condition = max(fitted.condition_number for fitted in fits)
         return Judged(structure, float(joined.mean()), by_block, len(fits[0].values), condition, fits)
+
+
+def block_errors(errors: Sequence[Array]) -> Array:
+    """Take the means of errors by flight, which is what is independent; few of them are cut."""
+    pieces = -(-_FEWEST_BLOCKS // len(errors))
+    return np.array([piece.mean() for each in errors for piece in np.array_split(each, min(pieces, len(each)))])
 
 
 def tried_blocks(

@@ -17,6 +17,8 @@ from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
 from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import OF_A_WEIGHT, Group, JointNumbers
+from cpfls_cli.playback.history import Observer
+from cpfls_cli.playback.history_fit import find_history
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.loop import LoopBounds, loop_bounds
 from cpfls_cli.playback.model import VehicleModel
@@ -132,6 +134,9 @@ class FoundVehicle:
         What forecasts the flights, loop and all, where the model is the vehicle alone.
     gusts : FoundGusts or None
         Where the numbers are those of the vehicle; the model holds what is known of them.
+    history : Observer or None
+        By which the forecast uses the past; None where that is no better on flights kept aside, is not asked for, or
+        the search was stopped.
     """
 
     model: VehicleModel
@@ -150,6 +155,7 @@ class FoundVehicle:
     constants: Constants | None = None
     forecast: VehicleModel | None = None
     gusts: FoundGusts | None = None
+    history: Observer | None = None
 
 
 def find_vehicle(
@@ -199,6 +205,7 @@ def find_vehicle(
         None if forecast is None else constants,
         forecast,
         gusts,
+        find_history(chosen, fitted, own, settings) if choice.complete and settings.history_s else None,
     )
 
 

@@ -11,6 +11,7 @@ import pytest
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.store import read_record, write_record
+from cpfls_cli.artifacts.vehicle_model import HistoryGroup
 from cpfls_cli.commands import verify_export
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
@@ -427,3 +428,26 @@ def test_code_holds_gusts_and_says_how_to_play_them(cpfls, gusty, folder):
     assert np.std(seen) == pytest.approx(size, rel=0.07)
     late = round(memory / h)
     assert np.mean(np.multiply(seen[late:], seen[:-late])) == pytest.approx(size**2 / np.e, rel=0.2)
+
+
+def test_a_replay_uses_the_past_where_a_vehicle_holds_an_observer(
+    cpfls, refuse, config, written, noisy, vehicle, tmp_path
+):
+    history = HistoryGroup(past=0.5, rate=np.full(6, 20.0), memory=np.full(6, 0.2))
+    model, told = written("remembers.h5", history=history), []
+    for options in ((), ("--history", "0.5")):
+        output = tmp_path / f"{len(told)}.h5"
+        result = cpfls("replay", config, model, noisy, "-o", output, "--every", "20", "--json", *options)
+        assert result.exit_code == 0, result.stderr
+        assert cpfls("check", output).exit_code == 0
+        told.append(json.loads(result.stdout))
+    without, known = told
+    assert [each["history_s"] for each in told] == [0.0, 0.5]
+    assert without["windows"] == known["windows"]
+    assert known["models"]["model"] != without["models"]["model"]
+    assert known["models"]["stated"] == without["models"]["stated"]
+    assert any("3 of" in each and "use the past that there is" in each for each in known["warnings"])
+    (message,) = refuse("replay", config, vehicle, noisy, "--history", "0.5", "-o", tmp_path / "x.h5")
+    assert "vehicle.h5: holds no forecast that uses the past" in message
+    (message,) = refuse("replay", config, model, noisy, "--history", "0.001", "-o", tmp_path / "x.h5")
+    assert message.startswith("--history 0.001 s is shorter than a sample of noisy.h5")

@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.dynamics.equations_of_motion import identified_turning
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.errors import InputError
-from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.player import free_runs, player_of, rotation_vectors
@@ -18,32 +17,13 @@ from cpfls_cli.playback.replay import MODEL, NOTHING_MOVES, RATE_STAYS, SIGNALS,
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.rotations import cross, euler_angles
 from cpfls_cli.vehicle.rotors import body_wrench
-from cpfls_cli.vehicle.settings import VehicleSettings
+from tests.builders.random_flights import VEHICLE, flight_of
 
-VEHICLE = VehicleSettings(inertia_kg_m2=(0.6, 0.7, 1.2, 0.02, -0.03, 0.01))
 INERTIA = np.array([[0.6, 0.02, -0.03], [0.02, 0.7, 0.01], [-0.03, 0.01, 1.2]])
 DAMPING, DRAG = np.array([0.3, 0.2, 0.1]), 2e-4
 EFFECTS = (ModelEffect("linear_damping", {}, DAMPING), ModelEffect("rotor_drag", {}, np.array([DRAG])))
 HUBS = np.array([rotor.position_m for rotor in VEHICLE.rotors])
 PLANE = np.array([1.0, 1.0, 0.0])
-
-
-def flight_of(samples=80, period=0.01, seed=0, **changes):
-    """A flight at random: a playback is held against another one, not against what any vehicle does."""
-    rng = np.random.default_rng(seed)
-    time = period * np.arange(samples)
-    turns = 0.4 * np.sin(np.outer(time, rng.uniform(1, 3, 3)) + rng.uniform(0, 6, 3))
-    motion = MeasuredMotion(
-        position=rng.uniform(-1, 1, 3) + np.outer(time, rng.uniform(-1, 1, 3)),
-        velocity=np.cos(np.outer(time, rng.uniform(1, 3, 3)) + rng.uniform(0, 6, 3)),
-        rotation=Rotation.from_euler("ZYX", turns).as_matrix(),
-        rate=1.5 * np.sin(np.outer(time, rng.uniform(1, 3, 3)) + rng.uniform(0, 6, 3)),
-        period=period,
-    )
-    hover = np.sqrt(6 * 9.81 / 4 / VEHICLE.rotors[0].thrust_factor_n_s2)
-    speed = hover * (1 + 0.05 * np.sin(np.outer(time, rng.uniform(2, 6, 4)) + rng.uniform(0, 6, 4)))
-    given = {"name": "flight", "motion": motion, "speed": speed, "hold": "linear", "stretches": (slice(0, samples),)}
-    return PlaybackFlight(**{**given, **changes})
 
 
 def integrated(flight, start, horizon, acceleration):
