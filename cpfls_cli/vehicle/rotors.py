@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -75,6 +76,7 @@ class RotorDemand:
     violations: tuple[RotorViolation, ...]
 
 
+@lru_cache(maxsize=64)
 def allocation_matrix(vehicle: VehicleSettings) -> Array:
     """Map squared rotor speeds to thrust and body torque.
 
@@ -83,7 +85,8 @@ def allocation_matrix(vehicle: VehicleSettings) -> Array:
     Returns
     -------
     array, shape (4, rotor)
-        Rows are thrust in N, then roll, pitch and yaw torque in N m, for 1 rad^2/s^2.
+        Rows are thrust in N, then roll, pitch and yaw torque in N m, for 1 rad^2/s^2. Not to be written to: a flight
+        in closed loop asks for the same one at every step.
 
     References
     ----------
@@ -94,7 +97,9 @@ def allocation_matrix(vehicle: VehicleSettings) -> Array:
         x, y, _ = rotor.position_m
         k, b = rotor.thrust_factor_n_s2, rotor.drag_factor_n_m_s2
         columns.append([k, y * k, -x * k, -rotor.spin * b])
-    return np.array(columns).T
+    matrix = np.array(columns).T
+    matrix.flags.writeable = False
+    return matrix
 
 
 def body_wrench(vehicle: VehicleSettings, rotor_speed: Array) -> BodyWrench:
