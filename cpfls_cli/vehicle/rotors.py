@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -76,7 +75,6 @@ class RotorDemand:
     violations: tuple[RotorViolation, ...]
 
 
-@lru_cache(maxsize=64)
 def allocation_matrix(vehicle: VehicleSettings) -> Array:
     """Map squared rotor speeds to thrust and body torque.
 
@@ -85,8 +83,7 @@ def allocation_matrix(vehicle: VehicleSettings) -> Array:
     Returns
     -------
     array, shape (4, rotor)
-        Rows are thrust in N, then roll, pitch and yaw torque in N m, for 1 rad^2/s^2. Not to be written to: a flight
-        in closed loop asks for the same one at every step.
+        Rows are thrust in N, then roll, pitch and yaw torque in N m, for 1 rad^2/s^2.
 
     References
     ----------
@@ -97,9 +94,7 @@ def allocation_matrix(vehicle: VehicleSettings) -> Array:
         x, y, _ = rotor.position_m
         k, b = rotor.thrust_factor_n_s2, rotor.drag_factor_n_m_s2
         columns.append([k, y * k, -x * k, -rotor.spin * b])
-    matrix = np.array(columns).T
-    matrix.flags.writeable = False
-    return matrix
+    return np.array(columns).T
 
 
 def body_wrench(vehicle: VehicleSettings, rotor_speed: Array) -> BodyWrench:
