@@ -20,13 +20,18 @@ def rotation_matrix(attitude: Array) -> Array:
     array, shape (time, 3, 3)
         ``v_world = R @ v_body``.
     """
-    (sr, cr), (sp, cp), (sy, cy) = ((np.sin(a), np.cos(a)) for a in attitude.T)
+    one = len(attitude) == 1
+    if one:
+        # At one instant NumPy spends ten times as long on its arrays as on what is in them.
+        (sr, sp, sy), (cr, cp, cy) = np.sin(attitude[0]).tolist(), np.cos(attitude[0]).tolist()
+    else:
+        (sr, cr), (sp, cp), (sy, cy) = ((np.sin(a), np.cos(a)) for a in attitude.T)
     rows = [
         [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
         [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
         [-sp, cp * sr, cp * cr],
     ]
-    return np.array(rows).transpose(2, 0, 1)
+    return np.array(rows)[None] if one else np.array(rows).transpose(2, 0, 1)
 
 
 def cross(first: Array, second: Array) -> Array:
@@ -43,6 +48,9 @@ def cross(first: Array, second: Array) -> Array:
     -------
     array, shape (..., 3)
     """
+    if first.ndim == second.ndim == 1:
+        (a, b, c), (u, v, w) = first.tolist(), second.tolist()
+        return np.array([b * w - c * v, c * u - a * w, a * v - b * u])
     (a, b, c), (u, v, w) = ((each[..., 0], each[..., 1], each[..., 2]) for each in (first, second))
     along = b * w - c * v
     product = np.empty((*along.shape, 3))
@@ -159,6 +167,12 @@ def attitude_rate(attitude: Array, body_rate: Array) -> Array:
     array, shape (time, 3), rad/s
         Not finite where the pitch is exactly +-90 degrees.
     """
+    if len(attitude) == 1:
+        ((sr, sp, _),), ((cr, cp, _),) = np.sin(attitude).tolist(), np.cos(attitude).tolist()
+        if cp != 0.0:
+            ((p, q, r),) = body_rate.tolist()
+            yaw_rate = (sr * q + cr * r) / cp
+            return np.array([[p + sp * yaw_rate, cr * q - sr * r, yaw_rate]])
     (sr, cr), (sp, cp) = ((np.sin(a), np.cos(a)) for a in attitude.T[:2])
     p, q, r = body_rate.T
     with np.errstate(divide="ignore", invalid="ignore"):

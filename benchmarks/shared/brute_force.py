@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.special import logsumexp, softmax
 
 from cpfls_cli.arrays import Array
 
@@ -57,6 +56,18 @@ def _feasible(matrix: Array, bounds: Array, period: float | None, more: Array) -
     return start
 
 
+def _total(y: Array) -> float:
+    """Give ``log sum exp y``; SciPy's own spends its time around five numbers, not on them."""
+    largest = y.max()
+    return float(largest + np.log(np.exp(y - largest).sum()))
+
+
+def _shares(y: Array) -> Array:
+    """Differentiate `_total`."""
+    parts = np.exp(y - y.max())
+    return np.asarray(parts / parts.sum())
+
+
 def _minimised(start: Array, matrix: Array, bounds: Array, period: float | None) -> float:
     size = len(start)
     constraints = [{"type": "ineq", "fun": lambda y: bounds - matrix @ y, "jac": lambda _: -matrix}]
@@ -66,11 +77,11 @@ def _minimised(start: Array, matrix: Array, bounds: Array, period: float | None)
         held = np.eye(1, size)
         constraints.append({"type": "eq", "fun": lambda y: y[:1] - np.log(period), "jac": lambda _: held})
     found = minimize(
-        logsumexp, start, jac=softmax, method="SLSQP", constraints=constraints, options={"maxiter": 500, "ftol": 1e-14}
+        _total, start, jac=_shares, method="SLSQP", constraints=constraints, options={"maxiter": 500, "ftol": 1e-14}
     )
     spans = found.x
     broken = min(np.min(bounds - matrix @ spans, initial=0.0), _nested(spans).min(initial=0.0))
-    return float(np.exp(logsumexp(spans))) if broken > -1e-8 else np.inf
+    return float(np.exp(_total(spans))) if broken > -1e-8 else np.inf
 
 
 def _nested(spans: Array) -> Array:
@@ -81,5 +92,5 @@ def _nested_slope(spans: Array) -> Array:
     size = len(spans)
     slope = np.eye(size)[1:]
     for row in range(size - 1):
-        slope[row, : row + 1] -= softmax(spans[: row + 1])
+        slope[row, : row + 1] -= _shares(spans[: row + 1])
     return slope

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import combinations_with_replacement, product
 
 import numpy as np
@@ -92,8 +92,9 @@ class Probe:
         return products / scale, np.asarray(np.linalg.pinv(products / scale)), scale
 
     @classmethod
+    @lru_cache(maxsize=8)
     def of(cls, vehicle: VehicleSettings) -> Probe:
-        """Draw motions of the size that the vehicle has."""
+        """Draw motions of the size that the vehicle has; what they are inverted by is worked out once for each."""
         rng = np.random.default_rng(0)
         rotors = len(vehicle.rotors)
         speed = scales.hover_speed(vehicle) * rng.uniform(0.5, 1.5, (_PROBES, rotors))

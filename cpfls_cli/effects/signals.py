@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.vehicle.rotors import body_wrench
+from cpfls_cli.vehicle.rotors import BodyWrench, body_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _T = TypeVar("_T")
@@ -139,14 +139,18 @@ class Signals:
         """Body torque of the rotors, shape (time, 3), N m."""
         if self.rotor_speed is None:
             return self.stated_torque
-        return body_wrench(self.vehicle, self.rotor_speed).body_torque
+        return self._of_rotors.body_torque
 
     @cached_property
     def thrust(self) -> Array | None:
         """Thrust along body z, shape (time,), N."""
         if self.rotor_speed is None:
             return self.stated_thrust
-        return body_wrench(self.vehicle, self.rotor_speed).thrust
+        return self._of_rotors.thrust
+
+    @cached_property
+    def _of_rotors(self) -> BodyWrench:
+        return body_wrench(self.vehicle, self.speed)
 
     @cached_property
     def wrench(self) -> Array:

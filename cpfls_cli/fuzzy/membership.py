@@ -209,8 +209,9 @@ def _inside(scaled_input: Array) -> Array:
 
 
 def _locate(scaled_input: Array, breakpoints: Array) -> _Located:
-    clipped = np.clip(scaled_input, 0.0, 1.0)
-    interval = np.clip(np.searchsorted(breakpoints, clipped, side="right") - 1, 0, len(breakpoints) - 2)
+    clipped = np.minimum(np.maximum(scaled_input, 0.0), 1.0)
+    found = np.searchsorted(breakpoints, clipped, side="right") - 1
+    interval = np.minimum(np.maximum(found, 0), len(breakpoints) - 2)
     width = np.diff(breakpoints)[interval]
     # A function of zero width is met only at the very end of the range; its left neighbour has gone there.
     empty = width <= 0.0

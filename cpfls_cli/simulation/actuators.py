@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from math import prod
+from math import prod, sqrt
 
 import numpy as np
 
@@ -47,12 +47,16 @@ class Mixer:
 
     def command(self, wrench: Array) -> Array:
         """Compute the possible rotor speeds, shape (rotor,), rad/s, nearest to a wrench, shape (4,)."""
-        upright, yaw = wrench[:3] @ self.inverse[:3], wrench[3] * self.inverse[3]
-        room = np.where(yaw > 0, self.limit - upright, upright)
-        # What yaw does not change by more than rounding sets no limit.
-        loaded = np.abs(yaw) > _ROUNDING * self.limit
-        share = np.min(room[loaded] / np.abs(yaw[loaded]), initial=1.0)
-        return np.asarray(np.sqrt(np.clip(upright + max(share, 0.0) * yaw, 0.0, self.limit)))
+        limit, share = self.limit, 1.0
+        upright_all, yaw_all = wrench[:3] @ self.inverse[:3], wrench[3] * self.inverse[3]
+        # Four numbers take NumPy longer than Python.
+        by_rotor = list(zip(upright_all.tolist(), yaw_all.tolist(), strict=True))
+        for upright, yaw in by_rotor:
+            # What yaw does not change by more than rounding sets no limit.
+            if abs(yaw) > _ROUNDING * limit:
+                share = min(share, (limit - upright if yaw > 0 else upright) / abs(yaw))
+        share = max(share, 0.0)
+        return np.array([sqrt(min(max(upright + share * yaw, 0.0), limit)) for upright, yaw in by_rotor])
 
 
 def mixer(vehicle: VehicleSettings) -> Mixer:

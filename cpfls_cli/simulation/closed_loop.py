@@ -135,8 +135,8 @@ class Autopilot:
 
     def _torque(self, step: int, turned: Array, body_rate: Array) -> Array:
         """Compute the torque that turns the body to its target attitude."""
-        skew = 0.5 * (turned - turned.T)
-        error = np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
+        (_, xy, xz), (yx, _, yz), (zx, zy, _) = turned.tolist()
+        error = np.array([0.5 * (zy - yz), 0.5 * (xz - zx), 0.5 * (yx - xy)])
         rate_error = body_rate - turned.T @ self._planned.body_rate[step]
         wanted = turned.T @ self._planned.body_acceleration[step]
         wanted = wanted - self._attitude_gain * error - self._rate_gain * rate_error
@@ -160,7 +160,7 @@ def upright(pull: Array, yaw: float) -> Array:
     # By the definition of yaw the x axis lies in the vertical plane of the heading, however the body rolls.
     forward = rotations.cross(np.array([-np.sin(yaw), np.cos(yaw), 0.0]), up)
     forward /= np.sqrt(forward @ forward)
-    return np.column_stack([forward, rotations.cross(up, forward), up])
+    return np.array([forward, rotations.cross(up, forward), up]).T.copy()
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,8 @@ from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 HUBS = (((0.3, 0.0, 0.05), 1), ((0.0, -0.3, 0.05), -1), ((-0.3, 0.0, 0.05), 1), ((0.0, 0.3, 0.05), -1))
 VEHICLE = VehicleSettings(rotors=tuple(RotorSettings(position_m=hub, spin=spin, radius_m=0.2) for hub, spin in HUBS))
 PERIOD = 0.01
+COARSE = 200.0
+"""Steps of the integration in a second, Hz, where a flight is not held against its own exact motion."""
 
 
 def planned(duration=3.0, also=0.0):

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown
+from tests.builders.closed_loop_flights import COARSE, PERIOD, VEHICLE, flown
 from tests.builders.vehicle_search import left_out
 
 NOISE = {"body_rate": 0.01, "attitude": 0.003, "velocity": 0.02, "position": 0.005, "rotor_speed": 1.0}
@@ -92,7 +92,7 @@ def config_of(folder):
 
 def log_of(path, seed, sign=(1.0, 1.0, 1.0), duration=8.0):
     """Write a log of a flight with measured rotor speeds; its gyroscope with these signs."""
-    logged = flown(duration, seed=seed, noise=NOISE, also=0.05).signals
+    logged = flown(duration, seed=seed, noise=NOISE, also=0.05, integration_rate_hz=COARSE).signals
     turned = Rotation.from_euler("ZYX", logged["attitude"][:, ::-1]).as_quat()[:, [3, 0, 1, 2]]
     time = PERIOD * np.arange(len(turned))
     values = np.column_stack(

@@ -34,6 +34,7 @@ trajectory:
   sample_time_s: 0.01
   duration_s: 8.0
   yaw_turn_rad: 2.0
+simulation: {{closed_loop: {{integration_rate_hz: 200.0}}}}
 """
 RESPONSE = RotorResponse(delay_s=0.013, lag_s=0.02, slow_roll_pitch=-0.3, slow_yaw=0.4, slow_s=0.3)
 # Reaction and flapping are the smallest parts of a gentle flight.

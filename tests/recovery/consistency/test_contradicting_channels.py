@@ -13,7 +13,7 @@ from cpfls_cli.consistency.audit import audit
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.weak_form.windows import Recording, windows
-from tests.builders.closed_loop_flights import PERIOD, flown, signals_of
+from tests.builders.closed_loop_flights import COARSE, PERIOD, flown, signals_of
 
 WINDOWS = windows(PERIOD, 0.4, 0.5)
 UP = np.array([0.0, 0.0, 9.81])
@@ -41,7 +41,8 @@ def lively():
 
 
 def dragged(also):
-    flown_twice = (flown(20.0, seed=seed, noise=NOISE, also=also, effects={"rotor_drag": [DRAG]}) for seed in (1, 2))
+    told = {"noise": NOISE, "also": also, "effects": {"rotor_drag": [DRAG]}, "integration_rate_hz": COARSE}
+    flown_twice = (flown(20.0, seed=seed, **told) for seed in (1, 2))
     return [headed(signals_of(flight), 60.0) for flight in flown_twice]
 
 

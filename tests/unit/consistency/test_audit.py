@@ -10,7 +10,7 @@ from cpfls_cli.consistency.audit import audit
 from cpfls_cli.consistency.sensors import sensors_of
 from cpfls_cli.vehicle.rotors import body_wrench
 from cpfls_cli.weak_form.windows import windows
-from tests.builders.closed_loop_flights import flown, signals_of
+from tests.builders.closed_loop_flights import COARSE, flown, signals_of
 from tests.builders.faulty_gyroscopes import LEVELS, Faults, faulty_flight
 
 WINDOWS = windows(0.01, 0.4, 0.5)
@@ -187,6 +187,8 @@ def test_rotors_that_hold_one_speed_are_named(turning):
 def test_a_delay_that_runs_away_is_no_repair():
     """Shifted beyond the flight a channel stands still, and the next delay had no bound: an array of exabytes."""
     noise = {"body_rate": 0.01, "attitude": 0.003, "velocity": 0.02, "position": 0.005, "acceleration": 0.1}
-    flights = [signals_of(flown(20.0, seed=seed, noise=noise, also=0.05)) for seed in (3, 13)]
+    flights = [
+        signals_of(flown(20.0, seed=seed, noise=noise, also=0.05, integration_rate_hz=COARSE)) for seed in (3, 13)
+    ]
     found = audit([replace(signals, position=1e3 * signals.position) for signals in flights], WINDOWS)
     assert any("is the position in mm" in sentence for sentence in found.contradictions)

@@ -8,7 +8,7 @@ import pytest
 from cpfls_cli.consistency.check import check
 from cpfls_cli.consistency.numbers import beyond_belief
 from cpfls_cli.gap.settings import GapSettings
-from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, signals_of
+from tests.builders.closed_loop_flights import COARSE, PERIOD, VEHICLE, flown, signals_of
 
 SETTINGS = GapSettings()
 NOISE = {"body_rate": 0.01, "attitude": 0.003, "velocity": 0.02, "position": 0.005, "acceleration": 0.1}
@@ -17,7 +17,7 @@ UP_IS_DOWN = np.array([1.0, 1.0, -1.0])
 
 @pytest.fixture(scope="module")
 def flight():
-    return signals_of(flown(12.0, noise=NOISE))
+    return signals_of(flown(12.0, noise=NOISE, integration_rate_hz=COARSE))
 
 
 def said(signals):
@@ -133,7 +133,7 @@ def test_a_fault_is_said(flight, fault):
 
 
 def test_rotors_on_another_clock_are_said():
-    lively = signals_of(flown(20.0, noise=NOISE, also=0.05))
+    lively = signals_of(flown(20.0, noise=NOISE, also=0.05, integration_rate_hz=COARSE))
     assert said(lively) == ""
     assert "the rotor speeds are late by" in said(replace(lively, rotor_speed=np.roll(lively.rotor_speed, 5, axis=0)))
 

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -29,12 +30,18 @@ def docstrings(tree):
     return {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
 
 
-def literals(path):
+@cache
+def read(path):
+    """Literals of a module, and the modules that it imports from; its tree is not kept."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    alone = docstrings(tree)
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in alone:
-            yield node.value
+    alone, nodes = docstrings(tree), list(ast.walk(tree))
+    strings = [node for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+    texts = [node.value for node in strings if id(node) not in alone]
+    return texts, [node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module]
+
+
+def literals(path):
+    return read(path)[0]
 
 
 def test_no_effect_is_named_outside_the_catalogue():
@@ -58,10 +65,10 @@ def test_texts_mention_effects_only_as_examples():
 def test_only_the_numbers_of_the_vehicle_are_imported_from_the_catalogue():
     prefix = "cpfls_cli.effects.catalogue"
     imported = {
-        node.module.removeprefix(f"{prefix}.")
+        module.removeprefix(f"{prefix}.")
         for path in ELSEWHERE
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith(f"{prefix}.")
+        for module in read(path)[1]
+        if module.startswith(f"{prefix}.")
     }
     assert imported == IMPORTED
 
