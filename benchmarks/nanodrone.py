@@ -2,6 +2,7 @@
 
     python benchmarks/nanodrone.py DATA [--unknown]
     python benchmarks/nanodrone.py DATA --history             a forecast that uses 0.5 s of the past, and without it
+    python benchmarks/nanodrone.py DATA --repeats             moments of inertia by runs of each path, and of all
     python benchmarks/nanodrone.py DATA --write FOLDER        the prepared flights as CSV, and nothing else
 
 DATA is a clone of idsia-robotics/nanodrone-sysid-benchmark, branch model_export (commit ac439db), which has the raw
@@ -18,6 +19,9 @@ random alone; with --unknown from mass and geometry, inertia and factors of the 
 since its script lays the flights end to end and holds the last windows of a flight against the beginning of the next.
 Rows "their way" are counted like that, and are what the published rows are to be set beside.
 
+With --repeats the paths of the training flights, each flown three or four times, tell the moments of inertia by
+instruments (docs/closed-loop.md); mass, arms and factors of the rotors are the stated ones.
+
 With --history no structure is searched for: blocks of one that was found (`BLOCKS`) are fitted to the training flights,
 and then the observer of their forecast; both are counted as above, and as `nonlinear_benchmarks` (NanoDrone) does: runs
 from 50 samples after the begin of each flight on, errors averaged by flight. Its flights are prepared by others.
@@ -27,7 +31,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
@@ -56,8 +61,11 @@ from benchmarks.shared.playback_scores import (
     score,
 )
 from cpfls_cli.errors import InputError
+from cpfls_cli.playback.constants import find_constants
 from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.instruments import instruments
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.vehicle import found_numbers
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 # Of position, velocity, attitude, body rate: h = 1, 10, 50, and the sum over h = 1 to 50. Printed by the notebook
@@ -111,6 +119,7 @@ BLOCKS = (
     "torque_bias",
     "remainder",
 )
+MOMENTS = ("inertia.Ixx", "inertia.Iyy")
 PAST = 50
 """Samples of the past that a forecast may use: the initialisation window of nonlinear_benchmarks."""
 COLUMNS = (
@@ -155,6 +164,32 @@ def rows_with_past(training: Sequence[PlaybackFlight], test: Sequence[PlaybackFl
     return rows
 
 
+def rows_of_repeats(training: Sequence[PlaybackFlight]) -> Iterator[list[object]]:
+    """Find the moments of inertia in the runs of each path, and in all flights."""
+    kinds = {flight.name.split("_")[0]: [] for flight in training}
+    for flight in training:
+        kinds[flight.name.split("_")[0]].append(flight)
+    for name, flown in (*kinds.items(), ("all", list(training))):
+        found = find_constants(replace(VEHICLE, unknown=("inertia",)), flown, instruments(flown))
+        if found is None:
+            yield [name, len(flown), *["not told"] * 5]
+            continue
+        moments = [number for number in found_numbers(found.fitted, found.spread) if number.name in MOMENTS]
+        bands = [hz for hz, used in zip(found.explained.bands_hz, found.explained.used, strict=True) if used]
+        yield [
+            name,
+            len(flown),
+            *(
+                f"{1e5 * each.value:.2f} ({1e5 * each.low:.2f} to {1e5 * each.high:.2f})"
+                if each.determined
+                else f"{1e5 * each.value:.2f}, not determined"
+                for each in moments
+            ),
+            f"{bands[-1][0]:g} to {bands[0][1]:g}",
+            *(f"{found.explained.total[axis]:.2f} ± {found.explained.error[axis]:.2f}" for axis in range(2)),
+        ]
+
+
 def rows_of(name: str, test: Sequence[PlaybackFlight], runs: Sequence[Runs]) -> list[list[object]]:
     """Count runs within flights, and as the published script does."""
     rows: list[list[object]] = []
@@ -174,6 +209,7 @@ def main() -> None:
     parser.add_argument("data", type=Path, metavar="DATA", help="folder of the benchmark's files")
     parser.add_argument("--unknown", action="store_true", help="learn from mass and geometry alone")
     parser.add_argument("--history", action="store_true", help="a forecast with the past, and without")
+    parser.add_argument("--repeats", action="store_true", help="moments of inertia by runs of each path")
     parser.add_argument("--write", type=Path, metavar="FOLDER", help="write the prepared flights as CSV, and stop")
     given = parser.parse_args()
     folder, stated = given.data, constants_unknown(VEHICLE) if given.unknown else VEHICLE
@@ -189,6 +225,18 @@ def main() -> None:
             write_flight(given.write, flight)
         return
     print(f"{len(training)} training flights, {len(test)} test flights read in {perf_counter() - start:.1f} s\n")
+    if given.repeats:
+        header = [
+            "path",
+            "flights",
+            "Ixx, 1e-5 kg m²",
+            "Iyy, 1e-5 kg m²",
+            "band, Hz",
+            "roll explained",
+            "pitch explained",
+        ]
+        table("nanodrone_repeats", header, list(rows_of_repeats(training)))
+        return
     if given.history:
         table("nanodrone_history", COLUMNS, rows_with_past(training, test), digits=4)
         return

@@ -19,17 +19,17 @@ from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.playback.parameters import FreeNumbers
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.weak_form.windows import Windows, windows
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
 
-BANDS = ((0.15, 0.4), (0.3, 0.8), (0.6, 1.6), (1.2, 3.2))
+BANDS = ((0.08, 0.2), (0.15, 0.4), (0.3, 0.8), (0.6, 1.6), (1.2, 3.2))
 """Windows in s; the longer average taken from the shorter leaves a band."""
-BANDS_HZ = ((2.0, 6.0), (1.0, 3.0), (0.5, 1.5), (0.25, 0.75))
+BANDS_HZ = ((4.0, 12.0), (2.0, 6.0), (1.0, 3.0), (0.5, 1.5), (0.25, 0.75))
 """The same by frequency, about."""
 OVERLAP = 0.75
 """Share that neighbouring windows have in common."""
 FOLDS = 5
 """Parts of the flights that are kept aside in turn."""
-_OF_FORCE = (*BANDS[1:3], (1.2, None))
+_OF_FORCE = (*BANDS[2:4], (1.2, None))
 """Forces are seen in slower motion, and the longest windows keep the mean: the weight."""
 _BLOCK_S, _LEAST_BLOCK_S, _BLOCKS = 4.0, 2.0, 9
 """Longer than what gusts remember and the longest windows see; the shortest, and how many a short path is cut into."""
@@ -145,10 +145,16 @@ class Balances:
     _last: tuple[RotorResponse, _Factors, Sums, Sums] | None = field(default=None, init=False)
 
     @cached_property
+    def bands_hz(self) -> tuple[tuple[float, float], ...]:
+        """Bands of torque by frequency, about."""
+        return tuple(hz for _, hz in fitting_bands(self.flights[0].motion.period))
+
+    @cached_property
     def bands(self) -> tuple[Windows, ...]:
         """Windows of torque, then of force."""
         period = self.flights[0].motion.period
-        return tuple(band_windows(period, *band) for band in (*BANDS, *(_OF_FORCE if self.translates else ())))
+        turning = [band for band, _ in fitting_bands(period)]
+        return tuple(band_windows(period, *band) for band in (*turning, *(_OF_FORCE if self.translates else ())))
 
     @property
     def translates(self) -> bool:
@@ -219,7 +225,7 @@ class Balances:
             return np.stack([terms[:, motion] * rotors[number][by][:, spun] for by, motion, spun in listed], axis=1)
 
         turning = self._products(
-            self.bands[: len(BANDS)],
+            self.bands[: len(self.bands_hz)],
             {number: _of_torque(self.flights[number], along(number, factors.torque)) for number in self.path},
             _turned,
         )
@@ -231,7 +237,7 @@ class Balances:
                 flight = self.flights[number]
                 pushes = flight.motion.rotation[:, axis, axes] * along(number, listed)
                 signals[number] = _of_force(flight, axis, evaluated.at.free.vehicle.gravity_m_s2, pushes)
-            pushing.append(self._products(self.bands[len(BANDS) :], signals, _pushed))
+            pushing.append(self._products(self.bands[len(self.bands_hz) :], signals, _pushed))
         names = sorted(set().union(*turning, *(each for by_band in pushing for each in by_band)))
         size = len(INERTIA_ENTRIES) + len(factors.torque), 1 + len(factors.force)
         return _arranged([turning], names, size[0]), _arranged(pushing, names, size[1])
@@ -336,6 +342,12 @@ def _arranged(axes: Sequence[_ByBand], names: Sequence[tuple[int, int]], size: i
 def block_length(seconds: float) -> float:
     """Choose how long the blocks of paths of so many seconds are, s."""
     return min(_BLOCK_S, max(seconds / _BLOCKS, _LEAST_BLOCK_S))
+
+
+def fitting_bands(period: float) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+    """Give the bands whose shortest windows hold enough samples, as windows in s and by frequency in Hz."""
+    pairs = zip(BANDS, BANDS_HZ, strict=True)
+    return [(band, hz) for band, hz in pairs if round(band[0] / period) >= FEWEST_SAMPLES]
 
 
 def band_windows(period: float, short_s: float, long_s: float | None) -> Windows:

@@ -17,7 +17,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, half_width, jackknife_covariance, jackknife_error, mean_error
-from cpfls_cli.playback.balances import BANDS, BANDS_HZ, FOLDS, OVERLAP, Balances, Sums
+from cpfls_cli.playback.balances import BANDS, FOLDS, OVERLAP, Balances, Sums, fitting_bands
 from cpfls_cli.playback.fit import Fitted, Uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers
@@ -25,7 +25,6 @@ from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.parameters import DRAG, INERTIA, LEARNED, LOG_INERTIA, FreeNumbers, blocks_of, needs_velocity
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.windows import FEWEST_SAMPLES
 
 _FEWEST_BLOCKS = 8
 _LONGEST_S = 8.0
@@ -71,7 +70,7 @@ class Explained(NamedTuple):
     used: BoolArray
     total: Array
     error: Array
-    bands_hz: tuple[tuple[float, float], ...] = BANDS_HZ
+    bands_hz: tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True)
@@ -107,6 +106,7 @@ class _Problem:
     sums: Sums
     values: Array
     bands: BoolArray
+    bands_hz: tuple[tuple[float, float], ...]
     held: Set[str]
 
     @cached_property
@@ -198,7 +198,7 @@ def find_constants(
     Söderström and Stoica 2002 (instrumental variables in closed loop); Pintelon and Schoukens 2012 (repeats).
     """
     periods = {flight.motion.period for flight in given.flown}
-    if len(periods) > 1 or FEWEST_SAMPLES * max(periods) > BANDS[0][0]:
+    if len(periods) > 1 or len(fitting_bands(max(periods))) < len(BANDS) - 1:
         return None
     tried = _tried(vehicle, flights, leave_out)
     blocks = [block for block in (*vehicle.unknown, *tried) if block == INERTIA or block in vehicle.unknown]
@@ -211,7 +211,7 @@ def find_constants(
     problem = _problem(setting, np.ones(len(balances.bands), dtype=bool), blocks, tried, held)
     if len(problem.sums.crossed) < _FEWEST_BLOCKS:
         return None
-    for slowest in range(len(BANDS) - 1, 0, -1):
+    for slowest in range(len(balances.bands_hz) - 1, 0, -1):
         faster = problem.bands.copy()
         faster[slowest] = False
         fast = _problem(setting, faster, blocks, tried, held)
@@ -245,7 +245,7 @@ def _agree(fast: _Problem, more: _Problem) -> bool:
 
 def _explains(problem: _Problem, band: int) -> bool:
     """Tell whether a model explains 90 % of roll and pitch that come again in a band, as far as is known."""
-    share, error = _explained(problem.sums)
+    share, error = _explained(problem)
     return bool((share[band, :2] + error[band, :2] >= _EXPLAINED).all())
 
 
@@ -274,7 +274,7 @@ class _Setting(NamedTuple):
 
     def problem(self, free: JointNumbers, values: Array, bands: BoolArray, held: Set[str]) -> _Problem:
         """Take the balances at values of the numbers."""
-        return _Problem(free, self.balances.sums(free.base, values), values, bands, held)
+        return _Problem(free, self.balances.sums(free.base, values), values, bands, self.balances.bands_hz, held)
 
 
 def _tried(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], leave_out: Sequence[str]) -> tuple[str, ...]:
@@ -360,13 +360,13 @@ def _blocks(free: JointNumbers) -> tuple[str, ...]:
     return tuple(dict.fromkeys(number.block for number in free.numbers))
 
 
-def _explained(sums: Sums) -> tuple[Array, Array]:
+def _explained(problem: _Problem) -> tuple[Array, Array]:
     """Compute the share of the rotation that comes again that a model explains, and its error, shape (band, 3)."""
 
     def share(crossed: Array) -> Array:
         return np.asarray(1.0 - crossed[..., 0, 0] / np.where(crossed[..., -1, -1] == 0, np.nan, crossed[..., -1, -1]))
 
-    crossed = sums.crossed[:, : len(BANDS)]
+    crossed = problem.sums.crossed[:, : len(problem.bands_hz)]
     return share(crossed.sum(axis=0)), jackknife_error(share(crossed.sum(axis=0) - crossed))
 
 
@@ -380,17 +380,23 @@ def _constants(problem: _Problem) -> Constants:
     told[places] = _f_statistics(problem) >= _STRONG
     if DRAG in problem.held and (yaw := free.index.get(LOG_INERTIA[2])) is not None:
         told[yaw] = False
+    explained, error = _explained_in_all(problem)
+    for name, enough in zip(LOG_INERTIA, explained + error >= _EXPLAINED, strict=True):
+        # Where much comes again that is not explained, a moment may stand for what is missing.
+        if name in free.index and not enough:
+            told[free.index[name]] = False
     without = _left_out(problem)
     covariance = np.diag(np.where(told, 0.0, free.spreads**2)) + jackknife_covariance(without)
-    share, _ = _explained(problem.sums)
+    share, _ = _explained(problem)
     fitted = Fitted(free, problem.values, float(1 - share[0, :2].mean()), problem.information(total))
     spread = Uncertainty(covariance * np.outer(free.scales, free.scales), len(without), told)
-    return Constants(fitted, spread, Explained(share, problem.bands[: len(BANDS)], *_explained_in_all(problem)))
+    used = problem.bands[: len(problem.bands_hz)]
+    return Constants(fitted, spread, Explained(share, used, explained, error, problem.bands_hz))
 
 
 def _explained_in_all(problem: _Problem) -> tuple[Array, Array]:
     """Compute the share of what comes again that is explained in all used bands together, and its error, (3,)."""
-    bands = slice(0, len(BANDS))
+    bands = slice(0, len(problem.bands_hz))
     crossed = np.einsum("ka,bkapq->bapq", problem.weights[bands], problem.sums.crossed[:, bands])
 
     def share(sums: Array) -> Array:

@@ -12,9 +12,9 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.playback.flight import PlaybackFlight
 
-_ALIKE = (0.7, 0.5)
-"""Correlation of changes of the rates, and of the velocity, from which on two flights fly the same path. Velocities of
-paths that have nothing to do with each other stay below 0.3 at every shift; changes of a few sines come nearer."""
+_ALIKE = 0.7
+"""Correlation of changes of the rates, or of the velocity, from which on two flights fly the same path. Unlike paths of
+a real vehicle reach 0.6, and runs of one path stay above 0.85 in storms."""
 _COMMON_S = 8.0
 """That two flights have in common at least: shorter, unlike paths may look alike."""
 _SAME, _FARTHEST = 0.98, 0.6
@@ -297,10 +297,9 @@ def repeats(flights: Sequence[PlaybackFlight]) -> Repeats:
         shifts = [
             _best_shift(*pair, flights[one].motion.period) for pair in zip(paths[one], paths[other], strict=False)
         ]
-        beyond = [alike - least for (_, alike), least in zip(shifts, _ALIKE, strict=False)]
-        best = int(np.argmax(beyond))
-        if beyond[best] >= 0:
-            shift, likeness[one, other] = shifts[best]
+        shift, alike = max(shifts, key=lambda found: found[1])
+        if alike >= _ALIKE:
+            likeness[one, other] = alike
             found[one][other] = _aligned(flights[one], flights[other], shift)
             found[other][one] = _inverse(found[one][other], len(flights[other]))
     return Repeats(found, likeness)

@@ -15,10 +15,10 @@ from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.gap.balance.balance_system import System, left_over
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
-from cpfls_cli.playback.balances import BANDS, BANDS_HZ, band_windows, block_length
+from cpfls_cli.playback.balances import BANDS, BANDS_HZ, band_windows, block_length, fitting_bands
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Instruments, instruments
-from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Recording, Windows
+from cpfls_cli.weak_form.windows import Recording, Windows
 
 _SLOWEST = (BANDS[-1][1], None), (0.0, BANDS_HZ[-1][0])
 """What the longest windows keep, a constant torque or the weight among it."""
@@ -253,9 +253,7 @@ def _different(recordings: Sequence[Recording]) -> Iterator[int]:
 
 def _bands(period: float) -> Iterator[Band]:
     """Make the windows of all bands together and of each, as far as a log is fast enough for them."""
-    fitting = [
-        (band, hz) for band, hz in zip(BANDS, BANDS_HZ, strict=True) if round(band[0] / period) >= FEWEST_SAMPLES
-    ]
+    fitting = fitting_bands(period)
     if fitting:
         (shortest, _), (_, highest) = fitting[0]
         yield Band(band_windows(period, shortest, None), 0.0, highest)
