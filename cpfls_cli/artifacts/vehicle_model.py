@@ -284,7 +284,7 @@ class VehicleRecord(ModelRecord):
     structure: StructuresTriedGroup = group("structure")
     loop: LoopGroup = group("loop")
     instruments: InstrumentsGroup | None = group("instruments", default=None)
-    response: ResponsesGroup | None = group("response", default=None)
+    responses: ResponsesGroup | None = group("responses", default=None)
     forecast: VehicleGroup | None = group("forecast", default=None, apart=True)
     history: HistoryGroup | None = group("history", default=None)
     held_out: HeldOutGroup | None = group("held_out", default=None)
@@ -331,7 +331,7 @@ class VehicleRecord(ModelRecord):
             structure=StructuresTriedGroup.of(found.choice),
             loop=LoopGroup.of(found.loop),
             instruments=None if found.constants is None else InstrumentsGroup.of(found.instruments, found.constants),
-            response=ResponsesGroup.of(responses, instrumented=found.loop.shows_loop) if responses else None,
+            responses=ResponsesGroup.of(responses, instrumented=found.loop.shows_loop) if responses else None,
             forecast=None if found.forecast is None else VehicleGroup.of(replace(found.forecast, commanded=commanded)),
             history=None if found.history is None else HistoryGroup.of(found.history),
             held_out=held_out,
@@ -369,11 +369,11 @@ class VehicleRecord(ModelRecord):
         good where the frequency response about roll or pitch is off.
         """
         against = self.contradiction or ()
-        off = self.response is not None and self.response.off
+        off = self.responses is not None and self.responses.off
         if self.instruments is None:
             return capped(self.forecast_verdict, against, loop=self.loop.shown, lacks=off)
         lacks = off or self.instruments.lacks
-        seen = lacks or (self.response is not None and self.response.judged)
+        seen = lacks or (self.responses is not None and self.responses.judged)
         if not (seen and self.tells_turning):
             return capped(Trust.NOT_JUDGED, against)
         return capped(Trust.SIMULATION, against, lacks=lacks)
@@ -415,7 +415,7 @@ class VehicleRecord(ModelRecord):
                 },
             },
             "instruments": None if self.instruments is None else self.instruments.summary,
-            "response": None if self.response is None else self.response.summary,
+            "responses": None if self.responses is None else self.responses.summary,
             "disturbance": None
             if self.disturbance is None
             else self.disturbance.summary(self.vehicle.inertia, self.vehicle.mass),

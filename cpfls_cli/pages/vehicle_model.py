@@ -88,8 +88,8 @@ def title(record: VehicleRecord) -> str:
 def grounds(record: VehicleRecord) -> Iterator[str]:
     """Say what a vehicle is good for, and how well it predicts what it was not fitted to."""
     yield from _judged_words(record)
-    if record.instruments is None and record.response is not None:
-        yield from response_words(record.response)
+    if record.instruments is None and record.responses is not None:
+        yield from response_words(record.responses)
     if record.forecast is not None:
         yield (
             "Beside these constants the file holds a forecast along logged rotor speeds, loop and all, which `cpfls "
@@ -165,8 +165,8 @@ def instrument_words(record: VehicleRecord, given: InstrumentsGroup) -> Iterator
             f"Below {number(below, 2)} Hz they explain less, or the body would be another one: the vehicle does "
             "something there that no constant may stand for; `cpfls response` shows it, `cpfls gap` looks for it."
         )
-    if record.response is not None:
-        yield from response_words(record.response)
+    if record.responses is not None:
+        yield from response_words(record.responses)
     if not record.tells_turning:
         yield "They do not tell the moments of inertia about roll and pitch yet: fly more runs, or larger ones."
     elif record.trust == Trust.NOT_JUDGED:

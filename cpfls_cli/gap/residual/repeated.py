@@ -253,7 +253,8 @@ def _different(recordings: Sequence[Recording]) -> Iterator[int]:
 
 def _bands(period: float) -> Iterator[Band]:
     """Make the windows of all bands together and of each, as far as a log is fast enough for them."""
-    fitting = fitting_bands(period)
+    # Above 6 Hz the noise of a gyroscope leaves little to split.
+    fitting = [(band, hz) for band, hz in fitting_bands(period) if band != BANDS[0]]
     if fitting:
         (shortest, _), (_, highest) = fitting[0]
         yield Band(band_windows(period, shortest, None), 0.0, highest)

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.parameters import parameters_of, vehicle_section
-from cpfls_cli.artifacts.vehicle_model import FoundNumbersGroup, InstrumentsGroup, LoopGroup, TradesGroup
+from cpfls_cli.artifacts.vehicle_model import (
+    FoundNumbersGroup,
+    InstrumentsGroup,
+    LoopGroup,
+    ResponsesGroup,
+    TradesGroup,
+)
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.pages.model import answer
@@ -109,7 +115,7 @@ def test_flights_that_show_the_loop_are_said_first_and_leave_no_good_word():
     assert capped(Trust.SIMULATION, ("rates are mirrored",), loop=True) == Trust.DO_NOT_USE
 
 
-def _told(record, **given):
+def _told(record, cost=12.0, **given):
     """The same vehicle with constants that repeats tell."""
     numbers = replace(record.found, determined=np.ones(2, dtype=bool), at_bound=np.zeros(2, dtype=bool))
     group = InstrumentsGroup(
@@ -125,7 +131,13 @@ def _told(record, **given):
         total=np.full(3, 0.98),
         error=np.full(3, 0.01),
     )
-    return replace(record, found=numbers, instruments=replace(group, **given), forecast=record.vehicle)
+    seen = ResponsesGroup(
+        name=("roll", "pitch", "thrust"),
+        cost=np.array([cost, 8.0, 300.0]),
+        low=np.array([0.4, 0.5, 0.3]),
+        high=np.array([9.0, 8.0, 2.0]),
+    )
+    return replace(record, found=numbers, instruments=replace(group, **given), responses=seen, forecast=record.vehicle)
 
 
 def test_constants_that_repeats_tell_are_judged_by_what_comes_again_and_not_by_a_forecast():
@@ -134,11 +146,22 @@ def test_constants_that_repeats_tell_are_judged_by_what_comes_again_and_not_by_a
     assert record.held_out is None
     assert record.forecast_verdict == Trust.NOT_JUDGED
     assert record.verdict == Trust.SIMULATION
-    first, second, *_ = grounds(record)
+    first, cost, second, *_ = grounds(record)
     assert "3 runs that repeat each other (correlation 0.90 to 0.97)" in first
     assert "From 1.0 to 6.0 Hz they explain 98 % (± 1 %) of the roll" in first
+    assert cost.startswith("Cost J of its frequency responses, 100 at most is acceptable: roll 12")
     assert "`cpfls replay` plays" in second
     assert not any("loop, not the vehicle" in line for line in warnings(record))
+
+
+def test_a_response_that_is_off_is_none_of_the_vehicle_and_one_that_is_not_seen_judges_nothing():
+    off, unseen = _told(record_of(whole()), cost=101.0), _told(record_of(whole()), cost=np.nan)
+    assert off.verdict == Trust.LACKING
+    assert "roll 101 (0.40 to 9.0 Hz), pitch 8.0" in " ".join(grounds(off))
+    assert unseen.verdict == Trust.NOT_JUDGED
+    assert "do not show the frequency responses of roll and pitch clearly enough" in " ".join(grounds(unseen))
+    assert off.summary["responses"]["roll"] == {"word": "not-acceptable", "cost": 101.0, "band_hz": [0.4, 9.0]}
+    assert off.summary["response"]["lag_s"] == off.vehicle.response.lag
 
 
 @pytest.mark.parametrize(
