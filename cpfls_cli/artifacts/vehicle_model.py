@@ -331,7 +331,7 @@ class VehicleRecord(ModelRecord):
             structure=StructuresTriedGroup.of(found.choice),
             loop=LoopGroup.of(found.loop),
             instruments=None if found.constants is None else InstrumentsGroup.of(found.instruments, found.constants),
-            responses=ResponsesGroup.of(responses, instrumented=found.loop.shows_loop) if responses else None,
+            responses=ResponsesGroup.of(responses, instrumented=found.constants is not None) if responses else None,
             forecast=None if found.forecast is None else VehicleGroup.of(replace(found.forecast, commanded=commanded)),
             history=None if found.history is None else HistoryGroup.of(found.history),
             held_out=held_out,

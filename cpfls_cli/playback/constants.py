@@ -43,6 +43,8 @@ _FARTHEST = 1.0
 """Natural sizes of a step."""
 _KNOWN = 2.0
 """Ratio of the ends of an interval from which on a moment of inertia is not known."""
+_VISIBLE = np.log(1.05)
+"""Logarithm of a ratio of moments of inertia that matters."""
 _STRONG = 10.0
 """F statistic of an instrument below which it is weak, and its interval no interval."""
 _APART = 3.0
@@ -88,14 +90,23 @@ class Constants:
     spread: Uncertainty
     explained: Explained
 
+    @cached_property
+    def _half(self) -> Array:
+        """Half of the 95 % intervals of the logarithms of the moments about roll and pitch; infinite where unknown."""
+        places = [self.fitted.free.index[name] for name in LOG_INERTIA[:2]]
+        half = half_width(np.sqrt(np.diag(self.spread.covariance))[places], self.spread.blocks)
+        return np.where(self.spread.determined[places], half, np.inf)
+
     @property
     def tells(self) -> bool:
         """Whether the moments of inertia about roll and pitch are known to a factor of two."""
-        deviation = np.sqrt(np.diag(self.spread.covariance))
-        index = self.fitted.free.index
-        places = [index[name] for name in LOG_INERTIA[:2] if name in index]
-        half = half_width(deviation[places], self.spread.blocks)
-        return bool(self.spread.determined[places].all() and (2 * half <= np.log(_KNOWN)).all())
+        return bool((2 * self._half <= np.log(_KNOWN)).all())
+
+    def contradict(self, inertia: Array) -> bool:
+        """Tell whether a body, shape (3, 3), is another one about roll or pitch: off by its interval, and visibly."""
+        own = np.diag(self.fitted.model.body.inertia)[:2]
+        off = np.abs(np.log(np.diag(inertia)[:2] / own))
+        return bool((off > np.maximum(self._half, _VISIBLE)).any())
 
 
 @dataclass(frozen=True)

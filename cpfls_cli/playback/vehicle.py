@@ -175,8 +175,10 @@ def find_vehicle(
     groups = tuple(Group(group.name, group.differs or OF_A_WEIGHT) for group in settings.groups if group.name in flown)
     fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fits[0], groups)
     loop, given = loop_bounds(fitted.model, own), instruments(own)
-    # Where nothing is left unexplained nothing can mislead, and the fit takes more from the flights.
-    constants = find_constants(begun, own, given, settings.leave_out) if loop.shows_loop else None
+    constants = find_constants(begun, own, given, settings.leave_out)
+    # Where instruments find the same body the fit is the vehicle's, and takes more from the flights.
+    if constants is not None and not (loop.shows_loop or constants.contradict(fitted.model.body.inertia)):
+        constants = None
     if constants is not None and constants.tells:
         solved, spread, forecast = constants.fitted, constants.spread, fitted.model
     else:

@@ -4,12 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
+from scipy.signal import lfilter
 
 from cpfls_cli.blocks import half_width
+from cpfls_cli.playback.balances import band_windows
 from cpfls_cli.playback.constants import find_constants
 from cpfls_cli.playback.instruments import instruments
 from cpfls_cli.playback.parameters import LOG_INERTIA
-from tests.builders.gusty_flights import CALM, GUSTS, SMALL, Flight, gusty_flights
+from tests.builders.gusty_flights import CALM, GUSTS, MEMORY_S, SMALL, Flight, gusty_flights
 
 SETS = {"calm": (CALM, 1), "repeats": (GUSTS, 4), "setpoints": (GUSTS, 1)}
 """Gusts, and how often each of two paths is flown."""
@@ -80,3 +83,68 @@ def test_flights_that_cannot_be_asked_have_no_constants(flights, left_out):
     known = replace(SMALL.vehicle, unknown=())
     blocks = ("inertia",) if left_out == "inertia" else ()
     assert find_constants(known, [first], instruments([first]), blocks) is None
+
+
+def _limited_information(torque, turning, asked):
+    """Estimate c in ``torque = c turning`` by LIML: the least ratio of residuals without and with instruments."""
+    both = np.stack([torque, turning], axis=1)
+    left = both - asked @ np.linalg.lstsq(asked, both, rcond=None)[0]
+    least = eigh(both.T @ both, left.T @ left, eigvals_only=True)[0]
+    moments = both.T @ both - least * left.T @ left
+    return moments[0, 1] / moments[1, 1]
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_limited_information_maximum_likelihood_finds_the_same_body(axis):
+    """Another estimator by hand: one axis, one band, lags of the velocity that is asked for."""
+    flown = list(gusty_flights([Flight(SMALL, GUSTS, path, 5, reach=2.5) for path in range(3)], 40.0))
+    found = find_constants(SMALL.vehicle, flown, instruments(flown))
+    place = found.fitted.free.index[LOG_INERTIA[axis]]
+    band = band_windows(0.01, 0.3, 0.8)
+    torque = [band.average(flight.speed**2 @ SMALL.mixer[1 + axis]) for flight in flown]
+    turning = [band.derivative(flight.motion.rate[:, axis]) for flight in flown]
+    lags = [
+        np.hstack([np.roll(flight.setpoints["velocity"], lag, axis=0) for lag in range(0, 50, 5)]) for flight in flown
+    ]
+    asked = [band.average(each) for each in lags]
+    other = _limited_information(*(np.concatenate(each) for each in (torque, turning, asked))) / SMALL.inertia[axis]
+    assert other == pytest.approx(1.0, abs=0.03)
+    assert np.exp(found.fitted.values[place]) == pytest.approx(other, abs=0.03)
+
+
+@pytest.mark.parametrize("name", ["repeats", "setpoints"])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_controller_that_is_designed_on_them_has_its_margin_on_the_true_body(constants, name, axis):
+    """A rate loop of 60 degrees is flown in gusts on the true body; its broken loop is measured by a multisine."""
+    place = constants[name].fitted.free.index[LOG_INERTIA[axis]]
+    body, true = 2 * SMALL.inertia[axis] * np.exp(constants[name].fitted.values[place]), SMALL.inertia[axis]
+    crossover = np.tan(np.radians(30)) / SMALL.lag_s
+    gain = crossover * body * np.hypot(1, crossover * SMALL.lag_s)
+    step, period = 5e-4, 4.0
+    count, lines = round(period / step), np.arange(8, 40)
+    rng = np.random.default_rng([7, axis])
+    time = step * np.arange(count)
+    waves = np.cos(2 * np.pi * np.outer(lines / period, time) + rng.uniform(0, 6.0, (len(lines), 1)))
+    shake = np.tile(true * waves.sum(axis=0), 20)
+    gusts = true * GUSTS[axis] * _remembered(rng, len(shake), np.exp(-step / MEMORY_S[axis]))
+    rate = torque = 0.0
+    fed, given = np.zeros((2, len(shake)))
+    keep = np.exp(-step / SMALL.lag_s)
+    for now, (push, gust) in enumerate(zip(shake.tolist(), gusts.tolist(), strict=True)):
+        fed[now] = -gain * rate
+        given[now] = fed[now] + push
+        after = keep * torque + (1 - keep) * given[now]
+        rate += step / true * (0.5 * (torque + after) - SMALL.damping * rate + gust)
+        torque = after
+    answers = [np.fft.rfft(each[count:].reshape(-1, count).mean(axis=0))[lines] for each in (fed, given)]
+    broken = -answers[0] / answers[1]
+    near = np.abs(np.log(2 * np.pi * lines / period / crossover)) < 0.5
+    turn = 2 * np.pi * lines[near] / period
+    size = np.polyfit(np.log(np.abs(broken[near])), np.log(turn), 1)[-1]
+    margin = 180 + np.polyval(np.polyfit(np.log(turn), np.degrees(np.angle(broken[near])), 1), size)
+    assert np.exp(size) == pytest.approx(crossover, rel=0.15)
+    assert margin == pytest.approx(60.0, abs=5.0)
+
+
+def _remembered(rng, samples, keep):
+    return lfilter([np.sqrt(1 - keep**2)], [1.0, -keep], rng.standard_normal(samples))
