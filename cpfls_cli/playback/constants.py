@@ -35,7 +35,7 @@ _FLAT = 0.85
 """Izz over the sum of Ixx and Iyy of a multirotor: 1 for a flat body, and no body has more."""
 _NOT_TRIED = "slow_actuation"
 """It answers for whatever is slow, and is no constant of the vehicle."""
-_STEPS, _SETTLED = 12, 1e-2
+_STEPS, _SETTLED = 12, 1e-3
 """Of an estimate, and natural sizes of a step that is none any more."""
 _LEAST = 1e-6
 """Of the power of a band that is never taken for what comes again."""

@@ -106,8 +106,10 @@ def windows(period: float, window_s: float, overlap: float) -> Windows:
         )
     phase = np.pi * (np.arange(samples) + 0.5) / samples
     shape = np.sin(phase) ** 4
-    slope = 4 * np.sin(phase) ** 3 * np.cos(phase) * np.pi / (samples * period)
-    return Windows(shape / shape.sum(), slope / shape.sum(), max(1, round(samples * (1 - overlap))), period)
+    slope = np.sin(phase) ** 3 * np.cos(phase)
+    # The derivative of time is 1, which eight samples of the window's own slope miss by 0.2 percent.
+    slope /= -(slope @ np.arange(samples)) * period
+    return Windows(shape / shape.sum(), slope, max(1, round(samples * (1 - overlap))), period)
 
 
 @dataclass(frozen=True)

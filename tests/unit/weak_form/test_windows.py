@@ -39,6 +39,12 @@ def test_slope_is_the_derivative_of_the_window():
     np.testing.assert_allclose(THROUGH.slope, -THROUGH.slope[::-1], atol=1e-12)
 
 
+@pytest.mark.parametrize("samples", [8, 9, 40])
+def test_the_derivative_of_time_is_1_however_few_samples_a_window_has(samples):
+    window = windows(0.01, 0.01 * samples, 0.5)
+    np.testing.assert_allclose(window.derivative(TIME), 1.0, rtol=1e-9)
+
+
 def test_a_line_is_seen_at_the_centre_of_each_window():
     np.testing.assert_allclose(THROUGH.average(7 * TIME), 7 * THROUGH.centres(TIME))
     np.testing.assert_allclose(np.diff(THROUGH.centres(TIME)), 0.2)
