@@ -29,6 +29,7 @@ from cpfls_cli.playback.constants import find_constants
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.instruments import Repeats, instruments
 from cpfls_cli.playback.parameters import LOG_INERTIA
+from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.gusty_flights import CALM, GUSTS, LARGE, SMALL, STORM, Flight, Truth, gusty_flights
 
 DRAWS = 20
@@ -44,7 +45,9 @@ def main(draws: int) -> None:
         for gusts in (CALM, GUSTS, STORM):
             for reach in REACHES_HZ:
                 for kind in KINDS:
-                    found = [_found(truth, kind, flown) for flown in _flown(truth, gusts, kind, draws, reach)]
+                    found = [
+                        found_moments(truth.vehicle, kind, flown) for flown in _flown(truth, gusts, kind, draws, reach)
+                    ]
                     rows.append([name, ", ".join(f"{gust:g}" for gust in gusts), f"{reach or 0.8:g}", kind])
                     rows[-1] += _cells(*(np.array([each[part] for each in found]) for part in range(3)))
                     print(" | ".join(rows[-1]), file=sys.stderr, flush=True)
@@ -55,7 +58,7 @@ def main(draws: int) -> None:
 def _cells(ratio: Array, half: Array, told: BoolArray) -> list[str]:
     inside = np.abs(np.log(ratio)) <= half
     return [
-        *(_ends(ratio[told[:, axis], axis]) for axis in range(2)),
+        *(ends(ratio[told[:, axis], axis]) for axis in range(2)),
         f"{100 * np.median(half[told]):.1f}" if told.any() else "—",
         f"{int(inside[told].sum())} of {int(told.sum())}",
         f"{int(told.sum())} of {told.size}",
@@ -76,13 +79,15 @@ def _flown(
     flown = gusty_flights(asked, SECONDS)
     for _ in range(draws):
         own = list(islice(flown, paths * runs))
-        yield [replace(flight, setpoints={}) for flight in own] if kind == "repeats" else own
+        yield own
 
 
-def _found(truth: Truth, kind: str, flights: list[PlaybackFlight]) -> tuple[Array, Array, BoolArray]:
+def found_moments(vehicle: VehicleSettings, kind: str, flights: list[PlaybackFlight]) -> tuple[Array, Array, BoolArray]:
     """Give moments about roll and pitch over the true ones, half of their intervals, and whether they are told."""
-    moments = tuple(2 * moment for moment in truth.inertia)
-    begun = replace(truth.vehicle, inertia_kg_m2=(*moments, 0.0, 0.0, 0.0), unknown=("inertia",))
+    moments = tuple(2 * moment for moment in vehicle.inertia_kg_m2[:3])
+    begun = replace(vehicle, inertia_kg_m2=(*moments, 0.0, 0.0, 0.0), unknown=("inertia",))
+    if kind == "repeats":
+        flights = [replace(flight, setpoints={}) for flight in flights]
     given = instruments(flights)
     if kind == "setpoints":
         # Paths of the same frequencies may come near each other; here only what was asked for is to tell.
@@ -96,7 +101,7 @@ def _found(truth: Truth, kind: str, flights: list[PlaybackFlight]) -> tuple[Arra
     return 2 * np.exp(found.fitted.values[places]), half_width(error, found.spread.blocks), told
 
 
-def _ends(values: Array) -> str:
+def ends(values: Array) -> str:
     """Give the mean and the ends over the draws; a dash where none tells it."""
     return f"{values.mean():.3f} ({values.min():.2f} to {values.max():.2f})" if len(values) else "—"
 

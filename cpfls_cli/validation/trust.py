@@ -22,11 +22,11 @@ class Trust(StrEnum):
 def capped(trust: Trust, contradictions: Sequence[str], *, loop: bool = False, lacks: bool = False) -> Trust:
     """Take back the word on a model whose flights contradict themselves: it repeats what is wrong with them.
 
-    Where they show the loop, a good forecast is one of vehicle and autopilot together, and says nothing of the vehicle;
-    one that lacks an effect is no vehicle either.
+    Where they show the loop, a forecast, judged or not, is one of vehicle and autopilot together, and says nothing of
+    the vehicle; one that lacks an effect is no vehicle either.
     """
     if contradictions:
         return Trust.DO_NOT_USE
-    if trust not in (Trust.SIMULATION, Trust.CONTROL):
-        return trust
-    return Trust.LOOP if loop else Trust.LACKING if lacks else trust
+    if loop and trust not in (Trust.RIGID_BODY, Trust.DO_NOT_USE):
+        return Trust.LOOP
+    return Trust.LACKING if lacks and trust in (Trust.SIMULATION, Trust.CONTROL) else trust

@@ -18,7 +18,7 @@ from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.pages.source import Sources
-from cpfls_cli.pages.vehicle_model import found_vehicle_section, grounds, remainder_curves, warnings
+from cpfls_cli.pages.vehicle_model import found_vehicle_section, grounds, remainder_curves, warnings, worth
 from cpfls_cli.report.content import Plot, Table
 from cpfls_cli.validation.trust import Trust, capped
 from tests.builders.forms import source_of_record
@@ -105,11 +105,15 @@ def test_flights_that_show_the_loop_are_said_first_and_leave_no_good_word():
         each for each in parameters_of(replace(record, loop=loop, found=numbers)) if each.key == "inertia_kg_m2.0"
     ]
     assert row.reason == "these flights show the loop, not the vehicle"
-    said = next(line for line in warnings(replace(record, loop=loop, found=numbers)) if "loop" in line)
+    misled = replace(record, loop=loop, found=numbers)
+    assert misled.held_out is None
+    assert misled.verdict == Trust.LOOP
+    assert not any("show the loop" in line for line in warnings(misled))
+    said = next(worth(misled))
     assert "torque explains 45 % of the roll acceleration and 47 % of the pitch acceleration" in said
     assert "Ixx 0.21 to 2.6 times and Iyy 0.23 to 2.4 times what was found" in said
     assert said.endswith(f": {WHAT_TO_FLY}")
-    for trust in (Trust.SIMULATION, Trust.CONTROL):
+    for trust in (Trust.SIMULATION, Trust.CONTROL, Trust.INSIDE, Trust.NOT_JUDGED):
         assert capped(trust, (), loop=True) == Trust.LOOP
     assert capped(Trust.DO_NOT_USE, (), loop=True) == Trust.DO_NOT_USE
     assert capped(Trust.SIMULATION, ("rates are mirrored",), loop=True) == Trust.DO_NOT_USE
