@@ -71,7 +71,7 @@ def _row(folder: Path, case: Case) -> list[str]:
 
 
 def _true(truth: Truth) -> Iterator[tuple[str, float]]:
-    return zip(("inertia.Ixx", "inertia.Iyy"), truth.inertia, strict=False)
+    return zip(("inertia_kg_m2.0", "inertia_kg_m2.1"), truth.inertia, strict=False)
 
 
 def _moment(number: dict[str, Any], true: float) -> str:

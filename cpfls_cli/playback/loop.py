@@ -9,6 +9,7 @@ regressions enclose the body, band by band of frequency; where no gust blows and
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -65,7 +66,8 @@ def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopB
     With ``t`` the model's torque and ``h`` the torque that its inertia takes along the motion, both in a band,
     ``<t, h> / <h, h>`` and ``<t, t> / <t, h>`` are the factors by which torque on rotation and rotation on torque want
     the inertia changed. A disturbance that the torque opposes and that turns the vehicle its own way leaves the true
-    factor between them.
+    factor between them. The torque is taken without slow actuation: a torque that fades by itself is how an autopilot
+    that cancels gusts looks.
 
     Parameters
     ----------
@@ -82,6 +84,7 @@ def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopB
     ----------
     Frisch 1934 (bounds by regression both ways); Forssell and Ljung 1999 (closed-loop identification revisited).
     """
+    model = replace(model, response=replace(model.response, slow_roll_pitch=0.0, slow_yaw=0.0))
     low, high, explained = np.full(3, np.nan), np.full(3, np.nan), np.full(3, np.nan)
     for band in _BANDS:
         sums = np.array([block for flight in flights for block in _sums(model, flight, *band)])

@@ -69,3 +69,12 @@ def test_a_body_that_is_found_too_heavy_is_bounded_by_its_truth(flights):
     assert still.high[:2] == pytest.approx(1 / 3, rel=0.1)
     assert (gusty.low < 1 / 3).all()
     assert (gusty.high > 1 / 3).all()
+
+
+def test_a_torque_that_fades_by_itself_explains_no_answered_gust(flights, bounds):
+    """A fit takes slow actuation for what an autopilot does; the bounds of a body stay those of the rotors' torque."""
+    key = ("45 g", GUSTS, 12.0)
+    model = VehicleModel(vehicle=SMALL.vehicle)
+    fading = replace(model, response=replace(model.response, slow_roll_pitch=-1.5, slow_s=0.45))
+    for found, expected in zip(loop_bounds(fading, flights[key]), bounds[key], strict=True):
+        np.testing.assert_array_equal(found, expected)
