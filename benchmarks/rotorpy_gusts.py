@@ -3,7 +3,7 @@
     python benchmarks/rotorpy_gusts.py [DRAWS]
 
 RotorPy's Crazyflie and Hummingbird on two paths with sines of up to 5 Hz, each flown four times for 40 s, or three
-paths once with the position that was asked for, at 500 Hz, in wind that wanders by 1.5 m/s. The Crazyflie has flapping
+paths once with the position that was asked for, at 250 Hz, in wind that wanders by 1.5 m/s. The Crazyflie has flapping
 rotors here, for the wind turns no other; noise is in what the controller sees of the rates and in the logged speeds.
 Equations, rotors and controller are RotorPy's. Beside what instruments tell stands what the loop leaves open: bounds by
 regression both ways with the true model of the body. The search begins at moments twice too large. Needs rotorpy.
@@ -35,9 +35,12 @@ from cpfls_cli.playback.loop import loop_bounds
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.builders.gusty_flights import SMALL, Flight, path_of
+from tests.builders.gusty_flights import STEP_S as PATH_STEP_S
 
 DRAWS = 4
-STEP_S, EVERY, SECONDS = 2e-3, 5, 40.0
+STRIDE, EVERY, SECONDS = 2, 2, 40.0
+"""Steps of a path that RotorPy steps over at once, and how often it is logged: at 250 and 125 Hz."""
+STEP_S = STRIDE * PATH_STEP_S
 WIND_M_S, MEMORY_S = 1.5, 0.7
 RATE_NOISE, SPEED_NOISE = 0.02, 1e-3
 """rad/s, in the loop, and of the mean speed, in the log."""
@@ -81,7 +84,7 @@ def _cells(vehicle: VehicleSettings, kind: str, sets: list[list[PlaybackFlight]]
     yield f"{100 * np.median(half[told]):.1f}" if told.any() else "—"
     yield f"{int((np.abs(np.log(ratio)) <= half)[told].sum())} of {int(told.sum())}"
     yield f"{int(told.sum())} of {told.size}"
-    bounds = [loop_bounds(VehicleModel(vehicle), flights) for flights in sets]
+    bounds = [loop_bounds(VehicleModel(vehicle=vehicle), flights) for flights in sets]
     for axis in range(2):
         low, high = (np.mean([each[axis] for each in pair]) for pair in zip(*(b[:2] for b in bounds), strict=True))
         yield f"{low:.2f} to {high:.2f}"
@@ -129,14 +132,14 @@ def _settings(numbers: Mapping[str, Any]) -> VehicleSettings:
 
 
 def _flown(asked: Asked) -> PlaybackFlight:
-    """Fly a path under RotorPy's controller, which sees noisy rates, and log every fifth step."""
+    """Fly a path under RotorPy's controller, which sees noisy rates, and log every second step."""
     from rotorpy.controllers.quadrotor_control import SE3Control
     from rotorpy.vehicles.multirotor import Multirotor
 
     numbers = _parameters(asked.vehicle)
     samples = round(SECONDS / STEP_S)
     rng = np.random.default_rng([2000, asked.path, asked.draw])
-    path = path_of(Flight(SMALL, path=asked.path, reach=5.0), samples)
+    path = path_of(Flight(SMALL, path=asked.path, reach=5.0), STRIDE * samples)[::STRIDE]
     keep = np.exp(-STEP_S / MEMORY_S)
     drawn = WIND_M_S * np.sqrt(1 - keep**2) * rng.standard_normal((samples, 3))
     wind, noise = lfilter([1.0], [1.0, -keep], drawn, axis=0), RATE_NOISE * rng.standard_normal((samples, 3))
