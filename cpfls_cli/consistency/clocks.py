@@ -43,12 +43,16 @@ _UNDECIDED = "Whether gyroscope or attitude is late these flights do not tell; t
 
 
 def actuation_delay(flights: Sequence[Signals]) -> tuple[str, ...]:
-    """Say how late the motion follows the logged torque, median over the flights; nothing where no flight tells."""
-    estimates = [estimate for signals in flights if (estimate := _estimate(signals)) is not None]
+    """Say how late the motion follows commands or a logged torque, median over the flights; nothing where none tells.
+
+    Behind measured speeds nothing has to come late: what looks so may be an autopilot that answers gusts.
+    """
+    told = [signals for signals in flights if signals.commanded or signals.rotor_speed is None]
+    estimates = [estimate for signals in told if (estimate := _estimate(signals)) is not None]
     if not estimates:
         return ()
     delay = float(np.median([estimate.delay_s for estimate in estimates]))
-    whom = "commands" if flights[0].commanded else "measured rotors"
+    whom = "commands" if told[0].commanded else "logged torque"
     bound = "at least" if any(estimate.at_bound for estimate in estimates) else "about"
     return (f"The motion follows the {whom} by {bound} {1000 * delay:.0f} ms.",)
 
