@@ -27,6 +27,6 @@ def capped(trust: Trust, contradictions: Sequence[str], *, loop: bool = False, l
     """
     if contradictions:
         return Trust.DO_NOT_USE
-    if trust not in (Trust.SIMULATION, Trust.CONTROL):
-        return trust
-    return Trust.LOOP if loop else Trust.LACKING if lacks else trust
+    if loop and trust in (Trust.SIMULATION, Trust.CONTROL, Trust.INSIDE, Trust.RIGID_BODY):
+        return Trust.LOOP
+    return Trust.LACKING if lacks and trust in (Trust.SIMULATION, Trust.CONTROL) else trust

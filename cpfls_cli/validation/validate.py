@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.dynamics.equations_of_motion import Predictor
+from cpfls_cli.identification.closed_loop import told_by
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.identify import TRAINING, Identification, model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings
@@ -87,12 +88,13 @@ def validate(
     part, source = next(iter(held_out.items()), (TRAINING, training))
     drawing, examining, simulating = rng.spawn(3)
     tell("compares structures")
-    structures = compare_structures(training, learned, settings) if asked.structures else None
+    told = told_by(result.freed, training, learned)
+    structures = compare_structures(*told, settings) if asked.structures else None
     tell("draws bands")
-    draws = bootstrap(model_evaluator(training, learned, settings), training, model, result.fit, asked, drawing)
+    draws = bootstrap(model_evaluator(*told, settings), told[0], model, result.fit, asked, drawing)
     drawn = curves(model, draws, result.rigid_body, training)
     tell("identifies its own simulation")
-    again = round_trip(training, learned, settings, model, drawn, simulating)
+    again = round_trip(*told, settings, model, drawn, simulating)
     tell("replays measured torques")
     predictors: dict[str, Predictor] = {MODEL: model, RIGID_BODY: result.rigid_body}
     steps = replay_steps(part, source, predictors, asked.horizon_samples, asked.windows)

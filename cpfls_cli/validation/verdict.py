@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import BoolArray
 from cpfls_cli.dynamics.rigid_body import why_unphysical
-from cpfls_cli.identification.findings import AXES
+from cpfls_cli.identification.findings import AXES, loop_in_words
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
 from cpfls_cli.validation.reasons import AGAINST, DEFINITE_SHARE, FOR, NEITHER, Reason, numbers, reasons
 from cpfls_cli.validation.trust import Trust, capped
@@ -57,11 +57,18 @@ def verdict(grounds: Grounds) -> Verdict:
        determine every coefficient beyond their noise, D(q) is positive definite at every roll and pitch, and R2
        confirms every axis; otherwise *good-inside-region*: nothing is known outside.
 
+    5. *shows-the-loop* where nothing tells the vehicle from its autopilot, too much of roll or pitch is left over, and
+       the label is not *do-not-use*.
+
     An unfinished search, wide bands, residuals that are not white and a few windows that were lost are told as
     reasons and do not decide: each of them harms a model only as far as it predicts worse, and that is measured.
     """
     label, decisive = _decided(grounds)
-    listed = (decisive, *reasons(grounds))
+    listed = [decisive, *reasons(grounds)]
+    loop = grounds.identification.loop
+    if loop is not None and loop.shows_loop:
+        label = capped(label, (), loop=True)
+        listed.insert(label is not Trust.LOOP, Reason(loop_in_words(loop), AGAINST))
     everywhere = label == "good-for-control"
     region = "every roll and pitch" if everywhere else region_in_words(grounds.identification.model.visited)
     return Verdict(label, region, tuple(r.text for r in listed), tuple(r.speaks for r in listed))
