@@ -24,12 +24,17 @@ from cpfls_cli.playback.instruments import Repeats, repeats
 from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.playback.loop import BalancedTorque, LoopBounds, bounds_between
 from cpfls_cli.regressor.motion import RIGID, Motion
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, windows
 
 _FEWEST_BLOCKS = 8
 _UNIFORM = 1e-3
 """Share of a sampling period by which clocks of one study differ at most."""
 _PAUSE = 0.5
 """Share of a sampling period by which a step is longer where time pauses."""
+_SLOW_S = 0.8
+"""Window whose average is taken off, which leaves what is faster than about 1.5 Hz: gusts are slower, and most of what
+a model of the inertia lacks. What a body takes is fast."""
+_MOSTLY = 0.5
 _KNOWN = 2.0
 """Ratio of the ends of an interval from which on a moment of inertia is not known."""
 _ROUNDING = 1e-12
@@ -83,11 +88,12 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     Flights that no other repeats are left out. So where there are such, the rest is taken only if least squares of all
     shows the loop, or instruments find another body.
 
-    With ``A`` the columns of a rigid body along a run, ``tau`` its torque and ``A'``, ``tau'`` the means of what the
-    other runs have at the same places of the path, the inertia parameters x solve ``sum A^T (tau' - A' x) = 0``: gusts
-    and noise of one run do not go with those of another. The torque becomes ``A x + tau' - A' x``, what the rigid body
-    takes along the run's own motion and what comes again of the rest. Least squares of this torque on ``A`` gives x
-    again, and on more columns what comes again of the rest beside it.
+    With ``A`` the columns of a rigid body along a run, ``tau`` its torque, both as far as they are fast, and ``A'``,
+    ``tau'`` the means of what the other runs have at the same places of the path, the inertia parameters x solve ``sum
+    A^T (tau' - A' x) = 0``: gusts and noise of one run do not go with those of another. The torque becomes what the
+    rigid body takes along the run's own motion and what comes again of the fast rest, ``tau' - A' x``. Least squares of
+    it gives the rigid body of the instruments again, and an inertia that depends on attitude as far as that comes
+    again. Where most of what a rigid body leaves comes again, slow or fast, it is no gust, and nothing is freed.
 
     Parameters
     ----------
@@ -110,11 +116,19 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     if period is None or len(parts) < len(flights):
         return None
     given = repeats([_flown(part, period) for part in parts])
-    runs = _runs(given, parts, period, 1.0 / axis_scale(training))
+    if not given.likeness:
+        return None
+    scale = 1.0 / axis_scale(training)
+    rows = [
+        np.concatenate([rigid_columns(part.motion), part.torque[:, :, None]], axis=2) * scale[:, None] for part in parts
+    ]
+    runs = _runs(given, rows, period)
     crossed = _by_block([(run.own, run.others, run.block) for run in runs])
     if len(crossed) < _FEWEST_BLOCKS:
         return None
-    least_squares, _ = _solved(_by_block([(run.own, run.own, run.block) for run in runs]))
+    least_squares, _ = _solved(_by_block([(run.rows, run.rows, run.block) for run in runs]))
+    if _share_again(given, [each @ np.append(-least_squares, 1.0) for each in rows], runs) > _MOSTLY:
+        return None
     rigid_body, half = _solved(crossed)
     if not _told(half)[2]:
         # What hardly comes again would shake what is known: about yaw the body stays as least squares has it.
@@ -125,9 +139,7 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
         return None
     starts = np.cumsum([0, *(len(part) for part in parts)])
     places = np.concatenate([starts[run.number] + run.samples for run in runs])
-    freed = replace(
-        gathered(training, places), torque=np.concatenate([run.freed(rigid_body) / run.scale for run in runs])
-    )
+    freed = replace(gathered(training, places), torque=np.concatenate([run.freed(rigid_body) / scale for run in runs]))
     every = len(learned) == len(training)
     found = FreedTorque(
         training=freed,
@@ -163,23 +175,24 @@ class _Run(NamedTuple):
     number : int
         Of the flight.
     samples : array of int, shape (samples,)
-    own, others : array, shape (samples, 3, 7)
+    rows : array, shape (samples, 3, 7)
         Columns of the rigid body, last the torque.
+    own, others : array, shape (samples, 3, 7)
+        What of these is fast, of the run itself and of others.
     block : array of int, shape (samples, 2)
         Path, and number of the block along it.
-    scale : array, shape (3,)
     """
 
     number: int
     samples: IntArray
+    rows: Array
     own: Array
     others: Array
     block: IntArray
-    scale: Array
 
     def freed(self, rigid_body: Array) -> Array:
         """Give the torque that a rigid body takes, and what comes again of the rest, shape (samples, 3)."""
-        return np.asarray(self.own[:, :, :-1] @ rigid_body + self.others @ np.append(-rigid_body, 1.0))
+        return np.asarray(self.rows[:, :, :-1] @ rigid_body + self.others @ np.append(-rigid_body, 1.0))
 
     def without_yaw(self) -> _Run:
         """Leave out what others have about yaw."""
@@ -187,11 +200,13 @@ class _Run(NamedTuple):
 
 
 def _common_period(parts: Sequence[TorqueData]) -> float | None:
-    """Give the sampling period of flights that are uniform in time; None where they are not, or differ."""
+    """Give the sampling period of flights that are uniform in time; None where they differ, or are slow."""
     steps = [np.diff(part.time) for part in parts]
     if len(steps) < 2 or not all(map(len, steps)):
         return None
     period = float(np.median(steps[0]))
+    if period * FEWEST_SAMPLES > _SLOW_S:
+        return None
     return period if all(np.allclose(step, period, rtol=_UNIFORM, atol=0.0) for step in steps) else None
 
 
@@ -210,18 +225,35 @@ def _flown(part: TorqueData, period: float) -> PlaybackFlight:
     )
 
 
-def _runs(given: Repeats, parts: Sequence[TorqueData], period: float, scale: Array) -> list[_Run]:
+def _runs(given: Repeats, rows: Sequence[Array], period: float) -> list[_Run]:
     """Lay the rows of flights that repeat each other beside those of the others, where all are known."""
-    columns = [np.concatenate([rigid_columns(part.motion), part.torque[:, :, None]], axis=2) for part in parts]
-    rows = [each * scale[:, None] for each in columns]
-    length = block_length(sum(len(parts[path[0]]) for path in given.paths()) * period) / period
+    fast = [_fast(each, period) for each in rows]
+    length = block_length(sum(len(rows[path[0]]) for path in given.paths()) * period) / period
     found = []
     for number in sorted(number for path in given.paths() for number in path):
-        others, (first, place) = given.others(number, rows), given.path(number, len(parts[number]))
-        samples = np.flatnonzero(np.isfinite(others).all(axis=(1, 2)) & np.isfinite(place))
-        along = (place[samples] // length).astype(np.int64)
-        block = np.column_stack([np.full(len(samples), first), along])
-        found.append(_Run(number, samples, rows[number][samples], others[samples], block, scale))
+        others, (first, place) = given.others(number, fast), given.path(number, len(rows[number]))
+        known = np.isfinite(others + fast[number]).all(axis=(1, 2)) & np.isfinite(place)
+        along = (place[known] // length).astype(np.int64)
+        block = np.column_stack([np.full(len(along), first), along])
+        both = fast[number][known], others[known]
+        found.append(_Run(number, np.flatnonzero(known), rows[number][known], *both, block))
+    return found
+
+
+def _share_again(given: Repeats, rest: Sequence[Array], runs: Sequence[_Run]) -> float:
+    """Compute the share of a rest about roll and pitch, shape (time, 3), that comes again in other runs."""
+    own = [rest[run.number][run.samples, :2] for run in runs]
+    others = [given.others(run.number, rest)[run.samples, :2] for run in runs]
+    square = sum(float(np.sum(each**2)) for each in own)
+    return sum(float(np.sum(mine * there)) for mine, there in zip(own, others, strict=True)) / (square or 1.0)
+
+
+def _fast(values: Array, period: float) -> Array:
+    """Take from values what a long window sees around them, shape (time, ...); NaN at the ends."""
+    window, found = windows(period, _SLOW_S, 1.0), np.full_like(values, np.nan)
+    half, count = len(window.weight) // 2, window.count(len(values))
+    if count:
+        found[half : half + count] = values[half : half + count] - window.average(values)
     return found
 
 

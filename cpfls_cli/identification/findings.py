@@ -134,7 +134,7 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
     moments = ", ".join(
         f"{name} {value:.3g} ({value * np.exp(-half):.3g} to {value * np.exp(half):.3g})"
         if told
-        else f"{name} not determined, for too little of yaw comes again"
+        else f"{name} not determined, for too little of yaw comes again, so it stays as least squares has it"
         for name, value, half, told in zip(INERTIA_PARAMETERS, freed.rigid_body, freed.half, freed.told, strict=False)
     )
     alone = freed.flights - freed.runs
@@ -164,9 +164,10 @@ def loop_in_words(loop: LoopBounds) -> str:
         for name, low, high in zip(INERTIA_PARAMETERS[:2], loop.low, loop.high, strict=False)
     )
     return (
-        f"the flights show the loop: torque explains {shares} in some band of 0.5 to 6 Hz, and an autopilot answers "
-        f"gusts with torque, so this may be the vehicle and its autopilot together; true moments over those found: "
-        f"{bounds}; fly each path three times or more, a log each, and give all (cpfls trajectory --repeat plans it)"
+        f"the flights show the loop: torque explains {shares} in some band of 0.5 to 6 Hz. An autopilot that answers "
+        "gusts, or an effect that is missing here, makes a body look heavier or lighter than it is; true moments over "
+        f"those found: {bounds}. Fly each path three times or more, a log each, and give all flights (cpfls trajectory "
+        "--repeat plans them)"
     )
 
 

@@ -21,7 +21,7 @@ from cpfls_cli.validation.physical import PeriodErrors, Physics, one_period_away
 from cpfls_cli.validation.replay import StepErrors, replay_steps
 from cpfls_cli.validation.residuals import ResidualAnalysis, examine_residuals
 from cpfls_cli.validation.structures import StructureComparison, compare_structures
-from cpfls_cli.validation.verdict import Verdict, verdict
+from cpfls_cli.validation.verdict import Verdict, beside_loop, verdict
 
 Tell = Callable[[str], None]
 """Takes the name of the next step, for the progress display."""
@@ -118,4 +118,5 @@ def validate(
         band=drawn.relative_width,
         definite=definite_share(model, draws),
     )
-    return Validation(structures, residuals, draws, drawn, again, steps, physics, period, verdict(grounds))
+    judged = beside_loop(verdict(grounds), result.loop)
+    return Validation(structures, residuals, draws, drawn, again, steps, physics, period, judged)

@@ -10,6 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import BoolArray
 from cpfls_cli.dynamics.rigid_body import why_unphysical
 from cpfls_cli.identification.findings import AXES, loop_in_words
+from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
 from cpfls_cli.validation.reasons import AGAINST, DEFINITE_SHARE, FOR, NEITHER, Reason, numbers, reasons
 from cpfls_cli.validation.trust import Trust, capped
@@ -57,18 +58,11 @@ def verdict(grounds: Grounds) -> Verdict:
        determine every coefficient beyond their noise, D(q) is positive definite at every roll and pitch, and R2
        confirms every axis; otherwise *good-inside-region*: nothing is known outside.
 
-    5. *shows-the-loop* where nothing tells the vehicle from its autopilot, too much of roll or pitch is left over, and
-       the label is not *do-not-use*.
-
     An unfinished search, wide bands, residuals that are not white and a few windows that were lost are told as
     reasons and do not decide: each of them harms a model only as far as it predicts worse, and that is measured.
     """
     label, decisive = _decided(grounds)
-    listed = [decisive, *reasons(grounds)]
-    loop = grounds.identification.loop
-    if loop is not None and loop.shows_loop:
-        label = capped(label, (), loop=True)
-        listed.insert(label is not Trust.LOOP, Reason(loop_in_words(loop), AGAINST))
+    listed = (decisive, *reasons(grounds))
     everywhere = label == "good-for-control"
     region = "every roll and pitch" if everywhere else region_in_words(grounds.identification.model.visited)
     return Verdict(label, region, tuple(r.text for r in listed), tuple(r.speaks for r in listed))
@@ -89,6 +83,25 @@ def contradicted(found: Verdict, contradictions: Sequence[str]) -> Verdict:
     return replace(
         found, label=capped(found.label, wrong), reason=(*wrong, *found.reason), speaks=(*against, *found.speaks)
     )
+
+
+def beside_loop(found: Verdict, loop: LoopBounds | None) -> Verdict:
+    """Take back a good verdict on a model whose flights show the loop.
+
+    Parameters
+    ----------
+    loop : LoopBounds or None
+        None where something tells the vehicle from its autopilot.
+    """
+    if loop is None or not loop.shows_loop:
+        return found
+    label = capped(found.label, (), loop=True)
+    # What decided stays first.
+    first = 0 if label is Trust.LOOP else 1
+    reason, speaks = list(found.reason), list(found.speaks)
+    reason.insert(first, loop_in_words(loop))
+    speaks.insert(first, AGAINST)
+    return replace(found, label=label, reason=tuple(reason), speaks=tuple(speaks))
 
 
 def good_axes(grounds: Grounds, predictor: str) -> BoolArray:

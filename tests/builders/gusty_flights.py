@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.signal import butter, lfilter, sosfiltfilt
 
 from cpfls_cli.effects.signals import Signals
@@ -206,7 +207,9 @@ def torque_samples(flight, truth, lowpass_hz=12.0):
     rate, torque = (
         sosfiltfilt(filtered, values, axis=0) for values in (motion.rate, flight.speed**2 @ truth.mixer[1:].T)
     )
-    attitude, turning = euler_angles(motion.rotation), np.gradient(rate, motion.period, axis=0)
-    of_angles = attitude_rate(attitude, rate), attitude_acceleration(attitude, rate, turning)
-    time = motion.period * np.arange(len(flight))
+    attitude, time = euler_angles(motion.rotation), motion.period * np.arange(len(flight))
+    of_angles = (
+        attitude_rate(attitude, rate),
+        attitude_acceleration(attitude, rate, CubicSpline(time, rate).derivative()(time)),
+    )
     return TorqueData(time, Motion(attitude, *of_angles), generalised_torque(attitude, torque))
