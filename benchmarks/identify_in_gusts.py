@@ -3,9 +3,10 @@
     python benchmarks/identify_in_gusts.py
 
 A vehicle of 45 g, four runs of 40 s of each of six paths, of 0.8, 3 and 5 Hz at most, in two levels of gusts, behind
-loops of 6, 8 and 12 rad/s. Torque and motion are behind a low-pass of 12 Hz. Nothing of the package flies them. A row is
-a level of gusts and a loop: in how many of its 18 sets the runs tell the body, errors of the moments there as root mean
-squares of their logarithms, and how often 95 % intervals hold the truth, around either estimate. The last row is of all.
+loops of 6, 8 and 12 rad/s. Torque and motion are behind a low-pass of 12 Hz. Nothing of the package flies them. A row
+is a level of gusts and a loop: in how many of its 18 sets the runs tell the body, errors of the moments there as root
+mean squares of their logarithms, and how often 95 % intervals hold the truth, around either estimate. The last row is
+of all.
 """
 
 from __future__ import annotations
