@@ -141,8 +141,8 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
     rest = f"; {alone} of the flights that train repeat none and teach nothing" if alone else ""
     least = " ".join(f"{value:.3g}" for value in freed.least_squares[:3])
     yield (
-        f"{freed.runs} flights fly {freed.paths} path{'s' * (freed.paths > 1)} again, so the parameters come from the "
-        "torque that comes again, in which no gust acts; scores are those of the torque as measured, gusts among it. "
+        f"{freed.runs} flights repeat {freed.paths} path{'s' * (freed.paths > 1)}, so the parameters come from the torque "
+        "that comes again, in which no gust acts; scores are those of the torque as measured, gusts among it. "
         f"Rigid body, kg m^2: {moments}; least squares of the torque as measured finds {least}{rest}"
     )
 
