@@ -140,9 +140,10 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
     alone = freed.flights - freed.runs
     rest = f"; {alone} of the flights that train repeat none and teach nothing" if alone else ""
     least = " ".join(f"{value:.3g}" for value in freed.least_squares[:3])
+    paths = "1 path" if freed.paths == 1 else f"{freed.paths} paths"
     yield (
-        f"{freed.runs} flights repeat {freed.paths} path{'s' * (freed.paths > 1)}, so the parameters come from the torque "
-        "that comes again, in which no gust acts; scores are those of the torque as measured, gusts among it. "
+        f"{freed.runs} flights repeat {paths}, so the parameters come from the torque that comes again, in which no "
+        "gust acts; scores are those of the torque as measured, gusts among it. "
         f"Rigid body, kg m^2: {moments}; least squares of the torque as measured finds {least}{rest}"
     )
 
