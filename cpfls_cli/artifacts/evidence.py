@@ -162,7 +162,9 @@ class VerdictGroup:
     """How far to trust the model, and why."""
 
     label: str | None = dataset(
-        "label", "good-for-control, good-inside-region, not-better-than-rigid-body, do-not-use", default=None
+        "label",
+        "good-for-control, good-inside-region, shows-the-loop, not-better-than-rigid-body, do-not-use",
+        default=None,
     )
     region: str | None = dataset("region", "region of attitudes that the verdict is about, in words", default=None)
     reason: tuple[str, ...] | None = dataset("reason", "what speaks for it and against it", "reason", default=None)

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.rigid_body import VERTICAL, why_unphysical
+from cpfls_cli.identification.closed_loop import FreedTorque
 from cpfls_cli.identification.excitation import AxisEvidence, RuleExcitation, Swings
 from cpfls_cli.identification.judge import Score
 from cpfls_cli.identification.least_squares import LeastSquares
 from cpfls_cli.identification.solver import Fit
+from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.rounding import less
 
 AXES = ("roll", "pitch", "yaw")
@@ -61,6 +64,10 @@ class FitDiagnostics:
         By part, then by model.
     learned : Score
         Of the model, on the samples learned from.
+    freed : FreedTorque or None
+        What the parameters were learned from, where flights repeat each other.
+    loop : LoopBounds or None
+        How far the loop may have misled the model, where nothing tells it from the vehicle.
     """
 
     fit: Fit
@@ -75,6 +82,8 @@ class FitDiagnostics:
     vertical: Mapping[str, int]
     scores: Mapping[str, Mapping[str, Score]]
     learned: Score
+    freed: FreedTorque | None = field(default=None, kw_only=True)
+    loop: LoopBounds | None = field(default=None, kw_only=True)
 
     @property
     def training_scores(self) -> Mapping[str, Score]:
@@ -84,7 +93,7 @@ class FitDiagnostics:
 
 def findings(diagnostics: FitDiagnostics) -> list[str]:
     """List what failed or was not excited in sentences, the most important first."""
-    of_the_model = (_physics, _scale, _axes, _rank, _silent_rules, _fuzzy_part_off)
+    of_the_model = (_physics, _instruments, _loop, _scale, _axes, _rank, _silent_rules, _fuzzy_part_off)
     of_its_errors = (_beaten, _badly_explained, _outside, _vertical)
     return [finding for rule in of_the_model + of_its_errors for finding in rule(diagnostics)]
 
@@ -115,6 +124,52 @@ def _scale(diagnostics: FitDiagnostics) -> Iterator[str]:
             f"the moments of inertia found ({axes}) are {ratios} times those stated (vehicle.inertia_kg_m2): check the "
             "units of torque and rates, the rotors' factors, and the vehicle"
         )
+
+
+def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
+    """Say what the parameters rest on where flights repeat each other."""
+    freed = diagnostics.freed
+    if freed is None:
+        return
+    moments = ", ".join(
+        f"{name} {value:.3g} ({value * np.exp(-half):.3g} to {value * np.exp(half):.3g})"
+        if told
+        else f"{name} not determined, for too little of yaw comes again, so it stays as least squares has it"
+        for name, value, half, told in zip(INERTIA_PARAMETERS, freed.rigid_body, freed.half, freed.told, strict=False)
+    )
+    alone = freed.flights - freed.runs
+    rest = f"; {alone} of the flights that train repeat none and teach nothing" if alone else ""
+    least = " ".join(f"{value:.3g}" for value in freed.least_squares[:3])
+    paths = "1 path" if freed.paths == 1 else f"{freed.paths} paths"
+    yield (
+        f"{freed.runs} flights repeat {paths}, so the parameters come from the torque that comes again, in which no "
+        "gust acts; scores are those of the torque as measured, gusts among it. "
+        f"Rigid body, kg m^2: {moments}; least squares of the torque as measured finds {least}{rest}"
+    )
+
+
+def _loop(diagnostics: FitDiagnostics) -> Iterator[str]:
+    """Say where the flights show the loop and nothing tells it from the vehicle."""
+    loop = diagnostics.loop
+    if loop is not None and loop.shows_loop:
+        yield loop_in_words(loop)
+
+
+def loop_in_words(loop: LoopBounds) -> str:
+    """Say how far the loop may have misled a model, and what to fly."""
+    shares = ", ".join(
+        f"{100 * max(share, 0):.0f} % of {axis}" for axis, share in zip(AXES[:2], loop.explained, strict=False)
+    )
+    bounds = " and ".join(
+        f"{name} from {low:.2g} to {high:.2g}"
+        for name, low, high in zip(INERTIA_PARAMETERS[:2], loop.low, loop.high, strict=False)
+    )
+    return (
+        f"the flights show the loop: torque explains {shares} in some band of 0.5 to 6 Hz. An autopilot that answers "
+        "gusts, or an effect that is missing here, makes a body look heavier or lighter than it is; true moments over "
+        f"those found: {bounds}. Fly each path three times or more, a log each, and give all flights (cpfls trajectory "
+        "--repeat plans them)"
+    )
 
 
 def _axes(diagnostics: FitDiagnostics) -> Iterator[str]:

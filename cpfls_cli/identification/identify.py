@@ -14,6 +14,7 @@ from cpfls_cli.dynamics.visited import visited_cells
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.engine import History
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
+from cpfls_cli.identification.closed_loop import freed_torque, loop_along, told_by
 from cpfls_cli.identification.cross_validation import RidgeCurve, with_folds
 from cpfls_cli.identification.data import TorqueSource, axis_scale
 from cpfls_cli.identification.evaluator import Evaluator
@@ -74,6 +75,9 @@ def identify(
 ) -> Identification:
     """Identify a model and judge it beside its baselines.
 
+    Where the flights that train repeat each other, parameters and the errors that the search minimises are those of the
+    torque that comes again (`freed_torque`), in which no gust acts; scores are those of the torque as measured.
+
     Parameters
     ----------
     training : TorqueSource
@@ -101,13 +105,14 @@ def identify(
     ----------
     Paper section 9; method.md sections 4, 5, 7 and 8.
     """
-    evaluator = model_evaluator(training, learned, settings)
+    freed = freed_torque(training, learned)
+    evaluator = model_evaluator(*told_by(freed, training, learned), settings)
     result = search(evaluator, settings, rng, run, kept)
     solved = _solve(evaluator, training, result.front.chromosomes[result.front.chosen])
     if solved is None:
         raise ComputationError("no chromosome gave a finite model; the data may not move at all")
     model, fit, system = solved
-    baselines = fit_baselines(learned, fit.row_scale, settings.rank_tolerance)
+    baselines = fit_baselines(told_by(freed, training, learned)[1], fit.row_scale, settings.rank_tolerance)
     predictors = {"model": model.torque} | {baseline.name: baseline.torque for baseline in baselines}
     uniform = _solve(evaluator, training, uniform_chromosome(model.structure))
     if uniform is not None and model.structure.genes > 0:
@@ -129,6 +134,8 @@ def identify(
         vertical={part: _count(data, vertical) for part, data in parts.items()},
         scores=scores,
         learned=scores[TRAINING]["model"] if len(learned) == len(training) else score_of(learned, model.torque),
+        freed=freed,
+        loop=None if freed is not None else loop_along(training, model.torque),
     )
     return Identification(
         **vars(diagnostics),

@@ -85,9 +85,30 @@ def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopB
     Frisch 1934 (bounds by regression both ways); Forssell and Ljung 1999 (closed-loop identification revisited).
     """
     model = replace(model, response=replace(model.response, slow_roll_pitch=0.0, slow_yaw=0.0))
+    return bounds_between([_balanced(model, flight, part) for flight in flights for part in flight.stretches])
+
+
+class BalancedTorque(NamedTuple):
+    """A stretch of the torque that acts, and of what a model's turn takes: a momentum's change and what adds to it.
+
+    Attributes
+    ----------
+    torque, direct : array, shape (time, 3), N m, body frame
+    momentum : array, shape (time, 3), N m s, body frame
+    period : float, s
+    """
+
+    torque: Array
+    momentum: Array
+    direct: Array
+    period: float
+
+
+def bounds_between(stretches: Sequence[BalancedTorque]) -> LoopBounds:
+    """Bound the factors that stretches allow; see `loop_bounds`."""
     low, high, explained = np.full(3, np.nan), np.full(3, np.nan), np.full(3, np.nan)
     for band in _BANDS:
-        sums = np.array([block for flight in flights for block in _sums(model, flight, *band)])
+        sums = np.array([block for stretch in stretches for block in _sums(stretch, *band)])
         if len(sums) < _FEWEST_BLOCKS:
             continue
         total = sums.sum(axis=0)
@@ -111,29 +132,32 @@ def _factors(sums: Array) -> Array:
     return np.asarray(np.clip([both / turning, torque / both], 1 / _ANY, _ANY))
 
 
-def _sums(model: VehicleModel, flight: PlaybackFlight, short_s: float, long_s: float) -> Iterator[Array]:
+def _balanced(model: VehicleModel, flight: PlaybackFlight, stretch: slice) -> BalancedTorque:
+    rate = flight.motion.rate[stretch]
+    momentum = rate @ model.body.inertia
+    torque = wrench_during(model, flight, stretch)[:, :3]
+    return BalancedTorque(torque, momentum, np.cross(rate, momentum), flight.motion.period)
+
+
+def _sums(stretch: BalancedTorque, short_s: float, long_s: float) -> Iterator[Array]:
     """Sum products of torque and of what the rotation takes over blocks of windows, shape (axis, 5).
 
     The last two are noise: white noise is as large in windows of alternating sign, where motion vanishes.
     """
-    period = flight.motion.period
+    torque, momentum, direct, period = stretch
     if short_s < FEWEST_SAMPLES * period:
         return
     band = windows(period, short_s, _OVERLAP).less(windows(period, long_s, _OVERLAP))
+    count = band.count(len(torque))
+    if not count:
+        return
     noise = band.alternating()
-    for stretch in flight.stretches:
-        count = band.count(stretch.stop - stretch.start)
-        if not count:
-            continue
-        rate = flight.motion.rate[stretch]
-        momentum = rate @ model.body.inertia
-        torque = wrench_during(model, flight, stretch)[:, :3]
-        turning = band.derivative(momentum) + band.average(np.cross(rate, momentum))
-        seen, unseen = band.average(torque), noise.average(torque)
-        products = np.stack([seen**2, seen * turning, turning**2, unseen**2, noise.derivative(momentum) ** 2], axis=2)
-        blocks = max(1, round(count * band.hop * period / _BLOCK_S))
-        number = contiguous(count, blocks)
-        yield from (products[number == block].sum(axis=0) for block in range(blocks))
+    seen, turning = band.average(torque), band.derivative(momentum) + band.average(direct)
+    unseen, trembling = noise.average(torque), noise.derivative(momentum) + noise.average(direct)
+    products = np.stack([seen**2, seen * turning, turning**2, unseen**2, trembling**2], axis=2)
+    blocks = max(1, round(count * band.hop * period / _BLOCK_S))
+    number = contiguous(count, blocks)
+    yield from (products[number == block].sum(axis=0) for block in range(blocks))
 
 
 def wrench_during(model: VehicleModel, flight: PlaybackFlight, stretch: slice) -> Array:

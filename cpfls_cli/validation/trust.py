@@ -27,6 +27,6 @@ def capped(trust: Trust, contradictions: Sequence[str], *, loop: bool = False, l
     """
     if contradictions:
         return Trust.DO_NOT_USE
-    if loop and trust not in (Trust.RIGID_BODY, Trust.DO_NOT_USE):
+    if loop and trust is not Trust.DO_NOT_USE:
         return Trust.LOOP
     return Trust.LACKING if lacks and trust in (Trust.SIMULATION, Trust.CONTROL) else trust

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.dynamics.equations_of_motion import Predictor
+from cpfls_cli.identification.closed_loop import told_by
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.identify import TRAINING, Identification, model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings
@@ -20,7 +21,7 @@ from cpfls_cli.validation.physical import PeriodErrors, Physics, one_period_away
 from cpfls_cli.validation.replay import StepErrors, replay_steps
 from cpfls_cli.validation.residuals import ResidualAnalysis, examine_residuals
 from cpfls_cli.validation.structures import StructureComparison, compare_structures
-from cpfls_cli.validation.verdict import Verdict, verdict
+from cpfls_cli.validation.verdict import Verdict, beside_loop, verdict
 
 Tell = Callable[[str], None]
 """Takes the name of the next step, for the progress display."""
@@ -87,12 +88,13 @@ def validate(
     part, source = next(iter(held_out.items()), (TRAINING, training))
     drawing, examining, simulating = rng.spawn(3)
     tell("compares structures")
-    structures = compare_structures(training, learned, settings) if asked.structures else None
+    told = told_by(result.freed, training, learned)
+    structures = compare_structures(*told, settings) if asked.structures else None
     tell("draws bands")
-    draws = bootstrap(model_evaluator(training, learned, settings), training, model, result.fit, asked, drawing)
+    draws = bootstrap(model_evaluator(*told, settings), told[0], model, result.fit, asked, drawing)
     drawn = curves(model, draws, result.rigid_body, training)
     tell("identifies its own simulation")
-    again = round_trip(training, learned, settings, model, drawn, simulating)
+    again = round_trip(*told, settings, model, drawn, simulating)
     tell("replays measured torques")
     predictors: dict[str, Predictor] = {MODEL: model, RIGID_BODY: result.rigid_body}
     steps = replay_steps(part, source, predictors, asked.horizon_samples, asked.windows)
@@ -116,4 +118,5 @@ def validate(
         band=drawn.relative_width,
         definite=definite_share(model, draws),
     )
-    return Validation(structures, residuals, draws, drawn, again, steps, physics, period, verdict(grounds))
+    judged = beside_loop(verdict(grounds), result.loop)
+    return Validation(structures, residuals, draws, drawn, again, steps, physics, period, judged)

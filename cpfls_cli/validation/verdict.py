@@ -9,7 +9,8 @@ import numpy as np
 
 from cpfls_cli.arrays import BoolArray
 from cpfls_cli.dynamics.rigid_body import why_unphysical
-from cpfls_cli.identification.findings import AXES
+from cpfls_cli.identification.findings import AXES, loop_in_words
+from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
 from cpfls_cli.validation.reasons import AGAINST, DEFINITE_SHARE, FOR, NEITHER, Reason, numbers, reasons
 from cpfls_cli.validation.trust import Trust, capped
@@ -82,6 +83,25 @@ def contradicted(found: Verdict, contradictions: Sequence[str]) -> Verdict:
     return replace(
         found, label=capped(found.label, wrong), reason=(*wrong, *found.reason), speaks=(*against, *found.speaks)
     )
+
+
+def beside_loop(found: Verdict, loop: LoopBounds | None) -> Verdict:
+    """Take back a good verdict on a model whose flights show the loop.
+
+    Parameters
+    ----------
+    loop : LoopBounds or None
+        None where something tells the vehicle from its autopilot.
+    """
+    if loop is None or not loop.shows_loop:
+        return found
+    label = capped(found.label, (), loop=True)
+    # What decided stays first.
+    first = 0 if label is Trust.LOOP else 1
+    reason, speaks = list(found.reason), list(found.speaks)
+    reason.insert(first, loop_in_words(loop))
+    speaks.insert(first, AGAINST)
+    return replace(found, label=label, reason=tuple(reason), speaks=tuple(speaks))
 
 
 def good_axes(grounds: Grounds, predictor: str) -> BoolArray:

@@ -3,12 +3,15 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, lfilter, sosfiltfilt
 
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.kernels import MeasuredMotion
-from cpfls_cli.rotations import euler_angles
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.rotations import attitude_acceleration, attitude_rate, euler_angles, generalised_torque
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 STEP_S, EVERY = 2e-3, 5
@@ -195,3 +198,18 @@ def logged(flight, vehicle):
         setpoints=flight.setpoints,
     )
     return LoggedFlight(flight.name, (signals,), flight.hold, "measured rotor speeds", ())
+
+
+def torque_samples(flight, truth, lowpass_hz=12.0):
+    """Give the torque of a flight's rotors and the motion that was measured, both behind one low-pass."""
+    motion = flight.motion
+    filtered = butter(2, lowpass_hz, output="sos", fs=1 / motion.period)
+    rate, torque = (
+        sosfiltfilt(filtered, values, axis=0) for values in (motion.rate, flight.speed**2 @ truth.mixer[1:].T)
+    )
+    attitude, time = euler_angles(motion.rotation), motion.period * np.arange(len(flight))
+    of_angles = (
+        attitude_rate(attitude, rate),
+        attitude_acceleration(attitude, rate, CubicSpline(time, rate).derivative()(time)),
+    )
+    return TorqueData(time, Motion(attitude, *of_angles), generalised_torque(attitude, torque))

@@ -5,9 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.validation.grounds import MODEL, Grounds
 from cpfls_cli.validation.replay import NOTHING_MOVES
-from cpfls_cli.validation.verdict import confirmed_axes, region_in_words
+from cpfls_cli.validation.trust import Trust
+from cpfls_cli.validation.verdict import Verdict, beside_loop, confirmed_axes, region_in_words
+
+LOOP = LoopBounds(np.full(3, 0.5), np.full(3, 2.0), np.array([0.5, 0.8, 0.1]))
 
 
 def visited(roll, pitch):
@@ -51,3 +55,22 @@ def test_playback_does_not_confirm_what_torque_denies():
 def test_without_windows_torque_decides():
     judged = grounds((np.nan,) * 3, (np.nan,) * 3)
     assert confirmed_axes(judged, MODEL).all()
+
+
+@pytest.mark.parametrize("label", [Trust.CONTROL, Trust.INSIDE, Trust.RIGID_BODY])
+def test_no_model_of_flights_that_show_the_loop_is_good(label):
+    found = beside_loop(Verdict(label, "", ("better",), (1,)), LOOP)
+    assert found.label == Trust.LOOP
+    assert "50 % of roll, 80 % of pitch" in found.reason[0]
+    assert found.speaks == (-1, 1)
+
+
+def test_a_loop_does_not_save_what_is_not_to_be_used():
+    found = beside_loop(Verdict(Trust.DO_NOT_USE, "", ("no body",), (-1,)), LOOP)
+    assert (found.label, found.reason[0], len(found.reason)) == (Trust.DO_NOT_USE, "no body", 2)
+
+
+@pytest.mark.parametrize("loop", [None, LOOP._replace(explained=np.array([0.95, 0.95, 0.1]))])
+def test_flights_that_explain_roll_and_pitch_leave_the_verdict(loop):
+    found = Verdict(Trust.INSIDE, "", ("better",), (1,))
+    assert beside_loop(found, loop) is found

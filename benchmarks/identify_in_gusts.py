@@ -1,0 +1,98 @@
+"""What `identify` finds of a body in gusts, by what comes again and by least squares, with the intervals of the first.
+
+    python benchmarks/identify_in_gusts.py
+
+A vehicle of 45 g, four runs of 40 s of each of six paths, of 0.8, 3 and 5 Hz at most, in two levels of gusts, behind
+loops of 6, 8 and 12 rad/s. Torque and motion are behind a low-pass of 12 Hz. Nothing of the package flies them. A row
+is a level of gusts and a loop: in how many of its 18 sets the runs tell the body, errors of the moments there as root
+mean squares of their logarithms, and how often 95 % intervals hold the truth, around either estimate. The last row is
+of all.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from itertools import islice
+from pathlib import Path
+from typing import NamedTuple
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.shared.measure import pin_threads, table
+
+pin_threads()
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.identification.closed_loop import freed_torque
+from cpfls_cli.identification.data import TorqueSource, axis_scale, joined
+from cpfls_cli.identification.judge import fit_baselines
+from tests.builders.gusty_flights import GUSTS, SMALL, STORM, Flight, gusty_flights, torque_samples
+
+RUNS, PATHS, SECONDS = 4, 6, 40.0
+LOOPS, REACHES_HZ = (6.0, 8.0, 12.0), (0.0, 3.0, 5.0)
+
+
+class Found(NamedTuple):
+    """Logarithms of moments over the true ones, by what comes again and by least squares, shape (3,)."""
+
+    again: Array
+    least: Array
+    half: Array
+    told: bool
+
+
+def main() -> None:
+    kinds = [(gusts, loop) for gusts in (GUSTS, STORM) for loop in LOOPS]
+    asked = [
+        Flight(SMALL, gusts, path, run, bandwidth=loop, reach=reach)
+        for gusts, loop in kinds
+        for reach in REACHES_HZ
+        for path in range(PATHS)
+        for run in range(RUNS)
+    ]
+    flown = (torque_samples(each, SMALL) for each in gusty_flights(asked, SECONDS))
+    rows, every = [], []
+    for gusts, loop in kinds:
+        own = [_found(joined(list(islice(flown, RUNS)))) for _ in range(len(REACHES_HZ) * PATHS)]
+        rows.append([", ".join(f"{gust:g}" for gust in gusts), f"{loop:g}", *_cells(own)])
+        every += own
+    rows.append(["all", "", *_cells(every)])
+    by = ("by what comes again", "by least squares")
+    header = ["gusts, rad/s²", "loop, rad/s", "told", *(f"Ixx, Iyy {each}, %" for each in by)]
+    header += [f"95 % hold, {each}" for each in by]
+    table("identify_in_gusts", [*header, "Izz told", *(f"Izz {each}, %" for each in by)], rows)
+
+
+def _found(source: TorqueSource) -> Found | None:
+    freed = freed_torque(source, source)
+    if freed is None:
+        return None
+    again, least = (
+        np.log(fit_baselines(data, 1 / axis_scale(data), 3e-7)[0].parameters[:3] / SMALL.inertia)
+        for data in (freed.learned, source)
+    )
+    return Found(again, least, freed.half, bool(freed.told[2]))
+
+
+def _cells(sets: Sequence[Found | None]) -> list[str]:
+    known = [each for each in sets if each is not None]
+    yaw = [each for each in known if each.told]
+    cells = [f"{len(known)} of {len(sets)}"]
+    if not known:
+        return [*cells, *["—"] * 4, "0", "—", "—"]
+    half = np.array([each.half for each in known])[:, :2]
+    of = [np.array([getattr(each, name) for each in known])[:, :2] for name in ("again", "least")]
+    cells += [", ".join(f"{100 * value:.1f}" for value in np.sqrt(np.mean(each**2, axis=0))) for each in of]
+    cells += [", ".join(f"{100 * value:.0f}" for value in (np.abs(each) <= half).mean(axis=0)) for each in of]
+    cells.append(str(len(yaw)))
+    for name in ("again", "least"):
+        values = np.array([getattr(each, name)[2] for each in yaw])
+        cells.append(f"{100 * np.sqrt(np.mean(values**2)):.0f}" if len(yaw) else "—")
+    return cells
+
+
+if __name__ == "__main__":
+    main()

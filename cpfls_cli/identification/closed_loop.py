@@ -1,0 +1,327 @@
+"""What an autopilot's loop does to the torque of flights: freed of it where runs repeat a path, else bounded.
+
+An autopilot answers gusts with torque, so least squares of torque on motion finds a mixture of vehicle and autopilot.
+Another run of the same path has the same motion asked for, and another gust: it is the instrument.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli import rotations
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import half_width, jackknife_covariance
+from cpfls_cli.dynamics.rigid_body import rigid_columns, vertical, why_unphysical
+from cpfls_cli.identification.data import Flights, TorqueData, TorqueSource, axis_scale, gathered, sample_times
+from cpfls_cli.playback.balances import block_length
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.instruments import Repeats, repeats
+from cpfls_cli.playback.kernels import MeasuredMotion
+from cpfls_cli.playback.loop import BalancedTorque, LoopBounds, bounds_between
+from cpfls_cli.regressor.motion import RIGID, Motion
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, windows
+
+_FEWEST_BLOCKS = 8
+_UNIFORM = 1e-3
+"""Share of a sampling period by which clocks of one study differ at most."""
+_PAUSE = 0.5
+"""Share of a sampling period by which a step is longer where time pauses."""
+_SLOW_S = 0.8
+"""Window whose average is taken off, which leaves what is faster than about 1.5 Hz: gusts are slower, and most of what
+a model of the inertia lacks. What a body takes is fast."""
+_MOSTLY = 0.5
+_KNOWN = 2.0
+"""Ratio of the ends of an interval from which on a moment of inertia is not known."""
+_ROUNDING = 1e-12
+_OF_YAW = (2, 4, 5)
+"""Places of Izz, Ixz and Iyz among the inertia parameters."""
+_VISIBLE = np.log(1.05)
+"""Logarithm of a ratio of moments of inertia that matters."""
+
+
+@dataclass(frozen=True)
+class FreedTorque:
+    """Samples of flights that repeat each other, with the torque that they take where no gust acts.
+
+    Attributes
+    ----------
+    training, learned : TorqueData
+        Those of the training part and of the samples learned from that another run knows.
+    rigid_body, least_squares : array, shape (6,), kg m^2
+        Inertia parameters by instruments, and by least squares of the torque as measured.
+    half : array, shape (3,)
+        Half of the 95 % intervals of the logarithms of the moments of inertia by instruments.
+    runs, paths, flights : int
+        Flights that repeat each other, their paths, and all flights.
+    """
+
+    training: TorqueData
+    learned: TorqueData
+    rigid_body: Array
+    least_squares: Array
+    half: Array
+    runs: int
+    paths: int
+    flights: int
+
+    @property
+    def told(self) -> BoolArray:
+        """Axes, shape (3,), whose moment of inertia the instruments tell to a factor of two."""
+        return _told(self.half)
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether instruments find another body than least squares: off by their interval, and visibly."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            off = np.abs(np.log(self.least_squares[:3] / self.rigid_body[:3]))
+        return bool((~(off <= np.maximum(self.half, _VISIBLE)) & self.told).any())
+
+
+def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque | None:
+    """Free the torque of flights of what does not come again in other runs of their path.
+
+    Flights that no other repeats are left out. So where there are such, the rest is taken only if least squares of all
+    shows the loop, or instruments find another body.
+
+    With ``A`` the columns of a rigid body along a run, ``tau`` its torque, both as far as they are fast, and ``A'``,
+    ``tau'`` the means of what the other runs have at the same places of the path, the inertia parameters x solve ``sum
+    A^T (tau' - A' x) = 0``: gusts and noise of one run do not go with those of another. The torque becomes what the
+    rigid body takes along the run's own motion and what comes again of the fast rest, ``tau' - A' x``. Least squares of
+    it gives the rigid body of the instruments again, and an inertia that depends on attitude as far as that comes
+    again. Where most of what a rigid body leaves comes again, slow or fast, it is no gust, and nothing is freed.
+
+    Parameters
+    ----------
+    training, learned : TorqueSource
+        As `identify` takes them.
+
+    Returns
+    -------
+    FreedTorque or None
+        None where no flight repeats another, for too short a time, or the others do not tell roll and pitch to a factor
+        of two or find no body; and of flights that stay in their files.
+
+    References
+    ----------
+    Söderström and Stoica 2002 (instrumental variables in closed loop); Pintelon and Schoukens 2012 (repeats).
+    """
+    flights = training.flights if isinstance(training, Flights) else ()
+    parts = [flight for flight in flights if isinstance(flight, TorqueData)]
+    period = _common_period(parts)
+    if period is None or len(parts) < len(flights):
+        return None
+    given = repeats([_flown(part, period) for part in parts])
+    if not given.likeness:
+        return None
+    scale = 1.0 / axis_scale(training)
+    rows = [
+        np.concatenate([rigid_columns(part.motion), part.torque[:, :, None]], axis=2) * scale[:, None] for part in parts
+    ]
+    runs = _runs(given, rows, period)
+    crossed = _by_block([(run.own, run.others, run.block) for run in runs])
+    if len(crossed) < _FEWEST_BLOCKS:
+        return None
+    least_squares, _ = _solved(_by_block([(run.rows, run.rows, run.block) for run in runs]))
+    if _share_again(given, [each @ np.append(-least_squares, 1.0) for each in rows], runs) > _MOSTLY:
+        return None
+    rigid_body, half = _solved(crossed)
+    if not _told(half)[2]:
+        # What hardly comes again would shake what is known: about yaw the body stays as least squares has it.
+        runs = [run.without_yaw() for run in runs]
+        rigid_body, beside = _solved(_by_block([(run.own, run.others, run.block) for run in runs]), least_squares)
+        half = np.array([*beside[:2], half[2]])
+    if why_unphysical(rigid_body) is not None:
+        return None
+    starts = np.cumsum([0, *(len(part) for part in parts)])
+    places = np.concatenate([starts[run.number] + run.samples for run in runs])
+    freed = replace(gathered(training, places), torque=np.concatenate([run.freed(rigid_body) / scale for run in runs]))
+    every = len(learned) == len(training)
+    found = FreedTorque(
+        training=freed,
+        learned=freed if every else freed[np.flatnonzero(np.isin(freed.time, sample_times(learned)))],
+        rigid_body=rigid_body,
+        least_squares=least_squares,
+        half=half,
+        runs=len(runs),
+        paths=len(given.paths()),
+        flights=len(parts),
+    )
+    if not (found.told[:2].all() and len(found.learned)):
+        return None
+    return found if found.runs == found.flights or found.contradicts or _shows_loop(found, training) else None
+
+
+def _shows_loop(found: FreedTorque, training: TorqueSource) -> bool:
+    return loop_along(training, lambda motion: rigid_columns(motion) @ found.least_squares).shows_loop
+
+
+def told_by(
+    freed: FreedTorque | None, training: TorqueSource, learned: TorqueSource
+) -> tuple[TorqueSource, TorqueSource]:
+    """Give what parameters and their errors are learned from: the torque that comes again, or else as measured."""
+    return (training, learned) if freed is None else (freed.training, freed.learned)
+
+
+class _Run(NamedTuple):
+    """Samples of a flight that others repeat, and what those have there; rows scaled by axis.
+
+    Attributes
+    ----------
+    number : int
+        Of the flight.
+    samples : array of int, shape (samples,)
+    rows : array, shape (samples, 3, 7)
+        Columns of the rigid body, last the torque.
+    own, others : array, shape (samples, 3, 7)
+        What of these is fast, of the run itself and of others.
+    block : array of int, shape (samples, 2)
+        Path, and number of the block along it.
+    """
+
+    number: int
+    samples: IntArray
+    rows: Array
+    own: Array
+    others: Array
+    block: IntArray
+
+    def freed(self, rigid_body: Array) -> Array:
+        """Give the torque that a rigid body takes, and what comes again of the rest, shape (samples, 3)."""
+        return np.asarray(self.rows[:, :, :-1] @ rigid_body + self.others @ np.append(-rigid_body, 1.0))
+
+    def without_yaw(self) -> _Run:
+        """Leave out what others have about yaw."""
+        return self._replace(others=self.others * [[1.0], [1.0], [0.0]])
+
+
+def _common_period(parts: Sequence[TorqueData]) -> float | None:
+    """Give the sampling period of flights that are uniform in time; None where they differ, or are slow."""
+    steps = [np.diff(part.time) for part in parts]
+    if len(steps) < 2 or not all(map(len, steps)):
+        return None
+    period = float(np.median(steps[0]))
+    if period * FEWEST_SAMPLES > _SLOW_S:
+        return None
+    return period if all(np.allclose(step, period, rtol=_UNIFORM, atol=0.0) for step in steps) else None
+
+
+def _flown(part: TorqueData, period: float) -> PlaybackFlight:
+    """Give what shows the path of a flight: how it turns."""
+    attitude, none = part.motion.attitude, np.zeros((len(part), 3))
+    rate = rotations.body_rate(attitude, part.motion.rate)
+    return PlaybackFlight(
+        name="",
+        motion=MeasuredMotion(none, none, rotations.rotation_matrix(attitude), rate, period),
+        speed=np.zeros((len(part), 0)),
+        hold="linear",
+        stretches=(slice(0, len(part)),),
+        has_velocity=False,
+        has_position=False,
+    )
+
+
+def _runs(given: Repeats, rows: Sequence[Array], period: float) -> list[_Run]:
+    """Lay the rows of flights that repeat each other beside those of the others, where all are known."""
+    fast = [_fast(each, period) for each in rows]
+    length = block_length(sum(len(rows[path[0]]) for path in given.paths()) * period) / period
+    found = []
+    for number in sorted(number for path in given.paths() for number in path):
+        others, (first, place) = given.others(number, fast), given.path(number, len(rows[number]))
+        known = np.isfinite(others + fast[number]).all(axis=(1, 2)) & np.isfinite(place)
+        along = (place[known] // length).astype(np.int64)
+        block = np.column_stack([np.full(len(along), first), along])
+        both = fast[number][known], others[known]
+        found.append(_Run(number, np.flatnonzero(known), rows[number][known], *both, block))
+    return found
+
+
+def _share_again(given: Repeats, rest: Sequence[Array], runs: Sequence[_Run]) -> float:
+    """Compute the share of a rest about roll and pitch, shape (time, 3), that comes again in other runs."""
+    own = [rest[run.number][run.samples, :2] for run in runs]
+    others = [given.others(run.number, rest)[run.samples, :2] for run in runs]
+    square = sum(float(np.sum(each**2)) for each in own)
+    return sum(float(np.sum(mine * there)) for mine, there in zip(own, others, strict=True)) / (square or 1.0)
+
+
+def _fast(values: Array, period: float) -> Array:
+    """Take from values what a long window sees around them, shape (time, ...); NaN at the ends."""
+    window, found = windows(period, _SLOW_S, 1.0), np.full_like(values, np.nan)
+    half, count = len(window.weight) // 2, window.count(len(values))
+    if count:
+        found[half : half + count] = values[half : half + count] - window.average(values)
+    return found
+
+
+def _by_block(rows: Iterable[tuple[Array, Array, IntArray]]) -> Array:
+    """Sum the products of the rigid-body columns of runs with rows of others, by block of the path, (block, 6, 7)."""
+    found: dict[tuple[int, int], Array] = {}
+    for own, others, block in rows:
+        for path, along in np.unique(block, axis=0).tolist():
+            here = (block == (path, along)).all(axis=1)
+            product = np.einsum("tap,taq->pq", own[here, :, :-1], others[here])
+            found[path, along] = found.get((path, along), 0.0) + product
+    return np.array(list(found.values()))
+
+
+def _solved(crossed: Array, held: Array | None = None) -> tuple[Array, Array]:
+    """Solve for the inertia parameters, with half of the 95 % intervals of the logarithms of the moments, (3,).
+
+    Parameters
+    ----------
+    crossed : array, shape (block, 6, 7)
+    held : array, shape (6,), kg m^2, or None
+        Parameters of which those of yaw are not sought.
+    """
+    total = crossed.sum(axis=0)
+    found, without = (_parameters(each, held) for each in (total[None], total - crossed))
+    error = np.sqrt(np.diag(jackknife_covariance(without)))[:3]
+    moments = found[0, :3]
+    positive = np.where(moments > 0, moments, np.nan)
+    return found[0], np.nan_to_num(half_width(error, len(crossed)) / positive, nan=np.inf)
+
+
+def _parameters(crossed: Array, held: Array | None) -> Array:
+    gram, moment = crossed[:, :, :RIGID], crossed[:, :, RIGID]
+    found = np.zeros((len(crossed), RIGID)) if held is None else np.tile(held, (len(crossed), 1))
+    free = np.array([number for number in range(RIGID) if held is None or number not in _OF_YAW])
+    found[:, free] = 0.0
+    left = (moment - np.einsum("bpq,bq->bp", gram, found))[:, free]
+    # Where an axis does not move at all, of minimum norm.
+    found[:, free] = np.einsum("bpq,bq->bp", np.linalg.pinv(gram[:, free][:, :, free], _ROUNDING), left)
+    return found
+
+
+def _told(half: Array) -> BoolArray:
+    return np.asarray(2 * half <= np.log(_KNOWN))
+
+
+def loop_along(training: TorqueSource, torque: Callable[[Motion], Array]) -> LoopBounds:
+    """Bound by which factors a loop may have misled a model, from its torque and the one measured.
+
+    Parameters
+    ----------
+    torque : callable
+        Predicts the generalised torque of a motion.
+    """
+    return bounds_between([stretch for data in training.chunks() for stretch in _stretches(data, torque)])
+
+
+def _stretches(data: TorqueData, torque: Callable[[Motion], Array]) -> Iterator[BalancedTorque]:
+    """Cut samples where their time pauses and where the nose points up or down."""
+    steps = np.diff(data.time)
+    if not len(steps):
+        return
+    period, known = float(np.median(steps)), ~vertical(data.motion.attitude)
+    ends = np.flatnonzero((np.abs(steps - period) > _PAUSE * period) | (known[1:] != known[:-1])) + 1
+    takes = torque(data.motion)
+    for first, last in pairwise([0, *ends.tolist(), len(data)]):
+        if known[first]:
+            part = slice(first, last)
+            attitude = data.motion.attitude[part]
+            measured, modelled = (rotations.body_torque(attitude, each[part]) for each in (data.torque, takes))
+            yield BalancedTorque(measured, np.zeros_like(measured), modelled, period)
