@@ -162,10 +162,10 @@ def _write_terms(motion: Array, airflow: Airflow, feature: Array, value: Array, 
     for i in range(6):
         value[1 + i] = motion[i]
     at = 7
-    for part in range(3):
-        first, second = 3 * (part // 2), 3 * ((part + 1) // 2)
+    for pair in range(3):
+        first, second = 3 * (pair // 2), 3 * ((pair + 1) // 2)
         for i in range(3):
-            for j in range(0 if part == 1 else i, 3):
+            for j in range(0 if pair == 1 else i, 3):
                 value[at] = motion[first + i] * motion[second + j]
                 at += 1
     speed = np.sqrt(motion[0] ** 2 + motion[1] ** 2 + motion[2] ** 2)
@@ -183,10 +183,10 @@ def _write_slopes(motion: Array, speed: float, slope: Array) -> None:
     for i in range(6):
         slope[1 + i, i] = 1.0
     at = 7
-    for part in range(3):
-        first, second = 3 * (part // 2), 3 * ((part + 1) // 2)
+    for pair in range(3):
+        first, second = 3 * (pair // 2), 3 * ((pair + 1) // 2)
         for i in range(first, first + 3):
-            for j in range(second if part == 1 else i, second + 3):
+            for j in range(second if pair == 1 else i, second + 3):
                 slope[at, i] = motion[j]
                 slope[at, j] = motion[i] if i != j else 2.0 * motion[i]
                 at += 1
@@ -746,8 +746,8 @@ def sensitivities(
     total = 0.0
     for n in range(len(starts)):
         _start(motion, starts[n], state)
-        for part in tangent:
-            part[:] = 0.0
+        for own in tangent:
+            own[:] = 0.0
         for step in range(len(loss.weight)):
             sample = starts[n] + step
             here, moved = state, tangent
