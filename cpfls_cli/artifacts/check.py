@@ -199,7 +199,10 @@ def opened(path: Path, *wanted: ArtifactSpec) -> Iterator[Stored]:
 def stored_of(path: Path, file: h5py.File) -> Stored:
     """Look up what an open file holds; the path is for messages."""
     spec = _identify(path, file)
-    data = {d.path: own for d in spec.datasets if (own := _dataset(file, d.path))}
+    # Most formats know many datasets that a file need not hold; to look for each took longer than to read the others.
+    names: set[bytes] = set()
+    file.id.links.visit(names.add)
+    data = {d.path: own for d in spec.datasets if d.path.encode() in names and (own := _dataset(file, d.path))}
     return Stored(spec, _read_header(file), data)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -223,7 +224,13 @@ def fill_template(template: str, words: dict[str, Any]) -> str:
     template : str
         Name of its file.
     """
-    environment = Environment(
+    return _templates().get_template(template).render(words)
+
+
+@cache
+def _templates() -> Environment:
+    """Keep what was made of templates: that takes longer than to fill them."""
+    return Environment(
         loader=PackageLoader("cpfls_cli.export"),
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -231,7 +238,6 @@ def fill_template(template: str, words: dict[str, Any]) -> str:
         keep_trailing_newline=True,
         autoescape=False,
     )
-    return environment.get_template(template).render(words)
 
 
 def executed(text: str) -> dict[str, Any]:

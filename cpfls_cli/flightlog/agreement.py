@@ -1,9 +1,11 @@
 """Signals of a log held against each other: which axes, signs, units and frames let them agree."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations, product
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -178,18 +180,10 @@ def body_rate_from(rotation: Rotation, rate_hz: float) -> Array:
     return np.vstack([steps, steps[-1:]])
 
 
-def fit_rates(rotation: Rotation, measured: Array, rate_hz: float) -> AxisFit | None:
-    """Hold a gyroscope against the derivative of an attitude; None where the vehicle hardly turns.
-
-    Parameters
-    ----------
-    measured : array, shape (time, 3)
-        In any unit.
-    """
+def turning_of(rotation: Rotation, rate_hz: float) -> Array | None:
+    """Derive what is slow of the body rates, shape (time, 3), rad/s; None where the vehicle hardly turns."""
     derived = slow(body_rate_from(rotation, rate_hz), rate_hz)
-    if float(np.sqrt((derived.var(axis=0)).sum())) < _MOVES_RAD_S:
-        return None
-    return fit_axes(derived, slow(measured, rate_hz))
+    return None if float(np.sqrt((derived.var(axis=0)).sum())) < _MOVES_RAD_S else derived
 
 
 @dataclass(frozen=True)
@@ -217,7 +211,25 @@ class LeanFit:
         return max(self.shares.values())
 
 
-def fit_lean(rotation: Rotation, acceleration: Array, rate_hz: float, lift: Array | None = None) -> LeanFit:
+class Ground(NamedTuple):
+    """What is slow of an acceleration over ground, in any unit.
+
+    Attributes
+    ----------
+    horizontal : array, shape (time, 2)
+    vertical : array, shape (time,)
+    """
+
+    horizontal: Array
+    vertical: Array
+
+    @classmethod
+    def of(cls, acceleration: Array, rate_hz: float) -> Ground:
+        """Filter the second derivative of a position, shape (time, 3)."""
+        return cls(slow(acceleration[:, :2], rate_hz, _TILT_HZ), slow(acceleration[:, 2:3], rate_hz)[:, 0])
+
+
+def fit_lean(rotation: Rotation, moving: Ground, rate_hz: float, lift: Array | None = None) -> LeanFit:
     """Hold the acceleration over ground against the lean of a body in every order and with every sign of the columns.
 
     A multirotor accelerates where its thrust leans: over the ground by ``g b_xy / b_z`` with the direction b of thrust
@@ -225,16 +237,13 @@ def fit_lean(rotation: Rotation, acceleration: Array, rate_hz: float, lift: Arra
 
     Parameters
     ----------
-    acceleration : array, shape (time, 3)
-        Second derivative of the position, in any unit.
     lift : array, shape (time,), or None
         What grows with the thrust.
     """
     axis = rotation.as_matrix()[:, :, 2]
     upright = np.where(np.abs(axis[:, 2:]) < 0.2, 0.2, axis[:, 2:])
     lean = slow(STANDARD_GRAVITY * axis[:, :2] / np.abs(upright), rate_hz, _TILT_HZ)
-    ground = slow(acceleration[:, :2], rate_hz, _TILT_HZ)
-    lean, ground = lean - lean.mean(axis=0), ground - ground.mean(axis=0)
+    lean, ground = lean - lean.mean(axis=0), moving.horizontal - moving.horizontal.mean(axis=0)
     power, total = float((lean**2).sum()), float((ground**2).sum())
     cross = ground.T @ lean
     shares = {}
@@ -243,16 +252,16 @@ def fit_lean(rotation: Rotation, acceleration: Array, rate_hz: float, lift: Arra
             together = first * cross[order[0], 0] + second * cross[order[1], 1]
             share = max(float(together), 0.0) ** 2 / (power * total) if power * total else 0.0
             shares[(order, (first, second))] = share
-    rises = 0.0 if lift is None else _rises(acceleration[:, 2], lift * np.abs(axis[:, 2]), rate_hz)
+    rises = 0.0 if lift is None else _rises(moving.vertical, lift * np.abs(axis[:, 2]), rate_hz)
     return LeanFit(shares, rises, float(np.sqrt(total / power)) if power else float("nan"))
 
 
 def _rises(vertical: Array, lift: Array, rate_hz: float) -> float:
-    """Tell whether a vertical acceleration grows (1) or falls (-1) with the lift; 0 if neither."""
-    own, other = (slow(values[:, None], rate_hz)[:, 0] for values in (vertical, lift))
-    if own.std() == 0 or other.std() == 0:
+    """Tell whether a slow vertical acceleration grows (1) or falls (-1) with the lift; 0 if neither."""
+    other = slow(lift[:, None], rate_hz)[:, 0]
+    if vertical.std() == 0 or other.std() == 0:
         return 0.0
-    together = float(np.corrcoef(own, other)[0, 1])
+    together = float(np.corrcoef(vertical, other)[0, 1])
     return float(np.sign(together)) if abs(together) > _RISES else 0.0
 
 

@@ -1,7 +1,8 @@
 """Where the rotors of a vehicle are and how they turn: from the parameters in a log, or from its motion."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from itertools import permutations
 from math import cos, hypot, pi, radians, sin
 from typing import Final, NamedTuple
@@ -217,8 +218,10 @@ _Explained = tuple[float, float, float]
 """Shares of the angular acceleration about roll, pitch and yaw."""
 
 
-def _layouts() -> Iterator[_RotorLayout]:
-    """List how four rotors can be numbered, in an X and in a plus, and which pair turns which way."""
+@cache
+def _layouts() -> tuple[tuple[_RotorLayout, Array], ...]:
+    """List how four rotors can be numbered, in an X and in a plus, and which pair turns which way; with weights."""
+    found = []
     for form, places in (("X", _CORNERS), ("plus", _ENDS)):
         for order in permutations(places):
             for first in (1, -1):
@@ -228,7 +231,9 @@ def _layouts() -> Iterator[_RotorLayout]:
                     RotorPlace(name, (places[name][0] / length, places[name][1] / length), turning[name])
                     for name in order
                 )
-                yield _RotorLayout(rotors, form)
+                layout = _RotorLayout(rotors, form)
+                found.append((layout, layout.weights()))
+    return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -329,9 +334,9 @@ def _shares(acceleration: Array, rate: Array, squared: Array) -> tuple[list[tupl
     wanted, rotors = (values[inner] - basis @ (basis.T @ values[inner]) for values in (acceleration, squared))
     together, own, total = rotors.T @ wanted, rotors.T @ rotors, (wanted**2).sum(axis=0)
     results = []
-    for layout in _layouts():
+    for layout, weights in _layouts():
         shares = []
-        for axis, weight in enumerate(layout.weights()):
+        for axis, weight in enumerate(weights):
             along, power = float(weight @ together[:, axis]), float(weight @ own @ weight) * float(total[axis])
             shares.append(along**2 / power if along > 0 and power > 0 else 0.0)
         results.append((layout, (shares[0], shares[1], shares[2])))

@@ -11,11 +11,11 @@ from cpfls_cli.flightlog.agreement import (
     SLOW_HZ,
     first_derivative,
     fit_axes,
-    fit_rates,
     on_clock,
     rotations_of,
     second_derivative,
     slow,
+    turning_of,
 )
 from cpfls_cli.flightlog.names import ColumnGroup, Named
 from cpfls_cli.flightlog.settings import SignalName
@@ -139,10 +139,13 @@ class _Matrix:
                 continue
             for key in (("xyzw", False), ("wxyz", False), ("xyzw", True), ("wxyz", True)):
                 rotation = on_clock(rotations_of(values, *key), self.time, self.grid)
+                turning = turning_of(rotation, self.rate_hz)
+                if turning is None:
+                    continue
                 for rates, measured in self.runs(3):
-                    fit = fit_rates(rotation, measured, self.rate_hz)
+                    fit = fit_axes(turning, slow(measured, self.rate_hz))
                     apart = rates + 3 <= first or rates >= first + 4
-                    if apart and fit is not None and less(max(_FOLLOWS, best[0] if best else 0.0), fit.as_named):
+                    if apart and less(max(_FOLLOWS, best[0] if best else 0.0), fit.as_named):
                         best = (fit.as_named, first, rotation, rates)
         return None if best is None else best[1:]
 

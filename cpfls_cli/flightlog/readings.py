@@ -9,6 +9,7 @@ takes less than twice as much, the log does not tell.
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import permutations, product
 from typing import Final, Literal
 
@@ -19,14 +20,17 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.agreement import (
     AS_NAMED,
     AxisFit,
+    Ground,
     LeanFit,
     Order,
     Sign,
+    fit_axes,
     fit_lean,
-    fit_rates,
     handed,
     on_clock,
     rotations_of,
+    slow,
+    turning_of,
 )
 
 CLEAR: Final = 0.3
@@ -95,6 +99,16 @@ class Witnesses:
     lift: Array | None
     sensed: float
     known: str | None
+
+    @cached_property
+    def turning(self) -> Array | None:
+        """What is slow of the gyroscope: filtered once, however many readings it is held against."""
+        return None if self.gyroscope is None else slow(self.gyroscope, self.rate_hz)
+
+    @cached_property
+    def ground(self) -> Ground | None:
+        """What is slow of the acceleration over ground."""
+        return None if self.moving is None else Ground.of(self.moving, self.rate_hz)
 
 
 @dataclass(frozen=True)
@@ -273,10 +287,10 @@ def read_quaternion(values: Array, named: bool, time: Array, grid: Array, witnes
 def _readings(attitude: Attitude, witnesses: Witnesses) -> Iterator[Reading]:
     """Read an attitude with the body's third axis up, and down."""
     rates = lean = None
-    if witnesses.gyroscope is not None:
-        rates = fit_rates(attitude.rotation, witnesses.gyroscope, witnesses.rate_hz)
-    if witnesses.moving is not None:
-        lean = fit_lean(attitude.rotation, witnesses.moving, witnesses.rate_hz, witnesses.lift)
+    if witnesses.turning is not None and (turning := turning_of(attitude.rotation, witnesses.rate_hz)) is not None:
+        rates = fit_axes(turning, witnesses.turning)
+    if witnesses.ground is not None:
+        lean = fit_lean(attitude.rotation, witnesses.ground, witnesses.rate_hz, witnesses.lift)
     bodies: tuple[Body, Body] = ("FLU", "FRD")
     for body in bodies:
         order, sign, share = AS_NAMED[0], AS_NAMED[1], 0.0

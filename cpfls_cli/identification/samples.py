@@ -190,7 +190,8 @@ class Samples:
             ``A^T r`` of the residual of the parameters.
         """
         rigid = RIGID if self.ready.rigid else 0
-        models = np.vstack([parameters, -directions.T])
+        # In the layout of `errors`, or the loops would be compiled anew.
+        models = np.ascontiguousarray(np.vstack([parameters, -directions.T]))
         weights = np.hstack([np.zeros((len(models), 1)), -models[:, :rigid]])
         weights[0, 0] = 1.0
         square, columns = np.zeros((len(models), len(models))), 1 + rigid
@@ -263,4 +264,5 @@ def _chunk(data: TorqueData, rigid: bool) -> Chunk:
     columns = [data.torque[:, :, None], rigid_columns(data.motion)] if rigid else [data.torque[:, :, None]]
     motion = data.motion
     attitude, rate, acceleration = map(np.ascontiguousarray, (motion.attitude, motion.rate, motion.acceleration))
-    return Chunk(attitude, rate, acceleration, np.concatenate(columns, axis=2), np.empty((8, 0)))
+    dense = np.ascontiguousarray(np.concatenate(columns, axis=2))
+    return Chunk(attitude, rate, acceleration, dense, np.empty((8, 0)))

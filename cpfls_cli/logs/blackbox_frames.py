@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import IntArray
-from cpfls_cli.compiling import compiled
+from cpfls_cli.compiling import compiled, part
 
 Bytes = np.ndarray
 KINDS = "IPGHS"
@@ -51,19 +51,19 @@ class Fields(NamedTuple):
     is_signed: IntArray
 
 
-@compiled
+@part
 def _byte(data: Bytes, place: int) -> Any:
     return np.int64(data[place]) if place < len(data) else np.int64(0)
 
 
-@compiled
+@part
 def _extended(value: Any, bits: Any) -> Any:
     """Extend the sign of a number of few bits."""
     top = np.int64(1) << (bits - 1)
     return ((value & (2 * top - 1)) ^ top) - top
 
 
-@compiled
+@part
 def _unsigned(data: Bytes, place: int) -> tuple[Any, int]:
     value = np.int64(0)
     for number in range(5):
@@ -75,26 +75,26 @@ def _unsigned(data: Bytes, place: int) -> tuple[Any, int]:
     return value & 0xFFFFFFFF, place
 
 
-@compiled
+@part
 def _signed(data: Bytes, place: int) -> tuple[Any, int]:
     value, place = _unsigned(data, place)
     return (value >> 1) ^ -(value & 1), place
 
 
-@compiled
+@part
 def _whole_bytes(data: Bytes, place: int, tag: int, values: IntArray) -> int:
     """Read three numbers of one to four bytes, the least first."""
     for number in range(3):
         size = 1 + ((tag >> (2 * number)) & 3)
         value = np.int64(0)
-        for part in range(size):
-            value |= _byte(data, place) << (8 * part)
+        for own in range(size):
+            value |= _byte(data, place) << (8 * own)
             place += 1
         values[number] = _extended(value, 8 * size)
     return place
 
 
-@compiled
+@part
 def _three(data: Bytes, place: int, values: IntArray, wide: bool) -> Any:
     """Read three numbers of 2, of 4 or 6 (wide: 5, 5, 4 or 8, 7, 7) bits, or of whole bytes."""
     first, second, third = _byte(data, place), _byte(data, place + 1), _byte(data, place + 2)
@@ -118,7 +118,7 @@ def _three(data: Bytes, place: int, values: IntArray, wide: bool) -> Any:
     return place + 3
 
 
-@compiled
+@part
 def _four(data: Bytes, place: int, values: IntArray) -> int:
     """Read four numbers of 0, 4, 8 or 16 bits, one close behind the other."""
     tag = _byte(data, place)
@@ -135,7 +135,7 @@ def _four(data: Bytes, place: int, values: IntArray) -> int:
     return (begin + 1) // 2
 
 
-@compiled
+@part
 def _group(data: Bytes, place: int, kind: int, first: int, fields: Fields, values: IntArray) -> tuple[int, int]:
     """Read the fields that are packed together from one on; how many they are, and where the next one begins."""
     how = fields.encoding[kind, first]
@@ -167,7 +167,7 @@ def _group(data: Bytes, place: int, kind: int, first: int, fields: Fields, value
     return 1, place
 
 
-@compiled
+@part
 def _predicted(how: int, field: int, row: IntArray, before: IntArray, constants: IntArray) -> Any:
     """Predict a field from the two frames before and what the header states; 0 where nothing is predicted."""
     if how == _PREVIOUS:
@@ -189,7 +189,7 @@ def _predicted(how: int, field: int, row: IntArray, before: IntArray, constants:
     return 1500 if how == _MIDDLE else 0
 
 
-@compiled
+@part
 def _frame(
     data: Bytes,
     place: int,
@@ -217,7 +217,7 @@ def _frame(
     return place
 
 
-@compiled
+@part
 def _event(data: Bytes, place: int) -> tuple[int, int]:
     """Step over an event; its kind, -1 for none that is known, and where the next frame begins."""
     kind = _byte(data, place)
@@ -243,7 +243,7 @@ def _event(data: Bytes, place: int) -> tuple[int, int]:
     return -1, place
 
 
-@compiled
+@part
 def _kind(marker: int) -> int:
     """Give the number of the kind of frame that a byte announces, len(KINDS) for an event, -1 for none."""
     for number in range(len(_MARKERS)):

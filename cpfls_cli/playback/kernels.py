@@ -17,18 +17,18 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.compiling import Function, compiled
+from cpfls_cli.compiling import Function, compiled, part
 from cpfls_cli.effects.polynomial import STATE_TERMS
 
 
 def _inlined(function: Function) -> Function:
     """Compile into the caller: to hand over tuples of arrays takes longer than what most of these functions do."""
-    return compiled(function, forceinline=True)
+    return part(function, forceinline=True)
 
 
 def _inlined_sum(function: Function) -> Function:
     """Compile into the caller, and let the processor take the terms of a sum in the order that suits its registers."""
-    return compiled(function, fastmath={"reassoc", "contract"}, forceinline=True)
+    return part(function, fastmath={"reassoc", "contract"}, forceinline=True)
 
 
 class MeasuredMotion(NamedTuple):
@@ -85,7 +85,6 @@ _POWERS = 2
 _POLYNOMIAL = len(STATE_TERMS)
 
 
-@compiled
 def airflow_terms(airflow: Airflow) -> int:
     """Count the terms of a remainder: each column of the system times the speed, and times its square."""
     if len(airflow.breakpoints) == 0:
@@ -163,10 +162,10 @@ def _write_terms(motion: Array, airflow: Airflow, feature: Array, value: Array, 
     for i in range(6):
         value[1 + i] = motion[i]
     at = 7
-    for part in range(3):
-        first, second = 3 * (part // 2), 3 * ((part + 1) // 2)
+    for pair in range(3):
+        first, second = 3 * (pair // 2), 3 * ((pair + 1) // 2)
         for i in range(3):
-            for j in range(0 if part == 1 else i, 3):
+            for j in range(0 if pair == 1 else i, 3):
                 value[at] = motion[first + i] * motion[second + j]
                 at += 1
     speed = np.sqrt(motion[0] ** 2 + motion[1] ** 2 + motion[2] ** 2)
@@ -184,10 +183,10 @@ def _write_slopes(motion: Array, speed: float, slope: Array) -> None:
     for i in range(6):
         slope[1 + i, i] = 1.0
     at = 7
-    for part in range(3):
-        first, second = 3 * (part // 2), 3 * ((part + 1) // 2)
+    for pair in range(3):
+        first, second = 3 * (pair // 2), 3 * ((pair + 1) // 2)
         for i in range(first, first + 3):
-            for j in range(second if part == 1 else i, second + 3):
+            for j in range(second if pair == 1 else i, second + 3):
                 slope[at, i] = motion[j]
                 slope[at, j] = motion[i] if i != j else 2.0 * motion[i]
                 at += 1
@@ -320,12 +319,12 @@ class _Space(NamedTuple):
     moved: Array
 
 
-@compiled
+@part
 def _new_state() -> _State:
     return _State(np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros(3))
 
 
-@compiled
+@part
 def _new_space(used: Terms, slopes: bool) -> _Space:
     return _Space(
         np.zeros(6),
@@ -467,10 +466,15 @@ def errors_of_runs(
             sample = starts[n] + step
             if diverged[n] < 0:
                 _copy(state, before)
-                _evaluate(body, used, weights[sample], state, at)
-                _to_middle(state, middle, h, translates, at)
-                _evaluate(body, used, weights[sample], middle, at)
-                _to_end(state, middle, h, translates, at)
+                here = state
+                # Written once for both halves of a step: what is written twice takes twice as long to compile.
+                for in_middle in (False, True):
+                    _evaluate(body, used, weights[sample], here, at)
+                    if in_middle:
+                        _to_end(state, middle, h, translates, at)
+                    else:
+                        _to_middle(state, middle, h, translates, at)
+                        here = middle
                 if _lost(state):
                     diverged[n] = step
                     _copy(before, state)
@@ -535,7 +539,7 @@ class _Tangent(NamedTuple):
     rate: Array
 
 
-@compiled
+@part
 def _new_tangent(count: int) -> _Tangent:
     return _Tangent(np.zeros((3, count)), np.zeros((3, count)), np.zeros((3, count)), np.zeros((3, count)))
 
@@ -585,7 +589,7 @@ class _Columns(NamedTuple):
     by_motion: Array
 
 
-@compiled
+@part
 def _new_columns(count: int) -> _Columns:
     return _Columns(
         np.zeros((6, count)), np.zeros((6, count)), np.zeros((3, count)), np.zeros((3, count)), np.zeros((6, 6))
@@ -742,18 +746,21 @@ def sensitivities(
     total = 0.0
     for n in range(len(starts)):
         _start(motion, starts[n], state)
-        for part in tangent:
-            part[:] = 0.0
+        for own in tangent:
+            own[:] = 0.0
         for step in range(len(loss.weight)):
             sample = starts[n] + step
-            _evaluate(body, used, weights[sample], state, at)
-            _linearise(body, used, weights[sample], parameters, sample, state, tangent, at, work, change)
-            _to_middle(state, middle, h, translates, at)
-            _tangent_to_middle(tangent, half, change, h, translates, at)
-            _evaluate(body, used, weights[sample], middle, at)
-            _linearise(body, used, weights[sample], parameters, sample, middle, half, at, work, change)
-            _to_end(state, middle, h, translates, at)
-            _tangent_to_end(tangent, half, change, h, translates, at)
+            here, moved = state, tangent
+            for in_middle in (False, True):
+                _evaluate(body, used, weights[sample], here, at)
+                _linearise(body, used, weights[sample], parameters, sample, here, moved, at, work, change)
+                if in_middle:
+                    _to_end(state, middle, h, translates, at)
+                    _tangent_to_end(tangent, half, change, h, translates, at)
+                else:
+                    _to_middle(state, middle, h, translates, at)
+                    _tangent_to_middle(tangent, half, change, h, translates, at)
+                    here, moved = middle, half
             if _lost(state):
                 # A run that leaves every flight behind: as bad as the largest error, and of no direction.
                 total += np.sum(loss.weight[step:] * loss.delta[step:]) * FASTEST

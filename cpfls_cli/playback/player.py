@@ -406,10 +406,11 @@ class _FuzzyRuns:
     def _begun(self, starts: IntArray) -> tuple[_State, Array, _Fuzzy]:
         motion = self.motion
         rate, rotation = motion.rate[starts], motion.rotation[starts]
-        _, matrices = body_inertia(self.fuzzy, _finite_attitude(rotation))
-        momentum = rotations.multiply(np.nan_to_num(matrices), rate)
+        attitude = _finite_attitude(rotation)
+        inertia = body_inertia(self.fuzzy, attitude)
+        momentum = rotations.multiply(np.nan_to_num(inertia[1]), rate)
         state = _State(motion.position[starts], motion.velocity[starts], rotation, momentum)
-        return state, rate, self._fuzzy(state.rotation, state.momentum)
+        return state, rate, _turning(attitude, inertia, momentum)
 
     def _step(self, state: _State, rate: Array, now: _Fuzzy, weights: Array) -> tuple[_State, _Fuzzy]:
         period = self.motion.period
@@ -435,12 +436,16 @@ class _FuzzyRuns:
 
     def _fuzzy(self, rotation: Array, momentum: Array) -> _Fuzzy:
         attitude = _finite_attitude(rotation)
-        values, matrices = body_inertia(self.fuzzy, attitude)
-        exists = _positive_definite(matrices)
-        safe = np.where(exists[:, None, None], matrices, np.eye(3))
-        rate: Array = np.asarray(np.linalg.solve(safe, momentum[..., None])[..., 0], dtype=float)
-        _, direct = momentum_form(attitude, rate, values)
-        return _Fuzzy(rate, direct, exists)
+        return _turning(attitude, body_inertia(self.fuzzy, attitude), momentum)
+
+
+def _turning(attitude: Array, inertia: tuple[InertiaValues, Array], momentum: Array) -> _Fuzzy:
+    values, matrices = inertia
+    exists = _positive_definite(matrices)
+    safe = np.where(exists[:, None, None], matrices, np.eye(3))
+    rate: Array = np.asarray(np.linalg.solve(safe, momentum[..., None])[..., 0], dtype=float)
+    _, direct = momentum_form(attitude, rate, values)
+    return _Fuzzy(rate, direct, exists)
 
 
 def body_inertia(model: InertiaModel, attitude: Array) -> tuple[InertiaValues, Array]:

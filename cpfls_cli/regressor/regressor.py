@@ -203,10 +203,10 @@ class Regressor:
         for index, block in enumerate(self.structure.blocks):
             function, of_block = block.function, coefficients[block.columns]
             evaluated = self.basis(index, partitions)
-            for row, column in {(function.row, function.column), (function.column, function.row)}:
-                J[:, row, column] = evaluated.value @ of_block
-                for angle, gradient in zip(function.inputs, evaluated.gradient, strict=True):
-                    dJ[:, angle, row, column] = gradient @ of_block
+            row, column = function.row, function.column
+            J[:, row, column] = J[:, column, row] = evaluated.value @ of_block
+            for angle, gradient in zip(function.inputs, evaluated.gradient, strict=True):
+                dJ[:, angle, row, column] = dJ[:, angle, column, row] = gradient @ of_block
         return InertiaValues(J, dJ)
 
     def _features(self, block: Block) -> Basis | None:

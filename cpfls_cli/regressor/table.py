@@ -78,7 +78,8 @@ def mapped_inputs(table: Table, attitude: Array) -> Array:
             value, slope = antecedent, antecedent_slope
     inside = (antecedent >= 0.0) & (antecedent <= 1.0)
     lines = antecedent, np.where(inside, antecedent_slope, 0.0), value, slope
-    return np.stack(lines, axis=1).reshape(8, -1)
+    # In one layout, whatever that of the attitude: for each the loops would be compiled anew.
+    return np.ascontiguousarray(np.stack(lines, axis=1).reshape(8, -1))
 
 
 def padded_breakpoints(partitions: Breakpoints) -> Array:

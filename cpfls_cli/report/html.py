@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from cpfls_cli.arrays import Array
@@ -21,6 +22,11 @@ _SMALL = 1e-4
 
 def html_page(document: Document) -> str:
     """Write a document as HTML."""
+    return _template().render(document=document)
+
+
+@cache
+def _template() -> Template:
     environment = Environment(
         loader=PackageLoader("cpfls_cli.report", "templates"),
         autoescape=True,
@@ -31,8 +37,7 @@ def html_page(document: Document) -> str:
     # Figures are made here and hold only escaped text; everything else on the page is escaped by the template.
     environment.filters["figure"] = Markup
     environment.filters["figure_tables"] = figure_tables
-    template = environment.get_template("page.html")
-    return template.render(document=document)
+    return environment.get_template("page.html")
 
 
 @dataclass

@@ -3,7 +3,6 @@
 import os
 import signal
 import sys
-import time
 import warnings
 from pathlib import Path
 from types import SimpleNamespace
@@ -67,8 +66,8 @@ class Forked:
 
     def wait(self):
         """Wait for its end; give the exit code, and what it printed into files."""
-        while self.poll() is None:
-            time.sleep(0.001)
+        if self._status is None:
+            _, self._status = os.waitpid(self._pid, 0)
         texts = {name: file.read_text() for name, file in self._files.items() if isinstance(file, Path)}
         return SimpleNamespace(returncode=self.poll(), **texts)
 

@@ -467,7 +467,7 @@ def rotorpy_flight(name):
     motion = MeasuredMotion(
         columns("x", "y", "z"),
         columns("vx", "vy", "vz"),
-        rotation_matrix(columns("phi", "theta", "psi")),
+        np.ascontiguousarray(rotation_matrix(columns("phi", "theta", "psi"))),
         columns("wx", "wy", "wz"),
         0.01,
     )

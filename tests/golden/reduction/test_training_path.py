@@ -37,7 +37,7 @@ def reduced(regressor):
 def worst_prediction(regressor, indices):
     """Largest standard deviation of a torque predicted anywhere on the path, per that of a torque measured."""
     kept = regressor[indices].reshape(-1, 113)
-    return np.sqrt(np.einsum("nij,jk,nik->ni", regressor, np.linalg.inv(kept.T @ kept), regressor).max())
+    return np.sqrt(np.einsum("nij,nij->ni", regressor @ np.linalg.inv(kept.T @ kept), regressor).max())
 
 
 @pytest.mark.parametrize(("criterion", "expected"), [("sigma_min", 3311), ("A", 3555), ("D", 5282)])

@@ -4,6 +4,7 @@ import pickle
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numba
 import numpy as np
 import pytest
 
@@ -11,10 +12,12 @@ from cpfls_cli.dynamics.rigid_body import rigid_columns
 from cpfls_cli.identification import data
 from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.cross_validation import contiguous_blocks, with_folds
+from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import IdentificationSettings, RidgeSettings
-from cpfls_cli.regressor.motion import RIGID
+from cpfls_cli.regressor import kernels
+from cpfls_cli.regressor.motion import RIGID, Motion
 from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import model_structure
 from tests.builders.flights import no_torque, random_flight
@@ -104,6 +107,22 @@ def test_moved(case):
     assert_close(found.moved, M.T @ M)
     assert_close(found.residual, M.T @ residual)
     assert found.square == pytest.approx(residual @ residual)
+
+
+def test_the_loops_are_compiled_for_one_layout_of_arrays(case, monkeypatch):
+    """Compiling them takes ten seconds, for each layout anew."""
+    layouts = set()
+    monkeypatch.setattr(kernels, "_add_up", lambda *arguments: layouts.add(numba.typeof(arguments)))
+    for attitude in (np.zeros((1, 3)), np.zeros((20, 3)), np.zeros((3, 20)).T):
+        zeros = np.zeros_like(attitude)
+        flight = TorqueData(np.arange(float(len(zeros))), Motion(attitude, zeros, zeros), zeros)
+        samples = Samples.of(Ready(flight, case.samples.ready.rigid), STRUCTURE, case.samples.ranges)
+        samples.products(case.partitions)
+        samples.errors(case.partitions, case.coefficients, case.rigid_body)
+        samples.moved(case.partitions, case.coefficients, case.rigid_body)
+        for directions in (np.zeros((len(case.parameters), 3)), np.zeros((3, len(case.parameters))).T):
+            samples.projected(case.partitions, case.parameters, directions)
+    assert len(layouts) == 1
 
 
 @pytest.mark.parametrize("every", [1, 2])
