@@ -127,13 +127,13 @@ _OF_ROTORS: Mapping[str, tuple[Number, ...]] = {
 @lru_cache(maxsize=256)
 def _stated_weights(block: str, vehicle: VehicleSettings) -> Array:
     """Weigh the terms for an effect on the stated vehicle; a search asks for it again and again."""
-    return effect_weights(block, {}, _probe(vehicle))
+    return effect_weights(block, {}, Probe.of(vehicle))
 
 
 @lru_cache(maxsize=256)
 def _drag_rows(block: str, vehicle: VehicleSettings) -> BoolArray:
     """Find the rows of each coefficient that grow with the drag factor while others do not, (coefficient, 6)."""
-    known, signals = CATALOGUE[block], _probe(vehicle).signals
+    known, signals = CATALOGUE[block], Probe.of(vehicle).signals
     if known.columns is None or known.kind != "wrench":
         return np.zeros((len(known.coefficients), 6), dtype=bool)
     twice = [replace(rotor, drag_factor_n_m_s2=2 * rotor.drag_factor_n_m_s2) for rotor in vehicle.rotors]
@@ -143,17 +143,12 @@ def _drag_rows(block: str, vehicle: VehicleSettings) -> BoolArray:
     return np.asarray(grows & np.any(acts & ~grows, axis=1, keepdims=True))
 
 
-@lru_cache(maxsize=8)
-def _probe(vehicle: VehicleSettings) -> Probe:
-    return Probe.of(vehicle)
-
-
 def blocks_of(vehicle: VehicleSettings) -> tuple[str, ...]:
     """List the blocks that a vehicle can have: of rotors and body, polynomial effects, and the remainder's.
 
     Numbers that the config does not know are free in every model, so they are not among the choices.
     """
-    probe = _probe(vehicle)
+    probe = Probe.of(vehicle)
     effects = (
         name for name, known in CATALOGUE.items() if not known.shapes and polynomial(known, probe, {}) is not None
     )
