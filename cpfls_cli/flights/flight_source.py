@@ -20,6 +20,7 @@ from cpfls_cli.consistency.check import ENOUGH
 from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flights.recordings import (
     ReadFlight,
     all_known,
@@ -121,7 +122,9 @@ def flight_source(path: Path, *, torque: bool = True) -> TorqueSource:
     samples = count_rows(path, FlightRecord.spec(), paths[0])
     if samples is None or samples <= IN_MEMORY:
         flight = read_record(path, FlightRecord, *names)
-        return _torque_data([getattr(flight, name) for name in names])
+        asked = {short: flight.signals[name] for name, short in SETPOINTS.items() if name in flight.signals}
+        known = {name: own.reshape(len(own), -1) for name, own in asked.items() if np.isfinite(own).all()}
+        return replace(_torque_data([getattr(flight, name) for name in names]), setpoints=known)
     check_rows(path, FlightRecord.spec(), paths)
     return FlightFile(path.resolve(), paths, 0, samples, path.stat().st_size, samples)
 

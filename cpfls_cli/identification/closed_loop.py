@@ -1,7 +1,8 @@
-"""What an autopilot's loop does to the torque of flights: freed of it where runs repeat a path, else bounded.
+"""What an autopilot's loop does to the torque of flights: freed of it where instruments tell, else bounded.
 
 An autopilot answers gusts with torque, so least squares of torque on motion finds a mixture of vehicle and autopilot.
-Another run of the same path has the same motion asked for, and another gust: it is the instrument.
+Another run of the same path has the same motion asked for, and another gust, and a setpoint from outside of the loop
+knows of no gust: they are the instruments.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from cpfls_cli.dynamics.rigid_body import rigid_columns, vertical, why_unphysica
 from cpfls_cli.identification.data import Flights, TorqueData, TorqueSource, axis_scale, gathered, sample_times
 from cpfls_cli.playback.balances import block_length
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.instruments import Repeats, repeats
+from cpfls_cli.playback.instruments import Instruments, foretold, instruments, late, late_by
 from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.playback.loop import BalancedTorque, LoopBounds, bounds_between
 from cpfls_cli.regressor.motion import RIGID, Motion
@@ -34,6 +35,8 @@ _PAUSE = 0.5
 _SLOW_S = 0.8
 """Window whose average is taken off, which leaves what is faster than about 1.5 Hz: gusts are slower, and most of what
 a model of the inertia lacks. What a body takes is fast."""
+_APART_S = 0.04
+"""Between the setpoints that predict a sample: the answer of a vehicle is slower."""
 _MOSTLY = 0.5
 _KNOWN = 2.0
 """Ratio of the ends of an interval from which on a moment of inertia is not known."""
@@ -46,18 +49,22 @@ _VISIBLE = np.log(1.05)
 
 @dataclass(frozen=True)
 class FreedTorque:
-    """Samples of flights that repeat each other, with the torque that they take where no gust acts.
+    """Samples of flights with instruments, with the torque that they take where no gust acts.
 
     Attributes
     ----------
     training, learned : TorqueData
-        Those of the training part and of the samples learned from that another run knows.
+        Those of the training part and of the samples learned from that the instruments know.
     rigid_body, least_squares : array, shape (6,), kg m^2
         Inertia parameters by instruments, and by least squares of the torque as measured.
     half : array, shape (3,)
         Half of the 95 % intervals of the logarithms of the moments of inertia by instruments.
-    runs, paths, flights : int
-        Flights that repeat each other, their paths, and all flights.
+    runs, paths : int
+        Runs that repeat each other, and their paths; or all that have setpoints.
+    alone, flights : int
+        Flights without instruments, and all flights.
+    setpoints : tuple of str
+        The instruments, where no runs repeat each other.
     """
 
     training: TorqueData
@@ -67,7 +74,9 @@ class FreedTorque:
     half: Array
     runs: int
     paths: int
+    alone: int
     flights: int
+    setpoints: tuple[str, ...] = ()
 
     @property
     def told(self) -> BoolArray:
@@ -83,17 +92,19 @@ class FreedTorque:
 
 
 def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque | None:
-    """Free the torque of flights of what does not come again in other runs of their path.
+    """Free the torque of flights of what instruments do not know: other runs of a path, or setpoints.
 
-    Flights that no other repeats are left out. So where there are such, the rest is taken only if least squares of all
-    shows the loop, or instruments find another body.
+    Flights that have none are left out. So where there are such, the rest is taken only if least squares of all shows
+    the loop, or instruments find another body; setpoints, which tell less than repeats, only then.
 
     With ``A`` the columns of a rigid body along a run, ``tau`` its torque, both as far as they are fast, and ``A'``,
-    ``tau'`` the means of what the other runs have at the same places of the path, the inertia parameters x solve ``sum
-    A^T (tau' - A' x) = 0``: gusts and noise of one run do not go with those of another. The torque becomes what the
-    rigid body takes along the run's own motion and what comes again of the fast rest, ``tau' - A' x``. Least squares of
-    it gives the rigid body of the instruments again, and an inertia that depends on attitude as far as that comes
-    again. Where most of what a rigid body leaves comes again, slow or fast, it is no gust, and nothing is freed.
+    ``tau'`` what instruments know of them, the inertia parameters x solve ``sum A'^T (tau - A x) = 0``: gusts and noise
+    of a run do not go with that. Of runs of a path it is the mean of what the others have at the same places; of
+    setpoints what the rest of the flights tells of the answer to them. The torque becomes what the rigid body takes
+    along the run's own motion and what is known of the fast rest, ``tau' - A' x``, as far as A does not hold it. Least
+    squares of it gives the rigid body of the instruments again, and an inertia that depends on attitude as far as
+    instruments know of it. Where they know most of what a rigid body leaves, slow or fast, it is no gust, and nothing
+    is freed.
 
     Parameters
     ----------
@@ -103,44 +114,47 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     Returns
     -------
     FreedTorque or None
-        None where no flight repeats another, for too short a time, or the others do not tell roll and pitch to a factor
-        of two or find no body; and of flights that stay in their files.
+        None where no flight has instruments, for too short a time, or they do not tell roll and pitch to a factor of
+        two or find no body; and of flights that stay in their files.
 
     References
     ----------
     Söderström and Stoica 2002 (instrumental variables in closed loop); Pintelon and Schoukens 2012 (repeats).
     """
-    flights = training.flights if isinstance(training, Flights) else ()
+    flights = training.flights if isinstance(training, Flights) else (training,)
     parts = [flight for flight in flights if isinstance(flight, TorqueData)]
     period = _common_period(parts)
     if period is None or len(parts) < len(flights):
         return None
-    given = repeats([_flown(part, period) for part in parts])
-    if not given.likeness:
+    given = instruments([_flown(part, period) for part in parts])
+    if given.kind == "none":
         return None
     scale = 1.0 / axis_scale(training)
-    rows = [
+    whole = [
         np.concatenate([rigid_columns(part.motion), part.torque[:, :, None]], axis=2) * scale[:, None] for part in parts
     ]
+    rows = [whole[run.flight][run.part] for run in given.runs]
     runs = _runs(given, rows, period)
-    crossed = _by_block([(run.own, run.others, run.block) for run in runs])
+    crossed = _by_block([(run.others, run.own, run.block) for run in runs])
     if len(crossed) < _FEWEST_BLOCKS:
         return None
     least_squares, _ = _solved(_by_block([(run.rows, run.rows, run.block) for run in runs]))
-    if _share_again(given, [each @ np.append(-least_squares, 1.0) for each in rows], runs) > _MOSTLY:
+    if _share_known(given, [each @ np.append(-least_squares, 1.0) for each in rows], runs, period) > _MOSTLY:
         return None
     rigid_body, half = _solved(crossed)
     if not _told(half)[2]:
-        # What hardly comes again would shake what is known: about yaw the body stays as least squares has it.
+        # What is hardly known would shake what is: about yaw the body stays as least squares has it.
         runs = [run.without_yaw() for run in runs]
-        rigid_body, beside = _solved(_by_block([(run.own, run.others, run.block) for run in runs]), least_squares)
+        rigid_body, beside = _solved(_by_block([(run.others, run.own, run.block) for run in runs]), least_squares)
         half = np.array([*beside[:2], half[2]])
     if why_unphysical(rigid_body) is not None:
         return None
     starts = np.cumsum([0, *(len(part) for part in parts)])
-    places = np.concatenate([starts[run.number] + run.samples for run in runs])
-    freed = replace(gathered(training, places), torque=np.concatenate([run.freed(rigid_body) / scale for run in runs]))
+    begins = [starts[run.flight] + run.part.start for run in given.runs]
+    places = np.concatenate([begins[run.number] + run.samples for run in runs])
+    freed = replace(gathered(training, places), torque=_freed(runs, rigid_body) / scale)
     every = len(learned) == len(training)
+    repeated = given.kind == "repeats"
     found = FreedTorque(
         training=freed,
         learned=freed if every else freed[np.flatnonzero(np.isin(freed.time, sample_times(learned)))],
@@ -148,12 +162,15 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
         least_squares=least_squares,
         half=half,
         runs=len(runs),
-        paths=len(given.paths()),
+        paths=len(given.repeats.paths()),
+        alone=len(parts) - len(given.flights),
         flights=len(parts),
+        setpoints=() if repeated else given.names,
     )
     if not (found.told[:2].all() and len(found.learned)):
         return None
-    return found if found.runs == found.flights or found.contradicts or _shows_loop(found, training) else None
+    taken = (repeated and not found.alone) or found.contradicts or _shows_loop(found, training)
+    return found if taken else None
 
 
 def _shows_loop(found: FreedTorque, training: TorqueSource) -> bool:
@@ -168,17 +185,17 @@ def told_by(
 
 
 class _Run(NamedTuple):
-    """Samples of a flight that others repeat, and what those have there; rows scaled by axis.
+    """Samples of a run, and what instruments know of them; rows scaled by axis.
 
     Attributes
     ----------
     number : int
-        Of the flight.
+        Of the run.
     samples : array of int, shape (samples,)
     rows : array, shape (samples, 3, 7)
         Columns of the rigid body, last the torque.
     own, others : array, shape (samples, 3, 7)
-        What of these is fast, of the run itself and of others.
+        What of these is fast, of the run itself and as instruments know it.
     block : array of int, shape (samples, 2)
         Path, and number of the block along it.
     """
@@ -190,19 +207,24 @@ class _Run(NamedTuple):
     others: Array
     block: IntArray
 
-    def freed(self, rigid_body: Array) -> Array:
-        """Give the torque that a rigid body takes, and what comes again of the rest, shape (samples, 3)."""
-        return np.asarray(self.rows[:, :, :-1] @ rigid_body + self.others @ np.append(-rigid_body, 1.0))
-
     def without_yaw(self) -> _Run:
-        """Leave out what others have about yaw."""
+        """Leave out what is known about yaw."""
         return self._replace(others=self.others * [[1.0], [1.0], [0.0]])
+
+
+def _freed(runs: Sequence[_Run], rigid_body: Array) -> Array:
+    """Give the torque that a rigid body takes, and what is known of the rest and no body takes, shape (samples, 3)."""
+    columns = np.concatenate([run.rows[:, :, :-1] for run in runs])
+    rest = np.concatenate([run.others for run in runs]) @ np.append(-rigid_body, 1.0)
+    flat = columns.reshape(-1, RIGID)
+    taken = np.linalg.lstsq(flat, rest.ravel(), rcond=_ROUNDING)[0]
+    return np.asarray(columns @ (rigid_body - taken) + rest)
 
 
 def _common_period(parts: Sequence[TorqueData]) -> float | None:
     """Give the sampling period of flights that are uniform in time; None where they differ, or are slow."""
     steps = [np.diff(part.time) for part in parts]
-    if len(steps) < 2 or not all(map(len, steps)):
+    if not steps or not all(map(len, steps)):
         return None
     period = float(np.median(steps[0]))
     if period * FEWEST_SAMPLES > _SLOW_S:
@@ -211,7 +233,7 @@ def _common_period(parts: Sequence[TorqueData]) -> float | None:
 
 
 def _flown(part: TorqueData, period: float) -> PlaybackFlight:
-    """Give what shows the path of a flight: how it turns."""
+    """Give what shows the path of a flight: how it turns, and what was asked of it."""
     attitude, none = part.motion.attitude, np.zeros((len(part), 3))
     rate = rotations.body_rate(attitude, part.motion.rate)
     return PlaybackFlight(
@@ -222,16 +244,19 @@ def _flown(part: TorqueData, period: float) -> PlaybackFlight:
         stretches=(slice(0, len(part)),),
         has_velocity=False,
         has_position=False,
+        setpoints=part.setpoints,
     )
 
 
-def _runs(given: Repeats, rows: Sequence[Array], period: float) -> list[_Run]:
-    """Lay the rows of flights that repeat each other beside those of the others, where all are known."""
+def _runs(given: Instruments, rows: Sequence[Array], period: float) -> list[_Run]:
+    """Lay the rows of runs beside what instruments know of them, where all are known."""
     fast = [_fast(each, period) for each in rows]
-    length = block_length(sum(len(rows[path[0]]) for path in given.paths()) * period) / period
+    beside = _known(given, fast, period, fast=True)
+    paths = {number: given.repeats.path(number, len(rows[number])) for number in beside}
+    length = block_length(sum(len(rows[first]) for first in {first for first, _ in paths.values()}) * period) / period
     found = []
-    for number in sorted(number for path in given.paths() for number in path):
-        others, (first, place) = given.others(number, fast), given.path(number, len(rows[number]))
+    for number, others in beside.items():
+        first, place = paths[number]
         known = np.isfinite(others + fast[number]).all(axis=(1, 2)) & np.isfinite(place)
         along = (place[known] // length).astype(np.int64)
         block = np.column_stack([np.full(len(along), first), along])
@@ -240,12 +265,44 @@ def _runs(given: Repeats, rows: Sequence[Array], period: float) -> list[_Run]:
     return found
 
 
-def _share_again(given: Repeats, rest: Sequence[Array], runs: Sequence[_Run]) -> float:
-    """Compute the share of a rest about roll and pitch, shape (time, 3), that comes again in other runs."""
-    own = [rest[run.number][run.samples, :2] for run in runs]
-    others = [given.others(run.number, rest)[run.samples, :2] for run in runs]
+def _known(given: Instruments, values: Sequence[Array], period: float, *, fast: bool = False) -> dict[int, Array]:
+    """Give what instruments know of the values of runs, by number of those that have any; NaN where it is nothing.
+
+    Parameters
+    ----------
+    values : sequence of array, shape (time, ...)
+        Of each run.
+    fast : bool
+        Whether they are what is fast of a signal.
+    """
+    if given.kind == "repeats":
+        repeated = sorted(number for path in given.repeats.paths() for number in path)
+        return {number: given.repeats.others(number, values) for number in repeated}
+    lags, asked, known = late_by(period, max(1, round(_APART_S / period))), [], {}
+    for number, setpoint in enumerate(given.setpoints):
+        if setpoint is not None:
+            columns = np.hstack([late(setpoint, lag) for lag in lags])
+            asked.append(_fast(columns, period) if fast else columns)
+            own = values[number].reshape(len(setpoint), -1)
+            known[number] = np.isfinite(asked[-1]).all(axis=1) & np.isfinite(own).all(axis=1)
+    predicted = foretold(
+        np.concatenate([each[there] for each, there in zip(asked, known.values(), strict=True)]),
+        np.concatenate([values[number][there] for number, there in known.items()]),
+    )
+    ends = np.cumsum([int(there.sum()) for there in known.values()])[:-1]
+    found = {}
+    for (number, there), own in zip(known.items(), np.split(predicted, ends), strict=True):
+        found[number] = np.full_like(values[number], np.nan)
+        found[number][there] = own
+    return found
+
+
+def _share_known(given: Instruments, rest: Sequence[Array], runs: Sequence[_Run], period: float) -> float:
+    """Compute the share of a rest about roll and pitch, shape (time, 3), that instruments know."""
+    known = _known(given, [each[:, :2] for each in rest], period)
+    own, there = ([values[run.number][run.samples, :2] for run in runs] for values in (rest, known))
     square = sum(float(np.sum(each**2)) for each in own)
-    return sum(float(np.sum(mine * there)) for mine, there in zip(own, others, strict=True)) / (square or 1.0)
+    return sum(float(np.sum(mine * theirs)) for mine, theirs in zip(own, there, strict=True)) / (square or 1.0)
 
 
 def _fast(values: Array, period: float) -> Array:
@@ -258,12 +315,12 @@ def _fast(values: Array, period: float) -> Array:
 
 
 def _by_block(rows: Iterable[tuple[Array, Array, IntArray]]) -> Array:
-    """Sum the products of the rigid-body columns of runs with rows of others, by block of the path, (block, 6, 7)."""
+    """Sum the products of rigid-body columns with all of other rows, by block of the path, shape (block, 6, 7)."""
     found: dict[tuple[int, int], Array] = {}
-    for own, others, block in rows:
+    for first, second, block in rows:
         for path, along in np.unique(block, axis=0).tolist():
             here = (block == (path, along)).all(axis=1)
-            product = np.einsum("tap,taq->pq", own[here, :, :-1], others[here])
+            product = np.einsum("tap,taq->pq", first[here, :, :-1], second[here])
             found[path, along] = found.get((path, along), 0.0) + product
     return np.array(list(found.values()))
 

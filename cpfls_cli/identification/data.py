@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -40,11 +40,14 @@ class TorqueData:
     time : array, shape (samples,), s
     torque : array, shape (samples, 3), N m
         Generalised torque on the Euler angles.
+    setpoints : mapping of str to array, shape (samples, column)
+        What was asked for, where that is known at all samples.
     """
 
     time: Array
     motion: Motion
     torque: Array
+    setpoints: Mapping[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check shapes and values."""
@@ -62,7 +65,8 @@ class TorqueData:
 
     def __getitem__(self, samples: slice | IntArray) -> TorqueData:
         """Take some of the samples."""
-        return TorqueData(self.time[samples], self.motion[samples], self.torque[samples])
+        asked = {name: values[samples] for name, values in self.setpoints.items()}
+        return TorqueData(self.time[samples], self.motion[samples], self.torque[samples], asked)
 
     def chunks(self) -> Iterator[TorqueData]:
         """Yield the samples, `CHUNK` at a time."""

@@ -65,7 +65,7 @@ class FitDiagnostics:
     learned : Score
         Of the model, on the samples learned from.
     freed : FreedTorque or None
-        What the parameters were learned from, where flights repeat each other.
+        What the parameters were learned from, where instruments tell the vehicle from the loop.
     loop : LoopBounds or None
         How far the loop may have misled the model, where nothing tells it from the vehicle.
     """
@@ -127,23 +127,28 @@ def _scale(diagnostics: FitDiagnostics) -> Iterator[str]:
 
 
 def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
-    """Say what the parameters rest on where flights repeat each other."""
+    """Say what the parameters rest on where instruments tell the vehicle from the loop."""
     freed = diagnostics.freed
     if freed is None:
         return
+    if freed.setpoints:
+        asked = " and ".join(f"setpoint of {name}" if name != "sticks" else name for name in freed.setpoints)
+        source = f"the {asked} knows of no gust, so the parameters come from the torque that answers it"
+        little, without = "too little of yaw answers it", "hold none"
+    else:
+        paths = "1 path" if freed.paths == 1 else f"{freed.paths} paths"
+        source = f"{freed.runs} flights repeat {paths}, so the parameters come from the torque that comes again"
+        little, without = "too little of yaw comes again", "repeat none"
     moments = ", ".join(
         f"{name} {value:.3g} ({value * np.exp(-half):.3g} to {value * np.exp(half):.3g})"
         if told
-        else f"{name} not determined, for too little of yaw comes again, so it stays as least squares has it"
+        else f"{name} not determined, for {little}, so it stays as least squares has it"
         for name, value, half, told in zip(INERTIA_PARAMETERS, freed.rigid_body, freed.half, freed.told, strict=False)
     )
-    alone = freed.flights - freed.runs
-    rest = f"; {alone} of the flights that train repeat none and teach nothing" if alone else ""
+    rest = f"; {freed.alone} of the flights that train {without} and teach nothing" if freed.alone else ""
     least = " ".join(f"{value:.3g}" for value in freed.least_squares[:3])
-    paths = "1 path" if freed.paths == 1 else f"{freed.paths} paths"
     yield (
-        f"{freed.runs} flights repeat {paths}, so the parameters come from the torque that comes again, in which no "
-        "gust acts; scores are those of the torque as measured, gusts among it. "
+        f"{source}, in which no gust acts; scores are those of the torque as measured, gusts among it. "
         f"Rigid body, kg m^2: {moments}; least squares of the torque as measured finds {least}{rest}"
     )
 
@@ -168,7 +173,7 @@ def loop_in_words(loop: LoopBounds) -> str:
         f"the flights show the loop: torque explains {shares} in some band of 0.5 to 6 Hz. An autopilot that answers "
         "gusts, or an effect that is missing here, makes a body look heavier or lighter than it is; true moments over "
         f"those found: {bounds}. Fly each path three times or more, a log each, and give all flights (cpfls trajectory "
-        "--repeat plans them)"
+        "--repeat plans them), or log the setpoint of position or velocity, or the sticks"
     )
 
 

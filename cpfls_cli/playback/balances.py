@@ -11,12 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.blocks import contiguous
 from cpfls_cli.effects.polynomial import state_terms
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric_columns
 from cpfls_cli.playback.evaluation import Evaluated, VehicleAt
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.instruments import Instruments
+from cpfls_cli.playback.instruments import Instruments, foretold, late, late_by
 from cpfls_cli.playback.parameters import FreeNumbers
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
@@ -27,16 +26,12 @@ BANDS_HZ = ((4.0, 12.0), (2.0, 6.0), (1.0, 3.0), (0.5, 1.5), (0.25, 0.75))
 """The same by frequency, about."""
 OVERLAP = 0.75
 """Share that neighbouring windows have in common."""
-FOLDS = 5
-"""Parts of the flights that are kept aside in turn."""
 _OF_FORCE = (*BANDS[2:4], (1.2, None))
 """Forces are seen in slower motion, and the longest windows keep the mean: the weight."""
 _BLOCK_S, _LEAST_BLOCK_S, _BLOCKS = 4.0, 2.0, 9
 """Longer than what gusts remember and the longest windows see; the shortest, and how many a short path is cut into."""
-_ANSWERED_S, _OF_WINDOW = 0.5, 0.25
-"""What was asked for is answered within half a second; it is looked at every so often, share of a window."""
-_RIDGE = 1e-6
-"""Of predictions, so that setpoints that hardly differ from each other do no harm."""
+_OF_WINDOW = 0.25
+"""What was asked for is looked at every so often, share of a window."""
 _NEAR = 1e-4
 """Step of a derivative by what the rotors' response has, in natural sizes."""
 
@@ -276,31 +271,19 @@ class Balances:
         return found
 
     def _expected(self, band: Windows, own: dict[int, Array]) -> dict[int, Array]:
-        """Predict balances from what was asked for, each part as the other parts of the flights tell.
-
-        What a flight itself would tell of its gusts is thereby left out, however many numbers predict.
-        """
+        """Predict balances from what was asked for; see `foretold`."""
         if not own:
             return {}
-        apart = round(_OF_WINDOW * band.hop / (1 - OVERLAP))
-        lags = range(0, max(round(_ANSWERED_S / band.period), 2 * apart) + 1, apart)
+        lags = late_by(band.period, round(_OF_WINDOW * band.hop / (1 - OVERLAP)))
         asked = np.concatenate(
             [
-                _averaged(band, self.flights[number], np.hstack([_late(self.asked[number], lag) for lag in lags]))
+                _averaged(band, self.flights[number], np.hstack([late(self.asked[number], lag) for lag in lags]))
                 for number in own
             ]
         )
-        size = asked.std(axis=0)
-        asked = np.hstack([np.ones((len(asked), 1)), asked / np.where(size > 0, size, 1.0)])
-        balances = np.concatenate(list(own.values()))
-        flat, parts = balances.reshape(len(balances), -1), contiguous(len(balances), FOLDS)
-        expected = np.empty_like(flat)
-        for fold in range(FOLDS):
-            rest, aside = asked[parts != fold], parts == fold
-            square = rest.T @ rest + _RIDGE * len(rest) * np.eye(asked.shape[1])
-            expected[aside] = asked[aside] @ np.linalg.solve(square, rest.T @ flat[parts != fold])
+        expected = foretold(asked, np.concatenate(list(own.values())))
         ends = np.cumsum([len(each) for each in own.values()])[:-1]
-        return dict(zip(own, np.split(expected.reshape(balances.shape), ends), strict=True))
+        return dict(zip(own, np.split(expected, ends), strict=True))
 
 
 class _Products(NamedTuple):
@@ -354,11 +337,6 @@ def band_windows(period: float, short_s: float, long_s: float | None) -> Windows
     """Make windows that leave a band: what short ones see less what long ones do; all of it without long ones."""
     short = windows(period, short_s, OVERLAP)
     return short if long_s is None else short.less(windows(period, long_s, OVERLAP))
-
-
-def _late(values: Array, samples: int) -> Array:
-    """Hold signals back by whole samples, shape (time, column)."""
-    return np.concatenate([np.repeat(values[:1], samples, axis=0), values[: len(values) - samples]])
 
 
 def _middles(band: Windows, flight: PlaybackFlight) -> IntArray:

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.blocks import contiguous
 from cpfls_cli.playback.flight import PlaybackFlight
 
 _ALIKE = 0.7
@@ -29,6 +30,14 @@ _OUTSIDE = (("sticks",), ("position", "velocity"))
 
 A velocity may be what a loop of position asks for: that answers gusts so slowly that it misleads by less than chance.
 """
+
+
+FOLDS = 5
+"""Parts of the flights that are kept aside in turn."""
+_ANSWERED_S = 0.5
+"""What was asked for is answered within this time."""
+_RIDGE = 1e-6
+"""Of predictions, so that setpoints that hardly differ from each other do no harm."""
 
 
 class Run(NamedTuple):
@@ -130,6 +139,41 @@ def instruments(flights: Sequence[PlaybackFlight]) -> Instruments:
     ]
     asked = dict.fromkeys(name for names in outside for name in names)
     return Instruments(runs, flown, repeats(flown), tuple(columns), tuple(asked))
+
+
+def late_by(period: float, apart: int) -> range:
+    """List by how many samples setpoints are held back that predict what answers them, so many of them apart."""
+    return range(0, max(round(_ANSWERED_S / period), 2 * apart) + 1, apart)
+
+
+def late(values: Array, samples: int) -> Array:
+    """Hold signals back by whole samples, shape (time, column)."""
+    return np.concatenate([np.repeat(values[:1], samples, axis=0), values[: len(values) - samples]])
+
+
+def foretold(asked: Array, values: Array) -> Array:
+    """Predict values from what was asked for, each part as the other parts tell.
+
+    What a part itself would tell of its gusts is thereby left out, however many numbers predict.
+
+    Parameters
+    ----------
+    asked : array, shape (time, column)
+    values : array, shape (time, ...)
+
+    Returns
+    -------
+    array, shape (time, ...)
+    """
+    size = asked.std(axis=0)
+    asked = np.hstack([np.ones((len(asked), 1)), asked / np.where(size > 0, size, 1.0)])
+    flat, parts = values.reshape(len(values), -1), contiguous(len(values), FOLDS)
+    found = np.empty_like(flat)
+    for fold in range(FOLDS):
+        rest, aside = asked[parts != fold], parts == fold
+        square = rest.T @ rest + _RIDGE * len(rest) * np.eye(asked.shape[1])
+        found[aside] = asked[aside] @ np.linalg.solve(square, rest.T @ flat[parts != fold])
+    return found.reshape(values.shape)
 
 
 def _runs(flight: PlaybackFlight) -> list[slice]:

@@ -200,8 +200,11 @@ def logged(flight, vehicle):
     return LoggedFlight(flight.name, (signals,), flight.hold, "measured rotor speeds", ())
 
 
-def torque_samples(flight, truth, lowpass_hz=12.0):
-    """Give the torque of a flight's rotors and the motion that was measured, both behind one low-pass."""
+def torque_samples(flight, truth, lowpass_hz=12.0, *, asked=False):
+    """Give the torque of a flight's rotors and the motion that was measured, both behind one low-pass.
+
+    If asked for, with its setpoints.
+    """
     motion = flight.motion
     filtered = butter(2, lowpass_hz, output="sos", fs=1 / motion.period)
     rate, torque = (
@@ -212,4 +215,5 @@ def torque_samples(flight, truth, lowpass_hz=12.0):
         attitude_rate(attitude, rate),
         attitude_acceleration(attitude, rate, CubicSpline(time, rate).derivative()(time)),
     )
-    return TorqueData(time, Motion(attitude, *of_angles), generalised_torque(attitude, torque))
+    setpoints = flight.setpoints if asked else {}
+    return TorqueData(time, Motion(attitude, *of_angles), generalised_torque(attitude, torque), setpoints)
