@@ -98,13 +98,13 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     the loop, or instruments find another body; setpoints, which tell less than repeats, only then.
 
     With ``A`` the columns of a rigid body along a run, ``tau`` its torque, both as far as they are fast, and ``A'``,
-    ``tau'`` what instruments know of them, the inertia parameters x solve ``sum A'^T (tau - A x) = 0``: gusts and noise
-    of a run do not go with that. Of runs of a path it is the mean of what the others have at the same places; of
-    setpoints what the rest of the flights tells of the answer to them. The torque becomes what the rigid body takes
-    along the run's own motion and what is known of the fast rest, ``tau' - A' x``, as far as A does not hold it. Least
-    squares of it gives the rigid body of the instruments again, and an inertia that depends on attitude as far as
-    instruments know of it. Where they know most of what a rigid body leaves, slow or fast, it is no gust, and nothing
-    is freed.
+    ``tau'`` what instruments know of them, the inertia parameters x solve ``sum A^T (tau' - A' x) = 0``: gusts and
+    noise of a run do not go with that. Of runs of a path it is the mean of what the others have at the same places; of
+    setpoints what the rest of the flights tells of the answer to them. Then ``sum A'^T (tau - A x) = 0``, for what is
+    foretold errs alike in many blocks. The torque becomes what the rigid body takes along the run's own motion and what
+    is known of the fast rest, ``tau' - A' x``, as far as A does not hold it. Least squares of it gives the rigid body
+    of the instruments again, and an inertia that depends on attitude as far as instruments know of it. Where they know
+    most of what a rigid body leaves, slow or fast, it is no gust, and nothing is freed.
 
     Parameters
     ----------
@@ -135,7 +135,8 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     ]
     rows = [whole[run.flight][run.part] for run in given.runs]
     runs = _runs(given, rows, period)
-    crossed = _by_block([(run.others, run.own, run.block) for run in runs])
+    repeated = given.kind == "repeats"
+    crossed = _crossed(runs, repeated=repeated)
     if len(crossed) < _FEWEST_BLOCKS:
         return None
     least_squares, _ = _solved(_by_block([(run.rows, run.rows, run.block) for run in runs]))
@@ -145,7 +146,7 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     if not _told(half)[2]:
         # What is hardly known would shake what is: about yaw the body stays as least squares has it.
         runs = [run.without_yaw() for run in runs]
-        rigid_body, beside = _solved(_by_block([(run.others, run.own, run.block) for run in runs]), least_squares)
+        rigid_body, beside = _solved(_crossed(runs, repeated=repeated), least_squares)
         half = np.array([*beside[:2], half[2]])
     if why_unphysical(rigid_body) is not None:
         return None
@@ -154,7 +155,6 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     places = np.concatenate([begins[run.number] + run.samples for run in runs])
     freed = replace(gathered(training, places), torque=_freed(runs, rigid_body) / scale)
     every = len(learned) == len(training)
-    repeated = given.kind == "repeats"
     found = FreedTorque(
         training=freed,
         learned=freed if every else freed[np.flatnonzero(np.isin(freed.time, sample_times(learned)))],
@@ -312,6 +312,12 @@ def _fast(values: Array, period: float) -> Array:
     if count:
         found[half : half + count] = values[half : half + count] - window.average(values)
     return found
+
+
+def _crossed(runs: Sequence[_Run], *, repeated: bool) -> Array:
+    """Sum the products of runs with what instruments know of them; see `freed_torque`."""
+    pairs = ((run.own, run.others, run.block) for run in runs)
+    return _by_block(pairs if repeated else ((others, own, block) for own, others, block in pairs))
 
 
 def _by_block(rows: Iterable[tuple[Array, Array, IntArray]]) -> Array:
