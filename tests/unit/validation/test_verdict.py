@@ -7,6 +7,7 @@ import pytest
 
 from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.validation.grounds import MODEL, Grounds
+from cpfls_cli.validation.reasons import _band
 from cpfls_cli.validation.replay import NOTHING_MOVES
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.validation.verdict import Verdict, beside_loop, confirmed_axes, region_in_words
@@ -74,3 +75,13 @@ def test_a_loop_does_not_save_what_is_not_to_be_used():
 def test_flights_that_explain_roll_and_pitch_leave_the_verdict(loop):
     found = Verdict(Trust.INSIDE, "", ("better",), (1,))
     assert beside_loop(found, loop) is found
+
+
+def test_the_band_of_a_moment_is_no_narrower_than_instruments_know_it():
+    told = SimpleNamespace(half=np.array([0.1, 0.05, np.inf]), told=np.array([True, True, False]))
+    known = SimpleNamespace(band=np.full(3, 0.005), identification=SimpleNamespace(freed=told))
+    (reason,) = _band(known)
+    assert "22.1 %" in reason.text
+    known.identification.freed = None
+    (reason,) = _band(known)
+    assert "0.5 %" in reason.text
