@@ -214,7 +214,11 @@ def _judged(seen: Seen, own: _Candidate) -> _Judged:
         asked = _as_angles(seen, own, asked, measured)
     fit = _Following.of(measured, asked, seen.rate_hz, _units(own))
     if not fit.followed.any():
-        return _Judged(None, f"{columns}: looks like a setpoint of the {_words(own.signal)}, which does not follow it")
+        return _Judged(
+            None,
+            f"{columns}: looks like a setpoint of the {_words(own.signal)}, which does not follow it; if gusts keep it "
+            f"from that, state it as import.signals.{own.signal}",
+        )
     return _by_motion(own, fit)
 
 
