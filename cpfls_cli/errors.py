@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+"""Characters that act on a terminal; line breaks and tabs may."""
 
 
 class CpflsError(Exception):
@@ -71,6 +75,11 @@ class SettingError(ValueError):
     def __init__(self, key: str, message: str) -> None:
         super().__init__(message)
         self.key = key
+
+
+def visible(text: str) -> str:
+    """Write control characters as escapes: names in files are data, and may hold what a terminal takes for orders."""
+    return _CONTROL.sub(lambda found: repr(found.group())[1:-1], text)
 
 
 def install_command(extra: str) -> str:

@@ -18,7 +18,7 @@ import typer
 
 from cpfls_cli.cli.misplaced import what_it_is
 from cpfls_cli.cli.options import Common
-from cpfls_cli.errors import CpflsError, InputError, NotAnArtifactError
+from cpfls_cli.errors import CpflsError, InputError, NotAnArtifactError, visible
 
 if TYPE_CHECKING:
     from cpfls_cli.report.outcome import Outcome
@@ -158,7 +158,7 @@ def _mute_output() -> None:
 
 
 def _complain(text: str, kind: str = "error") -> None:
-    for line in _with_plain_names(text).splitlines() or [""]:
+    for line in _with_plain_names(text).split("\n"):
         print(f"cpfls: {kind}: {line}", file=sys.stderr)
 
 
@@ -168,7 +168,7 @@ def _with_plain_names(text: str) -> str:
         for name in (given, str(Path(given))):
             if not name.isprintable():
                 text = text.replace(name, "".join(each if each.isprintable() else repr(each)[1:-1] for each in name))
-    return text
+    return visible(text)
 
 
 @dataclass(frozen=True)

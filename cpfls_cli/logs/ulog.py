@@ -47,6 +47,8 @@ def _parsed(path: Path) -> Any:
             return pyulog.ULog(stream)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
+    except RecursionError:
+        raise InputError(f"{path}: a broken ULog file: a message of it contains itself") from None
     except (pyulog.core.ULogException, struct.error, ValueError, KeyError, IndexError, TypeError) as error:
         raise InputError(f"{path}: a broken ULog file: {error}") from None
 

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text as RichText
 
+from cpfls_cli.errors import visible
 from cpfls_cli.report.content import Block, Box, Facts, Folded, Heading, Listing, Plot, Table, Text, Tone
 
 _STYLES: dict[Tone, str] = {"plain": "", "note": "", "good": "green", "warning": "bold red"}
@@ -29,21 +30,21 @@ def terminal_lines(blocks: Iterable[Block], width: int | None = None, *, colour:
             case Text() if block.tone == "warning":
                 pass
             case Text() | Heading():
-                yield block.text
+                yield visible(block.text)
             case Box():
-                yield f"{block.label}: {block.title}"
-                yield from (f"  {sentence}" for sentence in block.sentences)
+                yield visible(f"{block.label}: {block.title}")
+                yield from (visible(f"  {sentence}") for sentence in block.sentences)
             case Facts():
                 drawn = _grid(colour, header=False)
                 drawn.add_column(no_wrap=True)
                 drawn.add_column(no_wrap=width is None)
                 for term, value in block.rows:
-                    drawn.add_row(RichText(term), RichText(value))
+                    drawn.add_row(RichText(visible(term)), RichText(visible(value)))
                 yield from _printed(drawn, width, colour)
             case Table():
                 yield from _table(block, width, colour)
             case Listing():
-                yield from block.text.rstrip().splitlines()
+                yield from visible(block.text.rstrip()).split("\n")
             case Plot() | Folded():
                 pass
 
@@ -55,19 +56,19 @@ def warnings_of(blocks: Iterable[Block]) -> tuple[str, ...]:
 
 def _table(table: Table, width: int | None, colour: bool) -> Iterator[str]:
     if table.caption:
-        yield table.caption
+        yield visible(table.caption)
     drawn = _grid(colour, header=any(table.header))
     for column, title in enumerate(table.header):
         left = column in table.words or column in table.sentences
-        texts = [title, *(row[column].text for row in table.cells)]
+        texts = [title, *(visible(row[column].text) for row in table.cells)]
         drawn.add_column(
-            RichText(title),
+            RichText(visible(title)),
             justify="left" if left else "right",
             no_wrap=width is None,
             min_width=max((len(word) for text in texts for word in text.split()), default=0),
         )
     for row in table.cells:
-        drawn.add_row(*(RichText(cell.text, _STYLES[cell.tone] if colour else "") for cell in row))
+        drawn.add_row(*(RichText(visible(cell.text), _STYLES[cell.tone] if colour else "") for cell in row))
     lines = _printed(drawn, width, colour)
     # No word is broken; what that takes beyond the width, other columns have to give.
     excess = max((RichText.from_ansi(line).cell_len for line in lines), default=0) - (width or _UNLIMITED)

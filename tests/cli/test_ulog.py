@@ -215,8 +215,12 @@ def test_a_slow_topic_is_named(wrong):
         (header(), "LOG: a ULog file without samples: was the logger stopped at once, or the file cut off?"),
         (header() + definitions(FIELDS), "LOG: a ULog file without samples: "),
         (header() + message("B", bytes(8) + b"\x80" + bytes(31)), "LOG: a broken ULog file: "),
+        (
+            header() + definitions({"wheel": "uint64_t timestamp;wheel inner;float x"}) + data(0, 0, [1.0]),
+            "LOG: a broken ULog file: a message of it contains itself",
+        ),
     ],
-    ids=["empty", "text", "header-cut", "header-only", "no-data", "unknown-flag"],
+    ids=["empty", "text", "header-cut", "header-only", "no-data", "unknown-flag", "wheel"],
 )
 def test_what_is_no_ulog(wrong, content, message):
     (line,) = wrong(content)

@@ -69,3 +69,18 @@ def test_colours_only_where_they_are_asked_for():
     assert not any("\x1b" in line for line in lines(TABLE, width=80))
     (marked,) = (line for line in lines(TABLE, width=80, colour=True) if "12.5" in line)
     assert re.search(r"\x1b\[1;31m *12\.5\x1b\[0m", marked)
+
+
+def test_no_block_gives_a_terminal_orders():
+    name = "\x1b]0;title\x07red\x1b[31m"
+    blocks = [
+        Heading(name),
+        Text(name),
+        Box(name, "", ()),
+        Facts([(name, "value")]),
+        Listing("", name),
+        Table("names", "", (name, name), [[name, name]]),
+    ]
+    said = lines(*blocks)
+    assert len(said) == 7
+    assert all(line.isprintable() and "\\x1b]0;title\\x07red\\x1b[31m" in line for line in said)
