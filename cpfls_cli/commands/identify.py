@@ -82,13 +82,15 @@ def run(
         base, vehicle = job.study.identification.base, job.study.vehicle
         parts = LearnedGroup.parts(flight_roles(flights), data.parts)
         record = finish(job, IdentifiedRecord.of(result, base, data.indices, evidence, vehicle, parts), inputs)
-    search.end(result.stop_reason)
+    unjudged = signal is not None and evidence is None and job.study.identification.validation.enabled
+    if not unjudged:
+        search.end(result.stop_reason)
     seconds = round(time.perf_counter() - clock, 3)
     summary = {**record.summary, "not_positive_definite": result.indefinite, "seconds": seconds}
     warnings = [Text(sentence, "warning") for sentence in others]
     outcome = Outcome(summary, (*warnings, *answer(source_of(job, record))))
-    unjudged = evidence is None and job.study.identification.validation.enabled
-    return stopped(outcome, result.stop_reason, signal, job.output, unjudged=unjudged)
+    remedy = "--resume" if search.checkpoint.path.exists() else "--force"
+    return stopped(outcome, result.stop_reason, signal, job.output, unjudged=remedy if unjudged else None)
 
 
 def _contradictions(flights: Sequence[Path], study: Study) -> tuple[str, ...]:

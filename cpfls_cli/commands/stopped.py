@@ -16,7 +16,7 @@ _FROM_SIGNAL = 128
 
 
 def stopped(
-    outcome: Outcome, reason: StopReason, signal: int | None, output: Path, *, unjudged: bool = False
+    outcome: Outcome, reason: StopReason, signal: int | None, output: Path, *, unjudged: str | None = None
 ) -> Outcome:
     """Add to what is said of a result that a signal or the time limit came before all was done, and what is kept.
 
@@ -28,8 +28,8 @@ def stopped(
         Number of the signal that asked to stop.
     output : Path
         What was written.
-    unjudged : bool
-        Whether the signal left a whole model without evidence.
+    unjudged : str or None
+        Where the signal left a whole model without evidence, the option with which the command judges it.
 
     Returns
     -------
@@ -41,11 +41,8 @@ def stopped(
         note = f"{output}: is incomplete, because {_STOPPED[reason]}; {_REMEDY}"
     elif signal is None:
         return outcome
-    elif unjudged:
-        note = (
-            f"{output}: is complete but was not judged, because of the interrupt; the same command with --force "
-            "judges it"
-        )
+    elif unjudged is not None:
+        note = f"{output}: was found but not judged, because of the interrupt; the same command with {unjudged} judges"
     else:
         note = f"{output}: is complete; the interrupt came when there was nothing left to stop"
     code = 0 if signal is None else _FROM_SIGNAL + signal

@@ -15,6 +15,8 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 
 _COMMENT_COLUMNS, _NUMBER_COLUMNS = 112, 116
+_LONGEST_NAME = 48
+"""Letters of a prefix: strict compilers of C99 tell names by their first 63."""
 
 
 def comment_lines(paragraphs: Sequence[str]) -> list[str]:
@@ -66,7 +68,7 @@ def identifier(stem: str) -> str:
     str
         Letters, digits and underscores, a letter first.
     """
-    cleaned = re.sub(r"[^A-Za-z0-9]+", "_", stem).strip("_")
+    cleaned = re.sub(r"[^A-Za-z0-9]+", "_", stem)[:_LONGEST_NAME].strip("_")
     return cleaned if cleaned[:1].isalpha() else f"model_{cleaned}".rstrip("_")
 
 
@@ -81,6 +83,8 @@ def checked_identifier(name: str) -> str:
         raise InputError(
             f"--name {name or repr(name)}: is no identifier; use letters, digits and underscores, a letter first"
         )
+    if len(name) > _LONGEST_NAME:
+        raise InputError(f"--name {name[:8]}...: has {len(name)} letters; at most {_LONGEST_NAME}")
     return name
 
 

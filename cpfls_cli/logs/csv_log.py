@@ -16,6 +16,10 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.logs.formats import LogContents, some
 
+_LONGEST_HEADER = 1 << 20
+"""Characters of a line of column names, thousands of which it may hold; compressed, a longer one may fill the memory.
+"""
+
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     """Read columns of a log; without a wish, those whose first value is a number or absent."""
@@ -70,7 +74,9 @@ def _rows(path: Path) -> Iterator[tuple[list[str], Iterator[list[str]]]]:
     """Open a CSV: its column names, and its rows."""
     try:
         with _open(path) as stream:
-            first = stream.readline()
+            first = stream.readline(_LONGEST_HEADER)
+            if len(first) == _LONGEST_HEADER:
+                raise InputError(f"{path}: not a CSV file: its first line, of column names, does not end")
             if not first.strip():
                 raise InputError(f"{path}: is empty; a log starts with a line of column names")
             delimiter = max(",;\t", key=first.count)

@@ -1,11 +1,13 @@
 """Reader of HDF5 and of MATLAB's .mat: arrays of numbers by their path, the columns of a matrix one by one."""
 
+import struct
 import subprocess
 import sys
+import zlib
 from collections.abc import Collection, Iterable, Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import h5py
 import numpy as np
@@ -23,6 +25,12 @@ _SECONDS, _BYTES_PER_SECOND = 10.0, 2e7
 _PROBE = """
 import sys, h5py
 
+states = 0
+
+def count(name, own):
+    global states
+    states += own.nbytes if isinstance(own, h5py.Dataset) else 0
+
 def read(name, own):
     if isinstance(own, h5py.Dataset) and own.dtype.kind in "iufb" and own.ndim and own.size:
         rows = max(1, (1 << 20) * len(own) // own.size)
@@ -32,8 +40,14 @@ def read(name, own):
 with h5py.File(sys.argv[1], "r") as file:
     name = file.attrs.get("format")
     print(name if isinstance(name, str) and name.startswith("cpfls/") else "")
+    file.visititems(count)
+    if states > int(sys.argv[2]):
+        sys.exit(f"{states / 1e9:.3g} GB of numbers are stated")
     file.visititems(read)
 """
+_PLAIN, _TIMES = 1 << 29, 200
+"""Bytes that a log may hold whatever its size, and in sizes of the file beyond: signals of sensors hardly compress."""
+_COMPRESSED = 15
 _TIME_UNITS = ("s", "ms", "us", "ns")
 
 
@@ -89,7 +103,11 @@ def _probed(state: State) -> _Probed:
     limit = _SECONDS + state.size / _BYTES_PER_SECOND
     try:
         done = subprocess.run(
-            [sys.executable, "-c", _PROBE, state.path], capture_output=True, timeout=limit, check=False, text=True
+            [sys.executable, "-c", _PROBE, state.path, str(_most(state.size))],
+            capture_output=True,
+            timeout=limit,
+            check=False,
+            text=True,
         )
     except subprocess.TimeoutExpired:
         return _Probed(False, "", f"damaged: HDF5 does not come to an end with it within {limit:.0f} s")
@@ -132,8 +150,33 @@ def _of_mat(path: Path) -> Iterator[tuple[str, Any]]:
         elif isinstance(value, np.ndarray):
             yield prefix, value
 
+    _refuse_inflated(path)
     variables = scipy.io.loadmat(str(path), simplify_cells=True)
     yield from within("", {name: value for name, value in variables.items() if not name.startswith("__")})
+
+
+def _most(size: int) -> int:
+    """Give how many bytes a log of a file of so many may hold."""
+    return max(_PLAIN, _TIMES * size)
+
+
+def _refuse_inflated(path: Path) -> None:
+    """Refuse a .mat whose compressed variables hold more than memory may, out of proportion to the file."""
+    size, total = path.stat().st_size, 0
+    with path.open("rb") as stream:
+        head = stream.read(128)
+        order: Literal["<", ">"] = ">" if head[126:] == b"MI" else "<"
+        while len(tag := stream.read(8)) == 8:
+            kind, length = struct.unpack(f"{order}II", tag)
+            if kind != _COMPRESSED:
+                stream.seek(length, 1)
+                continue
+            part, left = zlib.decompressobj(), stream.read(length)
+            while left:
+                total += len(part.decompress(left, 1 << 20))
+                if total > _most(size):
+                    raise InputError(f"{path}: holds more than {total / 1e9:.2g} GB in {size / 1e6:.2g} MB: no log")
+                left = part.unconsumed_tail
 
 
 def _named(arrays: Iterable[tuple[str, Any]], wanted: Collection[str] | None) -> Iterator[tuple[str, Array]]:

@@ -392,7 +392,9 @@ def _interval(value: float, half: float, *, positive: bool) -> tuple[float, floa
     """Give the ends of an interval; by a factor for what cannot be below 0."""
     if not positive:
         return value - half, value + half
-    factor = float(np.exp(half / value))
+    # What is not known at all is known to a factor beyond any number.
+    with np.errstate(over="ignore"):
+        factor = float(np.exp(half / value))
     return value / factor, value * factor
 
 

@@ -229,3 +229,8 @@ def test_a_key_that_does_not_suit_the_log_is_named(wrong, key, value, message, d
     (line,) = wrong(table(), "log.csv", "--set", f"import.{key}={value}", *estimate, *dry_run)
     assert line.startswith(f"LOG: import.{key} = ")
     assert f": {message}" in line
+
+
+def test_a_header_without_an_end(wrong):
+    (line,) = wrong(gzip.compress(b"a" * (1 << 21)), "log.csv.gz")
+    assert line == "LOG: not a CSV file: its first line, of column names, does not end"

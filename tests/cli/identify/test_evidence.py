@@ -130,16 +130,22 @@ def test_an_interrupt_while_evidence_is_gathered_leaves_the_whole_model(
 
     monkeypatch.setattr(validate, "compare_structures", interrupted)
     output = tmp_path / "model.h5"
-    result = cpfls("identify", study, pipeline.flight, "--set", "identification.training_share=0.6", "-o", output)
+    words = ("identify", study, pipeline.flight, "--set", "identification.training_share=0.6", "-o", output)
+    result = cpfls(*words)
     assert result.exit_code == 130
-    assert f"{output}: is complete but was not judged" in result.stderr
-    assert [path.name for path in tmp_path.iterdir()] == ["model.h5"]
+    assert f"{output}: was found but not judged" in result.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["model.h5", "model.h5.checkpoint"]
     with h5py.File(output) as plain, h5py.File(validated[0]) as whole:
         assert plain["search/complete"][()] == 1
         assert "verdict/label" not in plain
         np.testing.assert_array_equal(
             plain["vehicle/inertia_functions/coefficients"][()], whole["vehicle/inertia_functions/coefficients"][()]
         )
+    monkeypatch.undo()
+    assert "with --resume judges it" in result.stderr
+    assert cpfls(*words, "--resume").exit_code == 0
+    assert output.read_bytes() == validated[0].read_bytes()
+    assert [path.name for path in tmp_path.iterdir()] == ["model.h5"]
 
 
 def test_use_of_a_model_that_was_not_judged_or_judged_unfit_is_told(validated, cpfls, study, pipeline, tmp_path):

@@ -72,13 +72,14 @@ def test_interrupted_again_and_again_it_evaluates_nothing_twice(cpfls, words, wh
     assert names(tmp_path) == ["model.h5"]
 
 
-def test_interrupted_in_the_last_evaluation_it_is_complete(cpfls, words, whole, tmp_path, interrupt_at):
+def test_interrupted_in_the_last_evaluation_it_is_judged_when_it_goes_on(cpfls, words, whole, tmp_path, interrupt_at):
     interrupt_at(int(stored(whole, "history/evaluations")[-1]))
     result = cpfls(*words, "-o", tmp_path / "model.h5")
     assert result.exit_code == 130
-    assert f"{tmp_path / 'model.h5'}: is complete but was not judged, because of the interrupt" in result.stderr
+    assert f"{tmp_path / 'model.h5'}: was found but not judged, because of the interrupt" in result.stderr
+    assert names(tmp_path) == ["model.h5", "model.h5.checkpoint"]
+    assert cpfls(*words, "-o", tmp_path / "model.h5", "--resume").exit_code == 0
     assert names(tmp_path) == ["model.h5"]
-    assert cpfls(*words, "-o", tmp_path / "model.h5", "--force").exit_code == 0
     assert (tmp_path / "model.h5").read_bytes() == whole.read_bytes()
 
 
