@@ -5,7 +5,15 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from cpfls_cli.consistency.findings import Finding
-from cpfls_cli.consistency.rotors import IDLE, lift, misplaced, tells_thrust, thrust_beside_weight, too_fast
+from cpfls_cli.consistency.rotors import (
+    IDLE,
+    beyond_propellers,
+    lift,
+    misplaced,
+    tells_thrust,
+    thrust_beside_weight,
+    too_fast,
+)
 from cpfls_cli.consistency.sensors import Sensors, sensors_of
 from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, WindowSettings, fitting_windows
@@ -41,7 +49,8 @@ def findings_of(parts: Sequence[Signals], sensors: Sensors | None) -> tuple[Find
 
 def _findings(parts: Sequence[Signals], sensors: Sensors | None) -> Iterator[Finding | None]:
     yield too_fast(parts)
-    yield thrust_beside_weight(parts)
+    weighs = thrust_beside_weight(parts)
+    yield weighs if weighs is not None else beyond_propellers(parts)
     hangs = _upside_down(_middle(parts))
     yield hangs
     if sensors is None or hangs is not None:

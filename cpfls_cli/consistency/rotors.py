@@ -8,7 +8,7 @@ import numpy as np
 from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.consistency.motion import PairCheck, by_thrust
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.flightlog.airframe import airframe_from_motion, place_of
+from cpfls_cli.flightlog.airframe import airframe_from_motion, place_of, thrust_number
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _THRUST_TO_WEIGHT = 5.0
@@ -22,6 +22,13 @@ _LIFTS = 1.25
 
 IDLE = 0.5
 """Share of the largest thrust below which rotors idle."""
+
+_THRUST_NUMBERS = (0.00075, 1.0)
+"""Of propellers as large as the room between hubs: those of 0.05 that fill a third of it, and of 0.2 that overlap by
+half. A wrong unit of speed is a factor of 91, of mass 1000."""
+
+_NEAR_M = 1e-3
+"""Hubs nearer than that, seen from above, are one above the other."""
 
 _REMEDY = (
     "check the unit of import.signals.rotor_speed (or rotor_command), vehicle.mass_kg, vehicle.gravity_m_s2 and "
@@ -40,6 +47,34 @@ def too_fast(parts: Sequence[Signals]) -> Finding | None:
         "check the unit of import.signals.rotor_speed (rpm?), or the limit",
         ("rotors", "vehicle.rotor_speed_max_rad_s"),
         fastest / limit,
+    )
+
+
+def beyond_propellers(parts: Sequence[Signals]) -> Finding | None:
+    """Say where no propellers that fit between the hubs carry the mass at the measured speeds."""
+    vehicle = parts[0].vehicle
+    hubs = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
+    apart = np.linalg.norm(hubs[:, None] - hubs, axis=2)
+    measured = [part.rotor_speed for part in parts if part.rotor_speed is not None and not part.commanded]
+    if not measured or not (apart > _NEAR_M).any():
+        return None
+    speed = np.concatenate(measured)
+    power = (speed**2).sum(axis=1)
+    turning = power >= IDLE * np.quantile(power, 0.99)
+    if not power[turning].any():
+        return None
+    number = thrust_number(vehicle.mass_kg, float(apart[apart > _NEAR_M].min()), speed[turning])
+    if _THRUST_NUMBERS[0] < number < _THRUST_NUMBERS[1]:
+        return None
+    slow = number > _THRUST_NUMBERS[1]
+    size = f"{number / 0.1 if slow else 0.1 / number:.2g}"
+    return Finding(
+        f"propellers that fit between the hubs lift {size} times {'less' if slow else 'more'} than the mass of "
+        f"{vehicle.mass_kg:g} kg at {np.sqrt(power[turning].mean() / speed.shape[1]):.3g} rad/s",
+        "check the unit of import.signals.rotor_speed (rad/s, rpm or Hz), vehicle.mass_kg (kg) and position_m of "
+        "vehicle.rotors (m)",
+        ("rotors", "vehicle"),
+        number,
     )
 
 

@@ -343,13 +343,18 @@ def _shares(acceleration: Array, rate: Array, squared: Array) -> tuple[list[tupl
     return results, np.asarray(np.linalg.lstsq(own, together, rcond=None)[0].T, dtype=float)
 
 
-def thrust_number(mass_kg: float, arm_m: float, speed: Array) -> float:
-    """Give the thrust number ``T / (rho n^2 D^4)`` of rotors that carry a mass, were they as large as they can be.
+def room(arm_m: float, rotors: int) -> float:
+    """Give the diameter of propellers at the ends of arms whose neighbours touch, m."""
+    return 2 * arm_m * sin(pi / rotors)
+
+
+def thrust_number(mass_kg: float, diameter_m: float, speed: Array) -> float:
+    """Give the thrust number ``T / (rho n^2 D^4)`` of rotors that carry a mass, were they of such a diameter.
 
     Parameters
     ----------
-    arm_m : float
-        From the middle to a rotor, m; neighbours nearly touch.
+    diameter_m : float
+        As large as they can be, where neighbours touch.
     speed : array, shape (time, rotor), rad/s
 
     Returns
@@ -357,7 +362,5 @@ def thrust_number(mass_kg: float, arm_m: float, speed: Array) -> float:
     float
         Of real propellers 0.003 to 0.2: their own number is 0.05 to 0.2, their diameter half of the room or more.
     """
-    rotors = speed.shape[1]
-    diameter = 2 * arm_m * sin(pi / rotors)
     turns = (speed / (2 * pi)) ** 2
-    return float(mass_kg * STANDARD_GRAVITY / (_AIR_KG_M3 * turns.mean(axis=0).sum() * diameter**4))
+    return float(mass_kg * STANDARD_GRAVITY / (_AIR_KG_M3 * turns.mean(axis=0).sum() * diameter_m**4))

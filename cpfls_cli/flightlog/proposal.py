@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.airframe import Airframe, Parameters, stated_airframe, thrust_number, usual_airframe
+from cpfls_cli.flightlog.airframe import Airframe, Parameters, room, stated_airframe, thrust_number, usual_airframe
 from cpfls_cli.flightlog.recognised import Choice, Guess, Recognition, Rival
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.settings import SETPOINTS, ColumnMap, SignalMap, SignalName
@@ -333,7 +333,8 @@ def _by_weight(guess: Guess, speeds: Array | None, mass_kg: float, arm_m: float)
     if guess.signal != "rotor_speed" or speeds is None or [rival.text for rival in guess.rivals] != ["unit: rpm"]:
         return guess
     units: tuple[UnitName, UnitName] = ("rad/s", "rpm")
-    numbers = {unit: thrust_number(mass_kg, arm_m, known_unit(unit).factor * speeds) for unit in units}
+    diameter = room(arm_m, speeds.shape[1])
+    numbers = {unit: thrust_number(mass_kg, diameter, known_unit(unit).factor * speeds) for unit in units}
     fitting = [unit for unit, own in numbers.items() if _PROPELLERS[0] < own < _PROPELLERS[1]]
     if len(fitting) != 1:
         return guess

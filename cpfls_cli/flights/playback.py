@@ -15,7 +15,7 @@ from cpfls_cli.consistency.check import check
 from cpfls_cli.consistency.findings import contradictions, doubts
 from cpfls_cli.consistency.numbers import beyond_belief
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.errors import ComputationError, ConfigError, CpflsError, InputError
+from cpfls_cli.errors import CpflsError, InputError
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flights.imported import imported
@@ -36,7 +36,6 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import made_ready, player_of
 from cpfls_cli.playback.replay import Played
 from cpfls_cli.playback.rotors import Hold
-from cpfls_cli.vehicle.rotors import require_control
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
 
@@ -119,8 +118,6 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
             f"{flight.name}: has no rotor_speed, rotor_command or body_torque, so nothing drives a playback; name "
             "their columns in import.signals"
         )
-    if actuation != "body_torque":
-        _require_control(study)
     driven = {name: flight.signals[name] for name in ("time", *_STATE, actuation) if name in flight.signals}
     stretches = known_stretches(flight.name, all_known(driven), driven["time"])
     made = [signals_of(flight, _known(flight, actuation, part), study) for part in stretches]
@@ -142,14 +139,6 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
     named = tuple(f"{flight.name}: {warning}" for warning in warnings)
     wrong = contradictions(finding.of(flight.name) for finding in findings)
     return LoggedFlight(flight.name, parts, hold or usual, words[actuation], named, wrong)
-
-
-def _require_control(study: Study) -> None:
-    """Refuse a vehicle of the config that cannot have flown what its rotors are said to have driven."""
-    try:
-        require_control(study.vehicle)
-    except ComputationError as error:
-        raise ConfigError(str(error)) from None
 
 
 def _known(flight: ReadFlight, actuation: str, part: slice) -> dict[str, Array]:

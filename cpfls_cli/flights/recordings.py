@@ -20,7 +20,7 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import check
 from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.effects.signals import Signals, stretch_of
-from cpfls_cli.errors import InputError
+from cpfls_cli.errors import ComputationError, ConfigError, InputError
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flightlog.smoothing import body_rate_of
@@ -28,6 +28,7 @@ from cpfls_cli.flights.imported import commanded_speed, imported, log_findings
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.logs.formats import is_log
+from cpfls_cli.vehicle.rotors import require_control
 from cpfls_cli.weak_form.windows import Recording, common_windows
 
 _LOGGED = ("attitude", "velocity", "position", "acceleration", "specific_force")
@@ -205,6 +206,10 @@ def _actuated(signals: Signals, flight: ReadFlight, known: Mapping[str, Array], 
             "motion with; name their columns in import.signals"
         )
     if speed is not None:
+        try:
+            require_control(study.vehicle)
+        except ComputationError as error:
+            raise ConfigError(str(error)) from None
         command = _command_beside(flight, known, study)
         return replace(signals, rotor_speed=speed, commanded=commanded, rotor_command=command)
     return replace(signals, stated_torque=known["body_torque"], stated_thrust=known.get("thrust"), commanded=True)

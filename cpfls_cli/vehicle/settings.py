@@ -61,16 +61,13 @@ class VehicleSettings(Settings):
     ] = ()
 
     def __post_init__(self) -> None:
-        """Refuse an inertia that is not positive definite, and rotors that turn nothing.
+        """Refuse an inertia that is not positive definite.
 
         Raises
         ------
         SettingError
-            If a moment of inertia is not positive, the tensor is not positive definite, or all rotors are in one place.
+            If a moment of inertia is not positive, or the tensor is not positive definite.
         """
-        if len(self.rotors) > 1 and len({rotor.position_m for rotor in self.rotors}) == 1:
-            message = "all are in one place, where they turn nothing; state where each hub is, position_m"
-            raise SettingError("rotors", message)
         if len(self.inertia_kg_m2) not in (3, 6):
             raise SettingError("inertia_kg_m2", "give 3 moments of inertia, or 3 moments and 3 off-diagonal entries")
         if not min(self.inertia_kg_m2[:3]) > 0:

@@ -76,13 +76,6 @@ def test_negative_inertia_names_its_key(wrong):
     assert line == "FILE: vehicle.inertia_kg_m2.0 = -0.6: must be greater than 0"
 
 
-def test_rotors_in_one_place_turn_nothing(wrong):
-    rotor = "{position_m: [0, 0, 0], spin: 1, thrust_factor_n_s2: 1.0e-6, drag_factor_n_m_s2: 1.0e-8}"
-    (line,) = wrong(f"vehicle: {{rotors: [{rotor}, {rotor}]}}", whole=True)
-    assert line.startswith("FILE: vehicle.rotors = ")
-    assert line.endswith(": all are in one place, where they turn nothing; state where each hub is, position_m")
-
-
 def test_a_key_gives_a_terminal_no_orders(wrong):
     (line,) = wrong('"\\e[31mred\\e[0m": 1', whole=True)
     assert line.startswith("FILE: \\x1b[31mred\\x1b[0m = 1: unknown key")

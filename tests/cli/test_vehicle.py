@@ -325,7 +325,7 @@ def test_a_flight_of_another_vehicle_is_refused(refused, flights):
     ],
     ids=["all spin one way", "all on one side"],
 )
-@pytest.mark.parametrize("command", [("vehicle",), ("replay", "vehicle")])
+@pytest.mark.parametrize("command", [("vehicle",), ("replay", "vehicle"), ("gap",)])
 def test_rotors_that_no_vehicle_flies_with_are_refused(refuse, config, tmp_path, command, rotors, axes):
     log, time = tmp_path / "log.csv", np.arange(0.0, 4.0, 0.01)
     waves = np.column_stack([np.sin((1 + i) * time) for i in range(7)])

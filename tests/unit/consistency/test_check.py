@@ -122,6 +122,19 @@ FAULTS = {
         lambda s: replace(s, rotor_speed=s.rotor_speed / (2 * np.pi)),
         "times the weight at most",
     ),
+    "speeds a tenth of the true ones, thrust unknown": (
+        lambda s: replace(guessed(s, 1.0), rotor_speed=s.rotor_speed / 9.55),
+        "propellers that fit between the hubs lift",
+    ),
+    "arms in mm, thrust unknown": (
+        lambda s: with_vehicle(
+            guessed(s, 1.0),
+            rotors=tuple(
+                replace(each, position_m=tuple(1e3 * place for place in each.position_m)) for each in VEHICLE.rotors
+            ),
+        ),
+        "times more than the mass of",
+    ),
     "a digit of the mass": (lambda s: with_vehicle(s, mass_kg=0.6), "times the weight on average"),
 }
 
