@@ -26,35 +26,33 @@ _NO_GENERATOR = "null"
 class HistoryGroup:
     """Progress of the search by generation."""
 
-    evaluations: IntArray = dataset("evaluations", "chromosomes evaluated so far", "generation")
-    best: Array = dataset("best", "best of each objective so far", "generation", "3", units="SI", gaps=True)
-    front_size: IntArray = dataset("front_size", "members of the Pareto front so far", "generation")
+    evaluations: IntArray = dataset("chromosomes evaluated so far", "generation")
+    best: Array = dataset("best of each objective so far", "generation", "3", units="SI", gaps=True)
+    front_size: IntArray = dataset("members of the Pareto front so far", "generation")
 
 
 @record
 class PopulationGroup:
     """The current population."""
 
-    genes: Any = dataset("genes", "chromosomes, 16-bit weights", "individual", "gene")
+    genes: Any = dataset("chromosomes, 16-bit weights", "individual", "gene")
     objectives: Any = dataset(
-        "objectives",
         "MSE (rigid-body base: cross-validated, scaled by axis), largest error, condition number",
         "individual",
         "3",
         units="SI",
         gaps=True,
     )
-    subpopulation: Any = dataset("subpopulation", "label of the subpopulation", "individual")
+    subpopulation: Any = dataset("label of the subpopulation", "individual")
 
 
 @record
 class ArchiveGroup:
     """All evaluated chromosomes."""
 
-    submitted: Any = dataset("submitted", "chromosomes as bred, in order of evaluation", "evaluation", "gene")
-    genes: Any = dataset("genes", "what local search made of them", "evaluation", "gene")
+    submitted: Any = dataset("chromosomes as bred, in order of evaluation", "evaluation", "gene")
+    genes: Any = dataset("what local search made of them", "evaluation", "gene")
     objectives: Any = dataset(
-        "objectives",
         "MSE (rigid-body base: cross-validated, scaled by axis), largest error, condition number",
         "evaluation",
         "3",
@@ -68,14 +66,12 @@ class UnfinishedGroup:
     """What was evaluated of the next generation, where the search was stopped within it."""
 
     submitted: Any = dataset(
-        "submitted",
         "chromosomes of the next generation that are evaluated, where the search was stopped within it",
         "unfinished",
         "gene",
     )
-    genes: Any = dataset("genes", "what local search made of them", "unfinished", "gene")
+    genes: Any = dataset("what local search made of them", "unfinished", "gene")
     objectives: Any = dataset(
-        "objectives",
         "MSE (rigid-body base: cross-validated, scaled by axis), largest error, condition number",
         "unfinished",
         "3",
@@ -95,14 +91,12 @@ class CheckpointRecord(Record):
         ("flight", "selection", "validate", "choose-on"),
     )
 
-    generation: int = dataset("generation", "generations bred; 0: initial population, -1: not even that")
-    generator: str = dataset(
-        "generator", "state of the random generator, one for all subpopulations, as JSON; null at -1"
-    )
-    population: PopulationGroup = group("population")
-    archive: ArchiveGroup = group("archive")
-    history: HistoryGroup = group("history")
-    unfinished: UnfinishedGroup = group("unfinished")
+    generation: int = dataset("generations bred; 0: initial population, -1: not even that")
+    generator: str = dataset("state of the random generator, one for all subpopulations, as JSON; null at -1")
+    population: PopulationGroup = group()
+    archive: ArchiveGroup = group()
+    history: HistoryGroup = group()
+    unfinished: UnfinishedGroup = group()
 
     @classmethod
     def of_state(cls, state: EvolutionState) -> Self:
@@ -154,9 +148,9 @@ def _stored(submitted: IntArray, genes: IntArray, objectives: Array) -> dict[str
 class StructuresKeptGroup:
     """Structures that were judged, in the order of the search."""
 
-    blocks: tuple[str, ...] = dataset("blocks", "blocks of each, one space between two", "structure")
-    rules: IntArray = dataset("rules", "of its remainder: number of rules, order of the harmonics", "structure", "2")
-    numbers: IntArray = dataset("numbers", "free numbers", "structure")
+    blocks: tuple[str, ...] = dataset("blocks of each, one space between two", "structure")
+    rules: IntArray = dataset("of its remainder: number of rules, order of the harmonics", "structure", "2")
+    numbers: IntArray = dataset("free numbers", "structure")
 
 
 @record
@@ -170,10 +164,10 @@ class VehicleCheckpointRecord(Record):
         ("flight-1", "held-out-1"),
     )
 
-    structure: StructuresKeptGroup = group("structure")
-    loss: Array = dataset("loss", "of the fit without each part of the flights", "structure", "part")
-    values: Array = dataset("values", "numbers of all fits, one fit after another", "fitted", units="SI")
-    hessian: Array = dataset("hessian", "their curvatures by rows, one fit after another", "curvature")
+    structure: StructuresKeptGroup = group()
+    loss: Array = dataset("of the fit without each part of the flights", "structure", "part")
+    values: Array = dataset("numbers of all fits, one fit after another", "fitted", units="SI")
+    hessian: Array = dataset("their curvatures by rows, one fit after another", "curvature")
 
     @classmethod
     def of(cls, judged: Sequence[Judged]) -> Self:

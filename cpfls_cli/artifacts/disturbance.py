@@ -42,16 +42,14 @@ class GustAxis(NamedTuple):
 class DisturbanceGroup:
     """Gusts in the flights that the vehicle was found in, as torque about body axes and force along them."""
 
-    told_by: str = dataset("told_by", "what told gusts from what the model lacks: repeats, setpoints or none")
-    name: tuple[str, ...] = dataset("name", "roll, pitch, yaw, x, y, z", "gust")
-    size: Array = dataset("size", "standard deviation, N m or N", "gust", units="SI", gaps=True)
-    low: Array = dataset(
-        "low", "lower end of the 95 % interval; 0 where it is not known", "gust", units="SI", gaps=True
-    )
-    high: Array = dataset("high", "upper end; no gusts above it where no size is known", "gust", units="SI", gaps=True)
-    memory: Array = dataset("memory", "time in which a gust falls to 37 %", "gust", units="s", gaps=True)
-    memory_low: Array = dataset("memory_low", "lower end of the 95 % interval", "gust", units="s", gaps=True)
-    memory_high: Array = dataset("memory_high", "upper end of the 95 % interval", "gust", units="s", gaps=True)
+    told_by: str = dataset("what told gusts from what the model lacks: repeats, setpoints or none")
+    name: tuple[str, ...] = dataset("roll, pitch, yaw, x, y, z", "gust")
+    size: Array = dataset("standard deviation, N m or N", "gust", units="SI", gaps=True)
+    low: Array = dataset("lower end of the 95 % interval; 0 where it is not known", "gust", units="SI", gaps=True)
+    high: Array = dataset("upper end; no gusts above it where no size is known", "gust", units="SI", gaps=True)
+    memory: Array = dataset("time in which a gust falls to 37 %", "gust", units="s", gaps=True)
+    memory_low: Array = dataset("lower end of the 95 % interval", "gust", units="s", gaps=True)
+    memory_high: Array = dataset("upper end of the 95 % interval", "gust", units="s", gaps=True)
 
     @classmethod
     def of(cls, found: FoundGusts) -> Self:

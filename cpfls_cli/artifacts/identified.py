@@ -50,48 +50,44 @@ WELL_CONDITIONED = 100.0
 class ChosenGroup:
     """What was chosen for the inertia functions."""
 
-    weights: Array = dataset("weights", "partition weights a_i of the chosen chromosome", "gene")
-    base: str = dataset("base", "none or rigid-body")
-    ridge_weight: float = dataset("ridge_weight", "chosen; infinite means the fuzzy part is off", gaps=True)
+    weights: Array = dataset("partition weights a_i of the chosen chromosome", "gene")
+    base: str = dataset("none or rigid-body")
+    ridge_weight: float = dataset("chosen; infinite means the fuzzy part is off", gaps=True)
 
 
 @record
 class SolveGroup:
     """How well the training samples determine the coefficients."""
 
-    singular_values: Array = dataset(
-        "singular_values", "of the regressor of the parameters in use, without penalty", "value", units="SI"
-    )
-    rank: int = dataset("rank", "numerical rank")
-    condition_number: float = dataset("condition_number", "over the kept singular values", least=1.0)
-    parameters: int = dataset("parameters", "number of linear parameters in use")
+    singular_values: Array = dataset("of the regressor of the parameters in use, without penalty", "value", units="SI")
+    rank: int = dataset("numerical rank")
+    condition_number: float = dataset("over the kept singular values", least=1.0)
+    parameters: int = dataset("number of linear parameters in use")
 
 
 @record
 class RulesGroup:
     """Excitation of each rule in training."""
 
-    name: tuple[str, ...] = dataset("name", "inertia function and rule", "rule")
-    firing: Array = dataset("firing", "largest firing strength in training", "rule")
-    determined: Array = dataset("determined", "share of the rule's coefficients that data determine", "rule")
-    excited: BoolArray = dataset("excited", "1 where the rule is excited, else 0", "rule")
+    name: tuple[str, ...] = dataset("inertia function and rule", "rule")
+    firing: Array = dataset("largest firing strength in training", "rule")
+    determined: Array = dataset("share of the rule's coefficients that data determine", "rule")
+    excited: BoolArray = dataset("1 where the rule is excited, else 0", "rule")
 
 
 @record
 class FrontGroup:
     """Pareto front of the search."""
 
-    chromosomes: IntArray = dataset("chromosomes", "Pareto front, 16-bit weights", "member", "gene")
+    chromosomes: IntArray = dataset("Pareto front, 16-bit weights", "member", "gene")
     objectives: Array = dataset(
-        "objectives",
         "MSE (rigid-body base: cross-validated, scaled by axis), largest error, condition number",
         "member",
         "3",
         units="SI",
     )
-    chosen: int = dataset("chosen", "index of the chosen member", into="member")
+    chosen: int = dataset("index of the chosen member", into="member")
     held_out: Array | None = dataset(
-        "held_out",
         "mean squared error on the flights kept for the choice; objective 1 of them",
         "member",
         units="SI",
@@ -104,38 +100,32 @@ class FrontGroup:
 class SearchGroup:
     """How the search ended."""
 
-    stop_reason: str | None = dataset("stop_reason", "generations, converged, time-limit or interrupted", default=None)
-    complete: bool | None = dataset(
-        "complete", "1 where the search came to its end, 0 where `--resume` goes on", default=None
-    )
+    stop_reason: str | None = dataset("generations, converged, time-limit or interrupted", default=None)
+    complete: bool | None = dataset("1 where the search came to its end, 0 where `--resume` goes on", default=None)
 
 
 @record
 class BaselinesGroup:
     """Inertia parameters of the baselines."""
 
-    rigid_body: Array = dataset(
-        "rigid_body", "six inertia parameters by least squares", "6", units="kg m^2", frame=BODY
-    )
-    constant_inertia: Array = dataset(
-        "constant_inertia", "J11 J22 J33 J12 J13 J23, constant", "6", units="kg m^2", frame=EULER
-    )
+    rigid_body: Array = dataset("six inertia parameters by least squares", "6", units="kg m^2", frame=BODY)
+    constant_inertia: Array = dataset("J11 J22 J33 J12 J13 J23, constant", "6", units="kg m^2", frame=EULER)
 
 
 @record
 class RidgeGroup:
     """Cross-validation of the ridge weight."""
 
-    weight: Array = dataset("weight", "ridge weights tried", "tried", gaps=True)
-    error: Array = dataset("error", "cross-validated error", "tried")
-    standard_error: Array = dataset("standard_error", "its standard error", "tried")
+    weight: Array = dataset("ridge weights tried", "tried", gaps=True)
+    error: Array = dataset("cross-validated error", "tried")
+    standard_error: Array = dataset("its standard error", "tried")
 
 
 @record
 class IdentifiedVehicleGroup(VehicleGroup):
     """A vehicle with inertia functions, which are what is identified."""
 
-    inertia_functions: InertiaFunctionsGroup = group("inertia_functions")
+    inertia_functions: InertiaFunctionsGroup = group()
 
     @classmethod
     def identified(cls, vehicle: VehicleSettings, functions: InertiaFunctions) -> Self:
@@ -163,27 +153,27 @@ class IdentifiedRecord(ModelRecord):
         kind="identified",
     )
 
-    vehicle: IdentifiedVehicleGroup = group("vehicle")
-    model: ChosenGroup = group("model")
-    solve: SolveGroup = group("solve")
-    rules: RulesGroup = group("rules")
-    front: FrontGroup = group("front")
-    history: HistoryGroup = group("history")
-    search: SearchGroup | None = group("search", default=None)
-    judged: JudgedGroup = group("judged")
-    baselines: BaselinesGroup = group("baselines")
-    ridge: RidgeGroup | None = group("ridge", default=None)
-    training_indices: IntArray = dataset("training/indices", "samples of the flight that trained", "sample")
-    findings: tuple[str, ...] = dataset("findings", "what failed or was not excited, in words", "finding")
-    structures: StructuresGroup | None = group("structures", default=None)
-    residuals: ResidualsGroup | None = group("residuals", default=None)
-    uncertainty: UncertaintyGroup | None = group("uncertainty", default=None)
-    curves: CurvesGroup | None = group("curves", default=None)
-    round_trip: RoundTripGroup | None = group("round_trip", default=None)
-    steps: StepsGroup | None = group("steps", default=None)
-    physics: PhysicsGroup | None = group("physics", default=None)
-    period: PeriodGroup | None = group("period", default=None)
-    verdict: VerdictGroup | None = group("verdict", default=None)
+    vehicle: IdentifiedVehicleGroup = group()
+    model: ChosenGroup = group()
+    solve: SolveGroup = group()
+    rules: RulesGroup = group()
+    front: FrontGroup = group()
+    history: HistoryGroup = group()
+    search: SearchGroup | None = group(default=None)
+    judged: JudgedGroup = group()
+    baselines: BaselinesGroup = group()
+    ridge: RidgeGroup | None = group(default=None)
+    training_indices: IntArray = dataset("samples of the flight that trained", "sample", path="training/indices")
+    findings: tuple[str, ...] = dataset("what failed or was not excited, in words", "finding")
+    structures: StructuresGroup | None = group(default=None)
+    residuals: ResidualsGroup | None = group(default=None)
+    uncertainty: UncertaintyGroup | None = group(default=None)
+    curves: CurvesGroup | None = group(default=None)
+    round_trip: RoundTripGroup | None = group(default=None)
+    steps: StepsGroup | None = group(default=None)
+    physics: PhysicsGroup | None = group(default=None)
+    period: PeriodGroup | None = group(default=None)
+    verdict: VerdictGroup | None = group(default=None)
 
     @classmethod
     def of(

@@ -32,10 +32,8 @@ def response_word(cost: float) -> str:
 class CurveGroup:
     """Complex gains by response and frequency, as decibels and degrees."""
 
-    magnitude: Array = dataset(
-        "magnitude", "20 log10 of the gain in SI units", "response", "frequency", units="dB", gaps=True
-    )
-    phase: Array = dataset("phase", "from -180 to 180", "response", "frequency", units="deg", gaps=True)
+    magnitude: Array = dataset("20 log10 of the gain in SI units", "response", "frequency", units="dB", gaps=True)
+    phase: Array = dataset("from -180 to 180", "response", "frequency", units="deg", gaps=True)
 
     @classmethod
     def of(cls, gains: Array) -> Self:
@@ -52,12 +50,12 @@ class CurveGroup:
 class DeviationGroup:
     """Stretches of the band of a response, each one in which the model is right, or off in one way."""
 
-    response: IntArray = dataset("response", "index of the response", "deviation", into="response")
-    low: Array = dataset("low", "from this frequency", "deviation", units="Hz")
-    high: Array = dataset("high", "to this one", "deviation", units="Hz")
-    right: BoolArray = dataset("right", "1 where the model is right", "deviation")
-    gain: Array = dataset("gain", "gain of the model over the measured one, geometric mean", "deviation")
-    phase: Array = dataset("phase", "phase of the model less the measured one, mean", "deviation", units="deg")
+    response: IntArray = dataset("index of the response", "deviation", into="response")
+    low: Array = dataset("from this frequency", "deviation", units="Hz")
+    high: Array = dataset("to this one", "deviation", units="Hz")
+    right: BoolArray = dataset("1 where the model is right", "deviation")
+    gain: Array = dataset("gain of the model over the measured one, geometric mean", "deviation")
+    phase: Array = dataset("phase of the model less the measured one, mean", "deviation", units="deg")
 
 
 @record
@@ -71,62 +69,44 @@ class ResponseRecord(Record):
         ("model", "flight"),
     )
 
-    played: str = dataset("played", "the model: a file, or vehicle for that of /config")
-    flown: tuple[str, ...] = dataset("flown", "names of the flights", "flight")
+    played: str = dataset("the model: a file, or vehicle for that of /config")
+    flown: tuple[str, ...] = dataset("names of the flights", "flight")
     instruments: str = dataset(
-        "instruments",
-        "what moves the vehicle and knows nothing of gusts: repeats (the same path flown again), setpoints, or none",
+        "what moves the vehicle and knows nothing of gusts: repeats (the same path flown again), setpoints, or none"
     )
     name: tuple[str, ...] = dataset(
-        "name",
         "roll, pitch, yaw: torque of the rotors to angular acceleration; thrust: to specific force along z; rotor "
         "speed: from its command; roll rate, roll angle and others alike: from its setpoint",
         "response",
     )
     instrumented: BoolArray = dataset(
-        "instrumented", "1 where it was estimated with instruments, which they have to move, in all flights", "response"
+        "1 where it was estimated with instruments, which they have to move, in all flights", "response"
     )
-    frequency: Array = dataset(
-        "frequency", "frequencies, evenly spread on a logarithmic scale", "frequency", units="Hz"
-    )
-    measured: CurveGroup = group("measured")
-    model: CurveGroup = group("model")
-    direct: CurveGroup = group("direct")
+    frequency: Array = dataset("frequencies, evenly spread on a logarithmic scale", "frequency", units="Hz")
+    measured: CurveGroup = group()
+    model: CurveGroup = group()
+    direct: CurveGroup = group()
     coherence_input: Array = dataset(
-        "coherence_input",
-        "share of the input that the instruments explain; 1 without",
-        "response",
-        "frequency",
-        gaps=True,
+        "share of the input that the instruments explain; 1 without", "response", "frequency", gaps=True
     )
     coherence_output: Array = dataset(
-        "coherence_output",
-        "share of the output that the instruments explain; without, the input",
-        "response",
-        "frequency",
-        gaps=True,
+        "share of the output that the instruments explain; without, the input", "response", "frequency", gaps=True
     )
     random_error: Array = dataset(
-        "random_error",
         "standard error of the measured gain over the gain; in radians that of the phase",
         "response",
         "frequency",
         gaps=True,
     )
-    averages: Array = dataset("averages", "windows that count as independent", "response", "frequency", gaps=True)
-    cost: Array = dataset("cost", "J of the model; not finite where there is nothing to judge", "response", gaps=True)
+    averages: Array = dataset("windows that count as independent", "response", "frequency", gaps=True)
+    cost: Array = dataset("J of the model; not finite where there is nothing to judge", "response", gaps=True)
     band: Array = dataset(
-        "band",
-        "frequencies that are judged, first and last; not finite where none",
-        "response",
-        "2",
-        units="Hz",
-        gaps=True,
+        "frequencies that are judged, first and last; not finite where none", "response", "2", units="Hz", gaps=True
     )
-    deviation: DeviationGroup = group("deviation")
-    warning: tuple[str, ...] = dataset("warning", "what to know about flights and model", "warning")
+    deviation: DeviationGroup = group()
+    warning: tuple[str, ...] = dataset("what to know about flights and model", "warning")
     contradiction: tuple[str, ...] | None = dataset(
-        "contradiction", "what of the flights contradicts itself or the vehicle", "contradiction", default=None
+        "what of the flights contradicts itself or the vehicle", "contradiction", default=None
     )
 
     @classmethod
