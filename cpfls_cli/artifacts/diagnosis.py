@@ -293,12 +293,8 @@ class DiagnosisRecord(Record):
 
         Parameters
         ----------
-        model : ExtendedModel
-            That it arrives at.
         split : str
             Why these flights trained and those were held out.
-        warnings : sequence of str
-            What to know about the flights.
         base : VehicleModel
             The identified model that misses something, or the vehicle.
         """

@@ -175,15 +175,7 @@ class DisagreementRecord(Record):
     def of(
         cls, disagreement: Disagreement, recordings: Sequence[Recording], warnings: tuple[str, ...], base: VehicleModel
     ) -> Self:
-        """Arrange a comparison.
-
-        Parameters
-        ----------
-        warnings : tuple of str
-            What to know about the flights.
-        base : VehicleModel
-            That was compared.
-        """
+        """Arrange a comparison."""
         return cls(
             gap=GapGroup.of(disagreement),
             residual=ResidualGroup(

@@ -85,10 +85,6 @@ class ExtendedRecord(ModelRecord):
         ----------
         stated : VehicleSettings
             That the effects were fitted with.
-        model : VehicleModel
-            With the effects.
-        playback : PlaybackChangeGroup
-            Of held-out flights.
         left_out : sequence of LeftOut
             What no table of weights holds, along them.
         """

@@ -164,8 +164,6 @@ class TrackingGroup:
 
         Parameters
         ----------
-        controllers : sequence of str
-            Their names.
         attitude : array, shape (time, 3), rad
             Of the flight under the model's controller.
         """

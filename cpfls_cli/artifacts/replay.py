@@ -334,13 +334,7 @@ class WorstGroup:
 
     @classmethod
     def of(cls, windows: ReplayWindows, played: Sequence[Played], horizon: int) -> Self:
-        """Draw the worst windows.
-
-        Parameters
-        ----------
-        horizon : int
-            Samples.
-        """
+        """Draw the worst windows."""
         chosen = windows.worst(horizon, WORST)
         runs = [drawn_runs(played[windows.flight[index]], windows.start[[index]], horizon) for index in chosen]
         return cls(
@@ -366,13 +360,7 @@ class DrawnGroup:
 
     @classmethod
     def of(cls, windows: ReplayWindows, played: Sequence[Played], horizon: int) -> Self:
-        """Draw a stretch of which half are better and half are worse.
-
-        Parameters
-        ----------
-        horizon : int
-            Samples.
-        """
+        """Draw a stretch of which half are better and half are worse."""
         chosen = windows.typical(horizon, _DRAWN_RUNS)
         runs = drawn_runs(played[windows.flight[chosen[0]]], windows.start[chosen], horizon)
         return cls(window=np.array(chosen, dtype=np.int64), **vars(runs))
@@ -423,13 +411,7 @@ class ReplayRecord(Record):
         replay: Replay,
         warnings: Sequence[str],
     ) -> Self:
-        """Arrange a replay.
-
-        Parameters
-        ----------
-        name : str
-            Of the model.
-        """
+        """Arrange a replay."""
         errors, windows, period = replay.errors, replay.windows, played[0].flight.motion.period
         groups = {signal: SignalErrorGroup.of(found) for signal, found in errors.items()}
         assert groups["body_rate"] is not None, "every flight has rates"

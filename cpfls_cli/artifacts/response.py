@@ -119,17 +119,7 @@ class ResponseRecord(Record):
         warnings: Sequence[str],
         contradictions: tuple[str, ...] | None,
     ) -> Self:
-        """Arrange responses.
-
-        Parameters
-        ----------
-        played : str
-            Name of the model.
-        flown : sequence of str
-            Names of the flights.
-        instruments : str
-            What they are.
-        """
+        """Arrange responses."""
         estimates = [each.estimate for each in responses]
         frequency = np.unique(np.concatenate([each.frequency for each in estimates]))
 

@@ -145,8 +145,6 @@ def dataset(
 
     Parameters
     ----------
-    description : str
-        What it holds.
     *dimensions : str
         Labels of the axes; none for a scalar.
     path : str
@@ -252,13 +250,7 @@ class Record:
 
     @classmethod
     def lacking(cls, present: Container[str]) -> list[str]:
-        """List the datasets that an artifact lacks which holds these: of a group that is there, all but the optional.
-
-        Parameters
-        ----------
-        present : container of str
-            Paths of datasets.
-        """
+        """List the datasets that an artifact with these paths lacks: of a group that is there, all but the optional."""
         return list(_lacking(cls, "", present))
 
     @property
@@ -297,8 +289,6 @@ def columns_of(kind: type[_Class], rows: Iterable[object], /, **given: Any) -> _
 
     Parameters
     ----------
-    kind : type
-        A record whose fields are lists of text or numbers.
     **given : object
         Columns that are no attribute of the results, by field.
     """

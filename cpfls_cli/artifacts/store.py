@@ -86,10 +86,6 @@ def read_record(path: Path, wanted: type[R], *needed: str) -> R:
 
     Parameters
     ----------
-    path : Path
-        Of the file.
-    wanted : type of Record
-        Its format.
     *needed : str
         Fields at the top of the record that this command cannot do without.
     """
@@ -133,13 +129,7 @@ def artifact_of(record: Record) -> Artifact:
 
 
 def read_artifact(path: Path, *wanted: Format) -> Artifact:
-    """Read an artifact whole.
-
-    Parameters
-    ----------
-    *wanted : Format
-        Formats that the caller can use; any if none is named.
-    """
+    """Read an artifact whole."""
     with opened(path, *wanted) as stored:
         require_all(path, stored)
         refuse(path, check_structure(stored))
@@ -354,11 +344,6 @@ def file_sha256(path: Path) -> str:
 
 def count_rows(path: Path, spec: Format, first: str) -> int | None:
     """Count the rows of a dataset.
-
-    Parameters
-    ----------
-    first : str
-        Path of the dataset.
 
     Returns
     -------

@@ -128,10 +128,6 @@ class RunGroup:
 
         Parameters
         ----------
-        setting : int
-            Its index.
-        parts : sequence of str
-            What models are judged on.
         result : Identification or None
             None where no chromosome gave a finite model.
         """

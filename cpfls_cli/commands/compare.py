@@ -30,15 +30,7 @@ from cpfls_cli.report.outcome import Outcome, nothing_written
 
 
 def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
-    """Compare a model with flights and write where they disagree.
-
-    Parameters
-    ----------
-    flights : sequence of Path
-        Artifacts, or logs that the config describes.
-    model : Path or None
-        Identified, with effects, or of a whole vehicle; None for the rigid body of the vehicle.
-    """
+    """Compare a model with flights and write where they disagree."""
     roles = numbered_roles("flight", flights)
     inputs = begin(job, roles | ({} if model is None else {"model": model}))
     check_ignored(job.study)
@@ -71,13 +63,7 @@ def finish_disagreement(
 def compared(
     study: Study, given: Recordings, model: VehicleModel, progress: Callable[[float, str], None]
 ) -> DisagreementRecord:
-    """Compare a model with flights.
-
-    Parameters
-    ----------
-    model : VehicleModel
-        Flights are those of its vehicle.
-    """
+    """Compare a model with flights."""
     disagreement = compare(given.recordings, model, study.gap, generator(study, "compare"), progress)
     return DisagreementRecord.of(disagreement, given.recordings, given.warnings, model)
 

@@ -46,19 +46,7 @@ def run(
     options: SearchOptions,
     choose_on: Sequence[Path] = (),
 ) -> Outcome:
-    """Identify a model and write it.
-
-    Parameters
-    ----------
-    selection : Path or None
-        Samples to learn from; all of the training part if None.
-    validate : sequence of Path
-        Other flights to judge the model on; nothing is learned from them.
-    options : SearchOptions
-        How the search is run.
-    choose_on : sequence of Path
-        Other flights to choose the model on, for `identification.choice: held-out`.
-    """
+    """Identify a model and write it."""
     inputs, search = begin_search(job, input_roles(flights, selection, validate, choose_on), options)
     data = read_training(flights, selection, job.study, inputs)
     kept = choosing_source(choose_on, inputs)

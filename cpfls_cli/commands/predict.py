@@ -51,13 +51,7 @@ _Predicted = Callable[[FlightStretch], PredictionRecord]
 
 
 def run(job: Job, model: Path, flight: Path) -> Outcome:
-    """Predict along a flight and write it.
-
-    Parameters
-    ----------
-    model : Path
-        Identified, one with effects, or of a whole vehicle.
-    """
+    """Predict along a flight and write it."""
     inputs = begin(job, {"model": model, "flight": flight})
     require_known(job.study, "predict", whole=holds(model, VehicleRecord))
     record = read_record(model, ModelRecord)

@@ -30,15 +30,7 @@ _FORECAST = "{}: its forecast along logged rotor speeds is played, loop and all;
 
 
 def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) -> Outcome:
-    """Play a model back along flights and write its errors by horizon.
-
-    Parameters
-    ----------
-    model : Path
-        Any model; the word ``vehicle`` for the vehicle of the config.
-    flights : sequence of Path
-        Artifacts, or logs that the config describes.
-    """
+    """Play a model back along flights and write its errors by horizon."""
     require_known(job.study, "replay", whole=not is_vehicle(model))
     of_model = {} if is_vehicle(model) else {"model": model}
     roles = numbered_roles("flight", flights)

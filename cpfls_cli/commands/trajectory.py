@@ -77,22 +77,7 @@ class Flight:
 
 
 def run(job: Job, waypoints: Path | None = None, plot: bool = False, mission: Mission | None = None) -> Outcome:
-    """Plan the path of a study and write it.
-
-    Parameters
-    ----------
-    waypoints : Path or None
-        CSV of the points to fly to, in place of the path of the config.
-    plot : bool
-        Draw the path beside the output.
-    mission : Mission or None
-        Files for autopilots to write beside it; None for none.
-
-    Raises
-    ------
-    ComputationError
-        If the path asks for more than the vehicle has, unless `trajectory.infeasible` is ``report``.
-    """
+    """Plan the path of a study and write it."""
     mission = mission or Mission()
     inputs = begin(job, {"waypoints": waypoints} if waypoints else {})
     settings = _settings(job.study, waypoints)
@@ -242,11 +227,6 @@ def _demand(
     """Find what a plan asks of its vehicle, sampled anew where a part of a move may lie between two samples.
 
     The sentences say what is asked for beyond what the vehicle has.
-
-    Raises
-    ------
-    SettingError
-        If the moves are too short to be looked at between the samples.
     """
     shortest = _shortest_part(planned, settings)
     step = shortest / _SAMPLES_IN_A_PART
@@ -297,13 +277,7 @@ def _too_much_without_turn(study: Study, settings: TrajectorySettings) -> bool:
 
 
 def figure_paths(job: Job, names: Sequence[str]) -> tuple[Path, ...]:
-    """Name the figures of a path, beside its artifact.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Of the figures, one word each.
-    """
+    """Name the figures of a path, beside its artifact."""
     return tuple(job.output.with_name(f"{job.output.stem}-{name}.svg") for name in names)
 
 

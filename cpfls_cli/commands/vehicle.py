@@ -57,25 +57,7 @@ def run(
     *,
     resume: bool = False,
 ) -> Outcome:
-    """Find a vehicle and write it.
-
-    Parameters
-    ----------
-    flights : sequence of Path
-        Artifacts, or logs that the config describes; the vehicle is found in them.
-    held_out : sequence of Path
-        Others to judge it on, once.
-    config : ConfigCopy or None
-        Written beside the artifact, at the end of the search.
-    resume : bool
-        Go on with a search that was stopped.
-
-    Raises
-    ------
-    InputError
-        If a flight has no rotor speeds or commands, or is shorter than the horizon; also for a checkpoint that is not
-        asked for, or cannot be resumed.
-    """
+    """Find a vehicle and write it."""
     study = job.study
     learned, unseen = numbered_roles("flight", flights), numbered_roles("held-out", held_out)
     inputs, checkpoint, kept = begin_vehicle_search(job, learned | unseen, resume=resume)
@@ -141,13 +123,7 @@ def _require_rotors(flight: LoggedFlight) -> None:
 def _found(
     job: Job, flights: Sequence[LoggedFlight], checkpoint: VehicleCheckpoint, kept: Kept
 ) -> tuple[FoundVehicle, int | None]:
-    """Search; an interrupt ends the search, and its number is given beside what has been found until then.
-
-    Raises
-    ------
-    CpflsError
-        If there is nothing to take yet.
-    """
+    """Search; an interrupt ends the search, and its number is given beside what has been found until then."""
     study, watch = job.study, Watch(job, None)
     job.progress(0.0, 1, "loads compiled loops")
 

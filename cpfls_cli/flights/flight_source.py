@@ -106,11 +106,6 @@ class FlightFile:
 def flight_source(path: Path, *, torque: bool = True) -> TorqueSource:
     """Open a flight.
 
-    Parameters
-    ----------
-    torque : bool
-        Whether its torque is needed; without, it counts as zero.
-
     Raises
     ------
     InputError

@@ -58,13 +58,7 @@ _NEXT: dict[str, str] = {
 
 
 def first_screen(record: DiagnosisRecord, index: int) -> Iterator[Block]:
-    """Say what a diagnosis found, how sure that is, where, what it becomes on held-out flights, and what to do next.
-
-    Parameters
-    ----------
-    index : int
-        Number of the diagnosis on its page.
-    """
+    """Say what a diagnosis found, how sure that is, where, what it becomes on held-out flights, and what to do next."""
     if record.again_before is not None and not record.contradiction:
         yield again_box(record.again_before, record.again_after, model_words(record))
     yield verdict_box(record)

@@ -130,8 +130,6 @@ def again_blocks(
 
     Parameters
     ----------
-    index : int
-        Number of the artifact on its page.
     label : str
         What kind of artifact it is, for names that are unique on the page.
     """

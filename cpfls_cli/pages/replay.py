@@ -72,13 +72,7 @@ _POSITIONS = ("x", "y", "z")
 
 
 def answer(replay: Source[ReplayRecord], index: int = 1) -> Iterator[Block]:
-    """Say to which horizon a model is better than what it has to beat, by how much, and where it is worst.
-
-    Parameters
-    ----------
-    index : int
-        Number of the replay on its page.
-    """
+    """Say to which horizon a model is better than what it has to beat, by how much, and where it is worst."""
     yield verdict_box(replay)
     yield from _grounds(replay.record, index)
 
@@ -135,8 +129,6 @@ def playback_words(trust: str, held: PlaybackGroup | None, contradictions: Seque
 
     Parameters
     ----------
-    trust : str
-        See `trust_by_playback`.
     held : PlaybackGroup or None
         None where no flight was held out.
     contradictions : sequence of str or None

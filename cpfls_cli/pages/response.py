@@ -51,13 +51,7 @@ _UNEXCITED: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "zorder": 1.5}
 
 
 def answer(response: Source[ResponseRecord], index: int = 1) -> Iterator[Block]:
-    """Say in which responses and at which frequencies a model is right, and how far off it is where it is not.
-
-    Parameters
-    ----------
-    index : int
-        Number of the artifact on its page.
-    """
+    """Say in which responses and at which frequencies a model is right, and how far off it is where it is not."""
     yield response_box(response.record)
     yield from _grounds(response.record, index)
 

@@ -87,8 +87,6 @@ def seen_warnings(model: str, learned: Sequence[LearnedFlight], judged: KnownBy)
 
     Parameters
     ----------
-    model : str
-        What it is called.
     judged : iterable of (str, collection of str)
         File name and hashes, as for `seen_words`, of each flight.
     """
