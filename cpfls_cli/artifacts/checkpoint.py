@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
+from cpfls_cli.artifacts.spec import Format, Record, columns_of, dataset, group, group_of, record
 from cpfls_cli.evolution.engine import EvolutionState, History
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ class CheckpointRecord(Record):
             generator=json.dumps(state.rng.bit_generator.state),
             population=population,
             archive=ArchiveGroup(**_stored(submitted, results.genes, results.objectives)),
-            history=HistoryGroup(**vars(state.history)),
+            history=group_of(HistoryGroup, state.history),
             unfinished=UnfinishedGroup(**_stored(none, none, state.objectives[:0])),
         )
 
@@ -123,7 +123,7 @@ class CheckpointRecord(Record):
             generator=_NO_GENERATOR,
             population=PopulationGroup(genes=none.astype(np.uint16), objectives=objectives, subpopulation=np.arange(0)),
             archive=ArchiveGroup(**_stored(none, none, objectives)),
-            history=HistoryGroup(**vars(History.empty(objectives.shape[1]))),
+            history=group_of(HistoryGroup, History.empty(objectives.shape[1])),
             unfinished=UnfinishedGroup(**_stored(none, none, objectives)),
         )
         return empty.with_unfinished(unfinished)
@@ -174,10 +174,11 @@ class VehicleCheckpointRecord(Record):
         """Arrange the structures that were judged, at least one."""
         fits = [fitted for each in judged for fitted in each.fits]
         return cls(
-            structure=StructuresKeptGroup(
+            structure=columns_of(
+                StructuresKeptGroup,
+                judged,
                 blocks=tuple(" ".join(each.structure.blocks) for each in judged),
                 rules=np.array([each.structure.rules for each in judged], dtype=np.int64),
-                numbers=np.array([each.numbers for each in judged], dtype=np.int64),
             ),
             loss=np.array([[fitted.loss for fitted in each.fits] for each in judged]),
             values=np.concatenate([fitted.values for fitted in fits]),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.spec import BODY, dataset, record
+from cpfls_cli.artifacts.spec import BODY, dataset, group_of, record
 from cpfls_cli.blocks import half_width
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.settings import COUNTS
@@ -87,7 +87,7 @@ class ComesAgainGroup:
     @classmethod
     def of(cls, found: ComesAgain | None) -> Self | None:
         """Arrange what comes again; None where no flight repeats another."""
-        return None if found is None else cls(**{name: getattr(found, name) for name in cls.__dataclass_fields__})
+        return None if found is None else group_of(cls, found)
 
     @property
     def share(self) -> Array:

@@ -26,7 +26,7 @@ from cpfls_cli.artifacts.gap_flights import (
 )
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, LearnedGroup, learned_in
 from cpfls_cli.artifacts.model import VehicleGroup
-from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
+from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.gap.naming.results import Alternative, Unexplained
 
 if TYPE_CHECKING:
@@ -168,15 +168,7 @@ class PictureGroup:
     @classmethod
     def of(cls, change: BeforeAfter, held: Sequence[Recording]) -> Self:
         """Arrange the stretch with the largest gap."""
-        picture = change.picture
-        return cls(
-            flight=held[picture.flight].name,
-            channel=picture.channel,
-            time=picture.time,
-            measured=picture.measured,
-            before=picture.before,
-            after=picture.after,
-        )
+        return group_of(cls, change.picture, flight=held[change.picture.flight].name)
 
 
 @record

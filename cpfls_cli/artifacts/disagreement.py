@@ -16,7 +16,7 @@ from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, LearnedGrou
 from cpfls_cli.artifacts.model import VehicleGroup
 from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.replay import PlaybackGroup
-from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
+from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.replay import PREDICTIONS
@@ -46,13 +46,7 @@ class GapGroup:
     @classmethod
     def of(cls, disagreement: Disagreement) -> Self:
         """Arrange the gap of each channel."""
-        return cls(
-            channel=CHANNELS,
-            rms=disagreement.rms,
-            floor=disagreement.floor,
-            floors=disagreement.floors,
-            share=disagreement.rms / disagreement.activity,
-        )
+        return group_of(cls, disagreement, channel=CHANNELS, share=disagreement.rms / disagreement.activity)
 
     @property
     def known(self) -> list[int]:
@@ -135,14 +129,8 @@ class HeatMapGroup:
     def of(cls, worst: WorstChannel) -> Self:
         """Arrange the channel with the largest gap over two signals."""
         first, second = worst.heat_map.edges
-        return cls(
-            channel=worst.channel,
-            signal=worst.signals,
-            first_edge=first,
-            second_edge=second,
-            mean=worst.heat_map.mean,
-            count=worst.heat_map.count,
-        )
+        given = {"channel": worst.channel, "signal": worst.signals, "first_edge": first, "second_edge": second}
+        return group_of(cls, worst.heat_map, **given)
 
 
 @record

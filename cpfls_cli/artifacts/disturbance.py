@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.spec import dataset, record
+from cpfls_cli.artifacts.spec import dataset, group_of, record
 from cpfls_cli.playback.gusts import GUST_AXES
 
 if TYPE_CHECKING:
@@ -54,16 +54,7 @@ class DisturbanceGroup:
     @classmethod
     def of(cls, found: FoundGusts) -> Self:
         """Arrange what was found."""
-        return cls(
-            told_by=found.told_by,
-            name=GUST_AXES[: len(found.size)],
-            size=found.size,
-            low=found.low,
-            high=found.high,
-            memory=found.memory,
-            memory_low=found.memory_low,
-            memory_high=found.memory_high,
-        )
+        return group_of(cls, found, name=GUST_AXES[: len(found.size)])
 
     def axes(self, inertia: Array, mass: float) -> Iterator[GustAxis]:
         """Give each axis as the acceleration of a body.

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.spec import BODY, EULER, dataset, record
+from cpfls_cli.artifacts.spec import BODY, EULER, dataset, group_of, record
 
 if TYPE_CHECKING:
     from cpfls_cli.validation.validate import Validation
@@ -150,12 +149,6 @@ class VerdictGroup:
         """The verdict for machines."""
         reasons = [{"text": text, "speaks": speaks} for text, speaks in self.reasons]
         return {"label": self.label, "region": self.region or "", "reasons": reasons}
-
-
-def group_of(kind: type[G], result: object) -> G:
-    """Arrange a result as a group of datasets that have the names of its attributes."""
-    values = {field.name: getattr(result, field.name) for field in fields(kind)}  # type: ignore[arg-type]  # a record
-    return kind(**values)
 
 
 def evidence_groups(evidence: Validation) -> dict[str, Any]:

@@ -70,8 +70,9 @@ class FlightGroup:
             Of each: given, training or held-out.
         """
         lengths = [len(recording.signals) for recording in recordings]
-        return cls(
-            name=tuple(recording.name for recording in recordings),
+        return columns_of(
+            cls,
+            recordings,
             role=tuple(roles),
             first=np.cumsum([0, *lengths[:-1]]),
             commanded=np.array([int(recording.signals.commanded) for recording in recordings]),

@@ -19,7 +19,6 @@ from cpfls_cli.artifacts.evidence import (
     UncertaintyGroup,
     VerdictGroup,
     evidence_groups,
-    group_of,
 )
 from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.model import (
@@ -31,7 +30,7 @@ from cpfls_cli.artifacts.model import (
     VehicleGroup,
 )
 from cpfls_cli.artifacts.scores import MODEL, TRAINING, JudgedGroup
-from cpfls_cli.artifacts.spec import BODY, EULER, Format, dataset, group, record
+from cpfls_cli.artifacts.spec import BODY, EULER, Format, dataset, group, group_of, record
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.validation.trust import Trust
@@ -204,17 +203,8 @@ class IdentifiedRecord(ModelRecord):
         return cls(
             vehicle=IdentifiedVehicleGroup.identified(vehicle, result.model),
             learned=parts,
-            model=ChosenGroup(
-                weights=result.front.chromosomes[result.front.chosen],
-                base=base,
-                ridge_weight=result.fit.ridge_weight,
-            ),
-            solve=SolveGroup(
-                singular_values=result.system.singular_values,
-                rank=result.system.rank,
-                condition_number=result.system.condition_number,
-                parameters=result.system.parameters,
-            ),
+            model=group_of(ChosenGroup, result.fit, weights=result.front.chromosomes[result.front.chosen], base=base),
+            solve=group_of(SolveGroup, result.system),
             rules=group_of(RulesGroup, result.excitation),
             front=group_of(FrontGroup, result.front),
             history=group_of(HistoryGroup, result.history),

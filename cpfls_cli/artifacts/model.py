@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.audit import AuditGroup
 from cpfls_cli.artifacts.learned import LearnedFlight, LearnedGroup, learned_in
-from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record
+from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, group_of, record
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.rotors import RotorResponse
@@ -90,15 +90,8 @@ class ResponseGroup:
     @classmethod
     def of(cls, response: RotorResponse, *, commanded: bool, hold: str | None) -> Self:
         """Arrange a response, whether it lies behind commands, and what those are between samples."""
-        return cls(
-            delay=response.delay_s,
-            lag=response.lag_s,
-            slow_roll_pitch=response.slow_roll_pitch,
-            slow_yaw=response.slow_yaw,
-            slow=response.slow_s,
-            commanded=commanded,
-            hold=hold or USUAL,
-        )
+        times = {"delay": response.delay_s, "lag": response.lag_s, "slow": response.slow_s}
+        return group_of(cls, response, **times, commanded=commanded, hold=hold or USUAL)
 
     def response(self) -> RotorResponse:
         """Rebuild it."""
@@ -165,12 +158,7 @@ class RemainderGroup:
     @classmethod
     def of(cls, remainder: Remainder) -> Self:
         """Arrange a remainder."""
-        return cls(
-            breakpoints=remainder.breakpoints,
-            harmonic_order=remainder.harmonic_order,
-            rows=remainder.rows,
-            coefficients=remainder.coefficients,
-        )
+        return group_of(cls, remainder)
 
 
 @record
@@ -230,12 +218,9 @@ class InertiaFunctionsGroup:
         """Arrange an inertia over attitude."""
         structure = model.structure
         names = [p.name for p, peaks in zip(structure.partitions, model.partitions, strict=True) for _ in peaks]
-        return cls(
-            structure=structure.settings.structure,
-            input_map=structure.settings.input_map,
-            consequents=structure.settings.consequents,
-            harmonic_order=structure.settings.harmonic_order,
-            products=structure.settings.products,
+        return group_of(
+            cls,
+            structure.settings,
             membership_functions=np.array([each.functions for each in structure.partitions]),
             partition=tuple(names),
             breakpoints=np.concatenate(model.partitions),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.spec import BODY, WORLD, Format, Record, dataset, group, record
+from cpfls_cli.artifacts.spec import BODY, WORLD, Format, Record, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.playback.replay import PREDICTIONS, drawn_runs, where_better
 from cpfls_cli.rounding import less
 from cpfls_cli.validation.trust import Trust
@@ -213,7 +213,7 @@ class HeldOutGroup(PlaybackGroup):
     def judged(cls, flights: Sequence[Played], replay: Replay) -> Self:
         """Arrange a replay without its windows, and where the model is better than what knows no model."""
         better = where_better(flights, replay.windows)
-        region = None if better is None else RegionGroup(**vars(better))
+        region = None if better is None else group_of(RegionGroup, better)
         return cls.of(flights, replay, replay.predictions, better=region)
 
     @property
@@ -279,11 +279,10 @@ class PlayedFlightsGroup:
     @classmethod
     def of(cls, flights: Sequence[LoggedFlight], played: Sequence[Played], windows: ReplayWindows) -> Self:
         """Arrange flights."""
-        return cls(
-            name=tuple(flight.name for flight in flights),
+        return columns_of(
+            cls,
+            flights,
             windows=np.bincount(windows.flight, minlength=len(flights)),
-            actuation=tuple(flight.actuation for flight in flights),
-            hold=tuple(flight.hold for flight in flights),
             rotation_alone=np.array([not each.flight.translates for each in played]),
         )
 
@@ -459,21 +458,8 @@ class ReplayRecord(Record):
             "windows": self.windows,
             "models": {name: self._prediction(index) for index, name in enumerate(self.prediction)},
             "flights": [
-                {
-                    "name": name,
-                    "windows": int(windows),
-                    "driven_by": actuation,
-                    "hold": hold,
-                    "rotation_alone": bool(alone),
-                }
-                for name, windows, actuation, hold, alone in zip(
-                    self.flight.name,
-                    self.flight.windows,
-                    self.flight.actuation,
-                    self.flight.hold,
-                    self.flight.rotation_alone,
-                    strict=True,
-                )
+                {("driven_by" if key == "actuation" else key): value for key, value in row.items()}
+                for row in rows_of(self.flight)
             ],
             "worst": [
                 {

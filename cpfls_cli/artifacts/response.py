@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
+from cpfls_cli.artifacts.spec import Format, Record, columns_of, dataset, group, record, rows_of
 from cpfls_cli.response.mismatch import ACCEPTABLE, COHERENT, GOOD, ROTOR_SPEED, Deviation, clearness
 from cpfls_cli.rounding import at_most
 
@@ -148,13 +148,10 @@ class ResponseRecord(Record):
             averages=spread([each.averages for each in estimates]),
             cost=np.array([each.mismatch.cost for each in responses]),
             band=np.array([each.mismatch.band or (np.nan, np.nan) for each in responses]),
-            deviation=DeviationGroup(
+            deviation=columns_of(
+                DeviationGroup,
+                (each for _, each in listed),
                 response=np.array([index for index, _ in listed], dtype=np.int64),
-                low=np.array([each.low for _, each in listed]),
-                high=np.array([each.high for _, each in listed]),
-                right=np.array([each.right for _, each in listed], dtype=bool),
-                gain=np.array([each.gain for _, each in listed]),
-                phase=np.array([each.phase for _, each in listed]),
             ),
             warning=tuple(warnings),
             contradiction=contradictions,
@@ -201,10 +198,7 @@ class ResponseRecord(Record):
 
     def deviations(self, index: int) -> list[Deviation]:
         """List where the model is right and where it is off in one response, from low to high frequencies."""
-        listed, own = self.deviation, np.flatnonzero(self.deviation.response == index)
-        columns = (listed.low[own], listed.high[own], listed.right[own], listed.gain[own], listed.phase[own])
-        rows = zip(*(column.tolist() for column in columns), strict=True)
-        return [Deviation(low, high, bool(right), gain, phase) for low, high, right, gain, phase in rows]
+        return [Deviation(**row) for row in rows_of(self.deviation) if row.pop("response") == index]
 
     @property
     def columns(self) -> dict[str, Array]:

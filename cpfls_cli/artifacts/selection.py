@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
+from cpfls_cli.artifacts.spec import Format, Record, dataset, group, group_of, record
 
 if TYPE_CHECKING:
     from cpfls_cli.reduction.selection import Selection
@@ -62,21 +62,16 @@ class SelectionRecord(Record):
         random : array, shape (draw,)
             Condition numbers of random selections of equal size.
         """
-        return cls(
+        return group_of(
+            cls,
+            selection,
             indices=indices,
             trace=TraceGroup(
                 condition_number=selection.condition_number_trace,
                 singular_value_min=selection.singular_value_min_trace,
                 singular_value_max=selection.singular_value_max_trace,
             ),
-            rank=selection.rank,
-            rank_full=selection.rank_full,
-            condition_number=selection.condition_number,
-            condition_number_full=selection.condition_number_full,
             candidates=candidates,
-            criterion=selection.criterion,
-            exchanges=selection.exchanges,
-            stop_reason=selection.stop_reason,
             random_condition_number=random,
         )
 

@@ -284,6 +284,18 @@ class Record:
         return replace(self, header=header)
 
 
+def group_of(kind: type[_Class], result: object, /, **given: Any) -> _Class:
+    """Arrange a result as a group: each field holds the attribute of its name, but for those that are given.
+
+    Raises
+    ------
+    AttributeError
+        If a field is neither given nor an attribute.
+    """
+    names = (entry.name for entry in _entries(kind))  # type: ignore[arg-type]  # classes are hashable
+    return kind(**{name: getattr(result, name) for name in names if name not in given}, **given)
+
+
 def columns_of(kind: type[_Class], rows: Iterable[object], /, **given: Any) -> _Class:
     """Arrange results as a group of columns: each field holds the attributes of its name, one for each result.
 
@@ -294,7 +306,7 @@ def columns_of(kind: type[_Class], rows: Iterable[object], /, **given: Any) -> _
     """
     listed = list(rows)
     columns = {
-        entry.name: _column([getattr(row, entry.name) for row in listed], entry.kind)
+        entry.name: _read(entry.kind, [getattr(row, entry.name) for row in listed])
         for entry in _entries(kind)  # type: ignore[arg-type]  # classes are hashable
         if entry.name not in given
     }
@@ -310,10 +322,6 @@ def rows_of(group: object) -> list[dict[str, Any]]:
     }
     listed = [values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values()]
     return [dict(zip(columns, row, strict=True)) for row in zip(*listed, strict=True)]
-
-
-def _column(values: list[Any], kind: Any) -> Any:
-    return tuple(values) if kind == tuple[str, ...] else np.array(values, dtype=float)
 
 
 class _Entry(NamedTuple):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record, rows_of
+from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, columns_of, dataset, group, record, rows_of
 
 if TYPE_CHECKING:
     from cpfls_cli.simulation.room_left import RoomLeft
@@ -36,9 +36,9 @@ class LegGroup:
     @classmethod
     def of(cls, legs: Sequence[Leg]) -> Self:
         """Arrange the moves of a plan."""
-        return cls(
-            begin=np.array([leg.begin for leg in legs]),
-            end=np.array([leg.end for leg in legs]),
+        return columns_of(
+            cls,
+            legs,
             displacement=np.array([leg.vector for leg in legs]),
             limited_by=tuple(" ".join(leg.limited_by) for leg in legs),
         )

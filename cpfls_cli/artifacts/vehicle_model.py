@@ -15,7 +15,7 @@ from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
 from cpfls_cli.artifacts.parameters import parameters_of
 from cpfls_cli.artifacts.replay import HeldOutGroup, trust_by_playback
 from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, response_word
-from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, record, rows_of
+from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.response.mismatch import ROTATION, THRUST
 from cpfls_cli.validation.trust import Trust, capped
@@ -85,14 +85,13 @@ class StructuresTriedGroup:
         baselines = ("chosen", "best", "greedy", "everything", "nothing")
         listed = [*((name, getattr(choice, name)) for name in baselines), *(("front", each) for each in choice.front)]
         differences = [judged.worse_than(choice.best) for _, judged in listed]
-        return cls(
+        return columns_of(
+            cls,
+            (judged for _, judged in listed),
             name=tuple(name for name, _ in listed),
             blocks=tuple(" ".join(judged.structure.blocks) for _, judged in listed),
-            error=np.array([judged.error for _, judged in listed]),
             worse=np.array([worse for worse, _ in differences]),
             uncertain=np.array([uncertain for _, uncertain in differences]),
-            numbers=np.array([judged.numbers for _, judged in listed], dtype=np.int64),
-            condition_number=np.array([judged.condition_number for _, judged in listed]),
         )
 
 
@@ -121,7 +120,7 @@ class LoopGroup:
     @classmethod
     def of(cls, bounds: LoopBounds) -> Self:
         """Arrange bounds."""
-        return cls(**bounds._asdict(), shown=bounds.shows_loop)
+        return group_of(cls, bounds, shown=bounds.shows_loop)
 
 
 @record
@@ -148,7 +147,9 @@ class InstrumentsGroup:
     def of(cls, given: Instruments, constants: Constants) -> Self:
         """Arrange instruments, and what they say of the constants."""
         pairs, ends = list(given.repeats.likeness), np.array(constants.explained.bands_hz)
-        return cls(
+        return group_of(
+            cls,
+            constants.explained,
             kind=given.kind,
             setpoint=given.names,
             first=np.array([first for first, _ in pairs], dtype=np.int64),
@@ -157,9 +158,6 @@ class InstrumentsGroup:
             low=ends[:, 0],
             high=ends[:, 1],
             explained=constants.explained.share,
-            used=constants.explained.used,
-            total=constants.explained.total,
-            error=constants.explained.error,
         )
 
     @property
@@ -317,12 +315,7 @@ class VehicleRecord(ModelRecord):
         return cls(
             vehicle=VehicleGroup.of(replace(found.model, commanded=commanded)),
             learned=learned,
-            found=columns_of(
-                FoundNumbersGroup,
-                found.numbers,
-                determined=np.array([number.determined for number in found.numbers], dtype=bool),
-                at_bound=np.array([number.at_bound for number in found.numbers], dtype=bool),
-            ),
+            found=columns_of(FoundNumbersGroup, found.numbers),
             trade=columns_of(TradesGroup, found.trades),
             structure=StructuresTriedGroup.of(found.choice),
             loop=LoopGroup.of(found.loop),
