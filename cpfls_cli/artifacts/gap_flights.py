@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from cpfls_cli.config.study import Study
     from cpfls_cli.gap.naming.results import NotExcited
 
-RIGID_BODY = "rigid-body"
-"""Kind of a base that is the rigid body of the vehicle."""
-
 _ASKED = "setpoint_"
 """Before the name of a signal that was asked for."""
 

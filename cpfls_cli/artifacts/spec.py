@@ -143,6 +143,8 @@ def dataset(
 ) -> Any:
     """Make a field of a record a dataset; with ``default=None`` an artifact may lack it.
 
+    The others are the attributes of `DatasetSpec`.
+
     Parameters
     ----------
     *dimensions : str
@@ -151,16 +153,6 @@ def dataset(
         Below the group of the record; empty for the name of the field.
     units : str
         SI units; text is told by the type of the field.
-    frame : str
-        Frame of reference of its components.
-    gaps : bool
-        Whether values may be not finite, and mean "not known" there.
-    into : str
-        Label of the axis that its values are indices into.
-    least : float
-        What no value is below.
-    holds : str
-        A text that is among its texts.
     """
     spec = DatasetSpec(path, dimensions, units, frame, description, default is MISSING, gaps, into, least, holds)
     return field(default=default, metadata={_DATASET: spec, _PATH: path or None})

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from pathlib import Path
 
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
@@ -27,6 +26,7 @@ from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import KnownBy, seen_warnings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.words import did_you_mean
 
 
 def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
@@ -72,8 +72,7 @@ def check_ignored(study: Study) -> None:
     """Refuse names in `gap.ignore` that no effect has."""
     for name in study.gap.ignore:
         if name not in CATALOGUE:
-            near = get_close_matches(name, CATALOGUE, n=1, cutoff=0.4)
-            hint = f"did you mean {near[0]}?" if near else "`cpfls effects` lists all"
+            hint = did_you_mean(name, CATALOGUE, "`cpfls effects` lists all")
             raise ConfigError(f"gap.ignore = {name}: no such effect ({hint})")
 
 

@@ -23,8 +23,8 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.history import Observer, past_of
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.replay import Played, ReplayOptions, ReplayWindows, replay
-from cpfls_cli.report.numbers import joined
 from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.words import joined
 
 _FORECAST = "{}: its forecast along logged rotor speeds is played, loop and all; its constants are another model"
 

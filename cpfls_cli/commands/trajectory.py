@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
-from difflib import get_close_matches
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -43,6 +42,7 @@ from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory, held_rota
 from cpfls_cli.trajectory.repeats import repeated
 from cpfls_cli.trajectory.rotation import RotationPath, full_rotation
 from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
+from cpfls_cli.words import did_you_mean
 
 PlanAt = Callable[[float], PlannedRotation]
 """Samples a plan with a sample time in s."""
@@ -193,8 +193,7 @@ def _check_columns(path: Path, columns: dict[str, Array]) -> None:
         f"{path}: column '{name}' is missing; waypoints need {', '.join(_POSITION_COLUMNS)}" for name in missing
     ]
     for name in unknown:
-        near = get_close_matches(name, known, n=1)
-        hint = f"did you mean {near[0]}?" if near else f"the columns are {', '.join(known)}"
+        hint = did_you_mean(name, known, f"the columns are {', '.join(known)}", cutoff=0.6)
         problems.append(f"{path}: column '{name}' is not known; {hint}")
     if problems:
         raise InputError("\n".join(problems))

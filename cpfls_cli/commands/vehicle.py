@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,11 +30,11 @@ from cpfls_cli.playback.settings import GroupSettings
 from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError
 from cpfls_cli.playback.vehicle import FoundVehicle, find_vehicle
 from cpfls_cli.report.content import Text
-from cpfls_cli.report.numbers import joined
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.response.flown import VehicleResponse, vehicle_responses
 from cpfls_cli.search.resumable import Watch
 from cpfls_cli.search.vehicle_search import VehicleCheckpoint, begin_vehicle_search
+from cpfls_cli.words import did_you_mean, joined
 
 _KEPT_EVERY = 10
 """Structures after which the checkpoint is written again: what a killed search has to judge anew at most."""
@@ -213,6 +212,5 @@ def _check_blocks(study: Study) -> None:
 
 def _check_block(key: str, name: str, known: Sequence[str]) -> None:
     if name not in known:
-        near = get_close_matches(name, known, n=1, cutoff=0.4)
-        hint = f"did you mean {near[0]}?" if near else f"the blocks are {', '.join(known)}"
+        hint = did_you_mean(name, known, f"the blocks are {', '.join(known)}")
         raise ConfigError(f"{key} = {name}: no such block ({hint})")

@@ -27,7 +27,8 @@ from cpfls_cli.pages.repeats import NO_EFFECT, NOT_SPLIT, again_box
 from cpfls_cli.pages.replay import prediction_words, signal_scale
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Table, Text, Tone
-from cpfls_cli.report.numbers import joined, number, plain, sentence
+from cpfls_cli.report.numbers import number, plain, sentence
+from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.naming.results import Unexplained

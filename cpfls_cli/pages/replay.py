@@ -35,9 +35,10 @@ from cpfls_cli.report.canvas import (
     style_of,
 )
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import joined, number, sentence, whole_percent
+from cpfls_cli.report.numbers import number, sentence, whole_percent
 from cpfls_cli.rounding import less, tied
 from cpfls_cli.validation.trust import Trust
+from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -109,6 +110,12 @@ def verdict_box(replay: Source[ReplayRecord]) -> Box:
 def beside_rivals(errors: ErrorsByHorizon) -> list[str]:
     """Say of each signal to which horizon a model is better than what it has to beat, one sentence each."""
     return [_sentence(errors, name, group, rival) for name, (group, rival) in _rivals(errors).items()]
+
+
+def playback_text(playback: PlaybackGroup | None) -> Iterator[Text]:
+    """Say the same of a playback, one paragraph for each signal; nothing where there is none."""
+    if playback is not None:
+        yield from (Text(each) for each in beside_rivals(playback))
 
 
 def beside_past(errors: ErrorsByHorizon, past_s: float) -> Iterator[str]:

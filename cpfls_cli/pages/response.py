@@ -16,8 +16,9 @@ from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, GREY, HELD, band, legend_above, legend_over, plain_ticks, plot, style_of
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import joined, number, plain, sentence
+from cpfls_cli.report.numbers import number, plain, sentence
 from cpfls_cli.response.mismatch import ACCEPTABLE, COHERENT, GOOD, Deviation
+from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

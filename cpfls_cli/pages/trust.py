@@ -8,8 +8,8 @@ from typing import NamedTuple
 from cpfls_cli.artifacts.learned import LearnedFlight, part_learned
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.report.content import Tone
-from cpfls_cli.report.numbers import joined
 from cpfls_cli.validation.trust import Trust
+from cpfls_cli.words import joined
 
 
 class Words(NamedTuple):
