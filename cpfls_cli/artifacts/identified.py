@@ -22,23 +22,18 @@ from cpfls_cli.artifacts.evidence import (
 )
 from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.model import (
-    EffectsGroup,
     InertiaFunctionsGroup,
     ModelRecord,
-    ResponseGroup,
-    RotorsGroup,
     VehicleGroup,
 )
 from cpfls_cli.artifacts.scores import MODEL, TRAINING, JudgedGroup
 from cpfls_cli.artifacts.spec import BODY, EULER, Format, dataset, group, group_of, record
-from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
-from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.validation.trust import Trust
-from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
-    from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
     from cpfls_cli.identification.identify import Identification
+    from cpfls_cli.playback.model import VehicleModel
     from cpfls_cli.validation.validate import Validation
 
 WELL_CONDITIONED = 100.0
@@ -126,19 +121,6 @@ class IdentifiedVehicleGroup(VehicleGroup):
 
     inertia_functions: InertiaFunctionsGroup = group()
 
-    @classmethod
-    def identified(cls, vehicle: VehicleSettings, functions: InertiaFunctions) -> Self:
-        """Arrange mass and rotors as stated, and an inertia that was identified."""
-        return cls(
-            mass=vehicle.mass_kg,
-            gravity=vehicle.gravity_m_s2,
-            inertia=six_parameters(vehicle.inertia_kg_m2),
-            rotor=RotorsGroup.of(vehicle, 0.0),
-            response=ResponseGroup.of(RotorResponse(), commanded=False, hold=None),
-            effect=EffectsGroup.of(()),
-            inertia_functions=InertiaFunctionsGroup.of(functions),
-        )
-
 
 @record
 class IdentifiedRecord(ModelRecord):
@@ -181,7 +163,7 @@ class IdentifiedRecord(ModelRecord):
         base: str,
         learned: IntArray,
         evidence: Validation | None,
-        vehicle: VehicleSettings,
+        vehicle: VehicleModel,
         parts: LearnedGroup,
     ) -> Self:
         """Arrange an identification and the evidence on it.
@@ -194,14 +176,14 @@ class IdentifiedRecord(ModelRecord):
             Indices of the samples that trained.
         evidence : Validation or None
             None where it was not gathered.
-        vehicle : VehicleSettings
-            As stated: what was identified is its inertia.
+        vehicle : VehicleModel
+            Mass and rotors as stated, with the inertia that was identified.
         parts : LearnedGroup
             How much of each flight trained.
         """
         baselines = {baseline.name: baseline.parameters for baseline in result.baselines}
         return cls(
-            vehicle=IdentifiedVehicleGroup.identified(vehicle, result.model),
+            vehicle=IdentifiedVehicleGroup.of(vehicle),
             learned=parts,
             model=group_of(ChosenGroup, result.fit, weights=result.front.chromosomes[result.front.chosen], base=base),
             solve=group_of(SolveGroup, result.system),

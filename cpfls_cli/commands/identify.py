@@ -29,6 +29,7 @@ from cpfls_cli.identification.search import NothingFoundError, SearchRun, Search
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.source import source_of
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.search.resumable import SearchOptions, Watch, begin_search
@@ -67,7 +68,7 @@ def run(
     result = _with_length(result, flights, data)
     with search.kept():
         evidence, signal = _evidence(job, result, data, held_out, wrong, watch.signal)
-        base, vehicle = job.study.identification.base, job.study.vehicle
+        base, vehicle = job.study.identification.base, VehicleModel(vehicle=job.study.vehicle, fuzzy=result.model)
         parts = LearnedGroup.parts(flight_roles(flights), data.parts)
         record = finish(job, IdentifiedRecord.of(result, base, data.indices, evidence, vehicle, parts), inputs)
     search.end(result.stop_reason)
