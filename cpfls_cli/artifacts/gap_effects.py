@@ -398,26 +398,20 @@ class StretchGroup:
     """Stretches of time with the largest gap, largest first."""
 
     flight: Array = dataset("index of the flight; stretches of time with the largest gap, first", "stretch")
-    start: Array = dataset("on the clock of the flight", "stretch", units="s")
-    end: Array = dataset("on the clock of the flight", "stretch", units="s")
+    start_s: Array = dataset("on the clock of the flight", "stretch", path="start", units="s")
+    end_s: Array = dataset("on the clock of the flight", "stretch", path="end", units="s")
     channel: tuple[str, ...] = dataset("channel of the gap", "stretch")
-    floors: Array = dataset("root mean square of the gap there, in floors", "stretch")
+    rms_floors: Array = dataset("root mean square of the gap there, in floors", "stretch", path="floors")
 
     @classmethod
     def of(cls, stretches: Sequence[GapStretch]) -> Self:
         """Arrange stretches of time."""
-        return cls(
-            flight=np.fromiter((stretch.flight for stretch in stretches), float),
-            start=np.fromiter((stretch.start_s for stretch in stretches), float),
-            end=np.fromiter((stretch.end_s for stretch in stretches), float),
-            channel=tuple(stretch.channel for stretch in stretches),
-            floors=np.fromiter((stretch.rms_floors for stretch in stretches), float),
-        )
+        return columns_of(cls, stretches)
 
     def first(self, most: int) -> list[tuple[int, float, float, str, float]]:
         """List the largest: flight, start and end in s, channel, floors."""
-        columns = (self.flight.astype(int).tolist(), self.start.tolist(), self.end.tolist(), self.channel)
-        return list(zip(*columns, self.floors.tolist(), strict=True))[:most]
+        rows = (row.values() for row in rows_of(self)[:most])
+        return [(int(flight), start, end, channel, floors) for flight, start, end, channel, floors in rows]
 
 
 class EndError(NamedTuple):
