@@ -27,7 +27,8 @@ from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.sweep import joined_sweeps
-from cpfls_cli.report.numbers import UNKNOWN, change, joined, number, percent
+from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
+from cpfls_cli.words import joined
 
 Settings = Sequence[SettingRuns]
 Searches = Sequence[Settings]

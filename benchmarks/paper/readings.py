@@ -20,7 +20,8 @@ from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.sweep import joined_sweeps
 from cpfls_cli.report.canvas import GREY, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Folded, Plot, Table, Text
-from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent
+from cpfls_cli.report.numbers import UNKNOWN, number, percent
+from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 class AuditCoefficientGroup:
     """Numbers of the faults of sensors."""
 
-    finding: tuple[str, ...] = dataset("finding", "fault that each number belongs to", "audit_number")
-    name: tuple[str, ...] = dataset("name", "name of the number", "audit_number")
-    unit: tuple[str, ...] = dataset("unit", "unit of the number", "audit_number")
-    value: Array = dataset("value", "estimate", "audit_number", units="SI")
-    low: Array = dataset("low", "lower end of the 95 % interval", "audit_number", units="SI", gaps=True)
-    high: Array = dataset("high", "upper end of the 95 % interval", "audit_number", units="SI", gaps=True)
-    named: Array = dataset("named", "1 where it is sure and of practical size", "audit_number")
+    finding: tuple[str, ...] = dataset("fault that each number belongs to", "audit_number")
+    name: tuple[str, ...] = dataset("name of the number", "audit_number")
+    unit: tuple[str, ...] = dataset("unit of the number", "audit_number")
+    value: Array = dataset("estimate", "audit_number", units="SI")
+    low: Array = dataset("lower end of the 95 % interval", "audit_number", units="SI", gaps=True)
+    high: Array = dataset("upper end of the 95 % interval", "audit_number", units="SI", gaps=True)
+    named: Array = dataset("1 where it is sure and of practical size", "audit_number")
 
     @classmethod
     def of(cls, findings: Sequence[AuditFinding]) -> Self:
@@ -44,13 +44,13 @@ class AuditCoefficientGroup:
 class AuditRepairGroup:
     """Channels that contradict the others, and how they are set right."""
 
-    channel: tuple[str, ...] = dataset("channel", "channels that are set right or left out, in that order", "repair")
-    dropped: Array = dataset("dropped", "1 where it is left out, and nothing else counts", "repair")
-    delay_s: Array = dataset("delay", "how late it is", "repair", units="s")
-    in_body: Array = dataset("in_body", "1 where world axes were logged in body axes", "repair")
-    matrix: Array = dataset("matrix", "unit and axes, after the turn to world axes", "repair", "axis", "axis")
-    gravity_m_s2: Array = dataset("gravity", "added along the vertical, last", "repair", units="m/s^2")
-    sentence: tuple[str, ...] = dataset("sentence", "what is wrong, who says so, and what to mend", "repair")
+    channel: tuple[str, ...] = dataset("channels that are set right or left out, in that order", "repair")
+    dropped: Array = dataset("1 where it is left out, and nothing else counts", "repair")
+    delay_s: Array = dataset("how late it is", "repair", path="delay", units="s")
+    in_body: Array = dataset("1 where world axes were logged in body axes", "repair")
+    matrix: Array = dataset("unit and axes, after the turn to world axes", "repair", "axis", "axis")
+    gravity_m_s2: Array = dataset("added along the vertical, last", "repair", path="gravity", units="m/s^2")
+    sentence: tuple[str, ...] = dataset("what is wrong, who says so, and what to mend", "repair")
 
     @classmethod
     def of(cls, repairs: Sequence[ChannelRepair]) -> Self | None:
@@ -62,21 +62,24 @@ class AuditRepairGroup:
 class AuditGroup:
     """What the sensors say about each other."""
 
-    finding: tuple[str, ...] = dataset("audit/finding", "faults of sensors that were tested", "finding")
-    named: Array = dataset("audit/named", "1 where the fault is sure and matters", "finding")
-    p_value: Array = dataset("audit/p_value", "probability that chance shows as much", "finding")
-    sentence: tuple[str, ...] = dataset("audit/sentence", "what was found, in words", "finding")
+    finding: tuple[str, ...] = dataset("faults of sensors that were tested", "finding", path="audit/finding")
+    named: Array = dataset("1 where the fault is sure and matters", "finding", path="audit/named")
+    p_value: Array = dataset("probability that chance shows as much", "finding", path="audit/p_value")
+    sentence: tuple[str, ...] = dataset("what was found, in words", "finding", path="audit/sentence")
     coefficient: AuditCoefficientGroup = group("audit_coefficient")
     untested: tuple[str, ...] = dataset(
-        "audit/untested", "faults that could not be tested, with the reason", "untested"
+        "faults that could not be tested, with the reason", "untested", path="audit/untested"
     )
     warning: tuple[str, ...] = dataset(
-        "audit/warning", "channels that disagree or look broken; nothing is repaired for them", "audit_warning"
+        "channels that disagree or look broken; nothing is repaired for them", "audit_warning", path="audit/warning"
     )
-    note: tuple[str, ...] = dataset("audit/note", "for information", "audit_note")
+    note: tuple[str, ...] = dataset("for information", "audit_note", path="audit/note")
     repair: AuditRepairGroup | None = group("audit_repair", default=None)
     contradiction: tuple[str, ...] | None = dataset(
-        "audit/contradiction", "what no verdict can stand beside; nothing repairs it", "contradiction", default=None
+        "what no verdict can stand beside; nothing repairs it",
+        "contradiction",
+        path="audit/contradiction",
+        default=None,
     )
 
     @classmethod

@@ -17,8 +17,8 @@ from cpfls_cli.artifacts.spec import (
     FIXED,
     INPUTS,
     SCHEMA_VERSION,
-    ArtifactSpec,
     DatasetSpec,
+    Format,
     Header,
     InputFile,
 )
@@ -41,7 +41,7 @@ class Checkable(Protocol):
     """An artifact as its format and its datasets by path."""
 
     @property
-    def spec(self) -> ArtifactSpec:
+    def spec(self) -> Format:
         """Its format."""
         ...
 
@@ -171,13 +171,13 @@ def _present(artifact: Checkable) -> Iterator[tuple[DatasetSpec, Any]]:
 class Stored(NamedTuple):
     """An artifact that still lies in its file."""
 
-    spec: ArtifactSpec
+    spec: Format
     header: Header
     data: Mapping[str, h5py.Dataset]
 
 
 @contextmanager
-def opened(path: Path, *wanted: ArtifactSpec) -> Iterator[Stored]:
+def opened(path: Path, *wanted: Format) -> Iterator[Stored]:
     """Open an artifact: the one gate through which anything of it is read.
 
     HDF5 trusts what it parses, and damage there may keep it busy for ever; so it opens nothing whose seal does not fit.
@@ -188,9 +188,9 @@ def opened(path: Path, *wanted: ArtifactSpec) -> Iterator[Stored]:
             _refuse_links(file)
             stored = stored_of(path, file)
             if wanted and not any(each.includes(stored.spec) for each in wanted):
-                asked = " or ".join(f"{w.format} (made by {w.makers})" for w in wanted)
+                asked = " or ".join(f"{w.name} (made by {w.makers})" for w in wanted)
                 made = f" made by {stored.spec.makers}" if stored.spec.kind else ""
-                raise InputError(f"{path}: is a {stored.spec.format}{made}; this command needs a {asked}")
+                raise InputError(f"{path}: is a {stored.spec.name}{made}; this command needs a {asked}")
             yield stored
     except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
         raise InputError(f"{path}: damaged: {one_line(error)}") from None
@@ -251,7 +251,7 @@ def _dataset(file: h5py.File, path: str) -> h5py.Dataset | None:
     return found
 
 
-def _identify(path: Path, file: h5py.File) -> ArtifactSpec:
+def _identify(path: Path, file: h5py.File) -> Format:
     name = _text_attribute(file, "format")
     if name is None or not name.startswith("cpfls/"):
         raise InputError(f"{path}: an HDF5 file, but not made by cpfls (no root attribute 'format')")
@@ -288,11 +288,11 @@ def _read_header(file: h5py.File) -> Header:
 
 def require_all(path: Path, stored: Stored) -> None:
     """Refuse an artifact that lacks what every one of its format holds."""
-    record = record_of_format(stored.spec.format, stored.spec.kind)
+    record = record_of_format(stored.spec.name, stored.spec.kind)
     assert record is not None, "its format is known"
     missing = record.lacking(stored.data)
     if missing:
-        raise InputError(f"{path}: the {stored.spec.format} lacks {_some(missing)}; make it again")
+        raise InputError(f"{path}: the {stored.spec.name} lacks {_some(missing)}; make it again")
 
 
 def refuse(path: Path, findings: Sequence[str]) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
+from cpfls_cli.artifacts.spec import Format, Record, columns_of, dataset, group, group_of, record
 from cpfls_cli.evolution.engine import EvolutionState, History
 
 if TYPE_CHECKING:
@@ -26,35 +26,33 @@ _NO_GENERATOR = "null"
 class HistoryGroup:
     """Progress of the search by generation."""
 
-    evaluations: IntArray = dataset("evaluations", "chromosomes evaluated so far", "generation")
-    best: Array = dataset("best", "best of each objective so far", "generation", "3", units="SI", gaps=True)
-    front_size: IntArray = dataset("front_size", "members of the Pareto front so far", "generation")
+    evaluations: IntArray = dataset("chromosomes evaluated so far", "generation")
+    best: Array = dataset("best of each objective so far", "generation", "3", units="SI", gaps=True)
+    front_size: IntArray = dataset("members of the Pareto front so far", "generation")
 
 
 @record
 class PopulationGroup:
     """The current population."""
 
-    genes: Any = dataset("genes", "chromosomes, 16-bit weights", "individual", "gene")
+    genes: Any = dataset("chromosomes, 16-bit weights", "individual", "gene")
     objectives: Any = dataset(
-        "objectives",
         "MSE (rigid-body base: cross-validated, scaled by axis), largest error, condition number",
         "individual",
         "3",
         units="SI",
         gaps=True,
     )
-    subpopulation: Any = dataset("subpopulation", "label of the subpopulation", "individual")
+    subpopulation: Any = dataset("label of the subpopulation", "individual")
 
 
 @record
 class ArchiveGroup:
     """All evaluated chromosomes."""
 
-    submitted: Any = dataset("submitted", "chromosomes as bred, in order of evaluation", "evaluation", "gene")
-    genes: Any = dataset("genes", "what local search made of them", "evaluation", "gene")
+    submitted: Any = dataset("chromosomes as bred, in order of evaluation", "evaluation", "gene")
+    genes: Any = dataset("what local search made of them", "evaluation", "gene")
     objectives: Any = dataset(
-        "objectives",
         "MSE (rigid-body base: cross-validated, scaled by axis), largest error, condition number",
         "evaluation",
         "3",
@@ -68,14 +66,12 @@ class UnfinishedGroup:
     """What was evaluated of the next generation, where the search was stopped within it."""
 
     submitted: Any = dataset(
-        "submitted",
         "chromosomes of the next generation that are evaluated, where the search was stopped within it",
         "unfinished",
         "gene",
     )
-    genes: Any = dataset("genes", "what local search made of them", "unfinished", "gene")
+    genes: Any = dataset("what local search made of them", "unfinished", "gene")
     objectives: Any = dataset(
-        "objectives",
         "MSE (rigid-body base: cross-validated, scaled by axis), largest error, condition number",
         "unfinished",
         "3",
@@ -95,14 +91,12 @@ class CheckpointRecord(Record):
         ("flight", "selection", "validate", "choose-on"),
     )
 
-    generation: int = dataset("generation", "generations bred; 0: initial population, -1: not even that")
-    generator: str = dataset(
-        "generator", "state of the random generator, one for all subpopulations, as JSON; null at -1"
-    )
-    population: PopulationGroup = group("population")
-    archive: ArchiveGroup = group("archive")
-    history: HistoryGroup = group("history")
-    unfinished: UnfinishedGroup = group("unfinished")
+    generation: int = dataset("generations bred; 0: initial population, -1: not even that")
+    generator: str = dataset("state of the random generator, one for all subpopulations, as JSON; null at -1")
+    population: PopulationGroup = group()
+    archive: ArchiveGroup = group()
+    history: HistoryGroup = group()
+    unfinished: UnfinishedGroup = group()
 
     @classmethod
     def of_state(cls, state: EvolutionState) -> Self:
@@ -116,7 +110,7 @@ class CheckpointRecord(Record):
             generator=json.dumps(state.rng.bit_generator.state),
             population=population,
             archive=ArchiveGroup(**_stored(submitted, results.genes, results.objectives)),
-            history=HistoryGroup(**vars(state.history)),
+            history=group_of(HistoryGroup, state.history),
             unfinished=UnfinishedGroup(**_stored(none, none, state.objectives[:0])),
         )
 
@@ -129,7 +123,7 @@ class CheckpointRecord(Record):
             generator=_NO_GENERATOR,
             population=PopulationGroup(genes=none.astype(np.uint16), objectives=objectives, subpopulation=np.arange(0)),
             archive=ArchiveGroup(**_stored(none, none, objectives)),
-            history=HistoryGroup(**vars(History.empty(objectives.shape[1]))),
+            history=group_of(HistoryGroup, History.empty(objectives.shape[1])),
             unfinished=UnfinishedGroup(**_stored(none, none, objectives)),
         )
         return empty.with_unfinished(unfinished)
@@ -154,9 +148,9 @@ def _stored(submitted: IntArray, genes: IntArray, objectives: Array) -> dict[str
 class StructuresKeptGroup:
     """Structures that were judged, in the order of the search."""
 
-    blocks: tuple[str, ...] = dataset("blocks", "blocks of each, one space between two", "structure")
-    rules: IntArray = dataset("rules", "of its remainder: number of rules, order of the harmonics", "structure", "2")
-    numbers: IntArray = dataset("numbers", "free numbers", "structure")
+    blocks: tuple[str, ...] = dataset("blocks of each, one space between two", "structure")
+    rules: IntArray = dataset("of its remainder: number of rules, order of the harmonics", "structure", "2")
+    numbers: IntArray = dataset("free numbers", "structure")
 
 
 @record
@@ -170,20 +164,21 @@ class VehicleCheckpointRecord(Record):
         ("flight-1", "held-out-1"),
     )
 
-    structure: StructuresKeptGroup = group("structure")
-    loss: Array = dataset("loss", "of the fit without each part of the flights", "structure", "part")
-    values: Array = dataset("values", "numbers of all fits, one fit after another", "fitted", units="SI")
-    hessian: Array = dataset("hessian", "their curvatures by rows, one fit after another", "curvature")
+    structure: StructuresKeptGroup = group()
+    loss: Array = dataset("of the fit without each part of the flights", "structure", "part")
+    values: Array = dataset("numbers of all fits, one fit after another", "fitted", units="SI")
+    hessian: Array = dataset("their curvatures by rows, one fit after another", "curvature")
 
     @classmethod
     def of(cls, judged: Sequence[Judged]) -> Self:
         """Arrange the structures that were judged, at least one."""
         fits = [fitted for each in judged for fitted in each.fits]
         return cls(
-            structure=StructuresKeptGroup(
+            structure=columns_of(
+                StructuresKeptGroup,
+                judged,
                 blocks=tuple(" ".join(each.structure.blocks) for each in judged),
                 rules=np.array([each.structure.rules for each in judged], dtype=np.int64),
-                numbers=np.array([each.numbers for each in judged], dtype=np.int64),
             ),
             loss=np.array([[fitted.loss for fitted in each.fits] for each in judged]),
             values=np.concatenate([fitted.values for fitted in fits]),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.spec import BODY, dataset, record
+from cpfls_cli.artifacts.spec import BODY, dataset, group_of, record
 from cpfls_cli.blocks import half_width
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.settings import COUNTS
@@ -41,19 +41,12 @@ class Part(NamedTuple):
 class ComesAgainGroup:
     """What of a gap comes again, and what does not."""
 
-    low: Array = dataset("low", "lower end of each band, about; the first band is all of them", "band", units="Hz")
-    high: Array = dataset("high", "upper end of each band, about", "band", units="Hz")
+    low: Array = dataset("lower end of each band, about; the first band is all of them", "band", units="Hz")
+    high: Array = dataset("upper end of each band, about", "band", units="Hz")
     total: Array = dataset(
-        "total",
-        "mean square of the gap in a band, (N m)^2 and N^2",
-        "channel",
-        "band",
-        units="SI",
-        frame=BODY,
-        gaps=True,
+        "mean square of the gap in a band, (N m)^2 and N^2", "channel", "band", units="SI", frame=BODY, gaps=True
     )
     again: Array = dataset(
-        "again",
         "what of it comes again: mean product with the gap of another run at the same place of the path",
         "channel",
         "band",
@@ -62,7 +55,6 @@ class ComesAgainGroup:
         gaps=True,
     )
     noise: Array = dataset(
-        "noise",
         "what white noise of the sensors leaves of the gap; NaN where signals were filtered",
         "channel",
         "band",
@@ -71,7 +63,6 @@ class ComesAgainGroup:
         gaps=True,
     )
     taken: Array = dataset(
-        "taken",
         "what comes again of the torque or force that the motion takes, as a mean product",
         "channel",
         "band",
@@ -79,27 +70,24 @@ class ComesAgainGroup:
         frame=BODY,
         gaps=True,
     )
-    share_error: Array = dataset(
-        "share_error", "standard error of again over total", "channel", "band", frame=BODY, gaps=True
-    )
+    share_error: Array = dataset("standard error of again over total", "channel", "band", frame=BODY, gaps=True)
     explained_error: Array = dataset(
-        "explained_error",
         "standard error of 1 less again over taken, the share of the motion that comes again and the model explains",
         "channel",
         "band",
         frame=BODY,
         gaps=True,
     )
-    resists: Array = dataset("resists", "moments of inertia, kg m^2, and mass, kg", "channel", units="SI", frame=BODY)
-    flights: tuple[str, ...] = dataset("flight", "flights that repeat each other", "repeating")
-    runs: int = dataset("runs", "runs that are held against others")
-    paths: int = dataset("paths", "different paths among them")
-    blocks: IntArray = dataset("blocks", "blocks of the paths that tell the errors", "band")
+    resists: Array = dataset("moments of inertia, kg m^2, and mass, kg", "channel", units="SI", frame=BODY)
+    flights: tuple[str, ...] = dataset("flights that repeat each other", "repeating", path="flight")
+    runs: int = dataset("runs that are held against others")
+    paths: int = dataset("different paths among them")
+    blocks: IntArray = dataset("blocks of the paths that tell the errors", "band")
 
     @classmethod
     def of(cls, found: ComesAgain | None) -> Self | None:
         """Arrange what comes again; None where no flight repeats another."""
-        return None if found is None else cls(**{name: getattr(found, name) for name in cls.__dataclass_fields__})
+        return None if found is None else group_of(cls, found)
 
     @property
     def share(self) -> Array:

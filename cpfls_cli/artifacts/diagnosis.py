@@ -26,7 +26,7 @@ from cpfls_cli.artifacts.gap_flights import (
 )
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, LearnedGroup, learned_in
 from cpfls_cli.artifacts.model import VehicleGroup
-from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
+from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.gap.naming.results import Alternative, Unexplained
 
 if TYPE_CHECKING:
@@ -47,17 +47,13 @@ _PHYSICS = ("wrench", "actuator")
 class AlternativeGroup:
     """Effects that the flights cannot tell from a named one."""
 
-    name: tuple[str, ...] = dataset("name", "effects that the flights cannot tell from a named one", "alternative")
-    instead_of: tuple[str, ...] = dataset("instead_of", "the named one", "alternative")
+    name: tuple[str, ...] = dataset("effects that the flights cannot tell from a named one", "alternative")
+    instead_of: tuple[str, ...] = dataset("the named one", "alternative")
     relative_gain: Array = dataset(
-        "relative_gain",
-        "what it explains over what the named one explains; NaN where it could not be tried",
-        "alternative",
-        gaps=True,
+        "what it explains over what the named one explains; NaN where it could not be tried", "alternative", gaps=True
     )
-    separated_by: tuple[str, ...] = dataset("separated_by", "the flight, or the signal, that would tell", "alternative")
+    separated_by: tuple[str, ...] = dataset("the flight, or the signal, that would tell", "alternative")
     beside: tuple[str, ...] | None = dataset(
-        "beside",
         "another effect that is not named and without which it would not do; empty for none",
         "alternative",
         default=None,
@@ -77,12 +73,12 @@ class AlternativeGroup:
 class UnexplainedGroup:
     """Channels with a gap that nothing in the catalogue explains."""
 
-    axis: tuple[str, ...] = dataset("axis", "channels with a gap that nothing in the catalogue explains", "unexplained")
-    floors: Array = dataset("floors", "root mean square of what is left, in floors", "unexplained")
-    signal: tuple[str, ...] = dataset("signal", "signal that it depends on most; empty for none", "unexplained")
-    share: Array = dataset("share", "share of what is left that signal or narrow band explains", "unexplained")
-    frequency: Array = dataset("frequency", "of a narrow band that stands out", "unexplained", units="Hz", gaps=True)
-    energy: tuple[str, ...] = dataset("energy", "feeds, drains or neither", "unexplained")
+    axis: tuple[str, ...] = dataset("channels with a gap that nothing in the catalogue explains", "unexplained")
+    floors: Array = dataset("root mean square of what is left, in floors", "unexplained")
+    signal: tuple[str, ...] = dataset("signal that it depends on most; empty for none", "unexplained")
+    share: Array = dataset("share of what is left that signal or narrow band explains", "unexplained")
+    frequency: Array = dataset("of a narrow band that stands out", "unexplained", units="Hz", gaps=True)
+    energy: tuple[str, ...] = dataset("feeds, drains or neither", "unexplained")
 
     @classmethod
     def of(cls, unexplained: Sequence[Unexplained]) -> Self:
@@ -104,23 +100,23 @@ class UnexplainedGroup:
 class TorqueAloneGroup:
     """First choices of a look at the torques alone."""
 
-    name: tuple[str, ...] = dataset("name", "first choices of a look at the torques alone", "torque_alone")
-    share: Array = dataset("share", "share of the gap that each would explain", "torque_alone")
+    name: tuple[str, ...] = dataset("first choices of a look at the torques alone", "torque_alone")
+    share: Array = dataset("share of the gap that each would explain", "torque_alone")
 
 
 @record
 class ResidualChangeGroup:
     """Gap of each held-out window, before and after."""
 
-    time: Array = dataset("time", "middle of each held-out window, on the clock of its flight", "window", units="s")
-    flight: IntArray = dataset("flight", "index of its flight", "window", into="flight")
+    time: Array = dataset("middle of each held-out window, on the clock of its flight", "window", units="s")
+    flight: IntArray = dataset("index of its flight", "window", into="flight")
     before: Array = dataset(
-        "before", "gap of the model as given, N m and N", "window", "channel", units="SI", frame=BODY, gaps=True
+        "gap of the model as given, N m and N", "window", "channel", units="SI", frame=BODY, gaps=True
     )
     parameters: Array = dataset(
-        "parameters", "gap with only its numbers refitted", "window", "channel", units="SI", frame=BODY, gaps=True
+        "gap with only its numbers refitted", "window", "channel", units="SI", frame=BODY, gaps=True
     )
-    after: Array = dataset("after", "gap with the effects", "window", "channel", units="SI", frame=BODY, gaps=True)
+    after: Array = dataset("gap with the effects", "window", "channel", units="SI", frame=BODY, gaps=True)
 
     @classmethod
     def of(cls, unseen: HeldOut, change: BeforeAfter) -> Self:
@@ -134,13 +130,11 @@ class ResidualChangeGroup:
 class WhitenessGroup:
     """Autocorrelation of the gap on held-out windows."""
 
-    lag: Array = dataset("lag", "distance of windows that do not overlap", "lag", units="s")
-    before: Array = dataset("before", "autocorrelation of the gap of the model as given", "lag", "channel", gaps=True)
-    after: Array = dataset("after", "autocorrelation of the gap with the effects", "lag", "channel", gaps=True)
-    p_value_before: Array = dataset(
-        "p_value_before", "probability that noise is as correlated, by Ljung and Box", "channel", gaps=True
-    )
-    p_value_after: Array = dataset("p_value_after", "the same with the effects", "channel", gaps=True)
+    lag: Array = dataset("distance of windows that do not overlap", "lag", units="s")
+    before: Array = dataset("autocorrelation of the gap of the model as given", "lag", "channel", gaps=True)
+    after: Array = dataset("autocorrelation of the gap with the effects", "lag", "channel", gaps=True)
+    p_value_before: Array = dataset("probability that noise is as correlated, by Ljung and Box", "channel", gaps=True)
+    p_value_after: Array = dataset("the same with the effects", "channel", gaps=True)
 
     @classmethod
     def of(cls, change: BeforeAfter) -> Self:
@@ -164,40 +158,30 @@ class WhitenessGroup:
 class PictureGroup:
     """Stretch of a held-out flight in which model and flight disagree most."""
 
-    flight: str = dataset("flight", "held-out flight of the stretch in which model and flight disagreed most")
-    channel: str = dataset("channel", "channel of the stretch")
-    time: Array = dataset("time", "on the clock of the flight", "moment", units="s")
-    measured: Array = dataset(
-        "measured", "torque or force that the measured motion takes", "moment", units="SI", frame=BODY
-    )
-    before: Array = dataset("before", "simulated, model as given", "moment", units="SI", frame=BODY)
-    after: Array = dataset("after", "simulated, with the effects", "moment", units="SI", frame=BODY)
+    flight: str = dataset("held-out flight of the stretch in which model and flight disagreed most")
+    channel: str = dataset("channel of the stretch")
+    time: Array = dataset("on the clock of the flight", "moment", units="s")
+    measured: Array = dataset("torque or force that the measured motion takes", "moment", units="SI", frame=BODY)
+    before: Array = dataset("simulated, model as given", "moment", units="SI", frame=BODY)
+    after: Array = dataset("simulated, with the effects", "moment", units="SI", frame=BODY)
 
     @classmethod
     def of(cls, change: BeforeAfter, held: Sequence[Recording]) -> Self:
         """Arrange the stretch with the largest gap."""
-        picture = change.picture
-        return cls(
-            flight=held[picture.flight].name,
-            channel=picture.channel,
-            time=picture.time,
-            measured=picture.measured,
-            before=picture.before,
-            after=picture.after,
-        )
+        return group_of(cls, change.picture, flight=held[change.picture.flight].name)
 
 
 @record
 class RunGroup:
     """Free runs of a held-out stretch."""
 
-    flight: str = dataset("flight", "held-out flight of the stretch whose free runs went astray most")
-    axis: int = dataset("axis", "body axis on which they did: 0, 1, 2 for x, y, z")
-    time: Array = dataset("time", "on the clock of the flight", "run_sample", units="s")
-    restart: Array = dataset("restart", "times at which each free run starts from the measured rate", "run", units="s")
-    measured: Array = dataset("measured", "body rates", "run_sample", "axis", units="rad/s", frame=BODY)
-    before: Array = dataset("before", "simulated, model as given", "run_sample", "axis", units="rad/s", frame=BODY)
-    after: Array = dataset("after", "simulated, with the effects", "run_sample", "axis", units="rad/s", frame=BODY)
+    flight: str = dataset("held-out flight of the stretch whose free runs went astray most")
+    axis: int = dataset("body axis on which they did: 0, 1, 2 for x, y, z")
+    time: Array = dataset("on the clock of the flight", "run_sample", units="s")
+    restart: Array = dataset("times at which each free run starts from the measured rate", "run", units="s")
+    measured: Array = dataset("body rates", "run_sample", "axis", units="rad/s", frame=BODY)
+    before: Array = dataset("simulated, model as given", "run_sample", "axis", units="rad/s", frame=BODY)
+    after: Array = dataset("simulated, with the effects", "run_sample", "axis", units="rad/s", frame=BODY)
 
     @classmethod
     def of(cls, change: BeforeAfter, held: Sequence[Recording]) -> Self:
@@ -245,43 +229,43 @@ class DiagnosisRecord(Record):
         ("disagreement", "flight-1", "held-out-1", "model-flight-1"),
     )
 
-    verdict: str = dataset("verdict", "NAMED, PARTIAL, AMBIGUOUS, UNEXPLAINED, FLIGHTS_DIFFER, NO_GAP or NOT_EXCITED")
-    share: float = dataset("share", "part of the held-out gap above the floor that the effects take off")
-    split: str = dataset("split", "which flights trained and which were held out, and why")
+    verdict: str = dataset("NAMED, PARTIAL, AMBIGUOUS, UNEXPLAINED, FLIGHTS_DIFFER, NO_GAP or NOT_EXCITED")
+    share: float = dataset("part of the held-out gap above the floor that the effects take off")
+    split: str = dataset("which flights trained and which were held out, and why")
     effects: NamedEffectsGroup = group("")
-    alternative: AlternativeGroup = group("alternative")
-    unexplained: UnexplainedGroup = group("unexplained")
-    torque_alone: TorqueAloneGroup = group("torque_alone")
-    gap: GapChangeGroup = group("gap")
-    playback: PlaybackChangeGroup | None = group("playback", default=None)
-    stretch: StretchGroup | None = group("stretch", default=None)
-    residual: ResidualChangeGroup = group("residual")
-    whiteness: WhitenessGroup | None = group("whiteness", default=None)
-    picture: PictureGroup | None = group("picture", default=None)
-    run: RunGroup | None = group("run", default=None)
-    not_excited: NotExcitedGroup = group("not_excited")
+    alternative: AlternativeGroup = group()
+    unexplained: UnexplainedGroup = group()
+    torque_alone: TorqueAloneGroup = group()
+    gap: GapChangeGroup = group()
+    playback: PlaybackChangeGroup | None = group(default=None)
+    stretch: StretchGroup | None = group(default=None)
+    residual: ResidualChangeGroup = group()
+    whiteness: WhitenessGroup | None = group(default=None)
+    picture: PictureGroup | None = group(default=None)
+    run: RunGroup | None = group(default=None)
+    not_excited: NotExcitedGroup = group()
     audit: AuditGroup = group("")
-    note: tuple[str, ...] = dataset("note", "what a reader should know", "note")
+    note: tuple[str, ...] = dataset("what a reader should know", "note")
     contradiction: tuple[str, ...] = dataset(
-        "impossible",
         "what of the log contradicts itself or its vehicle, numbers that no vehicle has among it",
         "impossible",
+        path="impossible",
         default=(),
     )
-    warning: tuple[str, ...] = dataset("warning", "what to know about the flights", "warning", default=())
-    base: VehicleGroup = group("base")
+    warning: tuple[str, ...] = dataset("what to know about the flights", "warning", default=())
+    base: VehicleGroup = group()
     flights: FlightsGroup = group("")
     difference: tuple[str, ...] | None = dataset(
-        "difference", "what differs between the flights that trained and those held out", "difference", default=None
+        "what differs between the flights that trained and those held out", "difference", default=None
     )
     shares: Array | None = dataset(
-        "share_by_kind",
         "the share of torque and of force; NaN where there is no gap, or no name",
         "2",
+        path="share_by_kind",
         gaps=True,
         default=None,
     )
-    learned: LearnedGroup | None = group("learned", default=None)
+    learned: LearnedGroup | None = group(default=None)
     again_before: ComesAgainGroup | None = group("comes_again_before", default=None)
     again_after: ComesAgainGroup | None = group("comes_again_after", default=None)
 
@@ -301,12 +285,8 @@ class DiagnosisRecord(Record):
 
         Parameters
         ----------
-        model : ExtendedModel
-            That it arrives at.
         split : str
             Why these flights trained and those were held out.
-        warnings : sequence of str
-            What to know about the flights.
         base : VehicleModel
             The identified model that misses something, or the vehicle.
         """

@@ -16,7 +16,7 @@ from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, LearnedGrou
 from cpfls_cli.artifacts.model import VehicleGroup
 from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.replay import PlaybackGroup
-from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
+from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.replay import PREDICTIONS
@@ -35,30 +35,18 @@ _SIGNIFICANT = 0.05
 class GapGroup:
     """Gap of each channel."""
 
-    channel: tuple[str, ...] = dataset(
-        "channel", "names of the channels: torque about, force along the body axes", "channel"
-    )
+    channel: tuple[str, ...] = dataset("names of the channels: torque about, force along the body axes", "channel")
     rms: Array = dataset(
-        "rms", "root mean square of the gap over windows, N m and N", "channel", units="SI", frame=BODY, gaps=True
+        "root mean square of the gap over windows, N m and N", "channel", units="SI", frame=BODY, gaps=True
     )
-    floor: Array = dataset(
-        "floor", "noise floor of the same windows, N m and N", "channel", units="SI", frame=BODY, gaps=True
-    )
-    floors: Array = dataset("floors", "gap over floor", "channel", frame=BODY, gaps=True)
-    share: Array = dataset(
-        "share", "gap over the torque or force that moves the vehicle", "channel", frame=BODY, gaps=True
-    )
+    floor: Array = dataset("noise floor of the same windows, N m and N", "channel", units="SI", frame=BODY, gaps=True)
+    floors: Array = dataset("gap over floor", "channel", frame=BODY, gaps=True)
+    share: Array = dataset("gap over the torque or force that moves the vehicle", "channel", frame=BODY, gaps=True)
 
     @classmethod
     def of(cls, disagreement: Disagreement) -> Self:
         """Arrange the gap of each channel."""
-        return cls(
-            channel=CHANNELS,
-            rms=disagreement.rms,
-            floor=disagreement.floor,
-            floors=disagreement.floors,
-            share=disagreement.rms / disagreement.activity,
-        )
+        return group_of(cls, disagreement, channel=CHANNELS, share=disagreement.rms / disagreement.activity)
 
     @property
     def known(self) -> list[int]:
@@ -80,10 +68,10 @@ class GapGroup:
 class ResidualGroup:
     """Gap of each window."""
 
-    time: Array = dataset("time", "middle of each window, on the clock of its flight", "window", units="s")
-    flight: IntArray = dataset("flight", "index of its flight", "window", into="flight")
+    time: Array = dataset("middle of each window, on the clock of its flight", "window", units="s")
+    flight: IntArray = dataset("index of its flight", "window", into="flight")
     value: Array = dataset(
-        "value", "what inertia and rotors leave, N m and N", "window", "channel", units="SI", frame=BODY, gaps=True
+        "what inertia and rotors leave, N m and N", "window", "channel", units="SI", frame=BODY, gaps=True
     )
 
 
@@ -91,18 +79,18 @@ class ResidualGroup:
 class StateGroup:
     """Signals averaged over the windows."""
 
-    name: tuple[str, ...] = dataset("name", "signals averaged over the same windows", "state")
-    value: Array = dataset("value", "their averages", "window", "state", units="SI", gaps=True)
+    name: tuple[str, ...] = dataset("signals averaged over the same windows", "state")
+    value: Array = dataset("their averages", "window", "state", units="SI", gaps=True)
 
 
 @record
 class DependenceGroup:
     """How well single signals explain the gap of a channel."""
 
-    channel: tuple[str, ...] = dataset("channel", "channel; the best pairs of channel and signal first", "dependence")
-    signal: tuple[str, ...] = dataset("signal", "signal that the gap is explained with, alone", "dependence")
-    r2: Array = dataset("r2", "share of the variance explained on blocks that the fit did not see", "dependence")
-    p_value: Array = dataset("p_value", "probability that chance does as well with any signal", "dependence")
+    channel: tuple[str, ...] = dataset("channel; the best pairs of channel and signal first", "dependence")
+    signal: tuple[str, ...] = dataset("signal that the gap is explained with, alone", "dependence")
+    r2: Array = dataset("share of the variance explained on blocks that the fit did not see", "dependence")
+    p_value: Array = dataset("probability that chance does as well with any signal", "dependence")
 
     @classmethod
     def of(cls, pairs: Sequence[Dependence]) -> Self:
@@ -128,27 +116,21 @@ class DependenceGroup:
 class HeatMapGroup:
     """Mean gap over the two signals that explain it best."""
 
-    channel: str = dataset("channel", "channel with the largest gap in floors")
-    signal: tuple[str, ...] = dataset("signal", "the two signals that explain it best", "2")
-    first_edge: Array = dataset("first_edge", "edges of the cells along the first signal", "edge", units="SI")
-    second_edge: Array = dataset("second_edge", "edges of the cells along the second signal", "edge", units="SI")
+    channel: str = dataset("channel with the largest gap in floors")
+    signal: tuple[str, ...] = dataset("the two signals that explain it best", "2")
+    first_edge: Array = dataset("edges of the cells along the first signal", "edge", units="SI")
+    second_edge: Array = dataset("edges of the cells along the second signal", "edge", units="SI")
     mean: Array = dataset(
-        "mean", "mean gap in each cell, N m or N", "cell_first", "cell_second", units="SI", frame=BODY, gaps=True
+        "mean gap in each cell, N m or N", "cell_first", "cell_second", units="SI", frame=BODY, gaps=True
     )
-    count: Array = dataset("count", "windows in each cell", "cell_first", "cell_second")
+    count: Array = dataset("windows in each cell", "cell_first", "cell_second")
 
     @classmethod
     def of(cls, worst: WorstChannel) -> Self:
         """Arrange the channel with the largest gap over two signals."""
         first, second = worst.heat_map.edges
-        return cls(
-            channel=worst.channel,
-            signal=worst.signals,
-            first_edge=first,
-            second_edge=second,
-            mean=worst.heat_map.mean,
-            count=worst.heat_map.count,
-        )
+        given = {"channel": worst.channel, "signal": worst.signals, "first_edge": first, "second_edge": second}
+        return group_of(cls, worst.heat_map, **given)
 
 
 @record
@@ -162,34 +144,26 @@ class DisagreementRecord(Record):
         ("flight-1", "model", "model-flight-1"),
     )
 
-    gap: GapGroup = group("gap")
-    residual: ResidualGroup = group("residual")
-    state: StateGroup = group("state")
-    stretch: StretchGroup = group("stretch")
-    dependence: DependenceGroup = group("dependence")
-    heat_map: HeatMapGroup | None = group("heat_map", default=None)
-    playback: PlaybackGroup | None = group("playback", default=None)
-    not_excited: NotExcitedGroup = group("not_excited")
+    gap: GapGroup = group()
+    residual: ResidualGroup = group()
+    state: StateGroup = group()
+    stretch: StretchGroup = group()
+    dependence: DependenceGroup = group()
+    heat_map: HeatMapGroup | None = group(default=None)
+    playback: PlaybackGroup | None = group(default=None)
+    not_excited: NotExcitedGroup = group()
     audit: AuditGroup = group("")
-    warning: tuple[str, ...] = dataset("warning", "what to know about the flights", "warning")
-    base: VehicleGroup = group("base")
+    warning: tuple[str, ...] = dataset("what to know about the flights", "warning")
+    base: VehicleGroup = group()
     flights: FlightsGroup = group("")
     again: ComesAgainGroup | None = group("comes_again", default=None)
-    learned: LearnedGroup | None = group("learned", default=None)
+    learned: LearnedGroup | None = group(default=None)
 
     @classmethod
     def of(
         cls, disagreement: Disagreement, recordings: Sequence[Recording], warnings: tuple[str, ...], base: VehicleModel
     ) -> Self:
-        """Arrange a comparison.
-
-        Parameters
-        ----------
-        warnings : tuple of str
-            What to know about the flights.
-        base : VehicleModel
-            That was compared.
-        """
+        """Arrange a comparison."""
         return cls(
             gap=GapGroup.of(disagreement),
             residual=ResidualGroup(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.spec import dataset, record
+from cpfls_cli.artifacts.spec import dataset, group_of, record
 from cpfls_cli.playback.gusts import GUST_AXES
 
 if TYPE_CHECKING:
@@ -42,30 +42,19 @@ class GustAxis(NamedTuple):
 class DisturbanceGroup:
     """Gusts in the flights that the vehicle was found in, as torque about body axes and force along them."""
 
-    told_by: str = dataset("told_by", "what told gusts from what the model lacks: repeats, setpoints or none")
-    name: tuple[str, ...] = dataset("name", "roll, pitch, yaw, x, y, z", "gust")
-    size: Array = dataset("size", "standard deviation, N m or N", "gust", units="SI", gaps=True)
-    low: Array = dataset(
-        "low", "lower end of the 95 % interval; 0 where it is not known", "gust", units="SI", gaps=True
-    )
-    high: Array = dataset("high", "upper end; no gusts above it where no size is known", "gust", units="SI", gaps=True)
-    memory: Array = dataset("memory", "time in which a gust falls to 37 %", "gust", units="s", gaps=True)
-    memory_low: Array = dataset("memory_low", "lower end of the 95 % interval", "gust", units="s", gaps=True)
-    memory_high: Array = dataset("memory_high", "upper end of the 95 % interval", "gust", units="s", gaps=True)
+    told_by: str = dataset("what told gusts from what the model lacks: repeats, setpoints or none")
+    name: tuple[str, ...] = dataset("roll, pitch, yaw, x, y, z", "gust")
+    size: Array = dataset("standard deviation, N m or N", "gust", units="SI", gaps=True)
+    low: Array = dataset("lower end of the 95 % interval; 0 where it is not known", "gust", units="SI", gaps=True)
+    high: Array = dataset("upper end; no gusts above it where no size is known", "gust", units="SI", gaps=True)
+    memory: Array = dataset("time in which a gust falls to 37 %", "gust", units="s", gaps=True)
+    memory_low: Array = dataset("lower end of the 95 % interval", "gust", units="s", gaps=True)
+    memory_high: Array = dataset("upper end of the 95 % interval", "gust", units="s", gaps=True)
 
     @classmethod
     def of(cls, found: FoundGusts) -> Self:
         """Arrange what was found."""
-        return cls(
-            told_by=found.told_by,
-            name=GUST_AXES[: len(found.size)],
-            size=found.size,
-            low=found.low,
-            high=found.high,
-            memory=found.memory,
-            memory_low=found.memory_low,
-            memory_high=found.memory_high,
-        )
+        return group_of(cls, found, name=GUST_AXES[: len(found.size)])
 
     def axes(self, inertia: Array, mass: float) -> Iterator[GustAxis]:
         """Give each axis as the acceleration of a body.

@@ -27,17 +27,11 @@ if TYPE_CHECKING:
 class LeftOutGroup:
     """Effects that no vehicle for other programs holds, and what they do along the held-out flights."""
 
-    name: tuple[str, ...] = dataset("name", "identifier, see `cpfls effects`", "left_out")
+    name: tuple[str, ...] = dataset("identifier, see `cpfls effects`", "left_out")
     wrench: Array = dataset(
-        "wrench",
-        "root mean square of torque (x y z, N m) and force (x y z, N)",
-        "left_out",
-        "6",
-        units="SI",
-        frame=BODY,
+        "root mean square of torque (x y z, N m) and force (x y z, N)", "left_out", "6", units="SI", frame=BODY
     )
     ends: Array = dataset(
-        "ends",
         "how far half a second of playback ends off without it: position (m), velocity (m/s), attitude (rad), body "
         "rate (rad/s); NaN for what a flight does not show",
         "left_out",
@@ -51,7 +45,7 @@ class LeftOutGroup:
 class ExtendedVehicleGroup(VehicleGroup):
     """A vehicle with what was found of the sensors, which a refit repairs first."""
 
-    repair: AuditGroup = group("repair")
+    repair: AuditGroup = group()
 
 
 @record
@@ -66,15 +60,15 @@ class ExtendedRecord(ModelRecord):
         kind="extended",
     )
 
-    vehicle: ExtendedVehicleGroup = group("vehicle")
+    vehicle: ExtendedVehicleGroup = group()
     inertia: Array = dataset(
-        "inertia", "Ixx Iyy Izz Ixy Ixz Iyz: of the rigid body, or what the model gets", "6", units="kg m^2", frame=BODY
+        "Ixx Iyy Izz Ixy Ixz Iyz: of the rigid body, or what the model gets", "6", units="kg m^2", frame=BODY
     )
-    thrust_scale: float = dataset("thrust_scale", "thrust over that of the vehicle in /config")
+    thrust_scale: float = dataset("thrust over that of the vehicle in /config")
     effects: NamedEffectsGroup = group("")
-    gap: GapChangeGroup = group("gap")
-    playback: PlaybackChangeGroup | None = group("playback", default=None)
-    left_out: LeftOutGroup | None = group("left_out", default=None)
+    gap: GapChangeGroup = group()
+    playback: PlaybackChangeGroup | None = group(default=None)
+    left_out: LeftOutGroup | None = group(default=None)
 
     @classmethod
     def of(
@@ -91,10 +85,6 @@ class ExtendedRecord(ModelRecord):
         ----------
         stated : VehicleSettings
             That the effects were fitted with.
-        model : VehicleModel
-            With the effects.
-        playback : PlaybackChangeGroup
-            Of held-out flights.
         left_out : sequence of LeftOut
             What no table of weights holds, along them.
         """

@@ -29,16 +29,14 @@ MOTION = ("attitude", "attitude_rate", "attitude_acceleration")
 class QualityGroup:
     """What an import found in its log, and what was done about it."""
 
-    reason: tuple[str, ...] | None = dataset(
-        "reason", "what was found in the log, and what was done", "reason", default=None
-    )
-    count: IntArray | None = dataset("count", "rows, gaps or values by reason", "reason", default=None)
-    warning: tuple[str, ...] | None = dataset("warning", "what to know about the log", "warning", default=None)
+    reason: tuple[str, ...] | None = dataset("what was found in the log, and what was done", "reason", default=None)
+    count: IntArray | None = dataset("rows, gaps or values by reason", "reason", default=None)
+    warning: tuple[str, ...] | None = dataset("what to know about the log", "warning", default=None)
     filtered: tuple[str, ...] | None = dataset(
-        "filtered", "signals of the log that were low-passed before it was logged", "filtered", default=None
+        "signals of the log that were low-passed before it was logged", "filtered", default=None
     )
     cut_off: Array | None = dataset(
-        "cut_off", "where that filter halves the amplitude, seen in the spectrum", "filtered", units="Hz", default=None
+        "where that filter halves the amplitude, seen in the spectrum", "filtered", units="Hz", default=None
     )
 
     @classmethod
@@ -73,9 +71,9 @@ class QualityGroup:
 class DelayGroup:
     """Delay of motion behind command, and its estimate."""
 
-    value: float = dataset("value", "delay of motion behind command, taken out", units="s")
-    tried: Array | None = dataset("tried", "delays tried by the estimate", "tried", units="s", default=None)
-    r2: Array | None = dataset("r2", "R2 of the rigid body by delay, axes together", "tried", default=None)
+    value: float = dataset("delay of motion behind command, taken out", units="s")
+    tried: Array | None = dataset("delays tried by the estimate", "tried", units="s", default=None)
+    r2: Array | None = dataset("R2 of the rigid body by delay, axes together", "tried", default=None)
 
     @property
     def best_r2(self) -> float | None:
@@ -87,8 +85,8 @@ class DelayGroup:
 class NoiseGroup:
     """Noise that a simulation added."""
 
-    signal: tuple[str, ...] = dataset("signal", "signals with added noise", "noisy")
-    std: Array = dataset("std", "standard deviation added", "noisy", "axis", units="SI")
+    signal: tuple[str, ...] = dataset("signals with added noise", "noisy")
+    std: Array = dataset("standard deviation added", "noisy", "axis", units="SI")
 
     @classmethod
     def of(cls, std: Mapping[str, Array]) -> Self | None:
@@ -107,8 +105,8 @@ class NoiseGroup:
 class FlownEffectsGroup:
     """Effects that a simulation flew beyond its model."""
 
-    name: tuple[str, ...] = dataset("name", "what was flown beyond the model, by value", "flown")
-    value: Array = dataset("value", "the true value of each", "flown", units="SI")
+    name: tuple[str, ...] = dataset("what was flown beyond the model, by value", "flown")
+    value: Array = dataset("the true value of each", "flown", units="SI")
 
     @classmethod
     def of(cls, effects: SimulatedEffects) -> Self | None:
@@ -133,44 +131,30 @@ def _effect_values(effects: SimulatedEffects) -> Iterator[tuple[str, float]]:
 class TrackingGroup:
     """Attitude controllers that were compared on a flight."""
 
-    controller: tuple[str, ...] = dataset("controller", "model, rigid-body, pd, vehicle: the model flies", "controller")
-    time: Array = dataset("time", "samples of the plan; the flight ends where it was lost", "tracked", units="s")
+    controller: tuple[str, ...] = dataset("model, rigid-body, pd, vehicle: the model flies", "controller")
+    time: Array = dataset("samples of the plan; the flight ends where it was lost", "tracked", units="s")
     error: Array = dataset(
-        "error", "planned less flown angles", "controller", "tracked", "axis", units="rad", frame=EULER, gaps=True
+        "planned less flown angles", "controller", "tracked", "axis", units="rad", frame=EULER, gaps=True
     )
-    settled_from: float = dataset(
-        "settled_from", "when the initial error has died down, from the first sample", units="s"
-    )
+    settled_from: float = dataset("when the initial error has died down, from the first sample", units="s")
     rms: Array = dataset(
-        "rms",
-        "root mean square error; not finite where lost",
-        "controller",
-        "axis",
-        units="rad",
-        frame=EULER,
-        gaps=True,
+        "root mean square error; not finite where lost", "controller", "axis", units="rad", frame=EULER, gaps=True
     )
     settled_rms: Array = dataset(
-        "settled_rms",
-        "the same of the samples after that time",
-        "controller",
-        "axis",
-        units="rad",
-        frame=EULER,
-        gaps=True,
+        "the same of the samples after that time", "controller", "axis", units="rad", frame=EULER, gaps=True
     )
-    max_error: Array = dataset("max_error", "largest error", "controller", "axis", units="rad", frame=EULER, gaps=True)
+    max_error: Array = dataset("largest error", "controller", "axis", units="rad", frame=EULER, gaps=True)
     settled_max: Array = dataset(
-        "settled_max", "largest error after that time", "controller", "axis", units="rad", frame=EULER, gaps=True
+        "largest error after that time", "controller", "axis", units="rad", frame=EULER, gaps=True
     )
     torque_rms: Array = dataset(
-        "torque_rms", "root mean square of the torque", "controller", "axis", units="N m", frame=BODY, gaps=True
+        "root mean square of the torque", "controller", "axis", units="N m", frame=BODY, gaps=True
     )
-    clipped: Array = dataset("clipped", "share of the commands clipped to the largest torque", "controller")
-    lost_at: Array = dataset("lost_at", "time of a loss; not finite where none", "controller", units="s", gaps=True)
-    control_rate: float = dataset("control_rate", "commands in a second", units="1/s")
-    outside: BoolArray = dataset("outside", "1 where the flight leaves what the model's training visited", "time")
-    not_positive_definite: int = dataset("not_positive_definite", "samples of the flight where no body has the D(q)")
+    clipped: Array = dataset("share of the commands clipped to the largest torque", "controller")
+    lost_at: Array = dataset("time of a loss; not finite where none", "controller", units="s", gaps=True)
+    control_rate: float = dataset("commands in a second", units="1/s")
+    outside: BoolArray = dataset("1 where the flight leaves what the model's training visited", "time")
+    not_positive_definite: int = dataset("samples of the flight where no body has the D(q)")
 
     @classmethod
     def of(
@@ -180,8 +164,6 @@ class TrackingGroup:
 
         Parameters
         ----------
-        controllers : sequence of str
-            Their names.
         attitude : array, shape (time, 3), rad
             Of the flight under the model's controller.
         """
@@ -255,45 +237,30 @@ class FlightRecord(Record):
         ("trajectory", "model", "log"),
     )
 
-    time: Array = dataset("time", "time from the first sample", "time", units="s")
-    attitude: Array | None = dataset(
-        "attitude", "roll, pitch, yaw q", "time", "axis", units="rad", frame=EULER, default=None
-    )
-    attitude_rate: Array | None = dataset(
-        "attitude_rate", "Euler rates qd", "time", "axis", units="rad/s", frame=EULER, default=None
-    )
+    time: Array = dataset("time from the first sample", "time", units="s")
+    attitude: Array | None = dataset("roll, pitch, yaw q", "time", "axis", units="rad", frame=EULER, default=None)
+    attitude_rate: Array | None = dataset("Euler rates qd", "time", "axis", units="rad/s", frame=EULER, default=None)
     attitude_acceleration: Array | None = dataset(
-        "attitude_acceleration", "Euler accelerations qdd", "time", "axis", units="rad/s^2", frame=EULER, default=None
+        "Euler accelerations qdd", "time", "axis", units="rad/s^2", frame=EULER, default=None
     )
-    body_rate: Array | None = dataset(
-        "body_rate", "body rates p, q, r", "time", "axis", units="rad/s", frame=BODY, default=None
-    )
+    body_rate: Array | None = dataset("body rates p, q, r", "time", "axis", units="rad/s", frame=BODY, default=None)
     torque: Array | None = dataset(
-        "torque", "generalised torque, W^T body_torque", "time", "axis", units="N m", frame=EULER, default=None
+        "generalised torque, W^T body_torque", "time", "axis", units="N m", frame=EULER, default=None
     )
     body_torque: Array | None = dataset(
-        "body_torque", "torque about the body axes", "time", "axis", units="N m", frame=BODY, default=None
+        "torque about the body axes", "time", "axis", units="N m", frame=BODY, default=None
     )
-    thrust: Array | None = dataset("thrust", "total thrust along body z", "time", units="N", frame=BODY, default=None)
-    position: Array | None = dataset("position", "position", "time", "axis", units="m", frame=WORLD, default=None)
-    velocity: Array | None = dataset("velocity", "velocity", "time", "axis", units="m/s", frame=WORLD, default=None)
-    acceleration: Array | None = dataset(
-        "acceleration", "acceleration", "time", "axis", units="m/s^2", frame=WORLD, default=None
-    )
+    thrust: Array | None = dataset("total thrust along body z", "time", units="N", frame=BODY, default=None)
+    position: Array | None = dataset("position", "time", "axis", units="m", frame=WORLD, default=None)
+    velocity: Array | None = dataset("velocity", "time", "axis", units="m/s", frame=WORLD, default=None)
+    acceleration: Array | None = dataset("acceleration", "time", "axis", units="m/s^2", frame=WORLD, default=None)
     specific_force: Array | None = dataset(
-        "specific_force",
-        "what an accelerometer senses: +g along z in hover",
-        "time",
-        "axis",
-        units="m/s^2",
-        frame=BODY,
-        default=None,
+        "what an accelerometer senses: +g along z in hover", "time", "axis", units="m/s^2", frame=BODY, default=None
     )
     rotor_speed: Array | None = dataset(
-        "rotor_speed", "rotor speeds", "time", "rotor", units="rad/s", frame=BODY, gaps=True, default=None
+        "rotor speeds", "time", "rotor", units="rad/s", frame=BODY, gaps=True, default=None
     )
     rotor_command: Array | None = dataset(
-        "rotor_command",
         "commands to the rotors; rad/s if simulated, else aligned, filtered, in import.signals.rotor_command.unit",
         "time",
         "rotor",
@@ -302,14 +269,12 @@ class FlightRecord(Record):
         default=None,
     )
     voltage: Array | None = dataset(
-        "voltage",
         "of the battery: V; share of the full one if simulated or where import.signals.voltage.unit is 1",
         "time",
         units="SI",
         default=None,
     )
     setpoint_position: Array | None = dataset(
-        "setpoint_position",
         "position that was asked for; not finite where none was",
         "time",
         "axis",
@@ -319,37 +284,15 @@ class FlightRecord(Record):
         default=None,
     )
     setpoint_velocity: Array | None = dataset(
-        "setpoint_velocity",
-        "velocity that was asked for",
-        "time",
-        "axis",
-        units="m/s",
-        frame=WORLD,
-        gaps=True,
-        default=None,
+        "velocity that was asked for", "time", "axis", units="m/s", frame=WORLD, gaps=True, default=None
     )
     setpoint_attitude: Array | None = dataset(
-        "setpoint_attitude",
-        "roll, pitch, yaw that were asked for",
-        "time",
-        "axis",
-        units="rad",
-        frame=EULER,
-        gaps=True,
-        default=None,
+        "roll, pitch, yaw that were asked for", "time", "axis", units="rad", frame=EULER, gaps=True, default=None
     )
     setpoint_body_rate: Array | None = dataset(
-        "setpoint_body_rate",
-        "body rates that were asked for",
-        "time",
-        "axis",
-        units="rad/s",
-        frame=BODY,
-        gaps=True,
-        default=None,
+        "body rates that were asked for", "time", "axis", units="rad/s", frame=BODY, gaps=True, default=None
     )
     setpoint_thrust: Array | None = dataset(
-        "setpoint_thrust",
         "thrust that was asked for: N, or share of the largest where import.signals.setpoint_thrust.unit is 1",
         "time",
         units="SI",
@@ -358,18 +301,17 @@ class FlightRecord(Record):
         default=None,
     )
     sticks: Array | None = dataset(
-        "sticks",
         "roll, pitch, yaw and, where it counts alike, throttle of the pilot, shares of full deflection as logged",
         "time",
         "stick",
         gaps=True,
         default=None,
     )
-    quality: QualityGroup | None = group("quality", default=None)
-    delay: DelayGroup | None = group("delay", default=None)
-    noise: NoiseGroup | None = group("noise", default=None)
-    effects: FlownEffectsGroup | None = group("effects", default=None)
-    tracking: TrackingGroup | None = group("tracking", default=None)
+    quality: QualityGroup | None = group(default=None)
+    delay: DelayGroup | None = group(default=None)
+    noise: NoiseGroup | None = group(default=None)
+    effects: FlownEffectsGroup | None = group(default=None)
+    tracking: TrackingGroup | None = group(default=None)
 
     @classmethod
     def of_simulation(

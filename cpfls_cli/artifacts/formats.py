@@ -8,7 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 from textwrap import fill
 
-from cpfls_cli.artifacts.spec import ArtifactSpec, DatasetSpec, Record
+from cpfls_cli.artifacts.spec import DatasetSpec, Format, Record
 
 _RECORDS = {
     ("cpfls/trajectory", ""): "trajectory.TrajectoryRecord",
@@ -53,12 +53,12 @@ def format_tables() -> str:
     return "\n".join(_section(record.spec()) for record in records())
 
 
-def _section(spec: ArtifactSpec) -> str:
+def _section(spec: Format) -> str:
     inputs = ", ".join(f"`/inputs/{role}`" for role in spec.inputs) or "none"
     rows = "\n".join(_row(dataset) for dataset in spec.datasets)
     words = fill(f"Made by {spec.makers}: {spec.description}. Inputs: {inputs}.", _WIDTH, break_on_hyphens=False)
     kind = f", kind `{spec.kind}`" if spec.kind else ""
-    return f"### `{spec.format}`{kind}\n\n{words}\n\n{_HEAD}\n{rows}\n"
+    return f"### `{spec.name}`{kind}\n\n{words}\n\n{_HEAD}\n{rows}\n"
 
 
 def _row(dataset: DatasetSpec) -> str:

@@ -101,16 +101,14 @@ class EffectGroup:
     """Effects, largest share first."""
 
     name: tuple[str, ...] = dataset(
-        "name", "identifier, see `cpfls effects`; largest share first, faults of sensors before", "effect"
+        "identifier, see `cpfls effects`; largest share first, faults of sensors before", "effect"
     )
-    kind: tuple[str, ...] = dataset("kind", "wrench, actuator, sensor or parameter", "effect")
-    named: Array = dataset("named", "1 if the verdict names it, 0 if it is only the closest", "effect")
-    p_value: Array = dataset("p_value", "probability that chance explains as much, over the whole catalogue", "effect")
-    share: Array = dataset("share", "part of the gap above the floor that comes back without it", "effect")
-    selection_frequency: Array = dataset(
-        "selection_frequency", "share of the blocks without which it is still the first choice", "effect"
-    )
-    sentence: tuple[str, ...] = dataset("sentence", "what a pilot understands", "effect")
+    kind: tuple[str, ...] = dataset("wrench, actuator, sensor or parameter", "effect")
+    named: Array = dataset("1 if the verdict names it, 0 if it is only the closest", "effect")
+    p_value: Array = dataset("probability that chance explains as much, over the whole catalogue", "effect")
+    share: Array = dataset("part of the gap above the floor that comes back without it", "effect")
+    selection_frequency: Array = dataset("share of the blocks without which it is still the first choice", "effect")
+    sentence: tuple[str, ...] = dataset("what a pilot understands", "effect")
 
     @classmethod
     def of(cls, effects: Sequence[NamedEffect], named: bool) -> Self:
@@ -123,18 +121,14 @@ class EffectGroup:
 class CoefficientGroup:
     """Coefficients and shapes of the effects with their intervals."""
 
-    effect: tuple[str, ...] = dataset("effect", "effect that each coefficient belongs to", "coefficient")
-    name: tuple[str, ...] = dataset("name", "name of the coefficient or shape", "coefficient")
-    unit: tuple[str, ...] = dataset("unit", "unit of the coefficient", "coefficient")
-    value: Array = dataset("value", "estimate", "coefficient", units="SI")
-    low: Array = dataset("low", "lower end of the 95 % interval", "coefficient", units="SI", gaps=True)
-    high: Array = dataset("high", "upper end of the 95 % interval", "coefficient", units="SI", gaps=True)
-    plausible_low: Array = dataset(
-        "plausible_low", "least value that is physically possible", "coefficient", units="SI", gaps=True
-    )
-    plausible_high: Array = dataset(
-        "plausible_high", "largest value that is physically possible", "coefficient", units="SI", gaps=True
-    )
+    effect: tuple[str, ...] = dataset("effect that each coefficient belongs to", "coefficient")
+    name: tuple[str, ...] = dataset("name of the coefficient or shape", "coefficient")
+    unit: tuple[str, ...] = dataset("unit of the coefficient", "coefficient")
+    value: Array = dataset("estimate", "coefficient", units="SI")
+    low: Array = dataset("lower end of the 95 % interval", "coefficient", units="SI", gaps=True)
+    high: Array = dataset("upper end of the 95 % interval", "coefficient", units="SI", gaps=True)
+    plausible_low: Array = dataset("least value that is physically possible", "coefficient", units="SI", gaps=True)
+    plausible_high: Array = dataset("largest value that is physically possible", "coefficient", units="SI", gaps=True)
 
     @classmethod
     def of(cls, effects: Sequence[NamedEffect]) -> Self:
@@ -160,9 +154,9 @@ class LinearGroup:
     """Linear coefficients of the columns of each effect."""
 
     effect: tuple[str, ...] = dataset(
-        "effect", "effect that each linear coefficient belongs to, in the order of its columns", "linear"
+        "effect that each linear coefficient belongs to, in the order of its columns", "linear"
     )
-    value: Array = dataset("value", "linear coefficients of the columns of each effect", "linear", units="SI")
+    value: Array = dataset("linear coefficients of the columns of each effect", "linear", units="SI")
 
     @classmethod
     def of(cls, effects: Sequence[NamedEffect]) -> Self:
@@ -182,9 +176,9 @@ class LinearGroup:
 class ShapeGroup:
     """Nonlinear shapes of the effects."""
 
-    effect: tuple[str, ...] = dataset("effect", "effect that each shape belongs to", "shape")
-    name: tuple[str, ...] = dataset("name", "what the effect depends on nonlinearly", "shape")
-    value: Array = dataset("value", "value of the shape", "shape", units="SI")
+    effect: tuple[str, ...] = dataset("effect that each shape belongs to", "shape")
+    name: tuple[str, ...] = dataset("what the effect depends on nonlinearly", "shape")
+    value: Array = dataset("value of the shape", "shape", units="SI")
 
     @classmethod
     def of(cls, effects: Sequence[NamedEffect]) -> Self:
@@ -210,11 +204,11 @@ class ShapeGroup:
 class ParameterGroup:
     """Numbers of the vehicle, refitted with the effects."""
 
-    name: tuple[str, ...] = dataset("name", "numbers of the vehicle, refitted with the effects", "parameter")
-    unit: tuple[str, ...] = dataset("unit", "1 for a relative error: true over that of the model, less 1", "parameter")
-    value: Array = dataset("value", "estimate", "parameter", units="SI")
-    low: Array = dataset("low", "lower end of the 95 % interval", "parameter", units="SI", gaps=True)
-    high: Array = dataset("high", "upper end of the 95 % interval", "parameter", units="SI", gaps=True)
+    name: tuple[str, ...] = dataset("numbers of the vehicle, refitted with the effects", "parameter")
+    unit: tuple[str, ...] = dataset("1 for a relative error: true over that of the model, less 1", "parameter")
+    value: Array = dataset("estimate", "parameter", units="SI")
+    low: Array = dataset("lower end of the 95 % interval", "parameter", units="SI", gaps=True)
+    high: Array = dataset("upper end of the 95 % interval", "parameter", units="SI", gaps=True)
 
     @classmethod
     def of(cls, known: Mapping[str, Estimate], linear: Array) -> Self:
@@ -252,11 +246,11 @@ class ParameterGroup:
 class NamedEffectsGroup:
     """Effects with all their numbers, enough to evaluate them."""
 
-    effect: EffectGroup = group("effect")
-    coefficient: CoefficientGroup = group("coefficient")
-    linear: LinearGroup = group("linear")
-    shape: ShapeGroup = group("shape")
-    parameter: ParameterGroup = group("parameter")
+    effect: EffectGroup = group()
+    coefficient: CoefficientGroup = group()
+    linear: LinearGroup = group()
+    shape: ShapeGroup = group()
+    parameter: ParameterGroup = group()
 
     @classmethod
     def of(cls, effects: Sequence[NamedEffect], named: bool, known: Mapping[str, Estimate], linear: Array) -> Self:
@@ -332,24 +326,15 @@ class GapChangeGroup:
     """Gap of each channel on held-out flights, before and after."""
 
     channel: tuple[str, ...] = dataset(
-        "channel",
-        "names of the channels: torque about (x y z, N m) and force along (x y z, N) the body axes",
-        "channel",
+        "names of the channels: torque about (x y z, N m) and force along (x y z, N) the body axes", "channel"
     )
     before: Array = dataset(
-        "before",
-        "root mean square on the held-out flights, model as given",
-        "channel",
-        units="SI",
-        frame=BODY,
-        gaps=True,
+        "root mean square on the held-out flights, model as given", "channel", units="SI", frame=BODY, gaps=True
     )
-    after: Array = dataset("after", "the same with the effects", "channel", units="SI", frame=BODY, gaps=True)
-    floor: Array = dataset("floor", "noise floor of the held-out flights", "channel", units="SI", frame=BODY, gaps=True)
-    before_floors: Array = dataset(
-        "before_floors", "gap of the model as given, in floors", "channel", frame=BODY, gaps=True
-    )
-    after_floors: Array = dataset("after_floors", "gap with the effects, in floors", "channel", frame=BODY, gaps=True)
+    after: Array = dataset("the same with the effects", "channel", units="SI", frame=BODY, gaps=True)
+    floor: Array = dataset("noise floor of the held-out flights", "channel", units="SI", frame=BODY, gaps=True)
+    before_floors: Array = dataset("gap of the model as given, in floors", "channel", frame=BODY, gaps=True)
+    after_floors: Array = dataset("gap with the effects, in floors", "channel", frame=BODY, gaps=True)
 
     @classmethod
     def of(cls, before: GapSize, after: GapSize, floor: Array) -> Self:
@@ -412,27 +397,21 @@ class GapChangeGroup:
 class StretchGroup:
     """Stretches of time with the largest gap, largest first."""
 
-    flight: Array = dataset("flight", "index of the flight; stretches of time with the largest gap, first", "stretch")
-    start: Array = dataset("start", "on the clock of the flight", "stretch", units="s")
-    end: Array = dataset("end", "on the clock of the flight", "stretch", units="s")
-    channel: tuple[str, ...] = dataset("channel", "channel of the gap", "stretch")
-    floors: Array = dataset("floors", "root mean square of the gap there, in floors", "stretch")
+    flight: Array = dataset("index of the flight; stretches of time with the largest gap, first", "stretch")
+    start_s: Array = dataset("on the clock of the flight", "stretch", path="start", units="s")
+    end_s: Array = dataset("on the clock of the flight", "stretch", path="end", units="s")
+    channel: tuple[str, ...] = dataset("channel of the gap", "stretch")
+    rms_floors: Array = dataset("root mean square of the gap there, in floors", "stretch", path="floors")
 
     @classmethod
     def of(cls, stretches: Sequence[GapStretch]) -> Self:
         """Arrange stretches of time."""
-        return cls(
-            flight=np.fromiter((stretch.flight for stretch in stretches), float),
-            start=np.fromiter((stretch.start_s for stretch in stretches), float),
-            end=np.fromiter((stretch.end_s for stretch in stretches), float),
-            channel=tuple(stretch.channel for stretch in stretches),
-            floors=np.fromiter((stretch.rms_floors for stretch in stretches), float),
-        )
+        return columns_of(cls, stretches)
 
     def first(self, most: int) -> list[tuple[int, float, float, str, float]]:
         """List the largest: flight, start and end in s, channel, floors."""
-        columns = (self.flight.astype(int).tolist(), self.start.tolist(), self.end.tolist(), self.channel)
-        return list(zip(*columns, self.floors.tolist(), strict=True))[:most]
+        rows = (row.values() for row in rows_of(self)[:most])
+        return [(int(flight), start, end, channel, floors) for flight, start, end, channel, floors in rows]
 
 
 class EndError(NamedTuple):

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from cpfls_cli.config.study import Study
     from cpfls_cli.gap.naming.results import NotExcited
 
-RIGID_BODY = "rigid-body"
-"""Kind of a base that is the rigid body of the vehicle."""
-
 _ASKED = "setpoint_"
 """Before the name of a signal that was asked for."""
 
@@ -32,10 +29,8 @@ TRAINING, HELD_OUT = "training", "held-out"
 class NotExcitedGroup:
     """Effects that could be there unseen."""
 
-    name: tuple[str, ...] = dataset("name", "effects that could be there unseen", "unseen")
-    reason: tuple[str, ...] = dataset(
-        "reason", "why: signals that are lacking, or the flight that would show it", "unseen"
-    )
+    name: tuple[str, ...] = dataset("effects that could be there unseen", "unseen")
+    reason: tuple[str, ...] = dataset("why: signals that are lacking, or the flight that would show it", "unseen")
 
     @classmethod
     def of(cls, unseen: Sequence[NotExcited]) -> Self:
@@ -57,12 +52,10 @@ class NotExcitedGroup:
 class FlightGroup:
     """What each flight is, and where its samples begin."""
 
-    name: tuple[str, ...] = dataset("name", "file name, with the part of it where one flight was split", "flight")
-    role: tuple[str, ...] = dataset("role", "given, training or held-out", "flight")
-    first: IntArray = dataset("first", "index of the first sample of each flight", "flight")
-    commanded: IntArray = dataset(
-        "commanded", "1 where actuation is what was asked for, not what was measured", "flight"
-    )
+    name: tuple[str, ...] = dataset("file name, with the part of it where one flight was split", "flight")
+    role: tuple[str, ...] = dataset("given, training or held-out", "flight")
+    first: IntArray = dataset("index of the first sample of each flight", "flight")
+    commanded: IntArray = dataset("1 where actuation is what was asked for, not what was measured", "flight")
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], roles: Sequence[str]) -> Self:
@@ -74,8 +67,9 @@ class FlightGroup:
             Of each: given, training or held-out.
         """
         lengths = [len(recording.signals) for recording in recordings]
-        return cls(
-            name=tuple(recording.name for recording in recordings),
+        return columns_of(
+            cls,
+            recordings,
             role=tuple(roles),
             first=np.cumsum([0, *lengths[:-1]]),
             commanded=np.array([int(recording.signals.commanded) for recording in recordings]),
@@ -86,60 +80,30 @@ class FlightGroup:
 class SignalsGroup:
     """Signals of all flights; not finite in a flight that lacks one."""
 
-    time: Array = dataset("time", "time on the clock of the flight", "sample", units="s")
-    body_rate: Array = dataset(
-        "body_rate", "body rates p, q, r, as logged", "sample", "axis", units="rad/s", frame=BODY
-    )
+    time: Array = dataset("time on the clock of the flight", "sample", units="s")
+    body_rate: Array = dataset("body rates p, q, r, as logged", "sample", "axis", units="rad/s", frame=BODY)
     attitude: Array | None = dataset(
-        "attitude", "roll, pitch, yaw", "sample", "axis", units="rad", frame=EULER, gaps=True, default=None
+        "roll, pitch, yaw", "sample", "axis", units="rad", frame=EULER, gaps=True, default=None
     )
-    velocity: Array | None = dataset(
-        "velocity", "velocity", "sample", "axis", units="m/s", frame=WORLD, gaps=True, default=None
-    )
-    position: Array | None = dataset(
-        "position", "position", "sample", "axis", units="m", frame=WORLD, gaps=True, default=None
-    )
+    velocity: Array | None = dataset("velocity", "sample", "axis", units="m/s", frame=WORLD, gaps=True, default=None)
+    position: Array | None = dataset("position", "sample", "axis", units="m", frame=WORLD, gaps=True, default=None)
     acceleration: Array | None = dataset(
-        "acceleration", "acceleration", "sample", "axis", units="m/s^2", frame=WORLD, gaps=True, default=None
+        "acceleration", "sample", "axis", units="m/s^2", frame=WORLD, gaps=True, default=None
     )
     specific_force: Array | None = dataset(
-        "specific_force",
-        "what an accelerometer senses",
-        "sample",
-        "axis",
-        units="m/s^2",
-        frame=BODY,
-        gaps=True,
-        default=None,
+        "what an accelerometer senses", "sample", "axis", units="m/s^2", frame=BODY, gaps=True, default=None
     )
     rotor_speed: Array | None = dataset(
-        "rotor_speed",
-        "rotor speeds, measured or commanded",
-        "sample",
-        "rotor",
-        units="rad/s",
-        frame=BODY,
-        gaps=True,
-        default=None,
+        "rotor speeds, measured or commanded", "sample", "rotor", units="rad/s", frame=BODY, gaps=True, default=None
     )
     stated_torque: Array | None = dataset(
-        "stated_torque",
-        "torque of a log without rotor speeds",
-        "sample",
-        "axis",
-        units="N m",
-        frame=BODY,
-        gaps=True,
-        default=None,
+        "torque of a log without rotor speeds", "sample", "axis", units="N m", frame=BODY, gaps=True, default=None
     )
     stated_thrust: Array | None = dataset(
-        "stated_thrust", "thrust of such a log, along body z", "sample", units="N", frame=BODY, gaps=True, default=None
+        "thrust of such a log, along body z", "sample", units="N", frame=BODY, gaps=True, default=None
     )
-    voltage: Array | None = dataset(
-        "voltage", "of the battery, as a share of the full one", "sample", gaps=True, default=None
-    )
+    voltage: Array | None = dataset("of the battery, as a share of the full one", "sample", gaps=True, default=None)
     setpoint_position: Array | None = dataset(
-        "setpoint_position",
         "position that was asked for, by which runs in one flight are found",
         "sample",
         "axis",
@@ -192,7 +156,7 @@ class FlightsGroup:
     """Flights that later stages read, one after another along the samples."""
 
     each: FlightGroup = group("flight")
-    signals: SignalsGroup = group("signals")
+    signals: SignalsGroup = group()
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], roles: Sequence[str]) -> Self:

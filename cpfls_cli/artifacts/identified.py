@@ -19,27 +19,21 @@ from cpfls_cli.artifacts.evidence import (
     UncertaintyGroup,
     VerdictGroup,
     evidence_groups,
-    group_of,
 )
 from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.model import (
-    EffectsGroup,
     InertiaFunctionsGroup,
     ModelRecord,
-    ResponseGroup,
-    RotorsGroup,
     VehicleGroup,
 )
 from cpfls_cli.artifacts.scores import MODEL, TRAINING, JudgedGroup
-from cpfls_cli.artifacts.spec import BODY, EULER, Format, dataset, group, record
-from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
-from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.artifacts.spec import BODY, EULER, Format, dataset, group, group_of, record
+from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.validation.trust import Trust
-from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
-    from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
     from cpfls_cli.identification.identify import Identification
+    from cpfls_cli.playback.model import VehicleModel
     from cpfls_cli.validation.validate import Validation
 
 WELL_CONDITIONED = 100.0
@@ -50,48 +44,44 @@ WELL_CONDITIONED = 100.0
 class ChosenGroup:
     """What was chosen for the inertia functions."""
 
-    weights: Array = dataset("weights", "partition weights a_i of the chosen chromosome", "gene")
-    base: str = dataset("base", "none or rigid-body")
-    ridge_weight: float = dataset("ridge_weight", "chosen; infinite means the fuzzy part is off", gaps=True)
+    weights: Array = dataset("partition weights a_i of the chosen chromosome", "gene")
+    base: str = dataset("none or rigid-body")
+    ridge_weight: float = dataset("chosen; infinite means the fuzzy part is off", gaps=True)
 
 
 @record
 class SolveGroup:
     """How well the training samples determine the coefficients."""
 
-    singular_values: Array = dataset(
-        "singular_values", "of the regressor of the parameters in use, without penalty", "value", units="SI"
-    )
-    rank: int = dataset("rank", "numerical rank")
-    condition_number: float = dataset("condition_number", "over the kept singular values", least=1.0)
-    parameters: int = dataset("parameters", "number of linear parameters in use")
+    singular_values: Array = dataset("of the regressor of the parameters in use, without penalty", "value", units="SI")
+    rank: int = dataset("numerical rank")
+    condition_number: float = dataset("over the kept singular values", least=1.0)
+    parameters: int = dataset("number of linear parameters in use")
 
 
 @record
 class RulesGroup:
     """Excitation of each rule in training."""
 
-    name: tuple[str, ...] = dataset("name", "inertia function and rule", "rule")
-    firing: Array = dataset("firing", "largest firing strength in training", "rule")
-    determined: Array = dataset("determined", "share of the rule's coefficients that data determine", "rule")
-    excited: BoolArray = dataset("excited", "1 where the rule is excited, else 0", "rule")
+    name: tuple[str, ...] = dataset("inertia function and rule", "rule")
+    firing: Array = dataset("largest firing strength in training", "rule")
+    determined: Array = dataset("share of the rule's coefficients that data determine", "rule")
+    excited: BoolArray = dataset("1 where the rule is excited, else 0", "rule")
 
 
 @record
 class FrontGroup:
     """Pareto front of the search."""
 
-    chromosomes: IntArray = dataset("chromosomes", "Pareto front, 16-bit weights", "member", "gene")
+    chromosomes: IntArray = dataset("Pareto front, 16-bit weights", "member", "gene")
     objectives: Array = dataset(
-        "objectives",
         "MSE (rigid-body base: cross-validated, scaled by axis), largest error, condition number",
         "member",
         "3",
         units="SI",
     )
-    chosen: int = dataset("chosen", "index of the chosen member", into="member")
+    chosen: int = dataset("index of the chosen member", into="member")
     held_out: Array | None = dataset(
-        "held_out",
         "mean squared error on the flights kept for the choice; objective 1 of them",
         "member",
         units="SI",
@@ -104,51 +94,32 @@ class FrontGroup:
 class SearchGroup:
     """How the search ended."""
 
-    stop_reason: str | None = dataset("stop_reason", "generations, converged, time-limit or interrupted", default=None)
-    complete: bool | None = dataset(
-        "complete", "1 where the search came to its end, 0 where `--resume` goes on", default=None
-    )
+    stop_reason: str | None = dataset("generations, converged, time-limit or interrupted", default=None)
+    complete: bool | None = dataset("1 where the search came to its end, 0 where `--resume` goes on", default=None)
 
 
 @record
 class BaselinesGroup:
     """Inertia parameters of the baselines."""
 
-    rigid_body: Array = dataset(
-        "rigid_body", "six inertia parameters by least squares", "6", units="kg m^2", frame=BODY
-    )
-    constant_inertia: Array = dataset(
-        "constant_inertia", "J11 J22 J33 J12 J13 J23, constant", "6", units="kg m^2", frame=EULER
-    )
+    rigid_body: Array = dataset("six inertia parameters by least squares", "6", units="kg m^2", frame=BODY)
+    constant_inertia: Array = dataset("J11 J22 J33 J12 J13 J23, constant", "6", units="kg m^2", frame=EULER)
 
 
 @record
 class RidgeGroup:
     """Cross-validation of the ridge weight."""
 
-    weight: Array = dataset("weight", "ridge weights tried", "tried", gaps=True)
-    error: Array = dataset("error", "cross-validated error", "tried")
-    standard_error: Array = dataset("standard_error", "its standard error", "tried")
+    weight: Array = dataset("ridge weights tried", "tried", gaps=True)
+    error: Array = dataset("cross-validated error", "tried")
+    standard_error: Array = dataset("its standard error", "tried")
 
 
 @record
 class IdentifiedVehicleGroup(VehicleGroup):
     """A vehicle with inertia functions, which are what is identified."""
 
-    inertia_functions: InertiaFunctionsGroup = group("inertia_functions")
-
-    @classmethod
-    def identified(cls, vehicle: VehicleSettings, functions: InertiaFunctions) -> Self:
-        """Arrange mass and rotors as stated, and an inertia that was identified."""
-        return cls(
-            mass=vehicle.mass_kg,
-            gravity=vehicle.gravity_m_s2,
-            inertia=six_parameters(vehicle.inertia_kg_m2),
-            rotor=RotorsGroup.of(vehicle, 0.0),
-            response=ResponseGroup.of(RotorResponse(), commanded=False, hold=None),
-            effect=EffectsGroup.of(()),
-            inertia_functions=InertiaFunctionsGroup.of(functions),
-        )
+    inertia_functions: InertiaFunctionsGroup = group()
 
 
 @record
@@ -163,27 +134,27 @@ class IdentifiedRecord(ModelRecord):
         kind="identified",
     )
 
-    vehicle: IdentifiedVehicleGroup = group("vehicle")
-    model: ChosenGroup = group("model")
-    solve: SolveGroup = group("solve")
-    rules: RulesGroup = group("rules")
-    front: FrontGroup = group("front")
-    history: HistoryGroup = group("history")
-    search: SearchGroup | None = group("search", default=None)
-    judged: JudgedGroup = group("judged")
-    baselines: BaselinesGroup = group("baselines")
-    ridge: RidgeGroup | None = group("ridge", default=None)
-    training_indices: IntArray = dataset("training/indices", "samples of the flight that trained", "sample")
-    findings: tuple[str, ...] = dataset("findings", "what failed or was not excited, in words", "finding")
-    structures: StructuresGroup | None = group("structures", default=None)
-    residuals: ResidualsGroup | None = group("residuals", default=None)
-    uncertainty: UncertaintyGroup | None = group("uncertainty", default=None)
-    curves: CurvesGroup | None = group("curves", default=None)
-    round_trip: RoundTripGroup | None = group("round_trip", default=None)
-    steps: StepsGroup | None = group("steps", default=None)
-    physics: PhysicsGroup | None = group("physics", default=None)
-    period: PeriodGroup | None = group("period", default=None)
-    verdict: VerdictGroup | None = group("verdict", default=None)
+    vehicle: IdentifiedVehicleGroup = group()
+    model: ChosenGroup = group()
+    solve: SolveGroup = group()
+    rules: RulesGroup = group()
+    front: FrontGroup = group()
+    history: HistoryGroup = group()
+    search: SearchGroup | None = group(default=None)
+    judged: JudgedGroup = group()
+    baselines: BaselinesGroup = group()
+    ridge: RidgeGroup | None = group(default=None)
+    training_indices: IntArray = dataset("samples of the flight that trained", "sample", path="training/indices")
+    findings: tuple[str, ...] = dataset("what failed or was not excited, in words", "finding")
+    structures: StructuresGroup | None = group(default=None)
+    residuals: ResidualsGroup | None = group(default=None)
+    uncertainty: UncertaintyGroup | None = group(default=None)
+    curves: CurvesGroup | None = group(default=None)
+    round_trip: RoundTripGroup | None = group(default=None)
+    steps: StepsGroup | None = group(default=None)
+    physics: PhysicsGroup | None = group(default=None)
+    period: PeriodGroup | None = group(default=None)
+    verdict: VerdictGroup | None = group(default=None)
 
     @classmethod
     def of(
@@ -192,7 +163,7 @@ class IdentifiedRecord(ModelRecord):
         base: str,
         learned: IntArray,
         evidence: Validation | None,
-        vehicle: VehicleSettings,
+        vehicle: VehicleModel,
         parts: LearnedGroup,
     ) -> Self:
         """Arrange an identification and the evidence on it.
@@ -205,26 +176,17 @@ class IdentifiedRecord(ModelRecord):
             Indices of the samples that trained.
         evidence : Validation or None
             None where it was not gathered.
-        vehicle : VehicleSettings
-            As stated: what was identified is its inertia.
+        vehicle : VehicleModel
+            Mass and rotors as stated, with the inertia that was identified.
         parts : LearnedGroup
             How much of each flight trained.
         """
         baselines = {baseline.name: baseline.parameters for baseline in result.baselines}
         return cls(
-            vehicle=IdentifiedVehicleGroup.identified(vehicle, result.model),
+            vehicle=IdentifiedVehicleGroup.of(vehicle),
             learned=parts,
-            model=ChosenGroup(
-                weights=result.front.chromosomes[result.front.chosen],
-                base=base,
-                ridge_weight=result.fit.ridge_weight,
-            ),
-            solve=SolveGroup(
-                singular_values=result.system.singular_values,
-                rank=result.system.rank,
-                condition_number=result.system.condition_number,
-                parameters=result.system.parameters,
-            ),
+            model=group_of(ChosenGroup, result.fit, weights=result.front.chromosomes[result.front.chosen], base=base),
+            solve=group_of(SolveGroup, result.system),
             rules=group_of(RulesGroup, result.excitation),
             front=group_of(FrontGroup, result.front),
             history=group_of(HistoryGroup, result.history),

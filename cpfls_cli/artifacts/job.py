@@ -91,11 +91,6 @@ def check_outputs(job: Job, *paths: Path, replaceable: bool = False) -> None:
 def take_inputs(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
     """Check inputs, and take note of what they hold.
 
-    Parameters
-    ----------
-    inputs : mapping of str to Path
-        By role.
-
     Raises
     ------
     InputError
@@ -131,13 +126,7 @@ def finish_parts(job: Job, parts: Iterable[Record], samples: int, inputs: Mappin
 
 
 def header_of(study: Study, inputs: Mapping[str, InputFile]) -> Header:
-    """Tell where an artifact comes from.
-
-    Parameters
-    ----------
-    inputs : mapping of str to InputFile
-        By role.
-    """
+    """Tell where an artifact comes from."""
     return Header(__version__, study.seed, resolved_yaml(study), inputs)
 
 

@@ -37,9 +37,9 @@ class LearnedFlight(NamedTuple):
 class LearnedGroup:
     """How much of each flight a model learned from."""
 
-    role: tuple[str, ...] = dataset("role", "which of /inputs the flight is", "learned")
-    samples: IntArray = dataset("samples", "leading samples of it that were learned from", "learned")
-    of: IntArray = dataset("of", "samples of it that were used: learned from or held out", "learned")
+    role: tuple[str, ...] = dataset("which of /inputs the flight is", "learned")
+    samples: IntArray = dataset("leading samples of it that were learned from", "learned")
+    of: IntArray = dataset("samples of it that were used: learned from or held out", "learned")
 
     @classmethod
     def parts(cls, roles: Iterable[str], parts: Sequence[tuple[int, int]]) -> Self:

@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.audit import AuditGroup
 from cpfls_cli.artifacts.learned import LearnedFlight, LearnedGroup, learned_in
-from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record
+from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, group_of, record
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.rotors import RotorResponse
@@ -32,14 +32,14 @@ USUAL = "usual"
 class RotorsGroup:
     """Rotors, in the order of their speeds."""
 
-    position: Array = dataset("position", "hubs relative to the centre of mass", "rotor", "axis", units="m", frame=BODY)
-    spin: IntArray = dataset("spin", "1 turns counter-clockwise seen from above, -1 clockwise", "rotor")
-    thrust_factor: Array = dataset("thrust_factor", "thrust over squared speed", "rotor", units="N s^2")
-    drag_factor: Array = dataset("drag_factor", "reaction torque over squared speed", "rotor", units="N m s^2")
-    radius: Array = dataset("radius", "of the propellers", "rotor", units="m", gaps=True)
-    speed_max: float = dataset("speed_max", "largest speed of a rotor", units="rad/s")
+    position: Array = dataset("hubs relative to the centre of mass", "rotor", "axis", units="m", frame=BODY)
+    spin: IntArray = dataset("1 turns counter-clockwise seen from above, -1 clockwise", "rotor")
+    thrust_factor: Array = dataset("thrust over squared speed", "rotor", units="N s^2")
+    drag_factor: Array = dataset("reaction torque over squared speed", "rotor", units="N m s^2")
+    radius: Array = dataset("of the propellers", "rotor", units="m", gaps=True)
+    speed_max: float = dataset("largest speed of a rotor", units="rad/s")
     thrust_linear: float = dataset(
-        "thrust_linear", "a: thrust and drag follow w^2 + a w_h w, w_h the speed that hovers under the square alone"
+        "a: thrust and drag follow w^2 + a w_h w, w_h the speed that hovers under the square alone"
     )
 
     @classmethod
@@ -75,30 +75,23 @@ class RotorsGroup:
 class ResponseGroup:
     """How rotors follow their logged speed."""
 
-    delay: float = dataset("delay", "pure delay", units="s")
-    lag: float = dataset("lag", "time constant of the first-order lag; 0 for none", units="s")
+    delay: float = dataset("pure delay", units="s")
+    lag: float = dataset("time constant of the first-order lag; 0 for none", units="s")
     slow_roll_pitch: float = dataset(
-        "slow_roll_pitch", "share by which roll and pitch torque of the rotors come back after a change; below 0: fade"
+        "share by which roll and pitch torque of the rotors come back after a change; below 0: fade"
     )
-    slow_yaw: float = dataset("slow_yaw", "the same of the yaw torque")
-    slow: float = dataset("slow", "time constant with which they do", units="s")
+    slow_yaw: float = dataset("the same of the yaw torque")
+    slow: float = dataset("time constant with which they do", units="s")
     commanded: bool = dataset(
-        "commanded", "1 where delay and lag lie behind commands, which measured speeds have already; 0 behind any speed"
+        "1 where delay and lag lie behind commands, which measured speeds have already; 0 behind any speed"
     )
-    hold: str = dataset("hold", "what a command is between samples: linear, previous, or usual for the flight")
+    hold: str = dataset("what a command is between samples: linear, previous, or usual for the flight")
 
     @classmethod
     def of(cls, response: RotorResponse, *, commanded: bool, hold: str | None) -> Self:
         """Arrange a response, whether it lies behind commands, and what those are between samples."""
-        return cls(
-            delay=response.delay_s,
-            lag=response.lag_s,
-            slow_roll_pitch=response.slow_roll_pitch,
-            slow_yaw=response.slow_yaw,
-            slow=response.slow_s,
-            commanded=commanded,
-            hold=hold or USUAL,
-        )
+        times = {"delay": response.delay_s, "lag": response.lag_s, "slow": response.slow_s}
+        return group_of(cls, response, **times, commanded=commanded, hold=hold or USUAL)
 
     def response(self) -> RotorResponse:
         """Rebuild it."""
@@ -115,16 +108,12 @@ class ResponseGroup:
 class EffectsGroup:
     """Effects of the catalogue in the model."""
 
-    name: tuple[str, ...] = dataset("name", "identifier, see `cpfls effects`", "vehicle_effect")
-    linear_effect: tuple[str, ...] = dataset(
-        "linear_effect", "effect that each linear coefficient belongs to", "vehicle_linear"
-    )
-    linear: Array = dataset(
-        "linear", "linear coefficients, by effect in the order of its columns", "vehicle_linear", units="SI"
-    )
-    shape_effect: tuple[str, ...] = dataset("shape_effect", "effect that each shape belongs to", "vehicle_shape")
-    shape_name: tuple[str, ...] = dataset("shape_name", "what the effect depends on nonlinearly", "vehicle_shape")
-    shape: Array = dataset("shape", "value of the shape", "vehicle_shape", units="SI")
+    name: tuple[str, ...] = dataset("identifier, see `cpfls effects`", "vehicle_effect")
+    linear_effect: tuple[str, ...] = dataset("effect that each linear coefficient belongs to", "vehicle_linear")
+    linear: Array = dataset("linear coefficients, by effect in the order of its columns", "vehicle_linear", units="SI")
+    shape_effect: tuple[str, ...] = dataset("effect that each shape belongs to", "vehicle_shape")
+    shape_name: tuple[str, ...] = dataset("what the effect depends on nonlinearly", "vehicle_shape")
+    shape: Array = dataset("value of the shape", "vehicle_shape", units="SI")
 
     @classmethod
     def of(cls, effects: Sequence[ModelEffect]) -> Self:
@@ -154,12 +143,11 @@ class RemainderGroup:
     """What has no name: torque and force over the direction of the airflow."""
 
     breakpoints: Array = dataset(
-        "breakpoints", "peaks of the membership functions over the direction, share of a turn", "direction_breakpoint"
+        "peaks of the membership functions over the direction, share of a turn", "direction_breakpoint"
     )
-    harmonic_order: int = dataset("harmonic_order", "of the consequents; 0 for the seesaw")
-    rows: IntArray = dataset("rows", "which of torque (0 to 2) and force (3 to 5) it adds to", "remainder_row")
+    harmonic_order: int = dataset("of the consequents; 0 for the seesaw")
+    rows: IntArray = dataset("which of torque (0 to 2) and force (3 to 5) it adds to", "remainder_row")
     coefficients: Array = dataset(
-        "coefficients",
         "of each column: by speed in the rotor plane times mean rotor speed, and by that speed squared",
         "remainder_row",
         "remainder_column",
@@ -170,22 +158,17 @@ class RemainderGroup:
     @classmethod
     def of(cls, remainder: Remainder) -> Self:
         """Arrange a remainder."""
-        return cls(
-            breakpoints=remainder.breakpoints,
-            harmonic_order=remainder.harmonic_order,
-            rows=remainder.rows,
-            coefficients=remainder.coefficients,
-        )
+        return group_of(cls, remainder)
 
 
 @record
 class GustsGroup:
     """Random torque and force of its flights, as Gauss-Markov processes: roll, pitch, yaw, then along x, y, z."""
 
-    torque: Array = dataset("torque", "standard deviation; 0 for none", "axis", units="N m", frame=BODY)
-    torque_memory: Array = dataset("torque_memory", "time in which a gust falls to 37 %", "axis", units="s", frame=BODY)
-    force: Array = dataset("force", "standard deviation; 0 for none", "axis", units="N", frame=BODY)
-    force_memory: Array = dataset("force_memory", "time in which a gust falls to 37 %", "axis", units="s", frame=BODY)
+    torque: Array = dataset("standard deviation; 0 for none", "axis", units="N m", frame=BODY)
+    torque_memory: Array = dataset("time in which a gust falls to 37 %", "axis", units="s", frame=BODY)
+    force: Array = dataset("standard deviation; 0 for none", "axis", units="N", frame=BODY)
+    force_memory: Array = dataset("time in which a gust falls to 37 %", "axis", units="s", frame=BODY)
 
     @classmethod
     def of(cls, gusts: Gusts) -> Self:
@@ -212,39 +195,32 @@ class GustsGroup:
 class InertiaFunctionsGroup:
     """Inertia over attitude by fuzzy systems, all that is needed to evaluate it, and where it was found."""
 
-    structure: str = dataset("structure", "cpfls: first and last rule joined; fls: classic TSK system")
-    input_map: str = dataset("input_map", "full-circle or data-range")
-    consequents: str = dataset("consequents", "harmonic or seesaw")
-    harmonic_order: int = dataset("harmonic_order", "highest harmonic of harmonic consequents")
-    products: str = dataset("products", "features of two inputs: additive or tensor")
-    membership_functions: IntArray = dataset(
-        "membership_functions", "of D13(pitch) D22(roll) D23(roll) D23(pitch) D33(roll) D33(pitch)", "6"
-    )
-    partition: tuple[str, ...] = dataset("partition", "partition each breakpoint belongs to", "breakpoint")
-    breakpoints: Array = dataset("breakpoints", "peaks of the membership functions on [0, 1]", "breakpoint")
+    structure: str = dataset("cpfls: first and last rule joined; fls: classic TSK system")
+    input_map: str = dataset("full-circle or data-range")
+    consequents: str = dataset("harmonic or seesaw")
+    harmonic_order: int = dataset("highest harmonic of harmonic consequents")
+    products: str = dataset("features of two inputs: additive or tensor")
+    membership_functions: IntArray = dataset("of D13(pitch) D22(roll) D23(roll) D23(pitch) D33(roll) D33(pitch)", "6")
+    partition: tuple[str, ...] = dataset("partition each breakpoint belongs to", "breakpoint")
+    breakpoints: Array = dataset("peaks of the membership functions on [0, 1]", "breakpoint")
     coefficients: Array = dataset(
-        "coefficients", "coefficients of the rule consequents", "rule_coefficient", units="kg m^2", frame=EULER
+        "coefficients of the rule consequents", "rule_coefficient", units="kg m^2", frame=EULER
     )
-    parameter: tuple[str, ...] = dataset("parameter", "inertia function, rule and feature", "rule_coefficient")
+    parameter: tuple[str, ...] = dataset("inertia function, rule and feature", "rule_coefficient")
     rigid_body: Array = dataset(
-        "rigid_body", "Ixx Iyy Izz Ixy Ixz Iyz under the fuzzy part; zero for none", "6", units="kg m^2", frame=BODY
+        "Ixx Iyy Izz Ixy Ixz Iyz under the fuzzy part; zero for none", "6", units="kg m^2", frame=BODY
     )
-    input_range: Array = dataset("input_range", "minimum and maximum of roll and pitch inputs", "2", "2")
-    visited: BoolArray = dataset(
-        "visited", "cells of roll and pitch that training visited", "cell", "cell", frame=EULER
-    )
+    input_range: Array = dataset("minimum and maximum of roll and pitch inputs", "2", "2")
+    visited: BoolArray = dataset("cells of roll and pitch that training visited", "cell", "cell", frame=EULER)
 
     @classmethod
     def of(cls, model: InertiaFunctions) -> Self:
         """Arrange an inertia over attitude."""
         structure = model.structure
         names = [p.name for p, peaks in zip(structure.partitions, model.partitions, strict=True) for _ in peaks]
-        return cls(
-            structure=structure.settings.structure,
-            input_map=structure.settings.input_map,
-            consequents=structure.settings.consequents,
-            harmonic_order=structure.settings.harmonic_order,
-            products=structure.settings.products,
+        return group_of(
+            cls,
+            structure.settings,
             membership_functions=np.array([each.functions for each in structure.partitions]),
             partition=tuple(names),
             breakpoints=np.concatenate(model.partitions),
@@ -267,24 +243,19 @@ def _parameter_names(structure: ModelStructure) -> Iterator[str]:
 class VehicleGroup:
     """The model of a vehicle, all that is needed to evaluate it."""
 
-    mass: float = dataset("mass", "mass", units="kg")
-    gravity: float = dataset("gravity", "gravitational acceleration", units="m/s^2")
-    inertia: Array = dataset("inertia", "Ixx Iyy Izz Ixy Ixz Iyz", "6", units="kg m^2", frame=BODY)
-    rotor: RotorsGroup = group("rotor")
-    response: ResponseGroup = group("response")
-    effect: EffectsGroup = group("effect")
-    remainder: RemainderGroup | None = group("remainder", default=None)
+    mass: float = dataset("mass", units="kg")
+    gravity: float = dataset("gravitational acceleration", units="m/s^2")
+    inertia: Array = dataset("Ixx Iyy Izz Ixy Ixz Iyz", "6", units="kg m^2", frame=BODY)
+    rotor: RotorsGroup = group()
+    response: ResponseGroup = group()
+    effect: EffectsGroup = group()
+    remainder: RemainderGroup | None = group(default=None)
     wind: Array | None = dataset(
-        "steady_wind",
-        "of its flights; no part of the vehicle",
-        "3",
-        units="m/s",
-        frame=WORLD,
-        default=None,
+        "of its flights; no part of the vehicle", "3", path="steady_wind", units="m/s", frame=WORLD, default=None
     )
-    inertia_functions: InertiaFunctionsGroup | None = group("inertia_functions", default=None)
-    repair: AuditGroup | None = group("repair", default=None)
-    gusts: GustsGroup | None = group("gusts", default=None)
+    inertia_functions: InertiaFunctionsGroup | None = group(default=None)
+    repair: AuditGroup | None = group(default=None)
+    gusts: GustsGroup | None = group(default=None)
 
     @classmethod
     def of(cls, model: VehicleModel) -> Self:
@@ -347,8 +318,8 @@ class ModelRecord(Record):
         "cpfls/model", "a model of a vehicle, and how it was found", "identify, extend, gap, vehicle"
     )
 
-    vehicle: VehicleGroup = group("vehicle")
-    learned: LearnedGroup | None = group("learned", default=None)
+    vehicle: VehicleGroup = group()
+    learned: LearnedGroup | None = group(default=None)
 
     @property
     def learned_from(self) -> tuple[LearnedFlight, ...]:

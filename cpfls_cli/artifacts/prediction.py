@@ -35,68 +35,39 @@ class PredictionRecord(Record):
         compressed=True,
     )
 
-    time: Array = dataset("time", "time from the first sample", "time", units="s")
-    attitude: Array = dataset("attitude", "roll, pitch, yaw of the flight", "time", "axis", units="rad", frame=EULER)
-    torque: Array = dataset("torque", "generalised torque of the model", "time", "axis", units="N m", frame=EULER)
-    body_torque: Array = dataset("body_torque", "body torque of the model", "time", "axis", units="N m", frame=BODY)
+    time: Array = dataset("time from the first sample", "time", units="s")
+    attitude: Array = dataset("roll, pitch, yaw of the flight", "time", "axis", units="rad", frame=EULER)
+    torque: Array = dataset("generalised torque of the model", "time", "axis", units="N m", frame=EULER)
+    body_torque: Array = dataset("body torque of the model", "time", "axis", units="N m", frame=BODY)
     measured_torque: Array | None = dataset(
-        "measured_torque",
-        "generalised torque that the model is held against",
-        "time",
-        "axis",
-        units="N m",
-        frame=EULER,
-        default=None,
+        "generalised torque that the model is held against", "time", "axis", units="N m", frame=EULER, default=None
     )
-    error: Array | None = dataset(
-        "error", "measured minus model torque", "time", "axis", units="N m", frame=EULER, default=None
-    )
+    error: Array | None = dataset("measured minus model torque", "time", "axis", units="N m", frame=EULER, default=None)
     held_against: str | None = dataset(
-        "held_against",
         "of a whole vehicle, what measured_torque is: motion, which takes it with the model's inertia, or recorded",
         default=None,
     )
     force: Array | None = dataset(
-        "force", "force of a whole vehicle, without weight", "time", "axis", units="N", frame=BODY, default=None
+        "force of a whole vehicle, without weight", "time", "axis", units="N", frame=BODY, default=None
     )
     measured_force: Array | None = dataset(
-        "measured_force",
-        "force that the motion takes, without weight",
-        "time",
-        "axis",
-        units="N",
-        frame=BODY,
-        default=None,
+        "force that the motion takes, without weight", "time", "axis", units="N", frame=BODY, default=None
     )
-    inertia: Array = dataset("inertia", "inertia matrix D_ij(q)", "time", "axis", "axis", units="kg m^2", frame=EULER)
+    inertia: Array = dataset("inertia matrix D_ij(q)", "time", "axis", "axis", units="kg m^2", frame=EULER)
     inertia_low: Array | None = dataset(
-        "inertia_low", "lower end of its 95 % band", "time", "axis", "axis", units="kg m^2", frame=EULER, default=None
+        "lower end of its 95 % band", "time", "axis", "axis", units="kg m^2", frame=EULER, default=None
     )
     inertia_high: Array | None = dataset(
-        "inertia_high", "upper end of its 95 % band", "time", "axis", "axis", units="kg m^2", frame=EULER, default=None
+        "upper end of its 95 % band", "time", "axis", "axis", units="kg m^2", frame=EULER, default=None
     )
     torque_low: Array | None = dataset(
-        "torque_low",
-        "lower end of the 95 % band of the model torque",
-        "time",
-        "axis",
-        units="N m",
-        frame=EULER,
-        default=None,
+        "lower end of the 95 % band of the model torque", "time", "axis", units="N m", frame=EULER, default=None
     )
     torque_high: Array | None = dataset(
-        "torque_high",
-        "upper end of the 95 % band of the model torque",
-        "time",
-        "axis",
-        units="N m",
-        frame=EULER,
-        default=None,
+        "upper end of the 95 % band of the model torque", "time", "axis", units="N m", frame=EULER, default=None
     )
-    coriolis: Array = dataset(
-        "coriolis", "C(q, qd) by Christoffel symbols", "time", "axis", "axis", units="kg m^2/s", frame=EULER
-    )
-    outside: BoolArray = dataset("outside", "1 where the attitude lies outside the excited region", "time")
+    coriolis: Array = dataset("C(q, qd) by Christoffel symbols", "time", "axis", "axis", units="kg m^2/s", frame=EULER)
+    outside: BoolArray = dataset("1 where the attitude lies outside the excited region", "time")
 
     @classmethod
     def of(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.spec import BODY, WORLD, Format, Record, dataset, group, record
+from cpfls_cli.artifacts.spec import BODY, WORLD, Format, Record, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.playback.replay import PREDICTIONS, drawn_runs, where_better
 from cpfls_cli.rounding import less
 from cpfls_cli.validation.trust import Trust
@@ -38,9 +38,9 @@ class SignalErrorGroup:
     """Errors of one signal by prediction and horizon."""
 
     mae: Array = dataset(
-        "mae", "mean norm of the error; of attitudes the geodesic distance", "prediction", "horizon", units="SI"
+        "mean norm of the error; of attitudes the geodesic distance", "prediction", "horizon", units="SI"
     )
-    rms: Array = dataset("rms", "root mean square error by axis", "prediction", "horizon", "axis", units="SI")
+    rms: Array = dataset("root mean square error by axis", "prediction", "horizon", "axis", units="SI")
 
     @classmethod
     def of(cls, errors: SignalErrors | None, rows: int | None = None) -> Self | None:
@@ -122,11 +122,9 @@ def _summaries(errors: ErrorsByHorizon, prediction: int) -> dict[str, Any]:
 class RegionGroup:
     """Where a model predicts body rates better than what knows no model."""
 
-    share: float = dataset("share", "of the windows")
-    rate: Array = dataset(
-        "rate", "body rate at the begin of nine tenths of these windows: least, most", "2", units="rad/s"
-    )
-    speed: Array | None = dataset("speed", "the same of the speed of the flight", "2", units="m/s", default=None)
+    share: float = dataset("of the windows")
+    rate: Array = dataset("body rate at the begin of nine tenths of these windows: least, most", "2", units="rad/s")
+    speed: Array | None = dataset("the same of the speed of the flight", "2", units="m/s", default=None)
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -139,19 +137,18 @@ class RegionGroup:
 class PlaybackGroup:
     """A model played back along flights, beside what it has to beat."""
 
-    flown: tuple[str, ...] = dataset("flight", "file names", "playback_flight")
-    windows: int = dataset("windows", "samples from which it was played back")
+    flown: tuple[str, ...] = dataset("file names", "playback_flight", path="flight")
+    windows: int = dataset("samples from which it was played back")
     prediction: tuple[str, ...] = dataset(
-        "prediction",
         "as in cpfls/replay; with-past: the same model with /history; before, after: as given and with the effects",
         "prediction",
     )
-    horizon_s: Array = dataset("horizon_s", "horizons", "horizon", units="s")
-    diverged: IntArray = dataset("diverged", "windows in which a prediction ran away and was stopped", "prediction")
-    body_rate: SignalErrorGroup = group("body_rate")
-    attitude: SignalErrorGroup | None = group("attitude", default=None)
-    velocity: SignalErrorGroup | None = group("velocity", default=None)
-    position: SignalErrorGroup | None = group("position", default=None)
+    horizon_s: Array = dataset("horizons", "horizon", units="s")
+    diverged: IntArray = dataset("windows in which a prediction ran away and was stopped", "prediction")
+    body_rate: SignalErrorGroup = group()
+    attitude: SignalErrorGroup | None = group(default=None)
+    velocity: SignalErrorGroup | None = group(default=None)
+    position: SignalErrorGroup | None = group(default=None)
 
     @classmethod
     def of(cls, flights: Sequence[Played], replay: Replay, prediction: Sequence[str], **more: Any) -> Self:
@@ -205,7 +202,7 @@ class PlaybackGroup:
 class HeldOutGroup(PlaybackGroup):
     """A model played back along flights that it was not found in, beside what it has to beat."""
 
-    better: RegionGroup | None = group("better", default=None)
+    better: RegionGroup | None = group(default=None)
 
     @property
     def played(self) -> str:
@@ -216,7 +213,7 @@ class HeldOutGroup(PlaybackGroup):
     def judged(cls, flights: Sequence[Played], replay: Replay) -> Self:
         """Arrange a replay without its windows, and where the model is better than what knows no model."""
         better = where_better(flights, replay.windows)
-        region = None if better is None else RegionGroup(**vars(better))
+        region = None if better is None else group_of(RegionGroup, better)
         return cls.of(flights, replay, replay.predictions, better=region)
 
     @property
@@ -273,20 +270,19 @@ def contradictions_of(flights: Sequence[LoggedFlight]) -> tuple[str, ...] | None
 class PlayedFlightsGroup:
     """Flights that a model was played back along."""
 
-    name: tuple[str, ...] = dataset("name", "file name", "flight")
-    windows: IntArray = dataset("windows", "samples from which it was played back", "flight")
-    actuation: tuple[str, ...] = dataset("actuation", "what drove the playback", "flight")
-    hold: tuple[str, ...] = dataset("hold", "what that is between samples: linear or previous", "flight")
-    rotation_alone: BoolArray = dataset("rotation_alone", "1 where velocity was not played back", "flight")
+    name: tuple[str, ...] = dataset("file name", "flight")
+    windows: IntArray = dataset("samples from which it was played back", "flight")
+    actuation: tuple[str, ...] = dataset("what drove the playback", "flight")
+    hold: tuple[str, ...] = dataset("what that is between samples: linear or previous", "flight")
+    rotation_alone: BoolArray = dataset("1 where velocity was not played back", "flight")
 
     @classmethod
     def of(cls, flights: Sequence[LoggedFlight], played: Sequence[Played], windows: ReplayWindows) -> Self:
         """Arrange flights."""
-        return cls(
-            name=tuple(flight.name for flight in flights),
+        return columns_of(
+            cls,
+            flights,
             windows=np.bincount(windows.flight, minlength=len(flights)),
-            actuation=tuple(flight.actuation for flight in flights),
-            hold=tuple(flight.hold for flight in flights),
             rotation_alone=np.array([not each.flight.translates for each in played]),
         )
 
@@ -295,17 +291,13 @@ class PlayedFlightsGroup:
 class WindowGroup:
     """Free runs, one for each sample from which the model was played back."""
 
-    flight: IntArray = dataset("flight", "index of the flight", "window", into="flight")
-    start: Array = dataset("start", "begin, on the clock of the flight", "window", units="s")
+    flight: IntArray = dataset("index of the flight", "window", into="flight")
+    start: Array = dataset("begin, on the clock of the flight", "window", units="s")
     error: Array = dataset(
-        "error",
-        "mean norm of the error of the body rate over the horizon",
-        "prediction",
-        "window",
-        units="rad/s",
+        "mean norm of the error of the body rate over the horizon", "prediction", "window", units="rad/s"
     )
     diverged: Array = dataset(
-        "diverged", "when the model ran away, after the begin; not finite where not", "window", units="s", gaps=True
+        "when the model ran away, after the begin; not finite where not", "window", units="s", gaps=True
     )
 
     @classmethod
@@ -335,21 +327,13 @@ class WindowGroup:
 class WorstGroup:
     """Runs of the model beside the flight in the windows in which it is farthest off."""
 
-    window: IntArray = dataset("window", "index of the window, the worst first", "worst", into="window")
-    measured: Array = dataset(
-        "measured", "body rate of the flight", "worst", "sample", "axis", units="rad/s", frame=BODY
-    )
-    model: Array = dataset("model", "body rate of the model", "worst", "sample", "axis", units="rad/s", frame=BODY)
+    window: IntArray = dataset("index of the window, the worst first", "worst", into="window")
+    measured: Array = dataset("body rate of the flight", "worst", "sample", "axis", units="rad/s", frame=BODY)
+    model: Array = dataset("body rate of the model", "worst", "sample", "axis", units="rad/s", frame=BODY)
 
     @classmethod
     def of(cls, windows: ReplayWindows, played: Sequence[Played], horizon: int) -> Self:
-        """Draw the worst windows.
-
-        Parameters
-        ----------
-        horizon : int
-            Samples.
-        """
+        """Draw the worst windows."""
         chosen = windows.worst(horizon, WORST)
         runs = [drawn_runs(played[windows.flight[index]], windows.start[[index]], horizon) for index in chosen]
         return cls(
@@ -363,25 +347,19 @@ class WorstGroup:
 class DrawnGroup:
     """Runs of the model one after another beside a stretch of a flight."""
 
-    window: IntArray = dataset("window", "index of the window", "run", into="window")
-    measured: Array = dataset("measured", "body rate of the flight", "run", "sample", "axis", units="rad/s", frame=BODY)
-    model: Array = dataset("model", "body rate of the model", "run", "sample", "axis", units="rad/s", frame=BODY)
+    window: IntArray = dataset("index of the window", "run", into="window")
+    measured: Array = dataset("body rate of the flight", "run", "sample", "axis", units="rad/s", frame=BODY)
+    model: Array = dataset("body rate of the model", "run", "sample", "axis", units="rad/s", frame=BODY)
     measured_position: Array | None = dataset(
-        "measured_position", "position of the flight", "run", "sample", "axis", units="m", frame=WORLD, default=None
+        "position of the flight", "run", "sample", "axis", units="m", frame=WORLD, default=None
     )
     model_position: Array | None = dataset(
-        "model_position", "position of the model", "run", "sample", "axis", units="m", frame=WORLD, default=None
+        "position of the model", "run", "sample", "axis", units="m", frame=WORLD, default=None
     )
 
     @classmethod
     def of(cls, windows: ReplayWindows, played: Sequence[Played], horizon: int) -> Self:
-        """Draw a stretch of which half are better and half are worse.
-
-        Parameters
-        ----------
-        horizon : int
-            Samples.
-        """
+        """Draw a stretch of which half are better and half are worse."""
         chosen = windows.typical(horizon, _DRAWN_RUNS)
         runs = drawn_runs(played[windows.flight[chosen[0]]], windows.start[chosen], horizon)
         return cls(window=np.array(chosen, dtype=np.int64), **vars(runs))
@@ -398,31 +376,28 @@ class ReplayRecord(Record):
         ("model", "flight"),
     )
 
-    played: str = dataset("played", "what is played back: a file, or vehicle for that of /config")
+    played: str = dataset("what is played back: a file, or vehicle for that of /config")
     prediction: tuple[str, ...] = dataset(
-        "prediction",
         "the model; nothing moves: the whole state stays; rates and velocity stay; the vehicle that the config states",
         "prediction",
     )
-    asked_s: float = dataset("asked_s", "longest horizon, as asked for", units="s")
-    every: int = dataset("every", "samples from one begin to the next")
-    hold: str = dataset("hold", "what is between samples, as asked for: linear, previous; usual where nothing was")
-    history_s: float | None = dataset(
-        "history_s", "how much of the flight before a start the model uses", units="s", default=None
-    )
-    horizon_s: Array = dataset("horizon_s", "horizons", "horizon", units="s")
-    diverged: IntArray = dataset("diverged", "windows in which a prediction ran away and was stopped", "prediction")
-    body_rate: SignalErrorGroup = group("body_rate")
-    attitude: SignalErrorGroup | None = group("attitude", default=None)
-    velocity: SignalErrorGroup | None = group("velocity", default=None)
-    position: SignalErrorGroup | None = group("position", default=None)
-    flight: PlayedFlightsGroup = group("flight")
-    window: WindowGroup = group("window")
-    worst: WorstGroup = group("worst")
-    drawn: DrawnGroup = group("drawn")
-    warning: tuple[str, ...] = dataset("warning", "what to know about flights and model", "warning")
+    asked_s: float = dataset("longest horizon, as asked for", units="s")
+    every: int = dataset("samples from one begin to the next")
+    hold: str = dataset("what is between samples, as asked for: linear, previous; usual where nothing was")
+    history_s: float | None = dataset("how much of the flight before a start the model uses", units="s", default=None)
+    horizon_s: Array = dataset("horizons", "horizon", units="s")
+    diverged: IntArray = dataset("windows in which a prediction ran away and was stopped", "prediction")
+    body_rate: SignalErrorGroup = group()
+    attitude: SignalErrorGroup | None = group(default=None)
+    velocity: SignalErrorGroup | None = group(default=None)
+    position: SignalErrorGroup | None = group(default=None)
+    flight: PlayedFlightsGroup = group()
+    window: WindowGroup = group()
+    worst: WorstGroup = group()
+    drawn: DrawnGroup = group()
+    warning: tuple[str, ...] = dataset("what to know about flights and model", "warning")
     contradiction: tuple[str, ...] | None = dataset(
-        "contradiction", "what of the flights contradicts itself or the vehicle", "contradiction", default=None
+        "what of the flights contradicts itself or the vehicle", "contradiction", default=None
     )
 
     @classmethod
@@ -435,13 +410,7 @@ class ReplayRecord(Record):
         replay: Replay,
         warnings: Sequence[str],
     ) -> Self:
-        """Arrange a replay.
-
-        Parameters
-        ----------
-        name : str
-            Of the model.
-        """
+        """Arrange a replay."""
         errors, windows, period = replay.errors, replay.windows, played[0].flight.motion.period
         groups = {signal: SignalErrorGroup.of(found) for signal, found in errors.items()}
         assert groups["body_rate"] is not None, "every flight has rates"
@@ -489,21 +458,8 @@ class ReplayRecord(Record):
             "windows": self.windows,
             "models": {name: self._prediction(index) for index, name in enumerate(self.prediction)},
             "flights": [
-                {
-                    "name": name,
-                    "windows": int(windows),
-                    "driven_by": actuation,
-                    "hold": hold,
-                    "rotation_alone": bool(alone),
-                }
-                for name, windows, actuation, hold, alone in zip(
-                    self.flight.name,
-                    self.flight.windows,
-                    self.flight.actuation,
-                    self.flight.hold,
-                    self.flight.rotation_alone,
-                    strict=True,
-                )
+                {("driven_by" if key == "actuation" else key): value for key, value in row.items()}
+                for row in rows_of(self.flight)
             ],
             "worst": [
                 {

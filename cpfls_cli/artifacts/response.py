@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
+from cpfls_cli.artifacts.spec import Format, Record, columns_of, dataset, group, record, rows_of
 from cpfls_cli.response.mismatch import ACCEPTABLE, COHERENT, GOOD, ROTOR_SPEED, Deviation, clearness
 from cpfls_cli.rounding import at_most
 
@@ -32,10 +32,8 @@ def response_word(cost: float) -> str:
 class CurveGroup:
     """Complex gains by response and frequency, as decibels and degrees."""
 
-    magnitude: Array = dataset(
-        "magnitude", "20 log10 of the gain in SI units", "response", "frequency", units="dB", gaps=True
-    )
-    phase: Array = dataset("phase", "from -180 to 180", "response", "frequency", units="deg", gaps=True)
+    magnitude: Array = dataset("20 log10 of the gain in SI units", "response", "frequency", units="dB", gaps=True)
+    phase: Array = dataset("from -180 to 180", "response", "frequency", units="deg", gaps=True)
 
     @classmethod
     def of(cls, gains: Array) -> Self:
@@ -52,12 +50,12 @@ class CurveGroup:
 class DeviationGroup:
     """Stretches of the band of a response, each one in which the model is right, or off in one way."""
 
-    response: IntArray = dataset("response", "index of the response", "deviation", into="response")
-    low: Array = dataset("low", "from this frequency", "deviation", units="Hz")
-    high: Array = dataset("high", "to this one", "deviation", units="Hz")
-    right: BoolArray = dataset("right", "1 where the model is right", "deviation")
-    gain: Array = dataset("gain", "gain of the model over the measured one, geometric mean", "deviation")
-    phase: Array = dataset("phase", "phase of the model less the measured one, mean", "deviation", units="deg")
+    response: IntArray = dataset("index of the response", "deviation", into="response")
+    low: Array = dataset("from this frequency", "deviation", units="Hz")
+    high: Array = dataset("to this one", "deviation", units="Hz")
+    right: BoolArray = dataset("1 where the model is right", "deviation")
+    gain: Array = dataset("gain of the model over the measured one, geometric mean", "deviation")
+    phase: Array = dataset("phase of the model less the measured one, mean", "deviation", units="deg")
 
 
 @record
@@ -71,62 +69,44 @@ class ResponseRecord(Record):
         ("model", "flight"),
     )
 
-    played: str = dataset("played", "the model: a file, or vehicle for that of /config")
-    flown: tuple[str, ...] = dataset("flown", "names of the flights", "flight")
+    played: str = dataset("the model: a file, or vehicle for that of /config")
+    flown: tuple[str, ...] = dataset("names of the flights", "flight")
     instruments: str = dataset(
-        "instruments",
-        "what moves the vehicle and knows nothing of gusts: repeats (the same path flown again), setpoints, or none",
+        "what moves the vehicle and knows nothing of gusts: repeats (the same path flown again), setpoints, or none"
     )
     name: tuple[str, ...] = dataset(
-        "name",
         "roll, pitch, yaw: torque of the rotors to angular acceleration; thrust: to specific force along z; rotor "
         "speed: from its command; roll rate, roll angle and others alike: from its setpoint",
         "response",
     )
     instrumented: BoolArray = dataset(
-        "instrumented", "1 where it was estimated with instruments, which they have to move, in all flights", "response"
+        "1 where it was estimated with instruments, which they have to move, in all flights", "response"
     )
-    frequency: Array = dataset(
-        "frequency", "frequencies, evenly spread on a logarithmic scale", "frequency", units="Hz"
-    )
-    measured: CurveGroup = group("measured")
-    model: CurveGroup = group("model")
-    direct: CurveGroup = group("direct")
+    frequency: Array = dataset("frequencies, evenly spread on a logarithmic scale", "frequency", units="Hz")
+    measured: CurveGroup = group()
+    model: CurveGroup = group()
+    direct: CurveGroup = group()
     coherence_input: Array = dataset(
-        "coherence_input",
-        "share of the input that the instruments explain; 1 without",
-        "response",
-        "frequency",
-        gaps=True,
+        "share of the input that the instruments explain; 1 without", "response", "frequency", gaps=True
     )
     coherence_output: Array = dataset(
-        "coherence_output",
-        "share of the output that the instruments explain; without, the input",
-        "response",
-        "frequency",
-        gaps=True,
+        "share of the output that the instruments explain; without, the input", "response", "frequency", gaps=True
     )
     random_error: Array = dataset(
-        "random_error",
         "standard error of the measured gain over the gain; in radians that of the phase",
         "response",
         "frequency",
         gaps=True,
     )
-    averages: Array = dataset("averages", "windows that count as independent", "response", "frequency", gaps=True)
-    cost: Array = dataset("cost", "J of the model; not finite where there is nothing to judge", "response", gaps=True)
+    averages: Array = dataset("windows that count as independent", "response", "frequency", gaps=True)
+    cost: Array = dataset("J of the model; not finite where there is nothing to judge", "response", gaps=True)
     band: Array = dataset(
-        "band",
-        "frequencies that are judged, first and last; not finite where none",
-        "response",
-        "2",
-        units="Hz",
-        gaps=True,
+        "frequencies that are judged, first and last; not finite where none", "response", "2", units="Hz", gaps=True
     )
-    deviation: DeviationGroup = group("deviation")
-    warning: tuple[str, ...] = dataset("warning", "what to know about flights and model", "warning")
+    deviation: DeviationGroup = group()
+    warning: tuple[str, ...] = dataset("what to know about flights and model", "warning")
     contradiction: tuple[str, ...] | None = dataset(
-        "contradiction", "what of the flights contradicts itself or the vehicle", "contradiction", default=None
+        "what of the flights contradicts itself or the vehicle", "contradiction", default=None
     )
 
     @classmethod
@@ -139,17 +119,7 @@ class ResponseRecord(Record):
         warnings: Sequence[str],
         contradictions: tuple[str, ...] | None,
     ) -> Self:
-        """Arrange responses.
-
-        Parameters
-        ----------
-        played : str
-            Name of the model.
-        flown : sequence of str
-            Names of the flights.
-        instruments : str
-            What they are.
-        """
+        """Arrange responses."""
         estimates = [each.estimate for each in responses]
         frequency = np.unique(np.concatenate([each.frequency for each in estimates]))
 
@@ -178,13 +148,10 @@ class ResponseRecord(Record):
             averages=spread([each.averages for each in estimates]),
             cost=np.array([each.mismatch.cost for each in responses]),
             band=np.array([each.mismatch.band or (np.nan, np.nan) for each in responses]),
-            deviation=DeviationGroup(
+            deviation=columns_of(
+                DeviationGroup,
+                (each for _, each in listed),
                 response=np.array([index for index, _ in listed], dtype=np.int64),
-                low=np.array([each.low for _, each in listed]),
-                high=np.array([each.high for _, each in listed]),
-                right=np.array([each.right for _, each in listed], dtype=bool),
-                gain=np.array([each.gain for _, each in listed]),
-                phase=np.array([each.phase for _, each in listed]),
             ),
             warning=tuple(warnings),
             contradiction=contradictions,
@@ -231,10 +198,7 @@ class ResponseRecord(Record):
 
     def deviations(self, index: int) -> list[Deviation]:
         """List where the model is right and where it is off in one response, from low to high frequencies."""
-        listed, own = self.deviation, np.flatnonzero(self.deviation.response == index)
-        columns = (listed.low[own], listed.high[own], listed.right[own], listed.gain[own], listed.phase[own])
-        rows = zip(*(column.tolist() for column in columns), strict=True)
-        return [Deviation(low, high, bool(right), gain, phase) for low, high, right, gain, phase in rows]
+        return [Deviation(**row) for row in rows_of(self.deviation) if row.pop("response") == index]
 
     @property
     def columns(self) -> dict[str, Array]:

@@ -33,27 +33,18 @@ _JUDGED = ("judged_model", "part", "axis")
 class JudgedGroup:
     """Scores of the model and its baselines, by part of the data and axis."""
 
-    models: tuple[str, ...] = dataset("models", "the model and its baselines", "judged_model")
-    parts: tuple[str, ...] = dataset("parts", "training, held-out rest, other flights", "part", holds=TRAINING)
-    samples: IntArray = dataset("samples", "samples judged", "part")
-    outside: IntArray = dataset("outside", "of them outside the attitudes that training visited", "part")
-    mse: Array = dataset("mse", "mean squared torque error", *_JUDGED, units="(N m)^2", frame=EULER)
-    max_error: Array = dataset("max_error", "largest torque error", *_JUDGED, units="N m", frame=EULER)
-    relative_error: Array = dataset(
-        "relative_error", "largest error over largest torque", *_JUDGED, frame=EULER, gaps=True
-    )
-    r2: Array = dataset("r2", "share of the torque's variance explained", *_JUDGED, frame=EULER, gaps=True)
+    models: tuple[str, ...] = dataset("the model and its baselines", "judged_model")
+    parts: tuple[str, ...] = dataset("training, held-out rest, other flights", "part", holds=TRAINING)
+    samples: IntArray = dataset("samples judged", "part")
+    outside: IntArray = dataset("of them outside the attitudes that training visited", "part")
+    mse: Array = dataset("mean squared torque error", *_JUDGED, units="(N m)^2", frame=EULER)
+    max_error: Array = dataset("largest torque error", *_JUDGED, units="N m", frame=EULER)
+    relative_error: Array = dataset("largest error over largest torque", *_JUDGED, frame=EULER, gaps=True)
+    r2: Array = dataset("share of the torque's variance explained", *_JUDGED, frame=EULER, gaps=True)
     vaf: Array | None = dataset(
-        "vaf",
-        "the same without the mean of the error: variance accounted for",
-        *_JUDGED,
-        frame=EULER,
-        gaps=True,
-        default=None,
+        "the same without the mean of the error: variance accounted for", *_JUDGED, frame=EULER, gaps=True, default=None
     )
-    r2_body: Array = dataset(
-        "r2_body", "the same for body torque, not near a pitch of +-90 deg", *_JUDGED, frame=BODY, gaps=True
-    )
+    r2_body: Array = dataset("the same for body torque, not near a pitch of +-90 deg", *_JUDGED, frame=BODY, gaps=True)
 
     @classmethod
     def of(cls, result: Identification) -> Self:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
+from cpfls_cli.artifacts.spec import Format, Record, dataset, group, group_of, record
 
 if TYPE_CHECKING:
     from cpfls_cli.reduction.selection import Selection
@@ -18,18 +18,10 @@ class TraceGroup:
     """What a selection reaches after each sample."""
 
     condition_number: Array = dataset(
-        "condition_number",
-        "condition number after each sample; infinite while rank deficient",
-        "selected",
-        gaps=True,
-        least=1.0,
+        "condition number after each sample; infinite while rank deficient", "selected", gaps=True, least=1.0
     )
-    singular_value_min: Array = dataset(
-        "singular_value_min", "smallest singular value after each", "selected", units="SI"
-    )
-    singular_value_max: Array = dataset(
-        "singular_value_max", "largest singular value after each", "selected", units="SI"
-    )
+    singular_value_min: Array = dataset("smallest singular value after each", "selected", units="SI")
+    singular_value_max: Array = dataset("largest singular value after each", "selected", units="SI")
 
 
 @record
@@ -43,18 +35,18 @@ class SelectionRecord(Record):
         ("flight",),
     )
 
-    indices: IntArray = dataset("indices", "indices into the flight, in order of selection", "selected")
-    trace: TraceGroup = group("trace")
-    rank: int = dataset("rank", "numerical rank of the selection")
-    rank_full: int = dataset("rank_full", "numerical rank of all candidates")
-    condition_number: float = dataset("condition_number", "of the selection, over the kept rank", gaps=True, least=1.0)
-    condition_number_full: float = dataset("condition_number_full", "of all candidates, over the kept rank", least=1.0)
-    candidates: int = dataset("candidates", "number of samples that could be selected")
-    criterion: str = dataset("criterion", "the rule, as in reduction.criterion")
-    exchanges: int | None = dataset("exchanges", "samples that were replaced by others on the way", default=None)
-    stop_reason: str = dataset("stop_reason", "why the selection ended")
+    indices: IntArray = dataset("indices into the flight, in order of selection", "selected")
+    trace: TraceGroup = group()
+    rank: int = dataset("numerical rank of the selection")
+    rank_full: int = dataset("numerical rank of all candidates")
+    condition_number: float = dataset("of the selection, over the kept rank", gaps=True, least=1.0)
+    condition_number_full: float = dataset("of all candidates, over the kept rank", least=1.0)
+    candidates: int = dataset("number of samples that could be selected")
+    criterion: str = dataset("the rule, as in reduction.criterion")
+    exchanges: int | None = dataset("samples that were replaced by others on the way", default=None)
+    stop_reason: str = dataset("why the selection ended")
     random_condition_number: Array = dataset(
-        "random/condition_number", "of random selections of equal size", "draw", gaps=True, least=1.0
+        "of random selections of equal size", "draw", path="random/condition_number", gaps=True, least=1.0
     )
 
     @classmethod
@@ -70,21 +62,16 @@ class SelectionRecord(Record):
         random : array, shape (draw,)
             Condition numbers of random selections of equal size.
         """
-        return cls(
+        return group_of(
+            cls,
+            selection,
             indices=indices,
             trace=TraceGroup(
                 condition_number=selection.condition_number_trace,
                 singular_value_min=selection.singular_value_min_trace,
                 singular_value_max=selection.singular_value_max_trace,
             ),
-            rank=selection.rank,
-            rank_full=selection.rank_full,
-            condition_number=selection.condition_number,
-            condition_number_full=selection.condition_number_full,
             candidates=candidates,
-            criterion=selection.criterion,
-            exchanges=selection.exchanges,
-            stop_reason=selection.stop_reason,
             random_condition_number=random,
         )
 

@@ -1,14 +1,14 @@
 """What an artifact is made of: its format, and the records whose fields are its datasets.
 
 A format is a class: ``@record class SelectionRecord(Record)``, with one field for each dataset (`dataset`) or group of
-datasets (`group`). A path is written once, at its field; specification, writing, reading, the check and the tables of
-docs/format.md follow from the fields.
+datasets (`group`). A path is the name of its field where it does not say another; specification, writing, reading, the
+check and the tables of docs/format.md follow from the fields.
 """
 
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Mapping
-from dataclasses import MISSING, Field, dataclass, field, fields, replace
+from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import cache
 from types import NoneType
 from typing import Any, ClassVar, NamedTuple, Self, TypeVar, dataclass_transform, get_args, get_type_hints
@@ -33,7 +33,7 @@ PART = 8192
 """Samples of a compressed artifact that are written at a time, each such part compressed on its own."""
 
 _TEXT = "text"
-_PATH, _GROUP, _APART = "dataset", "group", "apart"
+_DATASET, _PATH, _APART = "dataset", "path", "apart"
 FIXED = {"axis": 3}
 """Axes whose label says their length."""
 
@@ -83,11 +83,28 @@ class DatasetSpec:
         return self.dimensions[:1] == ("time",)
 
 
-class Format(NamedTuple):
-    """Name of an artifact format, what it holds, the commands that write it, and the roles of their inputs.
+@dataclass(frozen=True)
+class Format:
+    """One artifact format: a record says all but its datasets, which are its fields.
 
-    One that is compressed is written some samples at a time. A format of several kinds has one record for each, which
-    adds sections of its own to what all of them hold.
+    A format of several kinds has one record for each, which adds sections of its own to what all of them hold.
+
+    Attributes
+    ----------
+    name : str
+        Value of the root attribute ``format``.
+    description : str
+        What it holds.
+    made_by : str
+        The commands that write it.
+    inputs : tuple of str
+        Roles of the files it was made from.
+    compressed : bool
+        Whether what has a value for each sample is compressed, and written some samples at a time.
+    kind : str
+        Value of the root attribute ``kind``; empty for a format of one kind, and for what all kinds hold.
+    datasets : tuple of DatasetSpec
+        In the order in which they are written, which shows in the bytes of a file.
     """
 
     name: str
@@ -96,41 +113,11 @@ class Format(NamedTuple):
     inputs: tuple[str, ...] = ()
     compressed: bool = False
     kind: str = ""
+    datasets: tuple[DatasetSpec, ...] = ()
 
-
-@dataclass(frozen=True)
-class ArtifactSpec:
-    """One artifact format as the list of its datasets.
-
-    Attributes
-    ----------
-    format : str
-        Value of the root attribute ``format``.
-    description : str
-        What it holds.
-    made_by : str
-        The commands that write it.
-    datasets : tuple of DatasetSpec
-        In the order in which they are written, which shows in the bytes of a file.
-    inputs : tuple of str
-        Roles of the files it was made from.
-    compressed : bool
-        Whether what has a value for each sample is compressed.
-    kind : str
-        Value of the root attribute ``kind``; empty for a format of one kind, and for what all kinds hold.
-    """
-
-    format: str
-    description: str
-    made_by: str
-    datasets: tuple[DatasetSpec, ...]
-    inputs: tuple[str, ...] = ()
-    compressed: bool = False
-    kind: str = ""
-
-    def includes(self, other: ArtifactSpec) -> bool:
+    def includes(self, other: Format) -> bool:
         """Tell whether an artifact of another specification is one of this."""
-        return self.format == other.format and self.kind in ("", other.kind)
+        return self.name == other.name and self.kind in ("", other.kind)
 
     @property
     def makers(self) -> str:
@@ -143,9 +130,9 @@ class ArtifactSpec:
 
 
 def dataset(
-    path: str,
     description: str,
     *dimensions: str,
+    path: str = "",
     units: str = "1",
     frame: str = NO_FRAME,
     gaps: bool = False,
@@ -156,42 +143,32 @@ def dataset(
 ) -> Any:
     """Make a field of a record a dataset; with ``default=None`` an artifact may lack it.
 
+    The others are the attributes of `DatasetSpec`.
+
     Parameters
     ----------
-    path : str
-        Below the group of the record.
-    description : str
-        What it holds.
     *dimensions : str
         Labels of the axes; none for a scalar.
+    path : str
+        Below the group of the record; empty for the name of the field.
     units : str
         SI units; text is told by the type of the field.
-    frame : str
-        Frame of reference of its components.
-    gaps : bool
-        Whether values may be not finite, and mean "not known" there.
-    into : str
-        Label of the axis that its values are indices into.
-    least : float
-        What no value is below.
-    holds : str
-        A text that is among its texts.
     """
     spec = DatasetSpec(path, dimensions, units, frame, description, default is MISSING, gaps, into, least, holds)
-    return field(default=default, metadata={_PATH: spec})
+    return field(default=default, metadata={_DATASET: spec, _PATH: path or None})
 
 
-def group(path: str, *, default: Any = MISSING, apart: bool = False) -> Any:
+def group(path: str | None = None, *, default: Any = MISSING, apart: bool = False) -> Any:
     """Make a field of a record a group of datasets, itself a record; with ``default=None`` an artifact may lack all.
 
     Parameters
     ----------
-    path : str
-        Below the group of the outer record; empty where the inner paths are whole.
+    path : str or None
+        Below the group of the outer record; empty where the inner paths are whole, None for the name of the field.
     apart : bool
         Whether its axes are as long as they like, though another group is a record of the same kind.
     """
-    return field(default=default, metadata={_GROUP: path, _APART: apart})
+    return field(default=default, metadata={_PATH: path, _APART: apart})
 
 
 _Class = TypeVar("_Class")
@@ -254,10 +231,9 @@ class Record:
     header: Header | None = field(default=None)
 
     @classmethod
-    def spec(cls) -> ArtifactSpec:
-        """List the datasets of the format."""
-        spec: ArtifactSpec = _artifact_spec(cls)  # type: ignore[arg-type]  # classes are hashable
-        return spec
+    def spec(cls) -> Format:
+        """Give the format with its datasets."""
+        return _format(cls)  # type: ignore[arg-type]  # classes are hashable
 
     @classmethod
     def of_data(cls, header: Header, data: Mapping[str, Any]) -> Self:
@@ -266,13 +242,7 @@ class Record:
 
     @classmethod
     def lacking(cls, present: Container[str]) -> list[str]:
-        """List the datasets that an artifact lacks which holds these: of a group that is there, all but the optional.
-
-        Parameters
-        ----------
-        present : container of str
-            Paths of datasets.
-        """
+        """List the datasets that an artifact with these paths lacks: of a group that is there, all but the optional."""
         return list(_lacking(cls, "", present))
 
     @property
@@ -289,7 +259,7 @@ class Record:
     @classmethod
     def path(cls, name: str) -> str:
         """Give the path of the dataset that a field at the top of the record holds."""
-        return str(cls.__dataclass_fields__[name].metadata[_PATH].path)
+        return next(entry.path for entry in _entries(cls) if entry.name == name)  # type: ignore[arg-type]
 
     def made_from(self, role: str) -> str | None:
         """Hash of an input by its role; None where it had none."""
@@ -306,21 +276,31 @@ class Record:
         return replace(self, header=header)
 
 
+def group_of(kind: type[_Class], result: object, /, **given: Any) -> _Class:
+    """Arrange a result as a group: each field holds the attribute of its name, but for those that are given.
+
+    Raises
+    ------
+    AttributeError
+        If a field is neither given nor an attribute.
+    """
+    names = (entry.name for entry in _entries(kind))  # type: ignore[arg-type]  # classes are hashable
+    return kind(**{name: getattr(result, name) for name in names if name not in given}, **given)
+
+
 def columns_of(kind: type[_Class], rows: Iterable[object], /, **given: Any) -> _Class:
     """Arrange results as a group of columns: each field holds the attributes of its name, one for each result.
 
     Parameters
     ----------
-    kind : type
-        A record whose fields are lists of text or numbers.
     **given : object
         Columns that are no attribute of the results, by field.
     """
     listed = list(rows)
     columns = {
-        entry.field.name: _column([getattr(row, entry.field.name) for row in listed], entry.kind)
+        entry.name: _read(entry.kind, [getattr(row, entry.name) for row in listed])
         for entry in _entries(kind)  # type: ignore[arg-type]  # classes are hashable
-        if entry.field.name not in given
+        if entry.name not in given
     }
     return kind(**columns, **given)
 
@@ -328,33 +308,39 @@ def columns_of(kind: type[_Class], rows: Iterable[object], /, **given: Any) -> _
 def rows_of(group: object) -> list[dict[str, Any]]:
     """List the rows of a group of columns, each by field."""
     columns = {
-        entry.field.name: getattr(group, entry.field.name)
+        entry.name: getattr(group, entry.name)
         for entry in _entries(type(group))  # type: ignore[arg-type]  # classes are hashable
-        if getattr(group, entry.field.name) is not None
+        if getattr(group, entry.name) is not None
     }
     listed = [values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values()]
     return [dict(zip(columns, row, strict=True)) for row in zip(*listed, strict=True)]
 
 
-def _column(values: list[Any], kind: Any) -> Any:
-    return tuple(values) if kind == tuple[str, ...] else np.array(values, dtype=float)
-
-
 class _Entry(NamedTuple):
-    """A field that is a dataset or a group, with its type without None."""
+    """A field that is a dataset, or a group (which has no specification), with its type without None."""
 
-    field: Field[Any]
+    name: str
+    path: str
     kind: Any
     optional: bool
+    spec: DatasetSpec | None
+    apart: bool
 
 
 @cache
 def _entries(cls: Any) -> tuple[_Entry, ...]:
     hints = get_type_hints(cls)
     return tuple(
-        _Entry(own, _without_none(hints[own.name]), own.default is not MISSING)
+        _Entry(
+            own.name,
+            own.name if own.metadata[_PATH] is None else own.metadata[_PATH],
+            _without_none(hints[own.name]),
+            own.default is not MISSING,
+            own.metadata.get(_DATASET),
+            own.metadata.get(_APART, False),
+        )
         for own in fields(cls)
-        if _PATH in own.metadata or _GROUP in own.metadata
+        if own.metadata
     )
 
 
@@ -368,15 +354,13 @@ def _joined(prefix: str, path: str) -> str:
 
 def _specs(cls: Any, prefix: str, optional: bool) -> Iterator[DatasetSpec]:
     for entry in _entries(cls):
-        if _GROUP in entry.field.metadata:
-            inner = _joined(prefix, entry.field.metadata[_GROUP])
-            for spec in _specs(entry.kind, inner, optional or entry.optional):
-                yield _relabelled(spec, f"{inner}_") if entry.field.metadata[_APART] else spec
+        path = _joined(prefix, entry.path)
+        if entry.spec is None:
+            for spec in _specs(entry.kind, path, optional or entry.optional):
+                yield _relabelled(spec, f"{path}_") if entry.apart else spec
         else:
-            spec = entry.field.metadata[_PATH]
-            units = _TEXT if entry.kind in (str, tuple[str, ...]) else spec.units
-            required = spec.required and not optional
-            yield replace(spec, path=_joined(prefix, spec.path), units=units, required=required)
+            units = _TEXT if entry.kind in (str, tuple[str, ...]) else entry.spec.units
+            yield replace(entry.spec, path=path, units=units, required=entry.spec.required and not optional)
 
 
 def _relabelled(spec: DatasetSpec, before: str) -> DatasetSpec:
@@ -386,21 +370,21 @@ def _relabelled(spec: DatasetSpec, before: str) -> DatasetSpec:
 
 
 @cache
-def _artifact_spec(cls: Any) -> ArtifactSpec:
-    own = cls.FORMAT
-    datasets = tuple(_specs(cls, "", False))
-    return ArtifactSpec(own.name, own.description, own.made_by, datasets, own.inputs, own.compressed, own.kind)
+def _format(cls: Any) -> Format:
+    own: Format = cls.FORMAT
+    return replace(own, datasets=tuple(_specs(cls, "", False)))
 
 
 def _data(owner: Any, prefix: str) -> Iterator[tuple[str, Any]]:
     for entry in _entries(type(owner)):  # type: ignore[arg-type]  # classes are hashable
-        value = getattr(owner, entry.field.name)
+        value = getattr(owner, entry.name)
         if value is None:
             continue
-        if _GROUP in entry.field.metadata:
-            yield from _data(value, _joined(prefix, entry.field.metadata[_GROUP]))
+        path = _joined(prefix, entry.path)
+        if entry.spec is None:
+            yield from _data(value, path)
         else:
-            yield _joined(prefix, entry.field.metadata[_PATH].path), _stored(value)
+            yield path, _stored(value)
 
 
 def _stored(value: Any) -> Any:
@@ -418,25 +402,23 @@ def _is_there(entry: _Entry, inner: str, present: Container[str]) -> bool:
 
 def _lacking(cls: Any, prefix: str, present: Container[str]) -> Iterator[str]:
     for entry in _entries(cls):
-        if _GROUP in entry.field.metadata:
-            inner = _joined(prefix, entry.field.metadata[_GROUP])
-            if _is_there(entry, inner, present):
-                yield from _lacking(entry.kind, inner, present)
-        elif not entry.optional and (path := _joined(prefix, entry.field.metadata[_PATH].path)) not in present:
+        path = _joined(prefix, entry.path)
+        if entry.spec is None:
+            if _is_there(entry, path, present):
+                yield from _lacking(entry.kind, path, present)
+        elif not entry.optional and path not in present:
             yield path
 
 
 def _values(cls: Any, prefix: str, data: Mapping[str, Any]) -> dict[str, Any]:
     values = {}
     for entry in _entries(cls):
-        if _GROUP in entry.field.metadata:
-            inner = _joined(prefix, entry.field.metadata[_GROUP])
-            if _is_there(entry, inner, data):
-                values[entry.field.name] = entry.kind(**_values(entry.kind, inner, data))
-            continue
-        path = _joined(prefix, entry.field.metadata[_PATH].path)
-        if path in data:
-            values[entry.field.name] = _read(entry.kind, data[path])
+        path = _joined(prefix, entry.path)
+        if entry.spec is None:
+            if _is_there(entry, path, data):
+                values[entry.name] = entry.kind(**_values(entry.kind, path, data))
+        elif path in data:
+            values[entry.name] = _read(entry.kind, data[path])
         elif not entry.optional:
             raise LookupError(path)
     return values

@@ -32,8 +32,8 @@ from cpfls_cli.artifacts.spec import (
     INPUTS,
     PART,
     SCHEMA_VERSION,
-    ArtifactSpec,
     DatasetSpec,
+    Format,
     Header,
     Record,
 )
@@ -52,7 +52,7 @@ class Artifact:
 
     Attributes
     ----------
-    spec : ArtifactSpec
+    spec : Format
         Its format.
     header : Header
         Where it comes from.
@@ -60,7 +60,7 @@ class Artifact:
         By dataset path; text as arrays of str.
     """
 
-    spec: ArtifactSpec
+    spec: Format
     header: Header
     data: Mapping[str, Any]
 
@@ -86,10 +86,6 @@ def read_record(path: Path, wanted: type[R], *needed: str) -> R:
 
     Parameters
     ----------
-    path : Path
-        Of the file.
-    wanted : type of Record
-        Its format.
     *needed : str
         Fields at the top of the record that this command cannot do without.
     """
@@ -100,7 +96,7 @@ def read_record(path: Path, wanted: type[R], *needed: str) -> R:
         raise InputError(f"{path}: lacks {', '.join(missing)}; this stage needs {', '.join(names)}")
     if any(np.size(artifact.data[name]) == 0 for name in names):
         raise InputError(f"{path}: holds no samples")
-    kind = record_of_format(artifact.spec.format, artifact.spec.kind)
+    kind = record_of_format(artifact.spec.name, artifact.spec.kind)
     # Of a format of several kinds the record of the kind, which is one of what was asked for.
     return _record(path, artifact, kind if kind is not None and issubclass(kind, wanted) else wanted)
 
@@ -108,7 +104,7 @@ def read_record(path: Path, wanted: type[R], *needed: str) -> R:
 def read_any(path: Path) -> Record:
     """Read an artifact of any format."""
     artifact = read_artifact(path)
-    wanted = record_of_format(artifact.spec.format, artifact.spec.kind)
+    wanted = record_of_format(artifact.spec.name, artifact.spec.kind)
     assert wanted is not None, "its format is known"
     return _record(path, artifact, wanted)
 
@@ -117,7 +113,7 @@ def _record(path: Path, artifact: Artifact, wanted: type[R]) -> R:
     try:
         return wanted.of_data(artifact.header, artifact.data)
     except LookupError as error:
-        raise InputError(f"{path}: the {artifact.spec.format} lacks {error.args[0]}; make it again") from None
+        raise InputError(f"{path}: the {artifact.spec.name} lacks {error.args[0]}; make it again") from None
     except (ValueError, TypeError, ArithmeticError) as error:
         raise InputError(f"{path}: damaged: {one_line(error)}") from None
 
@@ -132,14 +128,8 @@ def artifact_of(record: Record) -> Artifact:
     return Artifact(record.spec(), record.origin, record.data)
 
 
-def read_artifact(path: Path, *wanted: ArtifactSpec) -> Artifact:
-    """Read an artifact whole.
-
-    Parameters
-    ----------
-    *wanted : ArtifactSpec
-        Formats that the caller can use; any if none is named.
-    """
+def read_artifact(path: Path, *wanted: Format) -> Artifact:
+    """Read an artifact whole."""
     with opened(path, *wanted) as stored:
         require_all(path, stored)
         refuse(path, check_structure(stored))
@@ -160,7 +150,7 @@ class Outline:
         Single values, and a few words of text.
     """
 
-    spec: ArtifactSpec
+    spec: Format
     header: Header
     shapes: Mapping[str, tuple[int, ...]]
     values: Mapping[str, Any]
@@ -187,7 +177,7 @@ def _is_short_text(dataset: h5py.Dataset | Array) -> bool:
     return bool(dataset.dtype.kind in "SU" and dataset.size <= _SHORT)
 
 
-def findings_of(path: Path) -> tuple[ArtifactSpec, list[str]]:
+def findings_of(path: Path) -> tuple[Format, list[str]]:
     """List what in an artifact breaks its format, in little memory however large it is."""
     with opened(path) as stored:
         require_all(path, stored)
@@ -204,7 +194,7 @@ def format_name(path: Path) -> str | None:
     """
     try:
         with opened(path) as stored:
-            return stored.spec.format
+            return stored.spec.name
     except InputError:
         return None
 
@@ -294,7 +284,7 @@ def _in_parts(artifact: Artifact, spec: DatasetSpec) -> bool:
 
 def _write_header(file: h5py.File, artifact: Artifact) -> None:
     header = artifact.header
-    file.attrs["format"] = artifact.spec.format
+    file.attrs["format"] = artifact.spec.name
     if artifact.spec.kind:
         file.attrs["kind"] = artifact.spec.kind
     file.attrs["schema_version"] = SCHEMA_VERSION
@@ -314,7 +304,7 @@ def _write_data(file: h5py.File, artifact: Artifact, samples: int) -> None:
     specs = {spec.path: spec for spec in artifact.spec.datasets}
     unknown = artifact.data.keys() - specs.keys()
     if unknown:
-        raise KeyError(f"{artifact.spec.format} has no dataset {min(unknown)}")
+        raise KeyError(f"{artifact.spec.name} has no dataset {min(unknown)}")
     for path, spec in specs.items():
         if path in artifact.data:
             array = np.asarray(artifact.data[path])
@@ -352,13 +342,8 @@ def file_sha256(path: Path) -> str:
     return read_content(path).sha256
 
 
-def count_rows(path: Path, spec: ArtifactSpec, first: str) -> int | None:
+def count_rows(path: Path, spec: Format, first: str) -> int | None:
     """Count the rows of a dataset.
-
-    Parameters
-    ----------
-    first : str
-        Path of the dataset.
 
     Returns
     -------
@@ -372,7 +357,7 @@ def count_rows(path: Path, spec: ArtifactSpec, first: str) -> int | None:
         return None
 
 
-def check_rows(path: Path, spec: ArtifactSpec, names: Sequence[str]) -> None:
+def check_rows(path: Path, spec: Format, names: Sequence[str]) -> None:
     """Refuse datasets of an artifact that break its format, some rows at a time.
 
     Parameters

@@ -31,22 +31,19 @@ _MEASURES = ("mse", "max_error", "relative_error")
 class SettingGroup:
     """Settings of the sweep."""
 
-    name: tuple[str, ...] = dataset("name", "what the config calls it", "setting")
-    overrides: tuple[str, ...] = dataset("overrides", "what is different in it, as options of --set", "setting")
-    structure: tuple[str, ...] = dataset("structure", "cpfls or fls", "setting")
-    samples: IntArray = dataset("samples", "samples learned from", "setting")
-    criterion: tuple[str, ...] = dataset("criterion", "what chose them; all: all samples that train", "setting")
-    selection: tuple[str, ...] = dataset(
-        "selection", "sha256 of their indices; equal ones are the same samples", "setting"
-    )
-    population: IntArray = dataset("population", "chromosomes in the population", "setting")
-    generations: IntArray = dataset("generations", "generations bred at most", "setting")
+    name: tuple[str, ...] = dataset("what the config calls it", "setting")
+    overrides: tuple[str, ...] = dataset("what is different in it, as options of --set", "setting")
+    structure: tuple[str, ...] = dataset("cpfls or fls", "setting")
+    samples: IntArray = dataset("samples learned from", "setting")
+    criterion: tuple[str, ...] = dataset("what chose them; all: all samples that train", "setting")
+    selection: tuple[str, ...] = dataset("sha256 of their indices; equal ones are the same samples", "setting")
+    population: IntArray = dataset("chromosomes in the population", "setting")
+    generations: IntArray = dataset("generations bred at most", "setting")
     judged_on: tuple[str, ...] | None = dataset(
-        "judged_on", "what the search took its errors from: training or learned", "setting", default=None
+        "what the search took its errors from: training or learned", "setting", default=None
     )
-    ranking: tuple[str, ...] | None = dataset("ranking", "how the search ranked chromosomes", "setting", default=None)
+    ranking: tuple[str, ...] | None = dataset("how the search ranked chromosomes", "setting", default=None)
     uniform_condition_number: Array | None = dataset(
-        "uniform_condition_number",
         "of the samples learned from, at uniform partitions; not known below the rank of all",
         "setting",
         gaps=True,
@@ -59,53 +56,29 @@ class RunGroup:
     """One row for each run."""
 
     setting: IntArray = dataset(
-        "setting",
-        "index of the setting; every setting with the first seed, then the next seed",
-        "run",
-        into="setting",
+        "index of the setting; every setting with the first seed, then the next seed", "run", into="setting"
     )
-    seed: IntArray = dataset("seed", "`cpfls identify --seed` with it finds the same model", "run")
-    generations: IntArray = dataset("generations", "generations bred", "run")
-    evaluations: IntArray = dataset("evaluations", "chromosomes evaluated", "run")
+    seed: IntArray = dataset("`cpfls identify --seed` with it finds the same model", "run")
+    generations: IntArray = dataset("generations bred", "run")
+    evaluations: IntArray = dataset("chromosomes evaluated", "run")
     mse: Array = dataset(
-        "mse",
-        "mean squared torque error over the axes; not known: no model found",
-        "run",
-        "part",
-        units="(N m)^2",
-        gaps=True,
+        "mean squared torque error over the axes; not known: no model found", "run", "part", units="(N m)^2", gaps=True
     )
-    max_error: Array = dataset("max_error", "largest torque error", "run", "part", units="N m", gaps=True)
-    relative_error: Array = dataset(
-        "relative_error", "largest error over largest torque, worst axis", "run", "part", gaps=True
-    )
-    condition_number: Array = dataset("condition_number", "over the kept singular values", "run", gaps=True)
-    chromosome: npt.NDArray[np.int32] = dataset(
-        "chromosome", "chosen 16-bit weights; -1 beyond those of the setting", "run", "gene"
-    )
+    max_error: Array = dataset("largest torque error", "run", "part", units="N m", gaps=True)
+    relative_error: Array = dataset("largest error over largest torque, worst axis", "run", "part", gaps=True)
+    condition_number: Array = dataset("over the kept singular values", "run", gaps=True)
+    chromosome: npt.NDArray[np.int32] = dataset("chosen 16-bit weights; -1 beyond those of the setting", "run", "gene")
     learned_mse: Array | None = dataset(
-        "learned_mse",
-        "mean squared torque error over the samples learned from",
-        "run",
-        units="(N m)^2",
-        gaps=True,
-        default=None,
+        "mean squared torque error over the samples learned from", "run", units="(N m)^2", gaps=True, default=None
     )
     learned_max_error: Array | None = dataset(
-        "learned_max_error", "largest torque error of them", "run", units="N m", gaps=True, default=None
+        "largest torque error of them", "run", units="N m", gaps=True, default=None
     )
     learned_relative_error: Array | None = dataset(
-        "learned_relative_error",
-        "largest error over largest torque of them, worst axis",
-        "run",
-        gaps=True,
-        default=None,
+        "largest error over largest torque of them, worst axis", "run", gaps=True, default=None
     )
     settled: IntArray | None = dataset(
-        "settled",
-        "generation from which on the smallest first objective is within 5 % of the last one",
-        "run",
-        default=None,
+        "generation from which on the smallest first objective is within 5 % of the last one", "run", default=None
     )
 
     def __len__(self) -> int:
@@ -155,10 +128,6 @@ class RunGroup:
 
         Parameters
         ----------
-        setting : int
-            Its index.
-        parts : sequence of str
-            What models are judged on.
         result : Identification or None
             None where no chromosome gave a finite model.
         """
@@ -349,14 +318,12 @@ class SweepRecord(Record):
         ("flight", "validate", "choose-on"),
     )
 
-    setting: SettingGroup = group("setting")
-    part: tuple[str, ...] = dataset(
-        "part", "what models are judged on: training, held-out rests, other flights", "part"
-    )
-    run: RunGroup = group("run")
-    complete: bool = dataset("complete", "1 where every run is finished, 0 where `--resume` goes on")
+    setting: SettingGroup = group()
+    part: tuple[str, ...] = dataset("what models are judged on: training, held-out rests, other flights", "part")
+    run: RunGroup = group()
+    complete: bool = dataset("1 where every run is finished, 0 where `--resume` goes on")
     largest_torque: Array | None = dataset(
-        "largest_torque", "largest torque of the axis that has most", "part", units="N m", default=None
+        "largest torque of the axis that has most", "part", units="N m", default=None
     )
 
     @property

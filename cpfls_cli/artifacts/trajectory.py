@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record, rows_of
+from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, columns_of, dataset, group, record, rows_of
 
 if TYPE_CHECKING:
     from cpfls_cli.simulation.room_left import RoomLeft
@@ -26,19 +26,19 @@ DERIVATIVES = ("pop", "crackle", "snap", "jerk", "acceleration", "velocity", "di
 class LegGroup:
     """Moves of the path."""
 
-    begin: Array = dataset("begin", "when each move leaves its rest", "leg", units="s")
-    end: Array = dataset("end", "when each move is at rest again", "leg", units="s")
-    displacement: Array = dataset("displacement", "displacement of each move", "leg", "axis", units="m", frame=WORLD)
+    begin: Array = dataset("when each move leaves its rest", "leg", units="s")
+    end: Array = dataset("when each move is at rest again", "leg", units="s")
+    displacement: Array = dataset("displacement of each move", "leg", "axis", units="m", frame=WORLD)
     limited_by: tuple[str, ...] = dataset(
-        "limited_by", "derivatives that reach their limit; empty where a move was not planned under limits", "leg"
+        "derivatives that reach their limit; empty where a move was not planned under limits", "leg"
     )
 
     @classmethod
     def of(cls, legs: Sequence[Leg]) -> Self:
         """Arrange the moves of a plan."""
-        return cls(
-            begin=np.array([leg.begin for leg in legs]),
-            end=np.array([leg.end for leg in legs]),
+        return columns_of(
+            cls,
+            legs,
             displacement=np.array([leg.vector for leg in legs]),
             limited_by=tuple(" ".join(leg.limited_by) for leg in legs),
         )
@@ -48,27 +48,25 @@ class LegGroup:
 class RunsGroup:
     """Runs of a path that is repeated: what is planned is the same in all, but for whole turns of yaw."""
 
-    begin: Array = dataset("begin", "when each run leaves its rest", "run", units="s")
-    end: Array = dataset("end", "when each run is at rest again", "run", units="s")
+    begin: Array = dataset("when each run leaves its rest", "run", units="s")
+    end: Array = dataset("when each run is at rest again", "run", units="s")
 
 
 @record
 class ExcitedGroup:
     """The test signal in a path: attitude and acceleration that the setpoints have on its account."""
 
-    axis: tuple[str, ...] = dataset("axis", "roll, pitch, yaw or vertical", "excited")
-    crest: Array = dataset("crest", "crest factor of the signal of each, peak over root mean square", "excited")
-    size: Array = dataset("size", "largest angle, as planned", "excited", units="rad")
+    axis: tuple[str, ...] = dataset("roll, pitch, yaw or vertical", "excited")
+    crest: Array = dataset("crest factor of the signal of each, peak over root mean square", "excited")
+    size: Array = dataset("largest angle, as planned", "excited", units="rad")
     limit: tuple[str, ...] = dataset(
-        "limit", "limit of the vehicle that made it smaller than asked for; empty where none did", "excited"
+        "limit of the vehicle that made it smaller than asked for; empty where none did", "excited"
     )
-    signal: str = dataset("signal", "multisine, sweep-linear or sweep-logarithmic")
-    band: Array = dataset("band", "lowest and highest frequency", "2", units="Hz")
-    attitude: Array = dataset("attitude", "roll, pitch, yaw that it adds", "time", "axis", units="rad", frame=EULER)
-    position: Array = dataset("position", "position that it adds", "time", "axis", units="m", frame=WORLD)
-    acceleration: Array = dataset(
-        "acceleration", "acceleration that it adds", "time", "axis", units="m/s^2", frame=WORLD
-    )
+    signal: str = dataset("multisine, sweep-linear or sweep-logarithmic")
+    band: Array = dataset("lowest and highest frequency", "2", units="Hz")
+    attitude: Array = dataset("roll, pitch, yaw that it adds", "time", "axis", units="rad", frame=EULER)
+    position: Array = dataset("position that it adds", "time", "axis", units="m", frame=WORLD)
+    acceleration: Array = dataset("acceleration that it adds", "time", "axis", units="m/s^2", frame=WORLD)
 
     @classmethod
     def of(
@@ -108,22 +106,22 @@ class ExcitedGroup:
 class QuestionGroup:
     """What the flight is to tell, and how sure it will be."""
 
-    true: tuple[str, ...] = dataset("true", "effect that is taken to be there", "question")
-    rival: tuple[str, ...] = dataset("rival", "effect that it is told from; empty: from no effect at all", "question")
-    size: tuple[str, ...] = dataset("size", "numbers of the effect that is there", "question")
-    log_bayes: Array = dataset("log_bayes", "expected logarithm of the Bayes factor for it", "question")
-    sure: Array = dataset("sure", "probability that a diagnosis with this flight names it", "question")
+    true: tuple[str, ...] = dataset("effect that is taken to be there", "question")
+    rival: tuple[str, ...] = dataset("effect that it is told from; empty: from no effect at all", "question")
+    size: tuple[str, ...] = dataset("numbers of the effect that is there", "question")
+    log_bayes: Array = dataset("expected logarithm of the Bayes factor for it", "question")
+    sure: Array = dataset("probability that a diagnosis with this flight names it", "question")
     flown: Array = dataset(
-        "flown", "the same along the path that the autopilot of `simulation.closed_loop` flies", "question", gaps=True
+        "the same along the path that the autopilot of `simulation.closed_loop` flies", "question", gaps=True
     )
-    wrong: Array = dataset("wrong", "probability that a diagnosis names the rival", "question")
-    again: Array = dataset("again", "`sure` where the known flights are flown again instead", "question", gaps=True)
-    random: Array = dataset("random", "`sure` of the median of random paths within the same limits", "question")
-    least: Array = dataset("least", "share of the size from which on it is named with probability 0.975", "question")
+    wrong: Array = dataset("probability that a diagnosis names the rival", "question")
+    again: Array = dataset("`sure` where the known flights are flown again instead", "question", gaps=True)
+    random: Array = dataset("`sure` of the median of random paths within the same limits", "question")
+    least: Array = dataset("share of the size from which on it is named with probability 0.975", "question")
     smallest: tuple[str, ...] = dataset(
-        "smallest", "the numbers at that share; empty where shapes alone size the effect", "question"
+        "the numbers at that share; empty where shapes alone size the effect", "question"
     )
-    advice: tuple[str, ...] = dataset("advice", "the flight that the catalogue advises", "question")
+    advice: tuple[str, ...] = dataset("the flight that the catalogue advises", "question")
 
     @property
     def summary(self) -> list[dict[str, Any]]:
@@ -162,39 +160,33 @@ class TrajectoryRecord(Record):
         ("waypoints", "diagnosis"),
     )
 
-    time: Array = dataset("time", "time from the first sample", "time", units="s")
-    position: Array | None = dataset("position", "position", "time", "axis", units="m", frame=WORLD, default=None)
-    velocity: Array | None = dataset("velocity", "velocity", "time", "axis", units="m/s", frame=WORLD, default=None)
-    acceleration: Array | None = dataset(
-        "acceleration", "acceleration", "time", "axis", units="m/s^2", frame=WORLD, default=None
-    )
+    time: Array = dataset("time from the first sample", "time", units="s")
+    position: Array | None = dataset("position", "time", "axis", units="m", frame=WORLD, default=None)
+    velocity: Array | None = dataset("velocity", "time", "axis", units="m/s", frame=WORLD, default=None)
+    acceleration: Array | None = dataset("acceleration", "time", "axis", units="m/s^2", frame=WORLD, default=None)
     jerk: Array | None = dataset(
-        "jerk", "third derivative of position", "time", "axis", units="m/s^3", frame=WORLD, default=None
+        "third derivative of position", "time", "axis", units="m/s^3", frame=WORLD, default=None
     )
     snap: Array | None = dataset(
-        "snap", "fourth derivative of position", "time", "axis", units="m/s^4", frame=WORLD, default=None
+        "fourth derivative of position", "time", "axis", units="m/s^4", frame=WORLD, default=None
     )
     crackle: Array | None = dataset(
-        "crackle", "fifth derivative of position", "time", "axis", units="m/s^5", frame=WORLD, default=None
+        "fifth derivative of position", "time", "axis", units="m/s^5", frame=WORLD, default=None
     )
     pop: Array | None = dataset(
-        "pop", "sixth derivative of position", "time", "axis", units="m/s^6", frame=WORLD, default=None
+        "sixth derivative of position", "time", "axis", units="m/s^6", frame=WORLD, default=None
     )
-    yaw: Array = dataset("yaw", "planned yaw", "time", units="rad", frame=EULER)
-    yaw_rate: Array = dataset("yaw_rate", "derivative of yaw", "time", units="rad/s", frame=EULER)
-    yaw_acceleration: Array = dataset(
-        "yaw_acceleration", "second derivative of yaw", "time", units="rad/s^2", frame=EULER
-    )
-    attitude: Array = dataset("attitude", "roll, pitch, yaw q", "time", "axis", units="rad", frame=EULER)
-    attitude_rate: Array = dataset("attitude_rate", "Euler rates qd", "time", "axis", units="rad/s", frame=EULER)
-    attitude_acceleration: Array = dataset(
-        "attitude_acceleration", "Euler accelerations qdd", "time", "axis", units="rad/s^2", frame=EULER
-    )
-    body_rate: Array = dataset("body_rate", "body rates p, q, r", "time", "axis", units="rad/s", frame=BODY)
-    leg: LegGroup | None = group("leg", default=None)
-    run: RunsGroup | None = group("run", default=None)
-    excited: ExcitedGroup | None = group("excited", default=None)
-    question: QuestionGroup | None = group("question", default=None)
+    yaw: Array = dataset("planned yaw", "time", units="rad", frame=EULER)
+    yaw_rate: Array = dataset("derivative of yaw", "time", units="rad/s", frame=EULER)
+    yaw_acceleration: Array = dataset("second derivative of yaw", "time", units="rad/s^2", frame=EULER)
+    attitude: Array = dataset("roll, pitch, yaw q", "time", "axis", units="rad", frame=EULER)
+    attitude_rate: Array = dataset("Euler rates qd", "time", "axis", units="rad/s", frame=EULER)
+    attitude_acceleration: Array = dataset("Euler accelerations qdd", "time", "axis", units="rad/s^2", frame=EULER)
+    body_rate: Array = dataset("body rates p, q, r", "time", "axis", units="rad/s", frame=BODY)
+    leg: LegGroup | None = group(default=None)
+    run: RunsGroup | None = group(default=None)
+    excited: ExcitedGroup | None = group(default=None)
+    question: QuestionGroup | None = group(default=None)
 
     @classmethod
     def of(

@@ -15,7 +15,7 @@ from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
 from cpfls_cli.artifacts.parameters import parameters_of
 from cpfls_cli.artifacts.replay import HeldOutGroup, trust_by_playback
 from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, response_word
-from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, record, rows_of
+from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.response.mismatch import ROTATION, THRUST
 from cpfls_cli.validation.trust import Trust, capped
@@ -39,45 +39,45 @@ _EXPLAINED = 0.9
 class FoundNumbersGroup:
     """The numbers that were free, with 95 % intervals."""
 
-    name: tuple[str, ...] = dataset("name", "block and number", "found")
-    unit: tuple[str, ...] = dataset("unit", "empty for a ratio", "found")
-    value: Array = dataset("value", "estimate", "found", units="SI")
-    low: Array = dataset("low", "lower end of the 95 % interval", "found", units="SI")
-    high: Array = dataset("high", "upper end of the 95 % interval", "found", units="SI")
-    stated: Array = dataset("stated", "in /config; not finite where no config does", "found", units="SI", gaps=True)
-    determined: BoolArray = dataset("determined", "1 where the flights say more than what was believed before", "found")
-    at_bound: BoolArray = dataset("at_bound", "1 where it lies on a bound, so that the interval says little", "found")
+    name: tuple[str, ...] = dataset("block and number", "found")
+    unit: tuple[str, ...] = dataset("empty for a ratio", "found")
+    value: Array = dataset("estimate", "found", units="SI")
+    low: Array = dataset("lower end of the 95 % interval", "found", units="SI")
+    high: Array = dataset("upper end of the 95 % interval", "found", units="SI")
+    stated: Array = dataset("in /config; not finite where no config does", "found", units="SI", gaps=True)
+    determined: BoolArray = dataset("1 where the flights say more than what was believed before", "found")
+    at_bound: BoolArray = dataset("1 where it lies on a bound, so that the interval says little", "found")
 
 
 @record
 class TradesGroup:
     """Pairs of numbers that the flights cannot tell apart."""
 
-    first: tuple[str, ...] = dataset("first", "one number", "trade")
-    second: tuple[str, ...] = dataset("second", "the other", "trade")
-    correlation: Array = dataset("correlation", "of the two estimates", "trade")
+    first: tuple[str, ...] = dataset("one number", "trade")
+    second: tuple[str, ...] = dataset("the other", "trade")
+    correlation: Array = dataset("of the two estimates", "trade")
 
 
 @record
 class SharesGroup:
     """How much each part of the model does along the training flights."""
 
-    name: tuple[str, ...] = dataset("name", "rotors, an effect, or remainder", "part")
-    torque: Array = dataset("torque", "root mean square", "part", "axis", units="N m", frame=BODY)
-    force: Array = dataset("force", "root mean square", "part", "axis", units="N", frame=BODY)
+    name: tuple[str, ...] = dataset("rotors, an effect, or remainder", "part")
+    torque: Array = dataset("root mean square", "part", "axis", units="N m", frame=BODY)
+    force: Array = dataset("root mean square", "part", "axis", units="N", frame=BODY)
 
 
 @record
 class StructuresTriedGroup:
     """Structures of the Pareto front and the baselines, each judged on the flights kept aside."""
 
-    name: tuple[str, ...] = dataset("name", "chosen, best, greedy, everything, nothing, or front", "structure")
-    blocks: tuple[str, ...] = dataset("blocks", "its blocks, one space between two", "structure")
-    error: Array = dataset("error", "mean error of the windows kept aside; about 1.1 for rates that stay", "structure")
-    worse: Array = dataset("worse", "error less that of the best", "structure")
-    uncertain: Array = dataset("uncertain", "standard error of that difference", "structure")
-    numbers: IntArray = dataset("numbers", "free numbers", "structure")
-    condition_number: Array = dataset("condition_number", "of the numbers in their natural sizes", "structure")
+    name: tuple[str, ...] = dataset("chosen, best, greedy, everything, nothing, or front", "structure")
+    blocks: tuple[str, ...] = dataset("its blocks, one space between two", "structure")
+    error: Array = dataset("mean error of the windows kept aside; about 1.1 for rates that stay", "structure")
+    worse: Array = dataset("error less that of the best", "structure")
+    uncertain: Array = dataset("standard error of that difference", "structure")
+    numbers: IntArray = dataset("free numbers", "structure")
+    condition_number: Array = dataset("of the numbers in their natural sizes", "structure")
 
     @classmethod
     def of(cls, choice: Choice) -> Self:
@@ -85,14 +85,13 @@ class StructuresTriedGroup:
         baselines = ("chosen", "best", "greedy", "everything", "nothing")
         listed = [*((name, getattr(choice, name)) for name in baselines), *(("front", each) for each in choice.front)]
         differences = [judged.worse_than(choice.best) for _, judged in listed]
-        return cls(
+        return columns_of(
+            cls,
+            (judged for _, judged in listed),
             name=tuple(name for name, _ in listed),
             blocks=tuple(" ".join(judged.structure.blocks) for _, judged in listed),
-            error=np.array([judged.error for _, judged in listed]),
             worse=np.array([worse for worse, _ in differences]),
             uncertain=np.array([uncertain for _, uncertain in differences]),
-            numbers=np.array([judged.numbers for _, judged in listed], dtype=np.int64),
-            condition_number=np.array([judged.condition_number for _, judged in listed]),
         )
 
 
@@ -100,55 +99,57 @@ class StructuresTriedGroup:
 class DifferencesGroup:
     """What other configurations have that the vehicle has not, with 95 % intervals."""
 
-    name: tuple[str, ...] = dataset("name", "configuration, and what differs", "difference")
-    unit: tuple[str, ...] = dataset("unit", "of the difference", "difference")
-    value: Array = dataset("value", "estimate", "difference", units="SI")
-    low: Array = dataset("low", "lower end of the 95 % interval", "difference", units="SI")
-    high: Array = dataset("high", "upper end of the 95 % interval", "difference", units="SI")
+    name: tuple[str, ...] = dataset("configuration, and what differs", "difference")
+    unit: tuple[str, ...] = dataset("of the difference", "difference")
+    value: Array = dataset("estimate", "difference", units="SI")
+    low: Array = dataset("lower end of the 95 % interval", "difference", units="SI")
+    high: Array = dataset("upper end of the 95 % interval", "difference", units="SI")
 
 
 @record
 class LoopGroup:
     """How far an autopilot that answers what disturbs the vehicle may have misled the fit, about each body axis."""
 
-    low: Array = dataset("low", "factor on the moment of inertia", "axis", frame=BODY, gaps=True)
-    high: Array = dataset("high", "factor on the moment of inertia", "axis", frame=BODY, gaps=True)
+    low: Array = dataset("factor on the moment of inertia", "axis", frame=BODY, gaps=True)
+    high: Array = dataset("factor on the moment of inertia", "axis", frame=BODY, gaps=True)
     explained: Array = dataset(
-        "explained", "share of the rotation in a band that torque explains, the least", "axis", frame=BODY, gaps=True
+        "share of the rotation in a band that torque explains, the least", "axis", frame=BODY, gaps=True
     )
-    shown: bool = dataset("shown", "1 where so little is explained that the numbers may be those of the loop")
+    shown: bool = dataset("1 where so little is explained that the numbers may be those of the loop")
 
     @classmethod
     def of(cls, bounds: LoopBounds) -> Self:
         """Arrange bounds."""
-        return cls(**bounds._asdict(), shown=bounds.shows_loop)
+        return group_of(cls, bounds, shown=bounds.shows_loop)
 
 
 @record
 class InstrumentsGroup:
     """What told how the flights were moved, apart from gusts: other runs of their paths, or setpoints."""
 
-    kind: str = dataset("kind", "repeats or setpoints")
-    setpoint: tuple[str, ...] = dataset("setpoint", "signals asked for from outside of the loop", "setpoint")
+    kind: str = dataset("repeats or setpoints")
+    setpoint: tuple[str, ...] = dataset("signals asked for from outside of the loop", "setpoint")
     first: IntArray = dataset(
-        "first", "a run that repeats another: a flight, or a part of one, counted from 0", "repeat", least=0
+        "a run that repeats another: a flight, or a part of one, counted from 0", "repeat", least=0
     )
-    second: IntArray = dataset("second", "the other", "repeat", least=0)
-    likeness: Array = dataset("likeness", "correlation of the two along their path", "repeat")
-    low: Array = dataset("low", "lower end, about", "band", units="Hz")
-    high: Array = dataset("high", "upper end, about", "band", units="Hz")
+    second: IntArray = dataset("the other", "repeat", least=0)
+    likeness: Array = dataset("correlation of the two along their path", "repeat")
+    low: Array = dataset("lower end, about", "band", units="Hz")
+    high: Array = dataset("upper end, about", "band", units="Hz")
     explained: Array = dataset(
-        "explained", "share of the rotation that comes again that the constants explain", "band", "axis", frame=BODY
+        "share of the rotation that comes again that the constants explain", "band", "axis", frame=BODY
     )
-    total: Array = dataset("total", "the same in all used bands, weighed by what they tell", "axis", frame=BODY)
-    error: Array = dataset("error", "standard error of that", "axis", frame=BODY)
-    used: BoolArray = dataset("used", "1 where the constants rest on the band; others lack an effect", "band")
+    total: Array = dataset("the same in all used bands, weighed by what they tell", "axis", frame=BODY)
+    error: Array = dataset("standard error of that", "axis", frame=BODY)
+    used: BoolArray = dataset("1 where the constants rest on the band; others lack an effect", "band")
 
     @classmethod
     def of(cls, given: Instruments, constants: Constants) -> Self:
         """Arrange instruments, and what they say of the constants."""
         pairs, ends = list(given.repeats.likeness), np.array(constants.explained.bands_hz)
-        return cls(
+        return group_of(
+            cls,
+            constants.explained,
             kind=given.kind,
             setpoint=given.names,
             first=np.array([first for first, _ in pairs], dtype=np.int64),
@@ -157,9 +158,6 @@ class InstrumentsGroup:
             low=ends[:, 0],
             high=ends[:, 1],
             explained=constants.explained.share,
-            used=constants.explained.used,
-            total=constants.explained.total,
-            error=constants.explained.error,
         )
 
     @property
@@ -200,10 +198,10 @@ class InstrumentsGroup:
 class ResponsesGroup:
     """How far the model is from the frequency responses that its flights show (see `cpfls response`)."""
 
-    name: tuple[str, ...] = dataset("name", "roll, pitch, yaw, thrust", "response")
-    cost: Array = dataset("cost", "J; not finite where the flights do not show it", "response", gaps=True)
-    low: Array = dataset("low", "from this frequency", "response", units="Hz", gaps=True)
-    high: Array = dataset("high", "to this one", "response", units="Hz", gaps=True)
+    name: tuple[str, ...] = dataset("roll, pitch, yaw, thrust", "response")
+    cost: Array = dataset("J; not finite where the flights do not show it", "response", gaps=True)
+    low: Array = dataset("from this frequency", "response", units="Hz", gaps=True)
+    high: Array = dataset("to this one", "response", units="Hz", gaps=True)
 
     @classmethod
     def of(cls, responses: Sequence[VehicleResponse], *, instrumented: bool) -> Self:
@@ -252,13 +250,11 @@ class ResponsesGroup:
 class HistoryGroup:
     """The observer by which the forecast uses the past: of a disturbance until a run starts."""
 
-    past: float = dataset("past", "how much of the flight before a start its numbers were fitted with", units="s")
+    past: float = dataset("how much of the flight before a start its numbers were fitted with", units="s")
     rate: Array = dataset(
-        "rate", "at which what the model misses is taken up: torque x y z, force x y z", "6", units="1/s", frame=BODY
+        "at which what the model misses is taken up: torque x y z, force x y z", "6", units="1/s", frame=BODY
     )
-    memory: Array = dataset(
-        "memory", "time constant with which the disturbance fades", "6", units="s", frame=BODY, least=0.0
-    )
+    memory: Array = dataset("time constant with which the disturbance fades", "6", units="s", frame=BODY, least=0.0)
 
     @classmethod
     def of(cls, observer: Observer) -> Self:
@@ -279,31 +275,29 @@ class VehicleRecord(ModelRecord):
         "cpfls/model", "a vehicle found in flights", "vehicle", ("flight", "held-out"), kind="vehicle"
     )
 
-    found: FoundNumbersGroup = group("found")
-    trade: TradesGroup = group("trade")
-    structure: StructuresTriedGroup = group("structure")
-    loop: LoopGroup = group("loop")
-    instruments: InstrumentsGroup | None = group("instruments", default=None)
-    responses: ResponsesGroup | None = group("responses", default=None)
-    forecast: VehicleGroup | None = group("forecast", default=None, apart=True)
-    history: HistoryGroup | None = group("history", default=None)
-    held_out: HeldOutGroup | None = group("held_out", default=None)
-    share: SharesGroup = group("share")
-    airspeed: float = dataset(
-        "airspeed", "speed in the rotor plane that 95 % of the training samples stay below", units="m/s"
-    )
-    evaluated: int = dataset("evaluated", "structures that were judged")
-    complete: bool = dataset("complete", "1 where the search came to its end")
-    blocks: int = dataset("blocks", "blocks of windows that the intervals come from")
-    warning: tuple[str, ...] = dataset("warning", "what to know about the flights", "warning")
+    found: FoundNumbersGroup = group()
+    trade: TradesGroup = group()
+    structure: StructuresTriedGroup = group()
+    loop: LoopGroup = group()
+    instruments: InstrumentsGroup | None = group(default=None)
+    responses: ResponsesGroup | None = group(default=None)
+    forecast: VehicleGroup | None = group(default=None, apart=True)
+    history: HistoryGroup | None = group(default=None)
+    held_out: HeldOutGroup | None = group(default=None)
+    share: SharesGroup = group()
+    airspeed: float = dataset("speed in the rotor plane that 95 % of the training samples stay below", units="m/s")
+    evaluated: int = dataset("structures that were judged")
+    complete: bool = dataset("1 where the search came to its end")
+    blocks: int = dataset("blocks of windows that the intervals come from")
+    warning: tuple[str, ...] = dataset("what to know about the flights", "warning")
     guess: tuple[str, ...] | None = dataset(
-        "guess", "numbers of /vehicle that are guesses still: no flight tells them", "guess", default=None
+        "numbers of /vehicle that are guesses still: no flight tells them", "guess", default=None
     )
-    difference: DifferencesGroup | None = group("difference", default=None)
+    difference: DifferencesGroup | None = group(default=None)
     contradiction: tuple[str, ...] | None = dataset(
-        "contradiction", "what of the flights contradicts itself or the vehicle", "contradiction", default=None
+        "what of the flights contradicts itself or the vehicle", "contradiction", default=None
     )
-    disturbance: DisturbanceGroup | None = group("disturbance", default=None)
+    disturbance: DisturbanceGroup | None = group(default=None)
 
     @classmethod
     def of(
@@ -321,12 +315,7 @@ class VehicleRecord(ModelRecord):
         return cls(
             vehicle=VehicleGroup.of(replace(found.model, commanded=commanded)),
             learned=learned,
-            found=columns_of(
-                FoundNumbersGroup,
-                found.numbers,
-                determined=np.array([number.determined for number in found.numbers], dtype=bool),
-                at_bound=np.array([number.at_bound for number in found.numbers], dtype=bool),
-            ),
+            found=columns_of(FoundNumbersGroup, found.numbers),
             trade=columns_of(TradesGroup, found.trades),
             structure=StructuresTriedGroup.of(found.choice),
             loop=LoopGroup.of(found.loop),

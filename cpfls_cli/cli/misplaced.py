@@ -50,8 +50,6 @@ def refuse_misplaced_config(command: str, given: Sequence[Path], output: Path | 
 
     Parameters
     ----------
-    command : str
-        Its name.
     given : sequence of Path
         Its arguments, the config first.
     output : Path or None

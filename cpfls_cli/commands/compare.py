@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from pathlib import Path
 
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
@@ -27,18 +26,11 @@ from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import KnownBy, seen_warnings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.words import did_you_mean
 
 
 def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
-    """Compare a model with flights and write where they disagree.
-
-    Parameters
-    ----------
-    flights : sequence of Path
-        Artifacts, or logs that the config describes.
-    model : Path or None
-        Identified, with effects, or of a whole vehicle; None for the rigid body of the vehicle.
-    """
+    """Compare a model with flights and write where they disagree."""
     roles = numbered_roles("flight", flights)
     inputs = begin(job, roles | ({} if model is None else {"model": model}))
     check_ignored(job.study)
@@ -71,13 +63,7 @@ def finish_disagreement(
 def compared(
     study: Study, given: Recordings, model: VehicleModel, progress: Callable[[float, str], None]
 ) -> DisagreementRecord:
-    """Compare a model with flights.
-
-    Parameters
-    ----------
-    model : VehicleModel
-        Flights are those of its vehicle.
-    """
+    """Compare a model with flights."""
     disagreement = compare(given.recordings, model, study.gap, generator(study, "compare"), progress)
     return DisagreementRecord.of(disagreement, given.recordings, given.warnings, model)
 
@@ -86,8 +72,7 @@ def check_ignored(study: Study) -> None:
     """Refuse names in `gap.ignore` that no effect has."""
     for name in study.gap.ignore:
         if name not in CATALOGUE:
-            near = get_close_matches(name, CATALOGUE, n=1, cutoff=0.4)
-            hint = f"did you mean {near[0]}?" if near else "`cpfls effects` lists all"
+            hint = did_you_mean(name, CATALOGUE, "`cpfls effects` lists all")
             raise ConfigError(f"gap.ignore = {name}: no such effect ({hint})")
 
 

@@ -14,20 +14,7 @@ from cpfls_cli.report.outcome import Outcome
 
 
 def run(path: Path | None, sections: Sequence[str], overrides: Sequence[str], seed: int | None) -> Outcome:
-    """Show a resolved config, or a commented default.
-
-    Parameters
-    ----------
-    path : Path or None
-        None shows the commented default.
-    sections : sequence of str
-        Only these, and the seed.
-
-    Raises
-    ------
-    ConfigError
-        If the default is asked for together with overrides, sections or a seed.
-    """
+    """Show a resolved config, or a commented default."""
     if path is None:
         if sections or overrides or seed is not None:
             raise ConfigError("--section, --set and --seed need a CONFIG; without one the commented default is printed")

@@ -34,15 +34,7 @@ from cpfls_cli.report.outcome import Outcome, nothing_written
 
 
 def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
-    """Name what a model misses and write it.
-
-    Parameters
-    ----------
-    disagreement : Path
-        Holds the flights and the model.
-    held_out : sequence of Path
-        Flights to judge on.
-    """
+    """Name what a model misses and write it."""
     inputs = begin(job, {"disagreement": disagreement} | numbered_roles("held-out", held_out))
     check_ignored(job.study)
     compared = read_of_vehicle(disagreement, DisagreementRecord, job.study)
@@ -92,15 +84,7 @@ def diagnosed(
     base: VehicleModel,
     progress: Callable[[float, str], None],
 ) -> tuple[Diagnosis, DiagnosisRecord]:
-    """Diagnose flights.
-
-    Parameters
-    ----------
-    warnings : sequence of str
-        What to know about the flights.
-    base : VehicleModel
-        That misses something: the rigid body, or inertia functions.
-    """
+    """Diagnose flights."""
     model = base.fuzzy
     rng = generator(study, "diagnose")
     result = diagnose(split.training, split.held_out, study.gap, rng, model=model, progress=progress)

@@ -13,18 +13,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 def run(name: str | None) -> Outcome:
-    """List the effects, or describe one in full; ranges are those of the default vehicle.
-
-    Parameters
-    ----------
-    name : str or None
-        Identifier; None lists all.
-
-    Raises
-    ------
-    InputError
-        If there is no such effect.
-    """
+    """List the effects, or describe one in full; ranges are those of the default vehicle."""
     if name is None:
         entries = [_describe_effect(entry) for entry in CATALOGUE.values()]
         rows = [[entry.name, entry.kind, entry.title] for entry in CATALOGUE.values()]

@@ -27,17 +27,7 @@ _IMPORTED = ("casadi", "jax", "numpy", "rotorpy")
 
 
 def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
-    """Write a model in another form.
-
-    Parameters
-    ----------
-    job : Job
-        Its study is not used: a model holds its own.
-    form : a word of `FORMS`, or None
-        None takes the suffix of the output.
-    name : str or None
-        Prefix of the names in C, name of the model in JSON and XML; None takes the name of the output.
-    """
+    """Write a model in another form."""
     form = form or _form_of(job.output)
     prefix = _prefix_of(job.output, form, name)
     outputs = _outputs_of(job.output, form)
@@ -89,13 +79,7 @@ def _form_of(output: Path) -> str:
 
 
 def _prefix_of(output: Path, form: str, name: str | None) -> str:
-    """Choose the prefix of the names in source code.
-
-    Parameters
-    ----------
-    name : str or None
-        What was asked for.
-    """
+    """Choose the prefix of the names in source code."""
     if name is None:
         return identifier(output.stem)
     if ENDINGS[form] == ".py":

@@ -33,20 +33,7 @@ _EXTENDS = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
 
 
 def run(job: Job, diagnosis: Path, model: Path | None) -> Outcome:
-    """Put the named effects into a model and write it.
-
-    Parameters
-    ----------
-    diagnosis : Path
-        Holds the flights, the effects and the model that it was made with.
-    model : Path or None
-        Another identified model to extend.
-
-    Raises
-    ------
-    ComputationError
-        If the diagnosis names nothing, or the gap on the held-out flights does not shrink.
-    """
+    """Put the named effects into a model and write it."""
     inputs = begin(job, {"diagnosis": diagnosis} | ({} if model is None else {"model": model}))
     diagnosed = read_of_vehicle(diagnosis, DiagnosisRecord, job.study)
     base = vehicle_model(diagnosed.base) if model is None else read_base(model, job.study)
@@ -81,26 +68,14 @@ def finish_extended(
 
 
 def named_effects(diagnosis: DiagnosisRecord) -> Sequence[NamedEffect]:
-    """Take the effects that a diagnosis names.
-
-    Raises
-    ------
-    ComputationError
-        If it names none.
-    """
+    """Take the effects that a diagnosis names; one that names none is refused."""
     effects = diagnosis.effects.effects()
     require_named(diagnosis.verdict, diagnosis.effects.named)
     return effects
 
 
 def require_named(verdict: str, effects: Sequence[NamedEffect]) -> None:
-    """Refuse a diagnosis that names no effect to add.
-
-    Parameters
-    ----------
-    effects : sequence of NamedEffect
-        Those that it names.
-    """
+    """Refuse a diagnosis that names no effect to add."""
     if verdict not in _EXTENDS or not effects:
         closest = " (those that it calls closest are not it)" if verdict == GapVerdict.UNEXPLAINED else ""
         raise ComputationError(
@@ -115,18 +90,7 @@ def extended(
     diagnosis: DiagnosisRecord,
     base: VehicleModel,
 ) -> ExtendedRecord:
-    """Put the effects that a diagnosis names into a model.
-
-    Parameters
-    ----------
-    base : VehicleModel
-        To extend: the rigid body, or inertia functions.
-
-    Raises
-    ------
-    ComputationError
-        If the diagnosis names nothing, or the gap on the held-out flights does not shrink.
-    """
+    """Put the effects that a diagnosis names into a model; refused where the held-out gap does not shrink."""
     extension = extend(training, held, named_effects(diagnosis), audit(diagnosis.audit), study.gap, base.fuzzy)
     whole, given = (whole_vehicle(each, study.vehicle) for each in (extension.model, plain(base.fuzzy)))
     require_body(extension.model, study.vehicle)

@@ -71,17 +71,6 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path
     """Find where a model and flights disagree, name what is missing, and put it into the model.
 
     The search adds one effect after another until nothing more can be named, so once through is all the way.
-
-    Parameters
-    ----------
-    job : Job
-        Its output is a folder.
-    flights : sequence of Path
-        Artifacts, or logs that the config describes.
-    held_out : sequence of Path
-        Flights to judge on.
-    model : Path or None
-        An identified model; None for the rigid body of the vehicle.
     """
     given = _begin(job, flights, held_out, model)
     if job.dry_run:

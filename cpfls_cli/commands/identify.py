@@ -29,6 +29,7 @@ from cpfls_cli.identification.search import NothingFoundError, SearchRun, Search
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.source import source_of
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.search.resumable import SearchOptions, Watch, begin_search
@@ -46,19 +47,7 @@ def run(
     options: SearchOptions,
     choose_on: Sequence[Path] = (),
 ) -> Outcome:
-    """Identify a model and write it.
-
-    Parameters
-    ----------
-    selection : Path or None
-        Samples to learn from; all of the training part if None.
-    validate : sequence of Path
-        Other flights to judge the model on; nothing is learned from them.
-    options : SearchOptions
-        How the search is run.
-    choose_on : sequence of Path
-        Other flights to choose the model on, for `identification.choice: held-out`.
-    """
+    """Identify a model and write it."""
     inputs, search = begin_search(job, input_roles(flights, selection, validate, choose_on), options)
     data = read_training(flights, selection, job.study, inputs)
     kept = choosing_source(choose_on, inputs)
@@ -79,7 +68,7 @@ def run(
     result = _with_length(result, flights, data)
     with search.kept():
         evidence, signal = _evidence(job, result, data, held_out, wrong, watch.signal)
-        base, vehicle = job.study.identification.base, job.study.vehicle
+        base, vehicle = job.study.identification.base, VehicleModel(vehicle=job.study.vehicle, fuzzy=result.model)
         parts = LearnedGroup.parts(flight_roles(flights), data.parts)
         record = finish(job, IdentifiedRecord.of(result, base, data.indices, evidence, vehicle, parts), inputs)
     unjudged = signal is not None and evidence is None and job.study.identification.validation.enabled

@@ -17,20 +17,7 @@ from cpfls_cli.report.outcome import Outcome, nothing_written
 
 
 def run(job: Job, log: Path) -> Outcome:
-    """Import a log and write it as a flight.
-
-    Parameters
-    ----------
-    log : Path
-        In one of the formats of `cpfls_cli.logs`.
-
-    Raises
-    ------
-    InputError
-        If the log cannot be read or lacks columns that the config names.
-    ConfigError
-        If a key of the section `import` does not suit the log; the message names both.
-    """
+    """Import a log and write it as a flight."""
     inputs = begin(job, {"log": log})
     flight = imported(log, job.study)
     # An import is quick, and only the whole of it shows that every key suits the log.

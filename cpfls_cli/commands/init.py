@@ -21,22 +21,7 @@ from cpfls_cli.report.outcome import Outcome
 
 
 def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
-    """Write a commented config for logs of one vehicle.
-
-    Parameters
-    ----------
-    job : Job
-        Its study is not used.
-    logs : sequence of Path
-        One at least; the first one leads.
-    stated : Stated
-        Mass and arm length, where they are said.
-
-    Raises
-    ------
-    InputError
-        If a log cannot be read, nothing in it flies or is recognised, or the logs are of two vehicles.
-    """
+    """Write a commented config for logs of one vehicle."""
     take_inputs(job, {f"log-{number}": log for number, log in enumerate(logs)})
     check_outputs(job, job.output)
     known = []

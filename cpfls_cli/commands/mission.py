@@ -33,18 +33,7 @@ class Mission:
 
 
 def mission_of(study: Study, forms: Sequence[str], home: str | None) -> Mission:
-    """Take what is asked for; a path that is repeated or excited is to be flown, so it comes with a CSV.
-
-    Parameters
-    ----------
-    home : str or None
-        Latitude, longitude, height, with commas between.
-
-    Raises
-    ------
-    InputError
-        If a form lacks what it needs, or the vehicle is held.
-    """
+    """Take what is asked for; a path that is repeated or excited is to be flown, so it comes with a CSV."""
     settings = study.trajectory
     asked = tuple(dict.fromkeys(forms))
     if asked and settings.held:

@@ -80,20 +80,7 @@ class Case:
 
 
 def run(job: Job, diagnosis: Path | None = None, plot: bool = False) -> Outcome:
-    """Plan the flight that tells most, and write it with waypoints for an autopilot.
-
-    Parameters
-    ----------
-    diagnosis : Path or None
-        Whose open questions are to be settled; None for effects that the config names.
-    plot : bool
-        Draw the path beside the output.
-
-    Raises
-    ------
-    InputError
-        If there is nothing to tell, or no flight tells it.
-    """
+    """Plan the flight that tells most, and write it with waypoints for an autopilot."""
     study = job.study
     require_known(study, "trajectory", whole=False)
     inputs = begin(job, {"diagnosis": diagnosis} if diagnosis else {})

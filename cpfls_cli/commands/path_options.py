@@ -20,26 +20,10 @@ def option_overrides(
 ) -> list[str]:
     """Write the options as overrides of the config, so that the artifact's config has them too.
 
-    Parameters
-    ----------
-    to_tell : str or None
-        Names of effects, with commas between.
-    diagnosis : Path or None
-        Whose open questions the path settles.
-    box : str or None
-        Three lengths in m, with commas between.
-    height, duration : float or None
-        m and s.
-
     Returns
     -------
     list of str
         ``section.key=value`` each.
-
-    Raises
-    ------
-    InputError
-        If points to fly to are given for a flight that is to be planned.
     """
     settles = to_tell is not None or diagnosis is not None
     if settles and waypoints is not None:
@@ -89,18 +73,7 @@ class Added:
     hover: float | None = None
 
     def overrides(self, waypoints: Path | None, settles: bool, duration: float | None) -> list[str]:
-        """Write the options as overrides of the config, ``section.key=value`` each.
-
-        Parameters
-        ----------
-        settles : bool
-            Whether the path is to settle a diagnosis or to tell effects apart.
-
-        Raises
-        ------
-        InputError
-            If a hover is asked for beside another path or a duration.
-        """
+        """Write the options as overrides of the config, ``section.key=value`` each."""
         others = {
             f"--waypoints {waypoints}": waypoints is not None,
             "--to-tell and --for": settles,

@@ -17,9 +17,8 @@ from cpfls_cli.artifacts.job import Job, Progress, begin, finish_parts
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.artifacts.store import count_rows, holds, read_header, read_record
+from cpfls_cli.artifacts.store import count_rows, holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
-from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
 from cpfls_cli.config.unknown import require_known
 from cpfls_cli.consistency.findings import contradictions
@@ -28,14 +27,20 @@ from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.flight_source import FlightStretch, FlightStretches, check_file, flight_source, flight_stretches
+from cpfls_cli.flights.flight_source import (
+    FlightStretch,
+    FlightStretches,
+    check_file,
+    flight_source,
+    flight_stretches,
+    torque_source_of,
+)
 from cpfls_cli.flights.inputs import hashes_of
 from cpfls_cli.flights.models import read_model, rebuilt
 from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles
 from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_balance
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.identification.data import TorqueSource
-from cpfls_cli.logs.formats import is_log
 from cpfls_cli.pages.model import trust_notes
 from cpfls_cli.pages.prediction import answer
 from cpfls_cli.pages.sensors import contradicted
@@ -51,13 +56,7 @@ _Predicted = Callable[[FlightStretch], PredictionRecord]
 
 
 def run(job: Job, model: Path, flight: Path) -> Outcome:
-    """Predict along a flight and write it.
-
-    Parameters
-    ----------
-    model : Path
-        Identified, one with effects, or of a whole vehicle.
-    """
+    """Predict along a flight and write it."""
     inputs = begin(job, {"model": model, "flight": flight})
     require_known(job.study, "predict", whole=holds(model, VehicleRecord))
     record = read_record(model, ModelRecord)
@@ -131,7 +130,7 @@ def _of_vehicle(path: Path, flight: Path, study: Study) -> _Predicted:
     A torque that was logged beside the rotor speeds is taken in its place. A stretch raises an InputError if the flight
     lacks the attitude or a signal that the model needs.
     """
-    model, told = read_model(path, study), _tells_torque(flight, study)
+    model, told = read_model(path, study), torque_source_of(flight, study) == "column"
 
     def predicted(stretch: FlightStretch) -> PredictionRecord:
         (recording,) = of_vehicle([Recording(flight.name, stretch.signals)], model)
@@ -149,15 +148,6 @@ def _of_vehicle(path: Path, flight: Path, study: Study) -> _Predicted:
         )
 
     return predicted
-
-
-def _tells_torque(path: Path, study: Study) -> bool:
-    """Tell whether a sensor told the body torque of a flight, and no rotor of the config."""
-    if is_log(path):
-        return study.import_.torque_source == "column"
-    made = read_header(path)
-    config = parse_config(made.config, f"{path}: /config")
-    return "log" in made.inputs and config["import"]["torque_source"] == "column"
 
 
 def _prediction(signals: Signals, model: VehicleModel, body_torque: Array, measured: Array) -> PredictionRecord:

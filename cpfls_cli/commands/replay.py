@@ -23,22 +23,14 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.history import Observer, past_of
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.replay import Played, ReplayOptions, ReplayWindows, replay
-from cpfls_cli.report.numbers import joined
 from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.words import joined
 
 _FORECAST = "{}: its forecast along logged rotor speeds is played, loop and all; its constants are another model"
 
 
 def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) -> Outcome:
-    """Play a model back along flights and write its errors by horizon.
-
-    Parameters
-    ----------
-    model : Path
-        Any model; the word ``vehicle`` for the vehicle of the config.
-    flights : sequence of Path
-        Artifacts, or logs that the config describes.
-    """
+    """Play a model back along flights and write its errors by horizon."""
     require_known(job.study, "replay", whole=not is_vehicle(model))
     of_model = {} if is_vehicle(model) else {"model": model}
     roles = numbered_roles("flight", flights)

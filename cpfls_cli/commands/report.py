@@ -23,15 +23,7 @@ from cpfls_cli.version import __version__
 
 
 def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcome:
-    """Write a report about artifacts.
-
-    Parameters
-    ----------
-    artifacts : sequence of Path
-        Of any format and from any flights; a file given twice counts once.
-    form : Form or None
-        None to choose it by the suffix of the output.
-    """
+    """Write a report about artifacts."""
     inputs = begin(job, {str(path): path for path in artifacts})
     files = {path: inputs[str(path)].sha256 for path in artifacts}
     distinct = {sha256: path for path, sha256 in reversed(files.items())}
@@ -61,15 +53,7 @@ def read_sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:
 
 
 def source_of_record(record: Record, path: object, label: str, sha256: str) -> Source:
-    """Name an artifact for a report.
-
-    Parameters
-    ----------
-    path : object
-        Where it was read from, for messages.
-    label : str
-        Its name on the page.
-    """
+    """Name an artifact for a report."""
     study = validate(parse_yaml(record.origin.config, f"{path}: /config"), f"{path}: /config")
     parameters = model_structure(study.identification).parameters
     return Source(label, sha256, record, resolved(study), study.vehicle, parameters)

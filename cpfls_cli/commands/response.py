@@ -32,17 +32,7 @@ _DIGITS = 9
 
 
 def run(job: Job, flights: Sequence[Path], model: Path | None, table: Path | None = None) -> Outcome:
-    """Estimate frequency responses and write them.
-
-    Parameters
-    ----------
-    flights : sequence of Path
-        Artifacts, or logs that the config describes.
-    model : Path or None
-        Any model; None for the vehicle of the config.
-    table : Path or None
-        Written too, as CSV.
-    """
+    """Estimate frequency responses and write them."""
     roles = numbered_roles("flight", flights)
     inputs = begin(job, ({} if model is None else {"model": model}) | roles)
     require_known(job.study, "response", whole=model is not None and holds(model, VehicleRecord))

@@ -22,13 +22,13 @@ def info(path: Path) -> Outcome:
     datasets = {name: _describe_dataset(artifact, name) for name in artifact.shapes}
     summary = {
         "file": str(path),
-        "format": artifact.spec.format,
+        "format": artifact.spec.name,
         "cpfls_version": header.version,
         "seed": header.seed,
         "inputs": {role: vars(source) for role, source in header.inputs.items()},
         "datasets": datasets,
     }
-    if artifact.spec.format != ModelRecord.FORMAT.name:
+    if artifact.spec.name != ModelRecord.FORMAT.name:
         return Outcome(summary, description(artifact))
     model = read_record(path, ModelRecord)
     gusts = model.vehicle.gusts
@@ -44,7 +44,7 @@ def description(artifact: Outline, more: Sequence[tuple[str, str]] = ()) -> tupl
     rows = [_dataset_row(name, _describe_dataset(artifact, name)) for name in artifact.shapes]
     columns = ("Dataset", "Shape", "Unit", "What it holds")
     table = Table("datasets", "", columns, rows, frozenset(range(len(columns))), frozenset({3}))
-    return Text(f"{artifact.spec.format}: {artifact.spec.description}"), Facts([*origin, *more]), table
+    return Text(f"{artifact.spec.name}: {artifact.spec.description}"), Facts([*origin, *more]), table
 
 
 def _describe_dataset(artifact: Outline, name: str) -> dict[str, Any]:
@@ -69,6 +69,6 @@ def _dataset_row(name: str, entry: dict[str, Any]) -> list[str]:
 def check(path: Path) -> Outcome:
     """Check an artifact against its format; the exit code is 1 where it does not keep to it."""
     spec, findings = findings_of(path)
-    summary = {"file": str(path), "format": spec.format, "good": not findings, "findings": findings}
-    sentences = [f"{path}: {finding}" for finding in findings] or [f"{path}: good ({spec.format})"]
+    summary = {"file": str(path), "format": spec.name, "good": not findings, "findings": findings}
+    sentences = [f"{path}: {finding}" for finding in findings] or [f"{path}: good ({spec.name})"]
     return Outcome(summary, tuple(map(Text, sentences)), exit_code=int(bool(findings)))

@@ -39,25 +39,7 @@ _EFFECT_FORM = "write NAME=VALUE[,VALUE...] or NAME.coefficient=VALUE, see `cpfl
 
 
 def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None = None) -> Outcome:
-    """Simulate a flight along a trajectory and write it.
-
-    Parameters
-    ----------
-    model : Path or None
-        In mode closed-loop flown in place of the vehicle of the config: that of a whole vehicle, one with effects, or
-        an identified one. Without a mode that of a whole vehicle is flown so; with an identified one the attitude of
-        the vehicle is controlled.
-    mode : str or None
-        Of the command line, which the config has too; None where it gives none.
-
-    Raises
-    ------
-    InputError
-        If an effect is unknown or has impossible values, or the model is of another vehicle.
-    ComputationError
-        If a rotor would have to do what it cannot, unless `simulation.infeasible` is ``report``, or a flight in closed
-        loop loses its path.
-    """
+    """Simulate a flight along a trajectory and write it."""
     if model is not None and mode is None:
         whole = holds(model, VehicleRecord)
         job = replace(job, study=_with_mode(job.study, "closed-loop" if whole else "computed-torque"))
@@ -163,24 +145,10 @@ def _rms(values: Array) -> float:
 def option_overrides(mode: str | None, effects: Sequence[str], *, gusts: bool = False) -> list[str]:
     """Write ``--mode``, ``--effect`` and ``--gusts`` as overrides of the config, which its artifact then holds.
 
-    Parameters
-    ----------
-    mode : str or None
-        None keeps that of the config.
-    effects : sequence of str
-        ``NAME=VALUE[,VALUE...]`` or ``NAME.coefficient=VALUE`` each.
-    gusts : bool
-        Flown in closed loop, where no other mode is given.
-
     Returns
     -------
     list of str
         ``section.key=value`` each.
-
-    Raises
-    ------
-    InputError
-        If an effect is malformed, unknown, or given twice.
     """
     given: dict[str, list[float] | dict[str, float]] = {}
     for text in effects:

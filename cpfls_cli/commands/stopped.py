@@ -22,8 +22,6 @@ def stopped(
 
     Parameters
     ----------
-    reason : str
-        Why the search ended.
     signal : int or None
         Number of the signal that asked to stop.
     output : Path
@@ -54,8 +52,6 @@ def without_model(reason: StopReason, signal: int | None) -> CpflsError | None:
 
     Parameters
     ----------
-    reason : str
-        Why the search ended.
     signal : int or None
         Number of the signal that stopped it.
     """

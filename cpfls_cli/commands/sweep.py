@@ -27,19 +27,7 @@ def run(
     options: SearchOptions,
     choose_on: Sequence[Path] = (),
 ) -> Outcome:
-    """Run every setting of a sweep with every seed.
-
-    Parameters
-    ----------
-    flights : sequence of Path
-        That train.
-    validate : sequence of Path
-        Other flights to judge the models on; nothing is learned from them.
-    options : SearchOptions
-        How each search is run; the time limit is for all of them together.
-    choose_on : sequence of Path
-        Other flights to choose models on, for settings with `identification.choice: held-out`.
-    """
+    """Run every setting of a sweep with every seed."""
     options.require_workers()
     inputs = take_inputs(job, input_roles(flights, None, validate, choose_on))
     partial = PartialSweep.beside(job.output, header_of(job.study, inputs))

@@ -44,22 +44,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 def run(job: Job, trajectory: Path, model: Path) -> Outcome:
-    """Follow the attitude of a trajectory with several controllers, and write the flight under the model's.
-
-    Parameters
-    ----------
-    model : Path
-        Identified.
-
-    Raises
-    ------
-    InputError
-        If the model has effects, or is of another vehicle.
-    ConfigError
-        If the control rate is lower than that of the trajectory, or the vehicle is lost before it starts.
-    ComputationError
-        If the planned pitch comes near the vertical.
-    """
+    """Follow the attitude of a trajectory with several controllers, and write the flight under the model's."""
     inputs = begin(job, {"trajectory": trajectory, "model": model})
     identified = _identified(model, job.study)
     functions = rebuilt(model, identified).fuzzy

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
-from difflib import get_close_matches
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -43,6 +42,7 @@ from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory, held_rota
 from cpfls_cli.trajectory.repeats import repeated
 from cpfls_cli.trajectory.rotation import RotationPath, full_rotation
 from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
+from cpfls_cli.words import did_you_mean
 
 PlanAt = Callable[[float], PlannedRotation]
 """Samples a plan with a sample time in s."""
@@ -77,22 +77,7 @@ class Flight:
 
 
 def run(job: Job, waypoints: Path | None = None, plot: bool = False, mission: Mission | None = None) -> Outcome:
-    """Plan the path of a study and write it.
-
-    Parameters
-    ----------
-    waypoints : Path or None
-        CSV of the points to fly to, in place of the path of the config.
-    plot : bool
-        Draw the path beside the output.
-    mission : Mission or None
-        Files for autopilots to write beside it; None for none.
-
-    Raises
-    ------
-    ComputationError
-        If the path asks for more than the vehicle has, unless `trajectory.infeasible` is ``report``.
-    """
+    """Plan the path of a study and write it."""
     mission = mission or Mission()
     inputs = begin(job, {"waypoints": waypoints} if waypoints else {})
     settings = _settings(job.study, waypoints)
@@ -208,8 +193,7 @@ def _check_columns(path: Path, columns: dict[str, Array]) -> None:
         f"{path}: column '{name}' is missing; waypoints need {', '.join(_POSITION_COLUMNS)}" for name in missing
     ]
     for name in unknown:
-        near = get_close_matches(name, known, n=1)
-        hint = f"did you mean {near[0]}?" if near else f"the columns are {', '.join(known)}"
+        hint = did_you_mean(name, known, f"the columns are {', '.join(known)}", cutoff=0.6)
         problems.append(f"{path}: column '{name}' is not known; {hint}")
     if problems:
         raise InputError("\n".join(problems))
@@ -242,11 +226,6 @@ def _demand(
     """Find what a plan asks of its vehicle, sampled anew where a part of a move may lie between two samples.
 
     The sentences say what is asked for beyond what the vehicle has.
-
-    Raises
-    ------
-    SettingError
-        If the moves are too short to be looked at between the samples.
     """
     shortest = _shortest_part(planned, settings)
     step = shortest / _SAMPLES_IN_A_PART
@@ -297,13 +276,7 @@ def _too_much_without_turn(study: Study, settings: TrajectorySettings) -> bool:
 
 
 def figure_paths(job: Job, names: Sequence[str]) -> tuple[Path, ...]:
-    """Name the figures of a path, beside its artifact.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Of the figures, one word each.
-    """
+    """Name the figures of a path, beside its artifact."""
     return tuple(job.output.with_name(f"{job.output.stem}-{name}.svg") for name in names)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,11 +30,11 @@ from cpfls_cli.playback.settings import GroupSettings
 from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError
 from cpfls_cli.playback.vehicle import FoundVehicle, find_vehicle
 from cpfls_cli.report.content import Text
-from cpfls_cli.report.numbers import joined
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.response.flown import VehicleResponse, vehicle_responses
 from cpfls_cli.search.resumable import Watch
 from cpfls_cli.search.vehicle_search import VehicleCheckpoint, begin_vehicle_search
+from cpfls_cli.words import did_you_mean, joined
 
 _KEPT_EVERY = 10
 """Structures after which the checkpoint is written again: what a killed search has to judge anew at most."""
@@ -57,25 +56,7 @@ def run(
     *,
     resume: bool = False,
 ) -> Outcome:
-    """Find a vehicle and write it.
-
-    Parameters
-    ----------
-    flights : sequence of Path
-        Artifacts, or logs that the config describes; the vehicle is found in them.
-    held_out : sequence of Path
-        Others to judge it on, once.
-    config : ConfigCopy or None
-        Written beside the artifact, at the end of the search.
-    resume : bool
-        Go on with a search that was stopped.
-
-    Raises
-    ------
-    InputError
-        If a flight has no rotor speeds or commands, or is shorter than the horizon; also for a checkpoint that is not
-        asked for, or cannot be resumed.
-    """
+    """Find a vehicle and write it."""
     study = job.study
     learned, unseen = numbered_roles("flight", flights), numbered_roles("held-out", held_out)
     inputs, checkpoint, kept = begin_vehicle_search(job, learned | unseen, resume=resume)
@@ -141,13 +122,7 @@ def _require_rotors(flight: LoggedFlight) -> None:
 def _found(
     job: Job, flights: Sequence[LoggedFlight], checkpoint: VehicleCheckpoint, kept: Kept
 ) -> tuple[FoundVehicle, int | None]:
-    """Search; an interrupt ends the search, and its number is given beside what has been found until then.
-
-    Raises
-    ------
-    CpflsError
-        If there is nothing to take yet.
-    """
+    """Search; an interrupt ends the search, and its number is given beside what has been found until then."""
     study, watch = job.study, Watch(job, None)
     job.progress(0.0, 1, "loads compiled loops")
 
@@ -237,6 +212,5 @@ def _check_blocks(study: Study) -> None:
 
 def _check_block(key: str, name: str, known: Sequence[str]) -> None:
     if name not in known:
-        near = get_close_matches(name, known, n=1, cutoff=0.4)
-        hint = f"did you mean {near[0]}?" if near else f"the blocks are {', '.join(known)}"
+        hint = did_you_mean(name, known, f"the blocks are {', '.join(known)}")
         raise ConfigError(f"{key} = {name}: no such block ({hint})")

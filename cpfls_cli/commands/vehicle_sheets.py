@@ -32,8 +32,6 @@ def sheet_of(path: Path, name: str, file: InputFile, *, force: bool) -> Sheet:
 
     Parameters
     ----------
-    name : str
-        An identifier.
     force : bool
         Take a model that says itself that nobody should use it, and one whose search was stopped; both are marked.
 

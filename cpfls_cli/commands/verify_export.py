@@ -44,15 +44,7 @@ class Options:
 
 
 def run(model: Path, flight: Path, options: Options, *, force: bool, dry_run: bool) -> Outcome:
-    """Export a model, fly it, and say how far it is from its own playback.
-
-    Parameters
-    ----------
-    force : bool
-        Take a model that nobody should use.
-    dry_run : bool
-        Check that both belong together, and fly nothing.
-    """
+    """Export a model, fly it, and say how far it is from its own playback."""
     require_package(options.form)
     for path in (model, flight):
         if not path.is_file():

@@ -47,11 +47,6 @@ Location = tuple[str, ...]
 def check_data(data: dict[str, Any], source: str) -> tuple[Study | None, list[str]]:
     """Validate plain data as a study, or list every error.
 
-    Parameters
-    ----------
-    source : str
-        Name of the file, for messages.
-
     Returns
     -------
     study : Study or None
@@ -144,8 +139,6 @@ def _describe_errors(errors: Iterable[ErrorDetails], data: dict[str, Any], sourc
         From the validating library.
     data : dict
         What was validated.
-    source : str
-        Name of the file.
 
     Returns
     -------

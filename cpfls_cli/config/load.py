@@ -70,13 +70,7 @@ def stored_study(config: str, path: object) -> Study:
 
 
 def parse_config(text: str, source: str) -> dict[str, Any]:
-    """Read the text of a config as plain data.
-
-    Parameters
-    ----------
-    source : str
-        Name of the file, for messages.
-    """
+    """Read the text of a config as plain data."""
     data = parse_yaml(text, source)
     if data is None:
         raise ConfigError(f"{source}: the config is empty; `cpfls config` prints a commented default")
@@ -90,8 +84,6 @@ def validate(data: dict[str, Any], source: str, *, sweep: bool = False, wrong: S
 
     Parameters
     ----------
-    source : str
-        Name of the file, for messages.
     sweep : bool
         Check the settings of the sweep too; only what sweeps needs them to fit the other keys.
     wrong : sequence of str

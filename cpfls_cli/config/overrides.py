@@ -119,8 +119,6 @@ def setting_errors(data: Mapping[str, Any], source: str, known: Sequence[str]) -
     ----------
     data : mapping
         Plain data of a config.
-    source : str
-        Name of the file, for messages.
     known : sequence of str
         Errors without the settings; they are not repeated.
 

@@ -102,13 +102,7 @@ def _copy(keys: list[str], source: Any, target: dict[str, Any], asked: str) -> N
 
 
 def resolved_yaml(study: Study, sections: Sequence[str] = ()) -> str:
-    """Write a study as YAML with every default filled in.
-
-    Parameters
-    ----------
-    study, sections
-        See `resolved`.
-    """
+    """Write a study as YAML with every default filled in."""
     return to_yaml(resolved(study, sections))
 
 

@@ -63,13 +63,6 @@ _StudyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _ma
 def parse_yaml(text: str, source: str) -> Any:
     """Parse one YAML document.
 
-    Parameters
-    ----------
-    text : str
-        The document.
-    source : str
-        Name of the file, for messages.
-
     Returns
     -------
     object

@@ -105,12 +105,6 @@ def doubts(findings: Iterable[Finding]) -> tuple[str, ...]:
     return tuple(finding.sentence for finding in findings if not finding.contradiction)
 
 
-def joined(words: Iterable[str]) -> str:
-    """List words, each once."""
-    *most, last = dict.fromkeys(words)
-    return f"{', '.join(most)} and {last}" if most else last
-
-
 def capitalised(words: str) -> str:
     """Let words begin a sentence."""
     return words[0].upper() + words[1:]

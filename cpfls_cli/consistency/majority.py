@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.consistency.axes import AXES
-from cpfls_cli.consistency.findings import Finding, joined, off_clock
+from cpfls_cli.consistency.findings import Finding, off_clock
 from cpfls_cli.consistency.motion import ANOTHER_NORTH, CHANNELS, TINY, TURNED_RAD, PairCheck, by_thrust, checked
 from cpfls_cli.consistency.repairs import ChannelRepair, is_derived
 from cpfls_cli.effects.signals import Signals
@@ -19,6 +19,7 @@ from cpfls_cli.flightlog.agreement import fit_axes
 from cpfls_cli.rounding import largest, less
 from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, Windows
+from cpfls_cli.words import joined
 
 # Channels that are mended one after the other: there are no more.
 _ROUNDS = 3

@@ -9,11 +9,12 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.consistency.axes import AXES, SAME, TWICE, axes_apart
-from cpfls_cli.consistency.findings import Finding, joined, off_clock
+from cpfls_cli.consistency.findings import Finding, off_clock
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.weak_form.resampling import BLOCK_S, blocks_of
 from cpfls_cli.weak_form.windows import Windows
+from cpfls_cli.words import joined
 
 # Filters and drag make a fifth; a third of gravity is neither a bias nor a tilt of a sensor.
 _SCALE_OFF, _GRAVITY_OFF_M_S2 = 0.2, 3.0

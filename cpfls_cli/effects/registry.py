@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from difflib import get_close_matches
 from importlib import import_module
 from pkgutil import iter_modules
 from types import MappingProxyType
@@ -11,6 +10,7 @@ from types import MappingProxyType
 from cpfls_cli.effects import catalogue
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.errors import InputError
+from cpfls_cli.words import did_you_mean
 
 
 def _discover() -> Mapping[str, Effect]:
@@ -39,6 +39,5 @@ def effect(name: str) -> Effect:
     """
     if name in CATALOGUE:
         return CATALOGUE[name]
-    near = get_close_matches(name, CATALOGUE, n=3, cutoff=0.5)
-    hint = f"did you mean {' or '.join(near)}?" if near else "`cpfls effects` lists all"
+    hint = did_you_mean(name, CATALOGUE, "`cpfls effects` lists all", most=3, cutoff=0.5)
     raise InputError(f"{name}: no such effect ({hint})")

@@ -194,12 +194,6 @@ class Signals:
         assert self.velocity is not None, "an effect that needs velocity declares so"
         return np.asarray(np.einsum("tji,tj->ti", self.rotation, self.velocity))
 
-    @property
-    def steady_wind(self) -> tuple[float, float, float]:
-        """The wind in m/s, world frame; zeros in still air."""
-        x, y, z = (0.0, 0.0, 0.0) if self.wind is None else self.wind.tolist()
-        return x, y, z
-
     @cached_property
     def air_velocity(self) -> Array:
         """Velocity of the centre of mass through the air, shape (time, 3), m/s, body frame."""

@@ -161,8 +161,6 @@ def held_by(
         Of the target's rotors.
     body : Body or None
         Mass, gravity and inertia of the target; None for those of the model.
-    squares : bool
-        See `Held`.
     """
     table = WrenchTable(holds(model.table.weights)[:, : len(STATE_TERMS)])
     return Held(table, response, body or model.body, squares)

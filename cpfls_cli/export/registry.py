@@ -129,8 +129,6 @@ def exported(sheet: Sheet, form: str, file: str) -> Exported:
     ----------
     form : str
         Of `FORMS`.
-    file : str
-        Name of the file.
 
     Raises
     ------

@@ -41,8 +41,6 @@ def c_source(sheet: Sheet, stem: str, told: Sequence[str] = ()) -> CSource:
 
     Parameters
     ----------
-    stem : str
-        Name of both files without ``.c`` and ``.h``.
     told : sequence of str
         Further paragraphs of the head.
     """
@@ -143,8 +141,6 @@ def python_source(sheet: Sheet, file: str, library: str = "numpy", told: Sequenc
 
     Parameters
     ----------
-    file : str
-        Name of the file.
     library : {"numpy", "casadi", "jax"}
         That it computes with.
     told : sequence of str
@@ -217,13 +213,7 @@ def _plain(values: Any) -> Any:
 
 
 def fill_template(template: str, words: dict[str, Any]) -> str:
-    """Fill a template with all that it asks for.
-
-    Parameters
-    ----------
-    template : str
-        Name of its file.
-    """
+    """Fill a template with all that it asks for."""
     return _templates().get_template(template).render(words)
 
 

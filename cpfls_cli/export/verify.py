@@ -68,8 +68,6 @@ def verified(
         As logged, faults of sensors taken out.
     model : tuple of PlaybackFlight and Player
         What `cpfls replay` plays back along the flight, in the wind that it says; the export flies in the same.
-    horizon : int
-        Samples.
     windows : int
         At most; spread over the flight.
 

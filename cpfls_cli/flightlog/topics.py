@@ -240,21 +240,8 @@ def hold_previous(time: Array, values: Array, target: Array, longest_s: float) -
 def hold_asked(time: Array, values: Array, target: Array, gap_s: float) -> Array:
     """Hold what was asked for until it is asked for again, for three of its usual steps, and for `gap_s`, at most.
 
-    What comes before the first sample by no more than that has its value: the log began between two.
-
-    Parameters
-    ----------
-    time, values : array, shape (sample,)
-        Stamps, s, and values; those that are not finite are absent.
-    target : array, shape (row,), s
-        When values are wanted.
-    gap_s : float
-        Longest step between measurements that is bridged, s.
-
-    Returns
-    -------
-    array, shape (row,)
-        NaN where nothing is asked for.
+    What comes before the first sample by no more than that has its value: the log began between two. Arguments and
+    result are those of `interpolate`, and `gap_s` is the longest step between measurements that is bridged, s.
     """
     time, values = _present(time, values)
     if not len(time):

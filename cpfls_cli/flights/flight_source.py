@@ -39,6 +39,7 @@ from cpfls_cli.regressor.motion import Motion
 
 _NEEDED = ("time", *MOTION)
 _TORQUE = "torque"
+_ROTORS = ("rotor-speed", "rotor-command")
 
 IN_MEMORY = 500_000
 """Samples of a flight that are held in memory, 52 MB of motion and torque."""
@@ -106,11 +107,6 @@ class FlightFile:
 
 def flight_source(path: Path, *, torque: bool = True) -> TorqueSource:
     """Open a flight.
-
-    Parameters
-    ----------
-    torque : bool
-        Whether its torque is needed; without, it counts as zero.
 
     Raises
     ------
@@ -266,17 +262,18 @@ def check_file(path: Path, study: Study, *, driven: bool = False) -> tuple[Findi
         config give its torque.
     """
     try:
-        return check_flight(_enough_of(path, study), study, driven=driven or _rotors_tell_torque(path, study))
+        return check_flight(_enough_of(path, study), study, driven=driven or torque_source_of(path, study) in _ROTORS)
     except InputError:
         return ()
 
 
-def _rotors_tell_torque(path: Path, study: Study) -> bool:
+def torque_source_of(path: Path, study: Study) -> str:
+    """Say what gives the torque of a log, or of a flight that was imported; empty for one that was simulated."""
     if is_log(path):
-        return study.import_.torque_source in ("rotor-speed", "rotor-command")
+        return study.import_.torque_source or ""
     made = read_header(path)
     config = parse_config(made.config, f"{path}: /config")
-    return "log" in made.inputs and config["import"]["torque_source"] in ("rotor-speed", "rotor-command")
+    return str(config["import"]["torque_source"] or "") if "log" in made.inputs else ""
 
 
 def _enough_of(path: Path, study: Study) -> ReadFlight:

@@ -20,17 +20,7 @@ from cpfls_cli.logs.formats import is_log
 def input_roles(
     flights: Sequence[Path], selection: Path | None, validate: Sequence[Path], choose_on: Sequence[Path] = ()
 ) -> dict[str, Path]:
-    """Give the inputs of an identification their roles.
-
-    Parameters
-    ----------
-    flights : sequence of Path
-        That train.
-    validate : sequence of Path
-        That judge.
-    choose_on : sequence of Path
-        That the model is chosen on.
-    """
+    """Give the inputs of an identification their roles."""
     roles = flight_roles(flights) | ({"selection": selection} if selection else {})
     return roles | numbered_roles("choose-on", choose_on) | numbered_roles("validate", validate)
 
@@ -51,8 +41,6 @@ def known_by(paths: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> list
 
     Parameters
     ----------
-    paths : mapping of str to Path
-        By role.
     inputs : mapping of str to InputFile
         Of the command, by role.
     """
@@ -97,10 +85,6 @@ def held_out_parts(
     ----------
     rests : mapping of str to TorqueSource
         What of the flights that train is held out.
-    inputs : mapping of str to InputFile
-        By role, see `input_roles`.
-    validate : sequence of Path
-        Other flights.
 
     Raises
     ------

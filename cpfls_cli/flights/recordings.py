@@ -245,8 +245,6 @@ def known_stretches(name: str, known: BoolArray, time: Array) -> list[slice]:
 
     Parameters
     ----------
-    name : str
-        Of the flight.
     known : array of bool, shape (time,)
     time : array, shape (time,), s
 
@@ -293,15 +291,7 @@ def with_voltage(
 
 
 def doubts_on_voltage(signals: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, ...]:
-    """Say why a voltage is that of no battery in flight, and is not used; nothing where it may be or is not known.
-
-    Parameters
-    ----------
-    signals : mapping of str to array
-        Of a flight.
-    units : mapping of str to str
-        Of its import.
-    """
+    """Say why a voltage is that of no battery in flight, and is not used; nothing where it may be or is not known."""
     known = signals.get("voltage", np.zeros(0))
     known = known[np.isfinite(known)]
     empty, most = int((known <= 0).sum()), float(known.max(initial=0.0))

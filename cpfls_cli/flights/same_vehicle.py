@@ -21,13 +21,6 @@ R = TypeVar("R", bound=Record)
 def require_same_vehicle(path: Path, given: VehicleSettings, wanted: VehicleSettings) -> None:
     """Refuse a file that was made with another vehicle than that of the config.
 
-    Parameters
-    ----------
-    given : VehicleSettings
-        Of the file.
-    wanted : VehicleSettings
-        Of the config.
-
     Raises
     ------
     InputError

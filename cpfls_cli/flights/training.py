@@ -103,8 +103,6 @@ def split_training(
 
     Parameters
     ----------
-    inputs : mapping of str to InputFile, optional
-        The flights by role, where they are hashed already.
     torque : bool
         Whether their torque is needed.
 
@@ -128,8 +126,6 @@ def read_training(
     ----------
     selection : Path, optional
         Made from these very flights.
-    inputs : mapping of str to InputFile, optional
-        The flights by role, where they are hashed already.
 
     Raises
     ------

@@ -9,13 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.fuzzy.inputs import MappedInput
-from cpfls_cli.fuzzy.membership import (
-    Memberships,
-    MembershipSensitivity,
-    join_ends,
-    membership_sensitivity,
-    memberships,
-)
+from cpfls_cli.fuzzy.membership import Memberships, join_ends, memberships
 
 Consequents = Literal["seesaw", "harmonic"]
 Products = Literal["additive", "tensor"]
@@ -143,15 +137,6 @@ def antecedent(mapped: MappedInput, breakpoints: Array, circular: bool) -> Membe
     if circular:
         return Memberships(join_ends(degrees.value), join_ends(slope))
     return Memberships(degrees.value, slope)
-
-
-def antecedent_sensitivity(mapped: MappedInput, breakpoints: Array, circular: bool) -> MembershipSensitivity:
-    """Differentiate what `antecedent` gives by the inner breakpoints, shape (samples, rules, breakpoints)."""
-    by_breakpoint = membership_sensitivity(mapped.antecedent, breakpoints)
-    slope = by_breakpoint.slope * mapped.antecedent_slope[:, None, None]
-    if circular:
-        return MembershipSensitivity(join_ends(by_breakpoint.value), join_ends(slope))
-    return MembershipSensitivity(by_breakpoint.value, slope)
 
 
 def rule_firing(antecedents: list[Memberships]) -> tuple[Array, Array]:

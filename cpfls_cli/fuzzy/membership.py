@@ -79,28 +79,6 @@ class Memberships:
     slope: Array
 
 
-@dataclass(frozen=True)
-class MembershipSensitivity:
-    """Derivatives of memberships and of their slopes by the inner breakpoints.
-
-    Attributes
-    ----------
-    value, slope : array, shape (samples, functions, functions - 2)
-    """
-
-    value: Array
-    slope: Array
-
-
-@dataclass(frozen=True)
-class _Located:
-    """Where samples lie: interval, its width, and the position u in it (0 at its left end, 1 at its right end)."""
-
-    interval: IntArray
-    width: Array
-    position: Array
-
-
 def z_function(position: Array) -> tuple[Array, Array, Array]:
     """Evaluate Zadeh's z-function, the edge along which a membership function falls.
 
@@ -146,39 +124,19 @@ def memberships(scaled_input: Array, breakpoints: Array) -> Memberships:
     """
     if len(breakpoints) == 1:
         return Memberships(np.ones((len(scaled_input), 1)), np.zeros((len(scaled_input), 1)))
-    at = _locate(scaled_input, breakpoints)
-    falling, slope, _ = z_function(at.position)
-    slope = np.where(_inside(scaled_input), slope, 0.0) / at.width
+    clipped = np.minimum(np.maximum(scaled_input, 0.0), 1.0)
+    found = np.searchsorted(breakpoints, clipped, side="right") - 1
+    interval = np.minimum(np.maximum(found, 0), len(breakpoints) - 2)
+    width = np.diff(breakpoints)[interval]
+    # A function of zero width is met only at the very end of the range; its left neighbour has gone there.
+    empty = width <= 0.0
+    safe = np.where(empty, 1.0, width)
+    falling, slope, _ = z_function(np.where(empty, 1.0, (clipped - breakpoints[interval]) / safe))
+    slope = np.where(clipped == scaled_input, slope, 0.0) / safe
+    functions = len(breakpoints)
     return Memberships(
-        _spread(falling, 1.0 - falling, at.interval, len(breakpoints)),
-        _spread(slope, -slope, at.interval, len(breakpoints)),
+        _spread(falling, 1.0 - falling, interval, functions), _spread(slope, -slope, interval, functions)
     )
-
-
-def membership_sensitivity(scaled_input: Array, breakpoints: Array) -> MembershipSensitivity:
-    """Differentiate memberships and their slopes by the inner breakpoints, in closed form.
-
-    With ``u = (x - b1) / w``, ``w = b2 - b1``: ``du/db1 = (u - 1) / w`` and ``du/db2 = -u / w``.
-
-    Parameters
-    ----------
-    scaled_input : array, shape (samples,)
-    breakpoints : array, shape (functions,)
-    """
-    samples, functions = len(scaled_input), len(breakpoints)
-    value = np.zeros((samples, functions, functions))
-    slope = np.zeros((samples, functions, functions))
-    if functions > 2:
-        at = _locate(scaled_input, breakpoints)
-        _, first, second = (np.where(_inside(scaled_input), part, 0.0) for part in z_function(at.position))
-        rows = np.arange(samples)
-        for end, towards in ((0, at.position - 1.0), (1, -at.position)):
-            by_value = first * towards / at.width
-            by_slope = (second * towards + (1 - 2 * end) * first) / at.width**2
-            for side, sign in ((0, 1.0), (1, -1.0)):
-                value[rows, at.interval + side, at.interval + end] = sign * by_value
-                slope[rows, at.interval + side, at.interval + end] = sign * by_slope
-    return MembershipSensitivity(value[:, :, 1:-1], slope[:, :, 1:-1])
 
 
 def join_ends(values: Array) -> Array:
@@ -202,22 +160,6 @@ def join_ends(values: Array) -> Array:
     joined = values[:, :-1].copy()
     joined[:, 0] += values[:, -1]
     return joined
-
-
-def _inside(scaled_input: Array) -> Array:
-    return np.asarray((scaled_input >= 0.0) & (scaled_input <= 1.0))
-
-
-def _locate(scaled_input: Array, breakpoints: Array) -> _Located:
-    clipped = np.minimum(np.maximum(scaled_input, 0.0), 1.0)
-    found = np.searchsorted(breakpoints, clipped, side="right") - 1
-    interval = np.minimum(np.maximum(found, 0), len(breakpoints) - 2)
-    width = np.diff(breakpoints)[interval]
-    # A function of zero width is met only at the very end of the range; its left neighbour has gone there.
-    empty = width <= 0.0
-    safe = np.where(empty, 1.0, width)
-    position = np.where(empty, 1.0, (clipped - breakpoints[interval]) / safe)
-    return _Located(interval, safe, position)
 
 
 def _spread(left: Array, right: Array, interval: IntArray, functions: int) -> Array:

@@ -50,15 +50,12 @@ class DiagnosisRun:
     ----------
     hypothesis : System
         Of the training flights, with the chosen effects.
-    leftover : Leftover
-        Of the training flights with the effects.
     """
 
     diagnosis: Diagnosis
     audit: Audit
     hypothesis: System
     estimates: Estimates
-    leftover: Leftover
     held_out: HeldOut
 
     def model(self, base: InertiaModel | None) -> ExtendedModel:
@@ -124,7 +121,7 @@ def diagnose(
     notes = [*not_judged(judgement.held_out), *notes]
     remainder = judge.remainder(judgement.found)
     diagnosis = _concluded(judged, faults, judgement, remainder, differ, notes, steps, settings, torque_alone, audited)
-    return DiagnosisRun(diagnosis, audited, hypothesis, estimates, remainder, judgement.held_out)
+    return DiagnosisRun(diagnosis, audited, hypothesis, estimates, judgement.held_out)
 
 
 def _doubts(unnamed: Sequence[str], judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[str]:

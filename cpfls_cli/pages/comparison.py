@@ -16,7 +16,8 @@ from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.pages.uncertainty import compared_curves_figure
 from cpfls_cli.report.canvas import GREY, legend_over, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import ROUNDING, UNKNOWN, count, joined, number, percent, plain, r_squared
+from cpfls_cli.report.numbers import ROUNDING, UNKNOWN, count, number, percent, plain, r_squared
+from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

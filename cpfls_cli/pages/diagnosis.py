@@ -43,7 +43,8 @@ from cpfls_cli.pages.sensors import sensor_warnings, sensors_answer, unseen_answ
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.canvas import GREY, in_columns, legend_over, plain_ticks, plot, stacked
 from cpfls_cli.report.content import Block, Heading, Plot, Text
-from cpfls_cli.report.numbers import joined, sentence
+from cpfls_cli.report.numbers import sentence
+from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

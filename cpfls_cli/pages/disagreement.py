@@ -13,12 +13,13 @@ from cpfls_cli.artifacts.disagreement import DependenceGroup, DisagreementRecord
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.pages.gap import channel_unit, channel_words
 from cpfls_cli.pages.repeats import NOT_SPLIT, again_blocks, again_box
-from cpfls_cli.pages.replay import beside_rivals, playback_figure
+from cpfls_cli.pages.replay import playback_figure, playback_text
 from cpfls_cli.pages.sensors import contradicted, sensors_answer, settled_channels, unseen_answer
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import in_columns, line, plain_ticks, plot, stacked
 from cpfls_cli.report.content import Block, Box, Cell, Heading, Plot, Table, Text
-from cpfls_cli.report.numbers import joined, number, plain, sentence, whole_percent
+from cpfls_cli.report.numbers import number, plain, sentence, whole_percent
+from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,7 +59,7 @@ def answer(disagreement: Source[DisagreementRecord]) -> Iterator[Block]:
     yield from settled_channels(record.audit)
     yield from where(disagreement)
     yield from _not_split(record)
-    yield from _playback_text(record)
+    yield from playback_text(record.playback)
     yield from unseen_answer(record.not_excited)
     yield from sensors_answer(record.audit)
     yield from (Text(warning, "warning") for warning in record.warning)
@@ -133,7 +134,7 @@ def disagreement_blocks(disagreement: Source[DisagreementRecord], index: int) ->
     drawn = None if record.playback is None else playback_figure(f"replay-{index}", record.playback)
     if drawn is not None:
         yield Heading("Measured and simulated")
-        yield from _playback_text(record)
+        yield from playback_text(record.playback)
         yield drawn
 
 
@@ -178,11 +179,6 @@ def _followed_channels(record: DisagreementRecord) -> list[str]:
     """Channels above noise of which it is known what they follow: those below follow chance."""
     above = [record.gap.channel[index] for index in np.flatnonzero(record.gap.above_noise)]
     return [channel for channel in above if channel in record.dependence.channel]
-
-
-def _playback_text(record: DisagreementRecord) -> Iterator[Text]:
-    if record.playback is not None:
-        yield from (Text(each) for each in beside_rivals(record.playback))
 
 
 def residual_figure(name: str, record: DisagreementRecord) -> Plot:

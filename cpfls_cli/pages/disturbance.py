@@ -9,7 +9,8 @@ import numpy as np
 from cpfls_cli.artifacts.disturbance import GustAxis
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.report.content import Block, Table, Text
-from cpfls_cli.report.numbers import joined, number
+from cpfls_cli.report.numbers import number
+from cpfls_cli.words import joined
 
 
 def gust_blocks(record: VehicleRecord, index: int) -> Iterator[Block]:

@@ -10,16 +10,17 @@ from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.effects import coefficients_table, effect_sentence, intervals_figure, parameters_table, titles
 from cpfls_cli.pages.gap import gap_sizes_figure, gap_table
-from cpfls_cli.pages.replay import beside_rivals, playback_figure, playback_words
+from cpfls_cli.pages.replay import playback_figure, playback_text, playback_words
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Table, Text
-from cpfls_cli.report.numbers import joined, number, sentence
+from cpfls_cli.report.numbers import number, sentence
+from cpfls_cli.words import joined
 
 
 def details(extended: Source[ExtendedRecord]) -> Iterator[Block]:
     """Say what the gap of an extended model becomes, and about which axes it gets worse."""
     yield _gap_table(extended, 1)
-    yield from _playback_text(extended.record)
+    yield from playback_text(extended.record.playback)
     yield from (Text(warning, "warning") for warning in warnings(extended.record))
 
 
@@ -117,15 +118,10 @@ def _gap_table(extended: Source[ExtendedRecord], index: int) -> Table:
     return gap_table(f"extended-gap-{index}", extended.record.gap, caption)
 
 
-def _playback_text(record: ExtendedRecord) -> Iterator[Text]:
-    if record.playback is not None:
-        yield from (Text(each) for each in beside_rivals(record.playback))
-
-
 def _figures(record: ExtendedRecord, index: int) -> Iterator[Block]:
     if record.gap.known:
         yield gap_sizes_figure(f"extended-gap-sizes-{index}", record.gap)
-    yield from _playback_text(record)
+    yield from playback_text(record.playback)
     drawn = (
         record.playback and playback_figure(f"extended-prediction-error-{index}", record.playback),
         intervals_figure(f"extended-intervals-{index}", record.effects),

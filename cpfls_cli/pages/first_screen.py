@@ -27,7 +27,8 @@ from cpfls_cli.pages.repeats import NO_EFFECT, NOT_SPLIT, again_box
 from cpfls_cli.pages.replay import prediction_words, signal_scale
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Table, Text, Tone
-from cpfls_cli.report.numbers import joined, number, plain, sentence
+from cpfls_cli.report.numbers import number, plain, sentence
+from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.naming.results import Unexplained
@@ -58,13 +59,7 @@ _NEXT: dict[str, str] = {
 
 
 def first_screen(record: DiagnosisRecord, index: int) -> Iterator[Block]:
-    """Say what a diagnosis found, how sure that is, where, what it becomes on held-out flights, and what to do next.
-
-    Parameters
-    ----------
-    index : int
-        Number of the diagnosis on its page.
-    """
+    """Say what a diagnosis found, how sure that is, where, what it becomes on held-out flights, and what to do next."""
     if record.again_before is not None and not record.contradiction:
         yield again_box(record.again_before, record.again_after, model_words(record))
     yield verdict_box(record)

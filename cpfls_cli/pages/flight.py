@@ -15,8 +15,9 @@ from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.pages.trajectory import attitude_figure, rotation_figure
 from cpfls_cli.report.canvas import line, plot, stacked, style_of
 from cpfls_cli.report.content import HASH_SHOWN, Block, Facts, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import UNKNOWN, count, joined, number, plain
+from cpfls_cli.report.numbers import UNKNOWN, count, number, plain
 from cpfls_cli.units import SPEED_UNITS
+from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -133,13 +133,7 @@ def solution(model: Source[IdentifiedRecord]) -> Iterator[Text]:
 
 
 def scores_table(model: Source[IdentifiedRecord], index: int) -> Table:
-    """Show the errors of a model and its baselines on every part of the data.
-
-    Parameters
-    ----------
-    index : int
-        Number of the model on the page, from 1.
-    """
+    """Show the errors of a model and its baselines on every part of the data."""
     caption = (
         f"{model.label} beside the rigid body with six inertia parameters, a constant inertia and no torque at all, "
         "and where there is something to search for, the same structure without a search. MSE: mean over the axes. "

@@ -19,8 +19,9 @@ from cpfls_cli.pages.effects import effect_title, unit_words
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.pages.trust import trust_facts, trust_words
 from cpfls_cli.report.content import Block, Box, Facts, Heading, Section, Table, Text
-from cpfls_cli.report.numbers import joined, number, plain, whole_percent
+from cpfls_cli.report.numbers import number, plain, whole_percent
 from cpfls_cli.validation.trust import Trust
+from cpfls_cli.words import joined
 
 
 class _Kind(NamedTuple):

@@ -11,7 +11,8 @@ from cpfls_cli.artifacts.trajectory import QuestionGroup
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.pages.effects import effect_title, unit_words
 from cpfls_cli.report.content import Block, Table, Text
-from cpfls_cli.report.numbers import UNKNOWN, joined, number, whole_percent
+from cpfls_cli.report.numbers import UNKNOWN, number, whole_percent
+from cpfls_cli.words import joined
 
 _SETTLED = 0.975
 _EVEN = 0.5

@@ -12,7 +12,8 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.pages.gap import channel_words
 from cpfls_cli.report.canvas import GREY, in_columns, legend_over, plot
 from cpfls_cli.report.content import Block, Box, Folded, Heading, Plot, Table, Text
-from cpfls_cli.report.numbers import joined, number, plain, sentence, whole_percent
+from cpfls_cli.report.numbers import number, plain, sentence, whole_percent
+from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -130,8 +131,6 @@ def again_blocks(
 
     Parameters
     ----------
-    index : int
-        Number of the artifact on its page.
     label : str
         What kind of artifact it is, for names that are unique on the page.
     """

@@ -35,9 +35,10 @@ from cpfls_cli.report.canvas import (
     style_of,
 )
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import joined, number, sentence, whole_percent
+from cpfls_cli.report.numbers import number, sentence, whole_percent
 from cpfls_cli.rounding import less, tied
 from cpfls_cli.validation.trust import Trust
+from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -72,13 +73,7 @@ _POSITIONS = ("x", "y", "z")
 
 
 def answer(replay: Source[ReplayRecord], index: int = 1) -> Iterator[Block]:
-    """Say to which horizon a model is better than what it has to beat, by how much, and where it is worst.
-
-    Parameters
-    ----------
-    index : int
-        Number of the replay on its page.
-    """
+    """Say to which horizon a model is better than what it has to beat, by how much, and where it is worst."""
     yield verdict_box(replay)
     yield from _grounds(replay.record, index)
 
@@ -117,6 +112,12 @@ def beside_rivals(errors: ErrorsByHorizon) -> list[str]:
     return [_sentence(errors, name, group, rival) for name, (group, rival) in _rivals(errors).items()]
 
 
+def playback_text(playback: PlaybackGroup | None) -> Iterator[Text]:
+    """Say the same of a playback, one paragraph for each signal; nothing where there is none."""
+    if playback is not None:
+        yield from (Text(each) for each in beside_rivals(playback))
+
+
 def beside_past(errors: ErrorsByHorizon, past_s: float) -> Iterator[str]:
     """Say how much smaller errors are where the flight before each start is known as well, in one sentence, if any."""
     if WITH_PAST not in errors.prediction:
@@ -135,8 +136,6 @@ def playback_words(trust: str, held: PlaybackGroup | None, contradictions: Seque
 
     Parameters
     ----------
-    trust : str
-        See `trust_by_playback`.
     held : PlaybackGroup or None
         None where no flight was held out.
     contradictions : sequence of str or None

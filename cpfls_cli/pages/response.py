@@ -16,8 +16,9 @@ from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, GREY, HELD, band, legend_above, legend_over, plain_ticks, plot, style_of
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import joined, number, plain, sentence
+from cpfls_cli.report.numbers import number, plain, sentence
 from cpfls_cli.response.mismatch import ACCEPTABLE, COHERENT, GOOD, Deviation
+from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,13 +52,7 @@ _UNEXCITED: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "zorder": 1.5}
 
 
 def answer(response: Source[ResponseRecord], index: int = 1) -> Iterator[Block]:
-    """Say in which responses and at which frequencies a model is right, and how far off it is where it is not.
-
-    Parameters
-    ----------
-    index : int
-        Number of the artifact on its page.
-    """
+    """Say in which responses and at which frequencies a model is right, and how far off it is where it is not."""
     yield response_box(response.record)
     yield from _grounds(response.record, index)
 

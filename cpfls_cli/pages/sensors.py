@@ -10,7 +10,8 @@ from cpfls_cli.artifacts.gap_flights import NotExcitedGroup
 from cpfls_cli.pages.effects import effect_title, measured, titles, unit_words
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.content import Block, Box, Heading, Section, Table, Text
-from cpfls_cli.report.numbers import joined, probability, sentence
+from cpfls_cli.report.numbers import probability, sentence
+from cpfls_cli.words import joined
 
 _SENSORS, _UNSEEN = "Sensors", "What these flights cannot show"
 

@@ -15,11 +15,12 @@ from cpfls_cli.pages.next_flight import question_blocks
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, legend_above, line, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Plot, Table, Text
-from cpfls_cli.report.numbers import joined, number, plain
+from cpfls_cli.report.numbers import number, plain
 from cpfls_cli.trajectory.legs import Leg
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory
 from cpfls_cli.vehicle.rotors import RotorViolation
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,8 +8,8 @@ from typing import NamedTuple
 from cpfls_cli.artifacts.learned import LearnedFlight, part_learned
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.report.content import Tone
-from cpfls_cli.report.numbers import joined
 from cpfls_cli.validation.trust import Trust
+from cpfls_cli.words import joined
 
 
 class Words(NamedTuple):
@@ -87,8 +87,6 @@ def seen_warnings(model: str, learned: Sequence[LearnedFlight], judged: KnownBy)
 
     Parameters
     ----------
-    model : str
-        What it is called.
     judged : iterable of (str, collection of str)
         File name and hashes, as for `seen_words`, of each flight.
     """

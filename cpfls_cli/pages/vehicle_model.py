@@ -35,9 +35,10 @@ from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Facts, Heading, Listing, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent, whole_percent
+from cpfls_cli.report.numbers import UNKNOWN, number, percent, whole_percent
 from cpfls_cli.response.mismatch import ACCEPTABLE
 from cpfls_cli.validation.trust import Trust
+from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 UNKNOWN = "—"
 ROUNDING = 1e-12
@@ -136,12 +135,6 @@ def printed(text: str) -> str:
     mantissa, _, power = text.partition("e")
     raised = f" × {power_of_ten(int(power))}" if power else ""
     return mantissa.replace("-", "−") + raised
-
-
-def joined(words: Iterable[str], last: str = "and") -> str:
-    """Join words to a phrase, without repeating one."""
-    *others, final = dict.fromkeys(words)
-    return f"{', '.join(others)} {last} {final}" if others else final
 
 
 def sentence(text: str) -> str:

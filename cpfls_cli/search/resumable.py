@@ -142,13 +142,7 @@ class Resumable:
         return self.checkpoint.kept()
 
     def end(self, reason: StopReason) -> None:
-        """Remove the checkpoint of a search that came to its end, after what it found is written.
-
-        Parameters
-        ----------
-        reason : str
-            Why the search ended.
-        """
+        """Remove the checkpoint of a search that came to its end, after what it found is written."""
         if is_end(reason):
             self.checkpoint.remove()
 
@@ -156,13 +150,7 @@ class Resumable:
 def begin_search(
     job: Job, inputs: Mapping[str, Path], options: SearchOptions
 ) -> tuple[dict[str, InputFile], Resumable]:
-    """Check inputs, checkpoint and output of a search before anything is computed.
-
-    Parameters
-    ----------
-    inputs : mapping of str to Path
-        By role.
-    """
+    """Check inputs, checkpoint and output of a search before anything is computed."""
     options.require_workers()
     files = take_inputs(job, inputs)
     header = header_of(job.study, files)

@@ -224,12 +224,6 @@ def sweep_plan(
 
     Parameters
     ----------
-    flights : sequence of Path
-        That train.
-    validate : sequence of Path
-        That only judge.
-    inputs : mapping of str to InputFile
-        By role.
     choose_on : sequence of Path
         That models are chosen on, in settings whose choice is `held-out`.
     """

@@ -90,11 +90,6 @@ def finish_runs(
 ) -> tuple[RunGroup, StopReason]:
     """Go on from the first run that is not finished, and keep every run as soon as it is.
 
-    Parameters
-    ----------
-    runs : RunGroup
-        That are finished.
-
     Returns
     -------
     RunGroup

@@ -63,11 +63,6 @@ def begin_vehicle_search(
 ) -> tuple[dict[str, InputFile], VehicleCheckpoint, Kept | None]:
     """Check inputs, checkpoint and output of a search for the structure of a vehicle before anything is computed.
 
-    Parameters
-    ----------
-    inputs : mapping of str to Path
-        By role.
-
     Returns
     -------
     files : dict of str to InputFile

@@ -142,8 +142,6 @@ def require_workers(client: Client, patience_s: float) -> None:
 
     Parameters
     ----------
-    client : Client
-        Connection to the scheduler.
     patience_s : float
         How long to wait for one.
 
@@ -165,11 +163,6 @@ def require_workers(client: Client, patience_s: float) -> None:
 @contextmanager
 def explained(client: Client) -> Iterator[None]:
     """Turn whatever Dask raises into an error with a remedy.
-
-    Parameters
-    ----------
-    client : Client
-        Connection to the scheduler.
 
     Raises
     ------

@@ -20,11 +20,6 @@ _PACKAGES = ("cpfls", "numpy", "scipy", "numba", "llvmlite")
 def require_same_versions(client: Client) -> None:
     """Require that all workers have the packages that make the result, in the versions of this process.
 
-    Parameters
-    ----------
-    client : Client
-        Connection to a scheduler with workers.
-
     Raises
     ------
     WorkerError
@@ -42,11 +37,6 @@ def require_same_versions(client: Client) -> None:
 
 def require_same_processor(client: Client) -> None:
     """Require that the compiler makes the same code for all workers as for this process.
-
-    Parameters
-    ----------
-    client : Client
-        Connection to a scheduler with workers of the same software.
 
     Raises
     ------

@@ -119,8 +119,6 @@ def processes(evaluate: Evaluate, count: int) -> Iterator[Processes]:
     ----------
     evaluate : callable
         Evaluator of chromosomes that can be pickled; sent to each process once.
-    count : int
-        Number of processes, >= 1.
 
     Raises
     ------

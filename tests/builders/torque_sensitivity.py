@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.fuzzy.basis import antecedent_sensitivity
-from cpfls_cli.fuzzy.membership import Memberships, MembershipSensitivity
+from cpfls_cli.fuzzy.inputs import MappedInput
+from cpfls_cli.fuzzy.membership import Memberships, join_ends, z_function
 from cpfls_cli.regressor.regressor import Breakpoints, Regressor
 
 
@@ -72,8 +72,32 @@ def _function_sensitivity(
     return value, gradient
 
 
+def antecedent_sensitivity(mapped: MappedInput, breakpoints: Array, circular: bool) -> Memberships:
+    """Differentiate the firing of rules and its slope by the inner breakpoints, shape (samples, rules, breakpoints).
+
+    With ``u = (x - b1) / w``, ``w = b2 - b1``: ``du/db1 = (u - 1) / w`` and ``du/db2 = -u / w``.
+    """
+    scaled, functions, rows = mapped.antecedent, len(breakpoints), np.arange(len(mapped.antecedent))
+    inside, clipped = (scaled >= 0.0) & (scaled <= 1.0), np.clip(scaled, 0.0, 1.0)
+    interval = np.clip(np.searchsorted(breakpoints, clipped, side="right") - 1, 0, functions - 2)
+    width = np.diff(breakpoints)[interval]
+    empty = width <= 0.0
+    width = np.where(empty, 1.0, width)
+    position = np.where(empty, 1.0, (clipped - breakpoints[interval]) / width)
+    _, first, second = (np.where(inside, part, 0.0) for part in z_function(position))
+    value, slope = np.zeros((2, len(scaled), functions, functions))
+    for end, towards in ((0, position - 1.0), (1, -position)):
+        by_value = first * towards / width
+        by_slope = (second * towards + (1 - 2 * end) * first) / width**2
+        for side, sign in ((0, 1.0), (1, -1.0)):
+            value[rows, interval + side, interval + end] = sign * by_value
+            slope[rows, interval + side, interval + end] = sign * by_slope
+    value, slope = value[:, :, 1:-1], slope[:, :, 1:-1] * mapped.antecedent_slope[:, None, None]
+    return Memberships(join_ends(value), join_ends(slope)) if circular else Memberships(value, slope)
+
+
 def _by_antecedent(
-    outputs: Array, moved: MembershipSensitivity, antecedents: list[Memberships], input_index: int, direction: int
+    outputs: Array, moved: Memberships, antecedents: list[Memberships], input_index: int, direction: int
 ) -> Array:
     if direction == input_index:
         return _contract(outputs, moved.slope, antecedents, input_index, slope=False)

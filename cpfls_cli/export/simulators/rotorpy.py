@@ -70,8 +70,6 @@ def rotorpy_text(sheet: Sheet, held: Held, told: Sequence[str], file: str) -> st
     ----------
     told : sequence of str
         What it does not hold.
-    file : str
-        Name of the file.
     """
     model = sheet.model
     found = held.numbers

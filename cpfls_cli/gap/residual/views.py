@@ -162,8 +162,6 @@ class Whiteness:
     ----------
     autocorrelation : array, shape (lag, channel)
         At lags of 1, 2, ... windows without common samples.
-    statistic : array, shape (channel,)
-        Of Ljung and Box; about the number of lags for noise.
     p_value : array, shape (channel,)
         Small where the residual is not noise; 1 for channels that are 0.
     windows : int
@@ -171,7 +169,6 @@ class Whiteness:
     """
 
     autocorrelation: Array
-    statistic: Array
     p_value: Array
     windows: int
 
@@ -207,4 +204,4 @@ def whiteness(residual: Array, flight_index: IntArray, stride: int = 2, lags: in
     pairs = np.array([sum(max(0, len(flight) - lag) for flight in centred) for lag in range(1, lags + 1)])
     correlation = np.divide(products, square, out=np.zeros_like(products), where=square > 0)
     statistic = used * (used + 2) * (correlation**2 / pairs[:, None]).sum(axis=0)
-    return Whiteness(correlation, statistic, chdtrc(lags, statistic) if lags else np.ones_like(statistic), used)
+    return Whiteness(correlation, chdtrc(lags, statistic) if lags else np.ones_like(statistic), used)

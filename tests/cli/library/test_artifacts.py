@@ -38,7 +38,7 @@ def test_every_dataset_of_every_format_has_its_values_dimensions_and_unit(record
     write_artifact(path, made_up(spec))
     artifact = cpfls_cli.read(path)
     stored, named = artifact_data(artifact), artifact.to_xarray()
-    assert artifact.format == named.attrs["format"] == spec.format
+    assert artifact.format == named.attrs["format"] == spec.name
     assert list(artifact) == [dataset.path for dataset in spec.datasets]
     for dataset in spec.datasets:
         values = named[dataset.path]

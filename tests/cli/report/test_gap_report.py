@@ -25,7 +25,7 @@ def shown(folder, *artifacts, options=()):
     """Write artifacts and a report about them; give its summary, its HTML and its text."""
     config, output = folder / "study.yaml", folder / "report.html"
     config.write_text("seed: 1\n" + VEHICLE)
-    paths = [folder / f"{number}-{each.spec.format.split('/')[1]}.h5" for number, each in enumerate(artifacts)]
+    paths = [folder / f"{number}-{each.spec.name.split('/')[1]}.h5" for number, each in enumerate(artifacts)]
     for path, artifact in zip(paths, artifacts, strict=True):
         assert check_artifact(artifact) == []
         write_artifact(path, artifact)

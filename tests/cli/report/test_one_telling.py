@@ -69,7 +69,7 @@ def answered(told):
             return source, tuple(model.answer(source))
         made = getattr(gap_artifacts, name)()
         source = source_of(
-            record_of_format(made.spec.format, made.spec.kind).of_data(made.header, made.data), f"{name}.h5"
+            record_of_format(made.spec.name, made.spec.kind).of_data(made.header, made.data), f"{name}.h5"
         )
         return source, tuple(FROM_NUMBERS[name].answer(source))
 

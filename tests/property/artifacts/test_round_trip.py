@@ -82,7 +82,7 @@ def test_round_trip(artifact):
 
 def _describes_itself(path, artifact):
     with h5py.File(path) as file:
-        assert file.attrs["format"] == artifact.spec.format
+        assert file.attrs["format"] == artifact.spec.name
         assert file.attrs["schema_version"] == SCHEMA_VERSION
         assert file.attrs.get("kind", "") == artifact.spec.kind
         assert file.attrs["cpfls_version"] == artifact.header.version

@@ -20,9 +20,9 @@ def test_page_names_the_schema_version_and_every_root_attribute():
     assert all(f"| `{name}` |" in PAGE for name in ("format", "kind", "cpfls_version", "seed", "config_sha256"))
 
 
-@pytest.mark.parametrize("spec", [record.spec() for record in records()], ids=lambda spec: spec.format)
+@pytest.mark.parametrize("spec", [record.spec() for record in records()], ids=lambda spec: spec.name)
 def test_every_dataset_is_described(spec):
-    assert record_of_format(spec.format, spec.kind).spec() is spec
+    assert record_of_format(spec.name, spec.kind).spec() is spec
     assert len({dataset.path for dataset in spec.datasets}) == len(spec.datasets)
     assert {"config", "inputs"}.isdisjoint(dataset.path.split("/")[0] for dataset in spec.datasets)
     for dataset in spec.datasets:

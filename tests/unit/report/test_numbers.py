@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from cpfls_cli.report.numbers import (
     change,
-    joined,
     number,
     percent,
     plain,
@@ -19,6 +18,7 @@ from cpfls_cli.report.numbers import (
     whole_percent,
     with_interval,
 )
+from cpfls_cli.words import joined
 
 
 @pytest.mark.parametrize(
