@@ -16,7 +16,7 @@ from cpfls_cli.artifacts.parameters import parameters_of
 from cpfls_cli.artifacts.replay import HeldOutGroup, trust_by_playback
 from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, response_word
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, group_of, record, rows_of
-from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.inertia import EXPLAINED, INERTIA_PARAMETERS
 from cpfls_cli.response.mismatch import ROTATION, THRUST
 from cpfls_cli.validation.trust import Trust, capped
 
@@ -29,10 +29,6 @@ if TYPE_CHECKING:
     from cpfls_cli.playback.structure import Choice
     from cpfls_cli.playback.vehicle import FoundVehicle
     from cpfls_cli.response.flown import VehicleResponse
-
-
-_EXPLAINED = 0.9
-"""Share of what comes again that constants have to explain, as of what torque has to explain in `playback/loop.py`."""
 
 
 @record
@@ -168,7 +164,7 @@ class InstrumentsGroup:
     @property
     def lacks(self) -> bool:
         """Whether less than 90 % of what comes again about roll or pitch is explained, by more than chance."""
-        return self.lacks_below is not None or bool((self.total + self.error < _EXPLAINED)[:2].any())
+        return self.lacks_below is not None or bool((self.total + self.error < EXPLAINED)[:2].any())
 
     @property
     def lacks_below(self) -> float | None:

@@ -19,6 +19,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import half_width, jackknife_covariance
 from cpfls_cli.dynamics.rigid_body import rigid_columns, vertical, why_unphysical
 from cpfls_cli.identification.data import Flights, TorqueData, TorqueSource, axis_scale, gathered, sample_times
+from cpfls_cli.inertia import KNOWN, VISIBLE
 from cpfls_cli.playback.balances import block_length
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.instruments import Instruments, foretold, instruments, late, late_by
@@ -38,13 +39,9 @@ a model of the inertia lacks. What a body takes is fast."""
 _APART_S = 0.04
 """Between the setpoints that predict a sample: the answer of a vehicle is slower."""
 _MOSTLY = 0.5
-_KNOWN = 2.0
-"""Ratio of the ends of an interval from which on a moment of inertia is not known."""
 _ROUNDING = 1e-12
 _OF_YAW = (2, 4, 5)
 """Places of Izz, Ixz and Iyz among the inertia parameters."""
-_VISIBLE = np.log(1.05)
-"""Logarithm of a ratio of moments of inertia that matters."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +85,7 @@ class FreedTorque:
         """Whether instruments find another body than least squares: off by their interval, and visibly."""
         with np.errstate(invalid="ignore", divide="ignore"):
             off = np.abs(np.log(self.least_squares[:3] / self.rigid_body[:3]))
-        return bool((~(off <= np.maximum(self.half, _VISIBLE)) & self.told).any())
+        return bool((~(off <= np.maximum(self.half, VISIBLE)) & self.told).any())
 
 
 def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque | None:
@@ -360,7 +357,7 @@ def _parameters(crossed: Array, held: Array | None) -> Array:
 
 
 def _told(half: Array) -> BoolArray:
-    return np.asarray(2 * half <= np.log(_KNOWN))
+    return np.asarray(2 * half <= np.log(KNOWN))
 
 
 def loop_along(training: TorqueSource, torque: Callable[[Motion], Array]) -> LoopBounds:

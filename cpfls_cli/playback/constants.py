@@ -17,6 +17,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, half_width, jackknife_covariance, jackknife_error, mean_error
+from cpfls_cli.inertia import EXPLAINED, KNOWN, VISIBLE
 from cpfls_cli.playback.balances import BANDS, OVERLAP, Balances, Sums, fitting_bands
 from cpfls_cli.playback.fit import Fitted, Uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -29,8 +30,6 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 _FEWEST_BLOCKS = 8
 _LONGEST_S = 8.0
 """Length from which on a run tells something in all bands."""
-_EXPLAINED = 0.9
-"""Share of what comes again that a model has to explain: below it lacks an effect in that band."""
 _FLAT = 0.85
 """Izz over the sum of Ixx and Iyy of a multirotor: 1 for a flat body, and no body has more."""
 _NOT_TRIED = "slow_actuation"
@@ -41,10 +40,6 @@ _LEAST = 1e-6
 """Of the power of a band that is never taken for what comes again."""
 _FARTHEST = 1.0
 """Natural sizes of a step."""
-_KNOWN = 2.0
-"""Ratio of the ends of an interval from which on a moment of inertia is not known."""
-_VISIBLE = np.log(1.05)
-"""Logarithm of a ratio of moments of inertia that matters."""
 _STRONG = 10.0
 """F statistic of an instrument below which it is weak, and its interval no interval."""
 _APART = 3.0
@@ -100,13 +95,13 @@ class Constants:
     @property
     def tells(self) -> bool:
         """Whether the moments of inertia about roll and pitch are known to a factor of two."""
-        return bool((2 * self._half <= np.log(_KNOWN)).all())
+        return bool((2 * self._half <= np.log(KNOWN)).all())
 
     def contradict(self, inertia: Array) -> bool:
         """Tell whether a body, shape (3, 3), is another one about roll or pitch: off by its interval, and visibly."""
         own = np.diag(self.fitted.model.body.inertia)[:2]
         off = np.abs(np.log(np.diag(inertia)[:2] / own))
-        return bool((off > np.maximum(self._half, _VISIBLE)).any())
+        return bool((off > np.maximum(self._half, VISIBLE)).any())
 
 
 @dataclass(frozen=True)
@@ -244,7 +239,7 @@ def _tells(problem: _Problem) -> bool:
     if problem.held & {*LOG_INERTIA[:2]}:
         return False
     left_out = _moments_left_out(problem)
-    return bool((2 * half_width(jackknife_error(left_out), len(left_out)) <= np.log(_KNOWN)).all())
+    return bool((2 * half_width(jackknife_error(left_out), len(left_out)) <= np.log(KNOWN)).all())
 
 
 def _agree(fast: _Problem, more: _Problem) -> bool:
@@ -257,7 +252,7 @@ def _agree(fast: _Problem, more: _Problem) -> bool:
 def _explains(problem: _Problem, band: int) -> bool:
     """Tell whether a model explains 90 % of roll and pitch that come again in a band, as far as is known."""
     share, error = _explained(problem)
-    return bool((share[band, :2] + error[band, :2] >= _EXPLAINED).all())
+    return bool((share[band, :2] + error[band, :2] >= EXPLAINED).all())
 
 
 def _moments_left_out(problem: _Problem) -> Array:
@@ -392,7 +387,7 @@ def _constants(problem: _Problem) -> Constants:
     if DRAG in problem.held and (yaw := free.index.get(LOG_INERTIA[2])) is not None:
         told[yaw] = False
     explained, error = _explained_in_all(problem)
-    for name, enough in zip(LOG_INERTIA, explained + error >= _EXPLAINED, strict=True):
+    for name, enough in zip(LOG_INERTIA, explained + error >= EXPLAINED, strict=True):
         # Where much comes again that is not explained, a moment may stand for what is missing.
         if name in free.index and not enough:
             told[free.index[name]] = False

@@ -16,6 +16,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import contiguous, half_width, jackknife_error
+from cpfls_cli.inertia import EXPLAINED
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, windows
@@ -30,8 +31,6 @@ _BLOCK_S = 4.0
 """Longer than what rotors and rotation remember of each other."""
 _FEWEST_BLOCKS = 4
 """Below which their scatter says nothing."""
-_EXPLAINED = 0.9
-"""Share from which on both regressions agree to a tenth: less than a fifth of the usual gain margin of 6 dB."""
 _ANY = 10.0
 """Factor either way from which on a body can be any."""
 _TINY = np.finfo(float).tiny
@@ -57,7 +56,7 @@ class LoopBounds(NamedTuple):
     @property
     def shows_loop(self) -> bool:
         """Whether so much of roll or pitch is left unexplained that numbers may be those of the loop."""
-        return bool((self.explained[:2] < _EXPLAINED).any())
+        return bool((self.explained[:2] < EXPLAINED).any())
 
 
 def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopBounds:

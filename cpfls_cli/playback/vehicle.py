@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width, jackknife_error
-from cpfls_cli.inertia import INERTIA_PARAMETERS, beyond_any_body
+from cpfls_cli.inertia import INERTIA_PARAMETERS, KNOWN, beyond_any_body
 from cpfls_cli.playback.constants import Constants, find_constants
 from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
 from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
@@ -31,8 +31,6 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 _TRADED = 0.95
 """Size of a correlation from which on two numbers trade against each other."""
 
-_KNOWN = 2.0
-"""Ratio of the ends of an interval from which on a number that cannot be negative is not determined."""
 
 _OF_TURNING = ("inertia.", "products.", "drag_factor")
 """Numbers that are known only as far as the torques are that turn the vehicle."""
@@ -270,7 +268,7 @@ def _sensed_thrust_factor(vehicle: VehicleSettings, flights: Sequence[PlaybackFl
     value = float(above.sum() / below.sum())
     without = (above.sum() - above) / (below.sum() - below)
     low, high = _interval(value, float(half_width(jackknife_error(without), len(products))), positive=True)
-    return FoundNumber("thrust_factor", "N s^2", value, low, high, np.nan, high < _KNOWN * low, False)
+    return FoundNumber("thrust_factor", "N s^2", value, low, high, np.nan, high < KNOWN * low, False)
 
 
 def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tuple[Share, ...], float]:
@@ -309,7 +307,7 @@ def found_numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
         ends = _interval(found.value, float(half[place]), positive=found.positive)
         low, high = np.clip(ends, *_bounds(free, values, place)).tolist()
         known = stated[name].value if found.stated else np.nan
-        wide = high > _KNOWN * low if found.positive else own[place] > number.scale
+        wide = high > KNOWN * low if found.positive else own[place] > number.scale
         determined = spread.determined[place] and not wide
         yield FoundNumber(name, found.unit, found.value, low, high, known, bool(determined), bool(bound))
 
@@ -348,7 +346,7 @@ def beside_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterator[Fo
     for number in numbers:
         below, above = (float(factor) for factor in factors.get(number.name, (1.0, 1.0)))
         ends = number.low * below, number.high * above
-        known = ends[1] <= _KNOWN * ends[0] if number.name in factors else True
+        known = ends[1] <= KNOWN * ends[0] if number.name in factors else True
         told = known and (number.name == "thrust_factor" or not loop.shows_loop)
         yield number._replace(low=ends[0], high=ends[1], determined=number.determined and told)
 
