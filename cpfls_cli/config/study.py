@@ -7,6 +7,7 @@ import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -109,7 +110,13 @@ def resolved_yaml(study: Study, sections: Sequence[str] = ()) -> str:
     study, sections
         See `resolved`.
     """
-    return to_yaml(resolved(study, sections))
+    return _written(json.dumps(resolved(study, sections)))
+
+
+@lru_cache(maxsize=8)
+def _written(data: str) -> str:
+    """Write a study once: a search writes one and the same config into every checkpoint and into its artifact."""
+    return to_yaml(json.loads(data))
 
 
 @contextmanager

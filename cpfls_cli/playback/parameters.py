@@ -143,6 +143,7 @@ def _drag_rows(block: str, vehicle: VehicleSettings) -> BoolArray:
     return np.asarray(grows & np.any(acts & ~grows, axis=1, keepdims=True))
 
 
+@lru_cache(maxsize=64)
 def blocks_of(vehicle: VehicleSettings) -> tuple[str, ...]:
     """List the blocks that a vehicle can have: of rotors and body, polynomial effects, and the remainder's.
 
