@@ -5,10 +5,11 @@ What is not a good artifact is refused with one message.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import h5py
 import numpy as np
@@ -38,12 +39,15 @@ from cpfls_cli.artifacts.spec import (
     Record,
 )
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.files import read_content, text_sha256
+from cpfls_cli.files import State, read_content, state_of, text_sha256
 
 R = TypeVar("R", bound=Record)
+T = TypeVar("T")
 
 _SHORT = 8
 """Words of text that stand in an outline."""
+_KEPT_BYTES = 1_000_000
+"""Size up to which an artifact that was read is kept."""
 
 
 @dataclass(frozen=True)
@@ -133,19 +137,54 @@ def artifact_of(record: Record) -> Artifact:
 
 
 def read_artifact(path: Path, *wanted: ArtifactSpec) -> Artifact:
-    """Read an artifact whole.
+    """Read an artifact whole; a small one that stayed as it was is read once only.
 
     Parameters
     ----------
     *wanted : ArtifactSpec
         Formats that the caller can use; any if none is named.
     """
+    known = _known(path, _small)
+    if known is None or (wanted and not any(each.includes(known.spec) for each in wanted)):
+        return _read_whole(path, *wanted)
+    data = {name: own.copy() if isinstance(own, np.ndarray) else own for name, own in known.data.items()}
+    return Artifact(known.spec, known.header, data)
+
+
+def _read_whole(path: Path, *wanted: ArtifactSpec) -> Artifact:
     with opened(path, *wanted) as stored:
         require_all(path, stored)
         refuse(path, check_structure(stored))
         artifact = Artifact(stored.spec, stored.header, {name: _read(own) for name, own in stored.data.items()})
         refuse(path, check_values(artifact))
         return artifact
+
+
+def _known(path: Path, look: Callable[[State], T | None]) -> T | None:
+    """Give what was found in a file while it stays as it is; None where it is no good: who reads it then says why."""
+    try:
+        return look(state_of(path))
+    except (OSError, ValueError, InputError):
+        return None
+
+
+@lru_cache(maxsize=16)
+def _small(state: State) -> Artifact | None:
+    return _read_whole(state.path) if state.size <= _KEPT_BYTES else None
+
+
+class _Origin(NamedTuple):
+    """What an artifact is, where it comes from, and the shapes of its datasets."""
+
+    spec: ArtifactSpec
+    header: Header
+    shapes: Mapping[str, tuple[int, ...]]
+
+
+@lru_cache(maxsize=64)
+def _origin_of(state: State) -> _Origin:
+    with opened(state.path) as stored:
+        return _Origin(stored.spec, stored.header, {name: own.shape for name, own in stored.data.items()})
 
 
 @dataclass(frozen=True)
@@ -202,24 +241,21 @@ def format_name(path: Path) -> str | None:
     str or None
         None where the file is not an artifact.
     """
-    try:
-        with opened(path) as stored:
-            return stored.spec.format
-    except InputError:
-        return None
+    known = _known(path, _origin_of)
+    return None if known is None else known.spec.format
 
 
 def holds(path: Path, wanted: type[Record]) -> bool:
     """Tell whether a file is an artifact of one format, and of its kind, without reading it whole."""
-    try:
-        with opened(path) as stored:
-            return wanted.spec().includes(stored.spec)
-    except InputError:
-        return False
+    known = _known(path, _origin_of)
+    return known is not None and wanted.spec().includes(known.spec)
 
 
 def read_header(path: Path) -> Header:
     """Read where an artifact comes from, and none of its data."""
+    known = _known(path, _origin_of)
+    if known is not None:
+        return known.header
     with opened(path) as stored:
         return stored.header
 
@@ -365,11 +401,10 @@ def count_rows(path: Path, spec: ArtifactSpec, first: str) -> int | None:
     int or None
         None where the file is no artifact of this format or lacks the dataset; reading it whole says why.
     """
-    try:
-        with opened(path, spec) as stored:
-            return len(stored.data[first]) if first in stored.data and stored.data[first].ndim else None
-    except InputError:
+    known = _known(path, _origin_of)
+    if known is None or not spec.includes(known.spec) or not known.shapes.get(first):
         return None
+    return known.shapes[first][0]
 
 
 def check_rows(path: Path, spec: ArtifactSpec, names: Sequence[str]) -> None:
