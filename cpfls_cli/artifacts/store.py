@@ -46,6 +46,8 @@ T = TypeVar("T")
 
 _SHORT = 8
 """Words of text that stand in an outline."""
+_TEXT, _SCALAR = h5py.h5t.py_create(h5py.string_dtype(), logical=True), h5py.h5s.create(h5py.h5s.SCALAR)
+"""Type and shape of a text that describes a dataset."""
 _KEPT_BYTES = 1_000_000
 """Size up to which an artifact that was read is kept."""
 
@@ -370,11 +372,11 @@ def _empty(file: h5py.File, path: str, part: np.ndarray, samples: int) -> h5py.D
 
 
 def _describe(dataset: h5py.Dataset, spec: DatasetSpec) -> None:
-    dataset.attrs["units"] = spec.units
-    dataset.attrs["frame"] = spec.frame
-    dataset.attrs["description"] = spec.description
+    # By the library below: to look first whether each is there took a third of the time to write a file.
+    for name, text in ((b"units", spec.units), (b"frame", spec.frame), (b"description", spec.description)):
+        h5py.h5a.create(dataset.id, name, _TEXT, _SCALAR).write(np.array(text, dtype=h5py.string_dtype()))
     for axis, label in enumerate(spec.dimensions):
-        dataset.dims[axis].label = label
+        h5py.h5ds.set_label(dataset.id, axis, label.encode())
 
 
 def file_sha256(path: Path) -> str:
