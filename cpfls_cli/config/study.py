@@ -7,6 +7,7 @@ import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -103,7 +104,13 @@ def _copy(keys: list[str], source: Any, target: dict[str, Any], asked: str) -> N
 
 def resolved_yaml(study: Study, sections: Sequence[str] = ()) -> str:
     """Write a study as YAML with every default filled in."""
-    return to_yaml(resolved(study, sections))
+    return _written(json.dumps(resolved(study, sections)))
+
+
+@lru_cache(maxsize=8)
+def _written(data: str) -> str:
+    """Write a study once: a search writes one and the same config into every checkpoint and into its artifact."""
+    return to_yaml(json.loads(data))
 
 
 @contextmanager

@@ -87,9 +87,7 @@ class Probe:
     @cached_property
     def joint(self) -> tuple[Array, Array, Array]:
         """Products of the terms in their own sizes, their pseudo-inverse, and the sizes."""
-        products = (self.state[:, :, None] * self.rotor[:, None, self.turning]).reshape(len(self.state), -1)
-        scale = np.sqrt(np.mean(products**2, axis=0))
-        return products / scale, np.asarray(np.linalg.pinv(products / scale)), scale
+        return _joint(self.state.tobytes(), self.rotor[:, self.turning].tobytes(), len(self.state))
 
     @classmethod
     @lru_cache(maxsize=8)
@@ -109,6 +107,15 @@ class Probe:
         )
         terms = rotor_terms(speed, np.zeros_like(speed))
         return cls(signals, terms, state_terms(signals.air_velocity, signals.body_rate))
+
+
+@lru_cache(maxsize=16)
+def _joint(state: bytes, rotor: bytes, probes: int) -> tuple[Array, Array, Array]:
+    """Work out `Probe.joint` once for all vehicles that hover alike: a fit changes other numbers more often."""
+    terms, turning = (np.frombuffer(values).reshape(probes, -1) for values in (state, rotor))
+    products = (terms[:, :, None] * turning[:, None]).reshape(probes, -1)
+    scale = np.sqrt(np.mean(products**2, axis=0))
+    return products / scale, np.asarray(np.linalg.pinv(products / scale)), scale
 
 
 def polynomial(known: Effect, probe: Probe, shape: Mapping[str, float]) -> Array | None:

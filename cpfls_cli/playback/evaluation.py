@@ -119,7 +119,7 @@ class VehicleAt:
         """By how much more the drag factor differs from the stated one than the thrust factor does."""
         return self.get(DRAG, 1.0) / self.get(THRUST, 1.0)
 
-    @property
+    @cached_property
     def forces_by_mass(self) -> Array:
         """What rows of the weights are multiplied with: runs divide forces by the stated mass; shape (6, 1, 1)."""
         share = self.free.vehicle.mass_kg / self.mass
@@ -226,7 +226,10 @@ class Evaluated:
         """Evaluate numbers at values, shape (number,)."""
         at = VehicleAt(free, values)
         derivatives = [_weight_derivative(at, number.name) for number in free.numbers]
-        touched = np.abs(at.table) + sum(np.abs(each) for each in derivatives if each is not None)
+        touched = at.table != 0
+        for each in derivatives:
+            if each is not None:
+                touched |= each != 0
         return cls(at, derivatives, used_terms(touched, free.used_airflow))
 
     @cached_property
@@ -306,12 +309,11 @@ def _weight_derivative(at: VehicleAt, name: str) -> Array | None:
     if name in (DELAY, LAG, SLOW):
         return None
     columns, coefficients = at.free.columns, at.coefficients
-    derivative = np.zeros(at.free.table_shape)
     if name in columns:
-        derivative = np.asarray(
-            np.exp(columns[name].share @ at.log_counted) * columns[name].scaled(at.drag_over_thrust)
-        )
-    elif name in at.free.counting:
+        scaled = np.exp(columns[name].share @ at.log_counted) * columns[name].scaled(at.drag_over_thrust)
+        return np.asarray(scaled * at.forces_by_mass)
+    derivative = np.zeros(at.free.table_shape)
+    if name in at.free.counting:
         axis = at.free.counting.index(name)
         for each, column in columns.items():
             derivative += coefficients[each] * column.share[axis] * column.weights

@@ -143,6 +143,7 @@ def _drag_rows(block: str, vehicle: VehicleSettings) -> BoolArray:
     return np.asarray(grows & np.any(acts & ~grows, axis=1, keepdims=True))
 
 
+@lru_cache(maxsize=64)
 def blocks_of(vehicle: VehicleSettings) -> tuple[str, ...]:
     """List the blocks that a vehicle can have: of rotors and body, polynomial effects, and the remainder's.
 
@@ -189,9 +190,14 @@ class Column:
         free = not np.any(weights[3:])
         return cls(weights, acts / max(acts.sum(), 1) * float(free), drags)
 
+    @cached_property
+    def dragged(self) -> bool:
+        """Whether any row goes with the drag factor."""
+        return bool(self.drags.any())
+
     def scaled(self, drag: float) -> Array:
         """Weights for a unit counted in thrust, with a drag factor that changed by as much more than the thrust's."""
-        return np.where(self.drags[:, None, None], drag * self.weights, self.weights)
+        return np.where(self.drags[:, None, None], drag * self.weights, self.weights) if self.dragged else self.weights
 
     def counted(self, found: Array) -> float:
         """Count a unit on another vehicle, shape of its weights (6, 34, 1 + 4 rotors)."""

@@ -135,11 +135,18 @@ def _sines(rng, turns, size, samples):
     return np.hstack([sine.sum(axis=2), (turns * cosine).sum(axis=2), -(turns**2 * sine).sum(axis=2)])
 
 
+_CROSS = np.array([[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]], float)
+_ONE = np.eye(3)
+
+
 def _skew(vector):
     """Arrange vectors as matrices of the cross product, shape (flights, 3, 3)."""
-    matrix = np.zeros((len(vector), 3, 3))
-    matrix[:, 2, 1], matrix[:, 0, 2], matrix[:, 1, 0] = vector.T
-    return matrix - matrix.transpose(0, 2, 1)
+    return (vector @ _CROSS).reshape(-1, 3, 3)
+
+
+def _clipped(values, low, high):
+    """Limit values as `numpy.clip` does, which takes longer to begin than to end."""
+    return np.minimum(np.maximum(values, low), high)
 
 
 def _flown(flights, path, pushes, shoves, noise):
@@ -157,7 +164,7 @@ def _flown(flights, path, pushes, shoves, noise):
     for now in range(len(path)):
         measured = rate + noise[now]
         wanted = path[now, :, 6:] + outer**2 * (path[now, :, :3] - position)
-        wanted = np.clip(wanted + 1.6 * outer * (path[now, :, 3:6] - velocity), -6.0, 6.0) + UP
+        wanted = _clipped(wanted + 1.6 * outer * (path[now, :, 3:6] - velocity), -6.0, 6.0) + UP
         up = wanted / np.sqrt((wanted**2).sum(axis=1, keepdims=True))
         # The heading is kept, so the vehicle leans about an axis of the level plane.
         lean = _skew(up) @ turn[:, :, 2, None]
@@ -168,18 +175,18 @@ def _flown(flights, path, pushes, shoves, noise):
         squared = (unmix @ np.concatenate([thrust, torque], axis=1)[:, :, None])[:, :, 0]
         if now % EVERY == 0:
             logs.append([position, velocity, turn, measured, speed, up])
-        before, speed = speed, speed + STEP_S / lag * (np.sqrt(np.clip(squared, 0.05 * hover, 4 * hover)) - speed)
+        before, speed = speed, speed + STEP_S / lag * (np.sqrt(_clipped(squared, 0.05 * hover, 4 * hover)) - speed)
         wrench = (mixer @ (0.5 * (before**2 + speed**2))[:, :, None])[:, :, 0]
         gyroscopic = (_skew(rate) @ (inertia * rate)[:, :, None])[:, :, 0]
         spin_up = (wrench[:, 1:] - damping * rate - gyroscopic) / inertia + pushes[now]
         # In the middle of the step, as all that turns and pushes is.
-        midway = turn @ (np.eye(3) + 0.5 * STEP_S * _skew(rate))
+        midway = turn @ (_ONE + 0.5 * STEP_S * _skew(rate))
         force = -drag * (velocity[:, None] @ midway)[:, 0] * [1.0, 1.0, 0.0] + wrench[:, :1] * [0.0, 0.0, 1.0]
         faster = (midway @ force[:, :, None])[:, :, 0] / mass + shoves[now] - UP
         position, velocity = position + STEP_S * (velocity + 0.5 * STEP_S * faster), velocity + STEP_S * faster
         angle = STEP_S * (rate + 0.5 * STEP_S * spin_up)
         small = _skew(angle)
-        turn = turn @ (np.eye(3) + small + 0.5 * small @ small + small @ small @ small / 6)
+        turn = turn @ (_ONE + small + 0.5 * small @ small + small @ small @ small / 6)
         rate = rate + STEP_S * spin_up
     return [np.array(each) for each in zip(*logs, strict=True)]
 

@@ -1,13 +1,17 @@
 """Interrupts and closed pipes, with real processes."""
 
 import importlib
+import itertools
 import os
 import signal
 import subprocess
 import sys
+import time
+from types import SimpleNamespace
 
 import pytest
 
+from cpfls_cli.cli import terminal
 from tests.builders.forked import Forked, finished
 
 MESSAGE = "cpfls: error: interrupted: no half-written file is left\n"
@@ -38,13 +42,19 @@ def environment():
     return {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
 
 
+def with_a_line_for_each_generation():
+    """Let a second pass each time that somebody looks, after which a line is due."""
+    terminal.time = SimpleNamespace(monotonic=itertools.count().__next__, perf_counter=time.perf_counter)
+
+
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_signal_during_the_search_keeps_what_can_be_resumed(pipeline, study, tmp_path, tmp_path_factory, number, code):
     output = tmp_path / "model.h5"
-    words = ["identify", str(study), str(pipeline.flight), "-o", str(output), "-v"]
-    endless = ["--set", "identification.population=50", "--set", "identification.generations=100000"]
+    words = ["identify", study, pipeline.flight, "--selection", pipeline.selection, "-o", output, "-v"]
+    endless = ["--set", "identification.generations=100000"]
     reading, writing = os.pipe()
-    process = Forked([*words, *endless], tmp_path_factory.mktemp("printed") / "stdout", writing)
+    printed = tmp_path_factory.mktemp("printed") / "stdout"
+    process = Forked([*words, *endless], printed, writing, patch=with_a_line_for_each_generation)
     os.close(writing)
     with open(reading) as said:
         assert any(line.startswith("identify: ") and "generation 2" in line for line in said)
