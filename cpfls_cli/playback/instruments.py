@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
@@ -132,13 +133,12 @@ def instruments(flights: Sequence[PlaybackFlight]) -> Instruments:
     """
     runs = tuple(Run(number, part) for number, flight in enumerate(flights) for part in _runs(flight))
     flown = tuple(_cut(flights[run.flight], run.part) for run in runs)
-    outside = [_outside(flight) for flight in flown]
+    outside = _of_one_kind(flown)
     columns = [
         np.hstack([flight.setpoints[name] for name in names]) if names else None
         for flight, names in zip(flown, outside, strict=True)
     ]
-    asked = dict.fromkeys(name for names in outside for name in names)
-    return Instruments(runs, flown, repeats(flown), tuple(columns), tuple(asked))
+    return Instruments(runs, flown, repeats(flown), tuple(columns), max(outside, key=len, default=()))
 
 
 def late_by(period: float, apart: int) -> range:
@@ -234,6 +234,16 @@ def _outside(flight: PlaybackFlight) -> tuple[str, ...]:
     """Name the setpoints of a flight that move and do not answer its state."""
     moves = [name for name, asked in flight.setpoints.items() if np.ptp(asked, axis=0).any()]
     return tuple(known[0] for kind in _OUTSIDE if (known := [name for name in kind if name in moves]))
+
+
+def _of_one_kind(flights: Sequence[PlaybackFlight]) -> list[tuple[str, ...]]:
+    """Name the setpoints of each flight, of the kind that most samples have: one answer is foretold of all."""
+    kinds = [tuple((name, flight.setpoints[name].shape[1]) for name in _outside(flight)) for flight in flights]
+    samples = Counter[tuple[tuple[str, int], ...]]()
+    for kind, flight in zip(kinds, flights, strict=True):
+        samples[kind] += len(flight) if kind else 0
+    usual = max(samples, key=lambda kind: samples[kind], default=())
+    return [tuple(name for name, _ in kind) if kind == usual else () for kind in kinds]
 
 
 @dataclass(frozen=True)

@@ -96,3 +96,13 @@ def test_setpoints_from_outside_of_the_loops_are_instruments_and_others_are_none
     found = instruments([replace(flight, setpoints={"sticks": position}), _flown(2)])
     assert found.kind == "setpoints"
     assert found.setpoints[1] is None
+
+
+def test_flights_that_log_other_setpoints_than_most_have_none():
+    """One answer is foretold of all: four sticks and three places cannot stand in one column."""
+    flights = [_flown(path) for path in (1, 2, 3)]
+    asked = [{"position": flight.motion.position} for flight in flights[:2]]
+    asked.append({"sticks": np.hstack([flights[2].motion.position, flights[2].motion.position[:, :1]])})
+    found = instruments([replace(flight, setpoints=own) for flight, own in zip(flights, asked, strict=True)])
+    assert found.names == ("position",)
+    assert [each is None for each in found.setpoints] == [False, False, True]
