@@ -166,7 +166,12 @@ def _known(path: Path, look: Callable[[State], T | None]) -> T | None:
 
 @lru_cache(maxsize=16)
 def _small(state: State) -> Artifact | None:
-    return _read_whole(state.path) if state.size <= _KEPT_BYTES else None
+    if state.size > _KEPT_BYTES:
+        return None
+    with opened(state.path) as stored:
+        # Compressed, a small file may hold much.
+        small = sum(own.nbytes for own in stored.data.values()) <= _KEPT_BYTES
+    return _read_whole(state.path) if small else None
 
 
 class _Origin(NamedTuple):

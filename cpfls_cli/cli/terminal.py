@@ -110,13 +110,15 @@ def progress_bar(title: str, common: Common) -> Iterator[Callable[..., None]]:
         TaskProgressColumn(),
         TimeRemainingColumn(table_column=Column(no_wrap=True)),
         # What is left of the line; a longer note is cut, so that bar and time stay whole.
-        TextColumn("{task.fields[note]}", table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1)),
+        TextColumn(
+            "{task.fields[note]}", markup=False, table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1)
+        ),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True, expand=True) as bar, _log_shown(title):
         task = bar.add_task(title, total=None, note="")
 
         def show(done: float, total: int, note: str = "") -> None:
-            bar.update(task, completed=done, total=total, note=note)
+            bar.update(task, completed=done, total=total, note=visible(note))
 
         yield show
 
@@ -147,7 +149,7 @@ def _log_progress(title: str) -> Callable[..., None]:
     def show(done: float, total: int, note: str = "") -> None:
         if time.monotonic() - last[0] >= 1.0 or done == total:
             last[0] = time.monotonic()
-            print(f"{title}: {done / total:4.0%}  {note}", file=sys.stderr)
+            print(f"{title}: {done / total:4.0%}  {visible(note)}", file=sys.stderr)
 
     return show
 
@@ -158,7 +160,7 @@ def _mute_output() -> None:
 
 
 def _complain(text: str, kind: str = "error") -> None:
-    for line in _with_plain_names(text).split("\n"):
+    for line in _with_plain_names(text).rstrip("\n").split("\n"):
         print(f"cpfls: {kind}: {line}", file=sys.stderr)
 
 

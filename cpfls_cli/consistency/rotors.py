@@ -27,8 +27,14 @@ _THRUST_NUMBERS = (0.00075, 1.0)
 """Of propellers as large as the room between hubs: those of 0.05 that fill a third of it, and of 0.2 that overlap by
 half. A wrong unit of speed is a factor of 91, of mass 1000."""
 
-_NEAR_M = 1e-3
-"""Hubs nearer than that, seen from above, are one above the other."""
+_ABOVE = 0.2
+"""Share of the distance of the farthest hubs below which two, seen from above, are one above the other."""
+
+_TYPICAL = 0.03
+"""Thrust number of vehicles of 25 g to 25 kg, of propellers as large as the room: 0.012 to 0.05."""
+
+_LEANS = 0.03
+"""Spread of roll and pitch in rad that no vehicle has that stands."""
 
 _REMEDY = (
     "check the unit of import.signals.rotor_speed (or rotor_command), vehicle.mass_kg, vehicle.gravity_m_s2 and "
@@ -51,30 +57,40 @@ def too_fast(parts: Sequence[Signals]) -> Finding | None:
 
 
 def beyond_propellers(parts: Sequence[Signals]) -> Finding | None:
-    """Say where no propellers that fit between the hubs carry the mass at the measured speeds."""
+    """Say where no propellers that fit between the hubs carry the mass at the measured speeds.
+
+    Only where the thrust factor is a guess: one that carries the weight bears witness for the speeds. Rotors that idle
+    on the ground lift nothing, so slow ones contradict only flights that lean; of fewer than three any may be small.
+    """
     vehicle = parts[0].vehicle
     hubs = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
     apart = np.linalg.norm(hubs[:, None] - hubs, axis=2)
-    measured = [part.rotor_speed for part in parts if part.rotor_speed is not None and not part.commanded]
-    if not measured or not (apart > _NEAR_M).any():
+    room = apart[apart > _ABOVE * apart.max()]
+    flown = [part for part in parts if part.rotor_speed is not None and not part.commanded]
+    if "thrust_factor" not in vehicle.unknown or not flown or not len(room):
         return None
-    speed = np.concatenate(measured)
+    speed = np.concatenate([part.rotor_speed for part in flown if part.rotor_speed is not None])
     power = (speed**2).sum(axis=1)
-    turning = power >= IDLE * np.quantile(power, 0.99)
-    if not power[turning].any():
+    # A flight of seconds in a long log on the ground is the largest thousandth.
+    most = float(np.quantile(power, 0.999))
+    turning = power >= IDLE * most
+    if not most:
         return None
-    number = thrust_number(vehicle.mass_kg, float(apart[apart > _NEAR_M].min()), speed[turning])
+    number = thrust_number(vehicle.mass_kg, float(room.min()), speed[turning])
     if _THRUST_NUMBERS[0] < number < _THRUST_NUMBERS[1]:
         return None
     slow = number > _THRUST_NUMBERS[1]
-    size = f"{number / 0.1 if slow else 0.1 / number:.2g}"
+    angles = np.concatenate([np.zeros((len(p), 2)) if p.attitude is None else p.attitude[:, :2] for p in flown])
+    leans = float(angles[turning].std(axis=0).max()) > _LEANS
+    size = number / _TYPICAL if slow else _TYPICAL / number
     return Finding(
-        f"propellers that fit between the hubs lift {size} times {'less' if slow else 'more'} than the mass of "
-        f"{vehicle.mass_kg:g} kg at {np.sqrt(power[turning].mean() / speed.shape[1]):.3g} rad/s",
+        f"propellers that fit between the hubs lift about {size:.0f} times {'less' if slow else 'more'} than the mass "
+        f"of {vehicle.mass_kg:g} kg at {np.sqrt(power[turning].mean() / speed.shape[1]):.3g} rad/s",
         "check the unit of import.signals.rotor_speed (rad/s, rpm or Hz), vehicle.mass_kg (kg) and position_m of "
-        "vehicle.rotors (m)",
+        f"vehicle.rotors (m){', or whether it took off' if slow else ''}",
         ("rotors", "vehicle"),
         number,
+        contradiction=leans if slow else len(vehicle.rotors) > 2,
     )
 
 

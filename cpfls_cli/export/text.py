@@ -68,8 +68,9 @@ def identifier(stem: str) -> str:
     str
         Letters, digits and underscores, a letter first.
     """
-    cleaned = re.sub(r"[^A-Za-z0-9]+", "_", stem)[:_LONGEST_NAME].strip("_")
-    return cleaned if cleaned[:1].isalpha() else f"model_{cleaned}".rstrip("_")
+    cleaned = re.sub(r"[^A-Za-z0-9]+", "_", stem).strip("_")
+    named = cleaned if cleaned[:1].isalpha() else f"model_{cleaned}"
+    return named[:_LONGEST_NAME].rstrip("_")
 
 
 def checked_identifier(name: str) -> str:

@@ -27,6 +27,7 @@ from cpfls_cli.flights.recordings import (
     known_stretches,
     read_flight,
     read_import,
+    require_rotors,
     signals_of,
     with_voltage,
 )
@@ -118,6 +119,8 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
             f"{flight.name}: has no rotor_speed, rotor_command or body_torque, so nothing drives a playback; name "
             "their columns in import.signals"
         )
+    if actuation != "body_torque":
+        require_rotors(study)
     driven = {name: flight.signals[name] for name in ("time", *_STATE, actuation) if name in flight.signals}
     stretches = known_stretches(flight.name, all_known(driven), driven["time"])
     made = [signals_of(flight, _known(flight, actuation, part), study) for part in stretches]

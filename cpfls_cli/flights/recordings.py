@@ -141,7 +141,17 @@ def _units(study: Study) -> dict[str, str]:
 def _recording(flight: ReadFlight, study: Study) -> tuple[Recording, tuple[str, ...]]:
     known, warnings = _known_part(flight)
     signals, notes = signals_of(flight, known, study)
+    if signals.rotor_speed is not None:
+        require_rotors(study)
     return Recording(flight.name, signals), (*warnings, *notes, *doubts_on_voltage(known, flight.units))
+
+
+def require_rotors(study: Study) -> None:
+    """Refuse a vehicle of the config that cannot have flown what its rotors are said to have driven."""
+    try:
+        require_control(study.vehicle)
+    except ComputationError as error:
+        raise ConfigError(str(error)) from None
 
 
 def signals_of(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> tuple[Signals, tuple[str, ...]]:
@@ -206,10 +216,6 @@ def _actuated(signals: Signals, flight: ReadFlight, known: Mapping[str, Array], 
             "motion with; name their columns in import.signals"
         )
     if speed is not None:
-        try:
-            require_control(study.vehicle)
-        except ComputationError as error:
-            raise ConfigError(str(error)) from None
         command = _command_beside(flight, known, study)
         return replace(signals, rotor_speed=speed, commanded=commanded, rotor_command=command)
     return replace(signals, stated_torque=known["body_torque"], stated_thrust=known.get("thrust"), commanded=True)

@@ -22,7 +22,7 @@ from cpfls_cli.identification.data import Flights, TorqueData, TorqueSource, axi
 from cpfls_cli.inertia import KNOWN, VISIBLE
 from cpfls_cli.playback.balances import block_length
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.instruments import Instruments, foretold, instruments, late, late_by
+from cpfls_cli.playback.instruments import FOLDS, Instruments, foretold, instruments, late, late_by
 from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.playback.loop import BalancedTorque, LoopBounds, bounds_between
 from cpfls_cli.regressor.motion import RIGID, Motion
@@ -38,6 +38,8 @@ _SLOW_S = 0.8
 a model of the inertia lacks. What a body takes is fast."""
 _APART_S = 0.04
 """Between the setpoints that predict a sample: the answer of a vehicle is slower."""
+_MOST = 5e7
+"""Numbers that predict, of all samples: 400 MB, an hour at 100 Hz."""
 _MOSTLY = 0.5
 _ROUNDING = 1e-12
 _OF_YAW = (2, 4, 5)
@@ -57,7 +59,7 @@ class FreedTorque:
     half : array, shape (3,)
         Half of the 95 % intervals of the logarithms of the moments of inertia by instruments.
     runs, paths : int
-        Runs that repeat each other, and their paths; or all that have setpoints.
+        Runs that repeat each other, and their paths; or runs with setpoints, of no common path.
     alone, flights : int
         Flights without instruments, and all flights.
     setpoints : tuple of str
@@ -91,8 +93,8 @@ class FreedTorque:
 def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque | None:
     """Free the torque of flights of what instruments do not know: other runs of a path, or setpoints.
 
-    Flights that have none are left out. So where there are such, the rest is taken only if least squares of all shows
-    the loop, or instruments find another body; setpoints, which tell less than repeats, only then.
+    Flights that have none are left out. So where there are such, the rest is taken only if least squares of it shows
+    the loop in all, or instruments find another body; setpoints, which tell less than repeats, only then.
 
     With ``A`` the columns of a rigid body along a run, ``tau`` its torque, both as far as they are fast, and ``A'``,
     ``tau'`` what instruments know of them, the inertia parameters x solve ``sum A^T (tau' - A' x) = 0``: gusts and
@@ -177,7 +179,7 @@ def _shows_loop(found: FreedTorque, training: TorqueSource) -> bool:
 def told_by(
     freed: FreedTorque | None, training: TorqueSource, learned: TorqueSource
 ) -> tuple[TorqueSource, TorqueSource]:
-    """Give what parameters and their errors are learned from: the torque that comes again, or else as measured."""
+    """Give what parameters and their errors are learned from: the torque that instruments know, or as measured."""
     return (training, learned) if freed is None else (freed.training, freed.learned)
 
 
@@ -241,7 +243,7 @@ def _flown(part: TorqueData, period: float) -> PlaybackFlight:
         stretches=(slice(0, len(part)),),
         has_velocity=False,
         has_position=False,
-        setpoints=part.setpoints,
+        setpoints={name: asked for name, asked in part.setpoints.items() if np.isfinite(asked).all()},
     )
 
 
@@ -249,6 +251,8 @@ def _runs(given: Instruments, rows: Sequence[Array], period: float) -> list[_Run
     """Lay the rows of runs beside what instruments know of them, where all are known."""
     fast = [_fast(each, period) for each in rows]
     beside = _known(given, fast, period, fast=True)
+    if not beside:
+        return []
     paths = {number: given.repeats.path(number, len(rows[number])) for number in beside}
     length = block_length(sum(len(rows[first]) for first in {first for first, _ in paths.values()}) * period) / period
     found = []
@@ -282,6 +286,9 @@ def _known(given: Instruments, values: Sequence[Array], period: float, *, fast: 
             asked.append(_fast(columns, period) if fast else columns)
             own = values[number].reshape(len(setpoint), -1)
             known[number] = np.isfinite(asked[-1]).all(axis=1) & np.isfinite(own).all(axis=1)
+    size = sum(int(there.sum()) for there in known.values())
+    if not size or not FOLDS * asked[0].shape[1] < size < _MOST / asked[0].shape[1]:
+        return {}
     predicted = foretold(
         np.concatenate([each[there] for each, there in zip(asked, known.values(), strict=True)]),
         np.concatenate([values[number][there] for number, there in known.items()]),

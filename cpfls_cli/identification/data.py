@@ -41,7 +41,7 @@ class TorqueData:
     torque : array, shape (samples, 3), N m
         Generalised torque on the Euler angles.
     setpoints : mapping of str to array, shape (samples, column)
-        What was asked for, where that is known at all samples.
+        What was asked for; NaN where nothing was.
     """
 
     time: Array

@@ -17,6 +17,7 @@ from cpfls_cli.identification.solver import Fit
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.rounding import less
+from cpfls_cli.words import joined
 
 AXES = ("roll", "pitch", "yaw")
 _BADLY_EXPLAINED_R2 = 0.5
@@ -132,12 +133,13 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
     if freed is None:
         return
     if freed.setpoints:
-        asked = " and ".join(f"setpoint of {name}" if name != "sticks" else name for name in freed.setpoints)
-        source = f"the {asked} knows of no gust, so the parameters come from the torque that answers it"
-        little, without = "too little of yaw answers it", "hold none"
+        asked = joined("the sticks" if name == "sticks" else f"the setpoint of {name}" for name in freed.setpoints)
+        know = "know" if len(freed.setpoints) > 1 or freed.setpoints == ("sticks",) else "knows"
+        source = f"{asked} {know} of no gust, so the parameters come from the torque that follows"
+        little, without = "too little of yaw follows", "hold no such setpoint"
     else:
         paths = "1 path" if freed.paths == 1 else f"{freed.paths} paths"
-        source = f"{freed.runs} flights repeat {paths}, so the parameters come from the torque that comes again"
+        source = f"{freed.runs} runs repeat {paths}, so the parameters come from the torque that comes again"
         little, without = "too little of yaw comes again", "repeat none"
     moments = ", ".join(
         f"{name} {value:.3g} ({value * np.exp(-half):.3g} to {value * np.exp(half):.3g})"

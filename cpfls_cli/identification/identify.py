@@ -75,8 +75,8 @@ def identify(
 ) -> Identification:
     """Identify a model and judge it beside its baselines.
 
-    Where the flights that train repeat each other, parameters and the errors that the search minimises are those of the
-    torque that comes again (`freed_torque`), in which no gust acts; scores are those of the torque as measured.
+    Where instruments tell the vehicle from its loop, parameters and the errors that the search minimises are those of
+    the torque that they know (`freed_torque`), in which no gust acts; scores are those of the torque as measured.
 
     Parameters
     ----------

@@ -7,6 +7,7 @@ import zlib
 from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TextIO
 
@@ -16,9 +17,8 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.logs.formats import LogContents, some
 
-_LONGEST_HEADER = 1 << 20
-"""Characters of a line of column names, thousands of which it may hold; compressed, a longer one may fill the memory.
-"""
+_LONGEST_LINE = 1 << 20
+"""Characters of a line, which may hold thousands of columns; compressed, a longer one may fill the memory."""
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
@@ -74,14 +74,15 @@ def _rows(path: Path) -> Iterator[tuple[list[str], Iterator[list[str]]]]:
     """Open a CSV: its column names, and its rows."""
     try:
         with _open(path) as stream:
-            first = stream.readline(_LONGEST_HEADER)
-            if len(first) == _LONGEST_HEADER:
+            first = stream.readline(_LONGEST_LINE)
+            if len(first) == _LONGEST_LINE:
                 raise InputError(f"{path}: not a CSV file: its first line, of column names, does not end")
             if not first.strip():
                 raise InputError(f"{path}: is empty; a log starts with a line of column names")
             delimiter = max(",;\t", key=first.count)
             names = [name.strip() for name in next(csv.reader([first], delimiter=delimiter))]
-            yield names, csv.reader(stream, delimiter=delimiter)
+            # Of a line without an end a part is a row, of another length than all others.
+            yield names, csv.reader(iter(partial(stream.readline, _LONGEST_LINE), ""), delimiter=delimiter)
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
     except (UnicodeDecodeError, csv.Error) as error:

@@ -42,12 +42,14 @@ with h5py.File(sys.argv[1], "r") as file:
     print(name if isinstance(name, str) and name.startswith("cpfls/") else "")
     file.visititems(count)
     if states > int(sys.argv[2]):
-        sys.exit(f"{states / 1e9:.3g} GB of numbers are stated")
+        print(f"states {states / 1e9:.3g} GB of numbers, far more than a file of its size holds: damaged, or no log")
+        sys.exit(3)
     file.visititems(read)
 """
 _PLAIN, _TIMES = 1 << 29, 200
 """Bytes that a log may hold whatever its size, and in sizes of the file beyond: signals of sensors hardly compress."""
-_COMPRESSED = 15
+_COMPRESSED, _INFLATED = 15, 3
+"""Kind of a variable of a .mat that is compressed; what the probe of a file ends with that states too much."""
 _TIME_UNITS = ("s", "ms", "us", "ns")
 
 
@@ -66,7 +68,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         hdf5 = h5py.is_hdf5(path)
         if hdf5:
             found = _probed(state_of(path))
-            if not found.readable:
+            if found.fault:
                 raise InputError(f"{path}: {found.fault}")
             if found.artifact:
                 raise InputError(f"{path}: is an artifact of this program ({found.artifact}), not a log")
@@ -111,6 +113,8 @@ def _probed(state: State) -> _Probed:
         )
     except subprocess.TimeoutExpired:
         return _Probed(False, "", f"damaged: HDF5 does not come to an end with it within {limit:.0f} s")
+    if done.returncode == _INFLATED:
+        return _Probed(True, "", done.stdout.strip().splitlines()[-1])
     if done.returncode:
         last = (done.stderr.strip().splitlines() or [f"HDF5 ended with {done.returncode}"])[-1]
         return _Probed(False, "", f"cannot be read as HDF5: {last}")
@@ -165,17 +169,21 @@ def _refuse_inflated(path: Path) -> None:
     size, total = path.stat().st_size, 0
     with path.open("rb") as stream:
         head = stream.read(128)
+        if head[126:] not in (b"IM", b"MI"):
+            return
         order: Literal["<", ">"] = ">" if head[126:] == b"MI" else "<"
         while len(tag := stream.read(8)) == 8:
             kind, length = struct.unpack(f"{order}II", tag)
             if kind != _COMPRESSED:
                 stream.seek(length, 1)
                 continue
-            part, left = zlib.decompressobj(), stream.read(length)
+            part, left = zlib.decompressobj(), stream.read(min(length, size))
             while left:
                 total += len(part.decompress(left, 1 << 20))
                 if total > _most(size):
-                    raise InputError(f"{path}: holds more than {total / 1e9:.2g} GB in {size / 1e6:.2g} MB: no log")
+                    raise InputError(
+                        f"{path}: holds more than {total / 1e9:.2g} GB in {size / 1e6:.2g} MB: damaged, or no log"
+                    )
                 left = part.unconsumed_tail
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 from typing import Literal, NamedTuple
@@ -133,12 +132,13 @@ def instruments(flights: Sequence[PlaybackFlight]) -> Instruments:
     """
     runs = tuple(Run(number, part) for number, flight in enumerate(flights) for part in _runs(flight))
     flown = tuple(_cut(flights[run.flight], run.part) for run in runs)
-    outside = _of_one_kind(flown)
+    repeating = repeats(flown)
+    outside = _of_one_kind(flown, {number for path in repeating.paths() for number in path})
     columns = [
         np.hstack([flight.setpoints[name] for name in names]) if names else None
         for flight, names in zip(flown, outside, strict=True)
     ]
-    return Instruments(runs, flown, repeats(flown), tuple(columns), max(outside, key=len, default=()))
+    return Instruments(runs, flown, repeating, tuple(columns), max(outside, key=len, default=()))
 
 
 def late_by(period: float, apart: int) -> range:
@@ -148,6 +148,7 @@ def late_by(period: float, apart: int) -> range:
 
 def late(values: Array, samples: int) -> Array:
     """Hold signals back by whole samples, shape (time, column)."""
+    samples = min(samples, len(values))
     return np.concatenate([np.repeat(values[:1], samples, axis=0), values[: len(values) - samples]])
 
 
@@ -236,14 +237,23 @@ def _outside(flight: PlaybackFlight) -> tuple[str, ...]:
     return tuple(known[0] for kind in _OUTSIDE if (known := [name for name in kind if name in moves]))
 
 
-def _of_one_kind(flights: Sequence[PlaybackFlight]) -> list[tuple[str, ...]]:
-    """Name the setpoints of each flight, of the kind that most samples have: one answer is foretold of all."""
-    kinds = [tuple((name, flight.setpoints[name].shape[1]) for name in _outside(flight)) for flight in flights]
-    samples = Counter[tuple[tuple[str, int], ...]]()
-    for kind, flight in zip(kinds, flights, strict=True):
-        samples[kind] += len(flight) if kind else 0
-    usual = max(samples, key=lambda kind: samples[kind], default=())
-    return [tuple(name for name, _ in kind) if kind == usual else () for kind in kinds]
+def _of_one_kind(flights: Sequence[PlaybackFlight], repeated: Collection[int]) -> list[tuple[str, ...]]:
+    """Name the setpoints of each flight that most samples have: one answer is foretold of all that have them.
+
+    Parameters
+    ----------
+    repeated : collection of int
+        Flights that others repeat, which are told by those.
+    """
+    held = [{(name, flight.setpoints[name].shape[1]) for name in _outside(flight)} for flight in flights]
+    voting = [number for number in range(len(flights)) if number not in repeated] or range(len(flights))
+
+    def samples(kind: frozenset[tuple[str, int]]) -> tuple[int, int, list[tuple[str, int]]]:
+        return sum(len(flights[number]) for number in voting if kind <= held[number]), len(kind), sorted(kind)
+
+    usual = max((frozenset(held[number]) for number in voting if held[number]), key=samples, default=frozenset())
+    names = tuple(name for kind in _OUTSIDE for name in kind if name in dict(usual))
+    return [names if usual <= own else () for own in held]
 
 
 @dataclass(frozen=True)

@@ -121,7 +121,7 @@ def _band(grounds: Grounds) -> Iterator[Reason]:
     freed = grounds.identification.freed
     if freed is not None:
         # Draws know the scatter of the torque that was freed, not that of what freed it.
-        widest = max(widest, *np.expm1(2 * freed.half[freed.told]).tolist())
+        widest = max(widest, *(2 * np.sinh(freed.half[freed.told])).tolist())
     text = f"the widest 95 % band of a moment of inertia is {100 * widest:.3g} % of the inertia itself"
     # A band as wide as its value leaves open by more than a factor of two how hard the body is to turn.
     yield Reason(text, FOR if widest < 1 else AGAINST)

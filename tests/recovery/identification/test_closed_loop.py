@@ -1,5 +1,7 @@
 """`identify` in gusts: the body by what comes again where flights repeat a path, and a warning where none does."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -112,7 +114,7 @@ def test_what_was_asked_for_tells_the_body_of_flights_that_repeat_none(identifie
     np.testing.assert_allclose(result.rigid_body[:2], freed.rigid_body[:2], rtol=5e-3)
     assert result.loop is None
     (finding,) = (each for each in result.findings if "setpoint of position knows of no gust" in each)
-    assert "Izz not determined, for too little of yaw answers it" in finding
+    assert "Izz not determined, for too little of yaw follows" in finding
 
 
 def test_gusts_of_a_flight_do_not_leak_into_what_its_setpoint_foretells():
@@ -121,3 +123,19 @@ def test_gusts_of_a_flight_do_not_leak_into_what_its_setpoint_foretells():
     gusts, asked = rng.standard_normal((2000, 1)).cumsum(axis=0) * 0.1, rng.standard_normal((2000, 60))
     told = foretold(asked, gusts - gusts.mean())
     assert np.sum(told * (gusts - gusts.mean())) < 0.05 * np.sum((gusts - gusts.mean()) ** 2)
+
+
+@pytest.mark.parametrize("length", [9, 50, 80, 300])
+def test_a_flight_that_is_too_short_is_no_instrument(sources, length):
+    (first, *_) = sources["asked"].flights
+    assert freed_torque(first[:length], first[:length]) is None
+
+
+def test_setpoints_that_are_not_known_throughout_are_none(sources):
+    flights = sources["asked"].flights
+    torn = replace(flights[0], setpoints={name: own.copy() for name, own in flights[0].setpoints.items()})
+    for own in torn.setpoints.values():
+        own[:10] = np.nan
+    source = joined([torn, *flights[1:]])
+    found = freed_torque(source, source)
+    assert (found.runs, found.alone) == (3, 1)

@@ -7,6 +7,7 @@ import pytest
 
 from cpfls_cli.consistency.check import check
 from cpfls_cli.consistency.numbers import beyond_belief
+from cpfls_cli.consistency.rotors import beyond_propellers
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.closed_loop_flights import COARSE, PERIOD, VEHICLE, flown, signals_of
 
@@ -128,10 +129,11 @@ FAULTS = {
     ),
     "arms in mm, thrust unknown": (
         lambda s: with_vehicle(
-            guessed(s, 1.0),
+            s,
             rotors=tuple(
                 replace(each, position_m=tuple(1e3 * place for place in each.position_m)) for each in VEHICLE.rotors
             ),
+            unknown=("thrust_factor",),
         ),
         "times more than the mass of",
     ),
@@ -143,6 +145,23 @@ FAULTS = {
 def test_a_fault_is_said(flight, fault):
     made, sentence = FAULTS[fault]
     assert sentence in said(made(flight))
+
+
+def test_rotors_that_idle_on_the_ground_are_said_and_contradict_nothing(flight):
+    level = replace(guessed(flight, 1.0), attitude=0.001 * flight.attitude)
+    for signals, contradicts in ((guessed(flight, 1.0), True), (level, False)):
+        slow = replace(signals, rotor_speed=0.1 * flight.rotor_speed)
+        (found,) = [each for each in check([slow], SETTINGS) if "propellers that fit" in each.what]
+        assert found.contradiction == contradicts
+        assert "whether it took off" in found.remedy
+
+
+def test_rotors_above_each_other_do_not_touch(flight):
+    """Of a coaxial vehicle the room is that between neighbours, not that between the hubs of one arm."""
+    below = [replace(each, position_m=tuple(1.02 * place for place in each.position_m)) for each in VEHICLE.rotors]
+    both = with_vehicle(flight, rotors=(*VEHICLE.rotors, *below), unknown=("thrust_factor",))
+    speed = np.hstack([flight.rotor_speed, flight.rotor_speed])
+    assert beyond_propellers([replace(both, rotor_speed=speed)]) is None
 
 
 def test_rotors_on_another_clock_are_said():

@@ -106,3 +106,10 @@ def test_flights_that_log_other_setpoints_than_most_have_none():
     found = instruments([replace(flight, setpoints=own) for flight, own in zip(flights, asked, strict=True)])
     assert found.names == ("position",)
     assert [each is None for each in found.setpoints] == [False, False, True]
+    # Sticks that lie still in one flight are left out of both.
+    still = {"sticks": np.zeros((len(flights[0]), 4))}
+    moves = {"sticks": np.hstack([flights[1].motion.position, flights[1].motion.position[:, :1]])}
+    both = [replace(flights[0], setpoints=asked[0] | still), replace(flights[1], setpoints=asked[1] | moves)]
+    found = instruments(both)
+    assert found.names == ("position",)
+    assert [each.shape[1] for each in found.setpoints] == [3, 3]

@@ -81,7 +81,7 @@ def test_the_band_of_a_moment_is_no_narrower_than_instruments_know_it():
     told = SimpleNamespace(half=np.array([0.1, 0.05, np.inf]), told=np.array([True, True, False]))
     known = SimpleNamespace(band=np.full(3, 0.005), identification=SimpleNamespace(freed=told))
     (reason,) = _band(known)
-    assert "22.1 %" in reason.text
+    assert "20 %" in reason.text
     known.identification.freed = None
     (reason,) = _band(known)
     assert "0.5 %" in reason.text
