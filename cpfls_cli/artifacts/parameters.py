@@ -29,6 +29,15 @@ FOUND_AS = {
 }
 """Numbers of a fit, by the keys under which people look for them."""
 
+_NAMES = {
+    THRUST: "thrust factor",
+    DRAG: "drag factor",
+    **dict(zip(INERTIA, INERTIA_PARAMETERS, strict=True)),
+    LAG: "lag of the rotors",
+    DELAY: "delay",
+    **dict(zip(CENTRE, ("centre of mass along x", "along y"), strict=True)),
+}
+
 OF_TURNING = frozenset(FOUND_AS[key] for key in (DRAG, *INERTIA))
 """Numbers of a fit that are known only as far as the torques are that turn the vehicle."""
 
@@ -66,6 +75,16 @@ class Parameter(NamedTuple):
     stated: float | None
     determined: bool
     reason: str
+
+    @property
+    def name(self) -> str:
+        """What people call it."""
+        return _NAMES[self.key]
+
+    @property
+    def needed(self) -> bool:
+        """Whether it is anything but a zero that nobody asked for."""
+        return self.value != 0 or self.low is not None or self.stated is not None
 
 
 def parameters_of(record: VehicleRecord) -> Iterator[Parameter]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -245,12 +246,10 @@ def warnings(record: VehicleRecord) -> list[str]:
     if heavy:
         said.append(f"inertia and drag factor: {heavy}")
     # Numbers of the remainder have no meaning of their own, together or apart.
-    said.extend(
-        f"{row['first']} and {row['second']} trade against each other (correlation {row['correlation']:.3f}): only "
-        "together do they mean anything"
-        for row in rows_of(record.trade)
-        if not (_is_learned(row["first"]) and _is_learned(row["second"]))
-    )
+    trades = [row for row in rows_of(record.trade) if not (_is_learned(row["first"]) and _is_learned(row["second"]))]
+    if trades:
+        pairs = "; ".join(f"{row['first']} and {row['second']} ({row['correlation']:.3f})" for row in trades)
+        said.append(f"numbers that trade against each other and mean something only together (correlation): {pairs}")
     stated = [row for row in rows_of(found) if np.isfinite(row["stated"]) and row["stated"] > 0]
     far = [row["name"] for row in stated if not 1 / _FAR < row["value"] / row["stated"] < _FAR]
     if far:
@@ -293,11 +292,15 @@ def _numbers_table(found: Source[VehicleRecord], index: int) -> Iterator[Table]:
 
 
 def _constants(record: VehicleRecord, index: int) -> Iterator[Block]:
-    """Show the constants of a vehicle by key, say what scale they have and what would tell the open ones."""
+    """Show the constants of a vehicle, say what scale they have and what would tell the open ones."""
     listed = list(parameters_of(record))
-    yield _constants_table(listed, index)
+    yield _constants_table([each for each in listed if each.needed], index)
     yield Text(" ".join(_scale(record, {each.key: each for each in listed})))
-    yield from (Text(f"To know {each.key}: {_FLIGHTS[each.key]}.", "warning") for each in filter(_wanting, listed))
+    idle = [each.name for each in listed if not each.needed]
+    if idle:
+        yield Text(f"Left at 0, since no lower error comes with it: {joined(idle)}.")
+    for flight, wanting in groupby(filter(_wanting, listed), key=lambda each: _FLIGHTS[each.key]):
+        yield Text(f"To know {joined(each.name for each in wanting)}: {flight}.", "warning")
 
 
 def _differences_table(record: VehicleRecord, index: int) -> Iterator[Table]:
@@ -326,7 +329,7 @@ def _section_to_paste(record: VehicleRecord) -> Listing:
 def _constants_table(listed: list[Parameter], index: int) -> Table:
     rows: list[list[str | Cell]] = [
         [
-            each.key,
+            each.name,
             each.unit,
             Cell(_or_unknown(each.value, 4), "warning" if _wanting(each) else "plain"),
             *(_or_unknown(value, 3) for value in (each.low, each.high, each.stated)),
@@ -334,8 +337,8 @@ def _constants_table(listed: list[Parameter], index: int) -> Table:
         ]
         for each in listed
     ]
-    caption = "Constants of the vehicle by key of the config, with 95 % intervals; stated: in the config."
-    header = ("Key", "Unit", "Value", "From", "To", "Stated", "Why")
+    caption = "Constants of the vehicle with 95 % intervals; stated: in the config."
+    header = ("Constant", "Unit", "Value", "From", "To", "Stated", "Why")
     return Table(f"vehicle-constants-{index}", caption, header, rows, frozenset({0, 1, 6}), frozenset({6}))
 
 
@@ -358,11 +361,11 @@ def _scale(record: VehicleRecord, known: dict[str, Parameter]) -> Iterator[str]:
         yield "The stated thrust factor gives all forces and torques their size."
     yaw = [known[DRAG], known[INERTIA[2]]]
     if all(each.low is not None for each in yaw):
-        told = [each.key for each in yaw if each.determined]
+        told = [each for each in yaw if each.determined]
         if len(told) == len(yaw):
             yield "About yaw the gyroscopic torque tells the drag factor from Izz."
         else:
-            yield f"About yaw {joined(each.key for each in yaw)} are known as a ratio alone."
+            yield f"About yaw {joined(each.name for each in yaw)} are known as a ratio alone."
 
 
 def found_vehicle_section(sources: Sources) -> Section | None:

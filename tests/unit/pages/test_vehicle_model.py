@@ -51,7 +51,7 @@ def test_numbers_without_a_meaning_of_their_own_are_counted_and_not_listed():
 
 def test_they_are_warned_of_only_where_they_stand_for_a_number_with_a_name():
     said = " ".join(warnings(found(whole())))
-    assert "rotor_drag.k_d and remainder_force.3_0_0 trade" in said
+    assert "only together (correlation): rotor_drag.k_d and remainder_force.3_0_0 (-0.970)" in said
     assert "remainder_force.3_0_1" not in said
     assert "not determined" not in said
 
