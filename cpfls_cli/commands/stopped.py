@@ -40,7 +40,9 @@ def stopped(
     elif signal is None:
         return outcome
     elif unjudged is not None:
-        note = f"{output}: was found but not judged, because of the interrupt; the same command with {unjudged} judges"
+        note = (
+            f"{output}: was found but not judged, because of the interrupt; the same command with {unjudged} judges it"
+        )
     else:
         note = f"{output}: is complete; the interrupt came when there was nothing left to stop"
     code = 0 if signal is None else _FROM_SIGNAL + signal

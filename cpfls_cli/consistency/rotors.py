@@ -84,8 +84,8 @@ def beyond_propellers(parts: Sequence[Signals]) -> Finding | None:
     leans = float(angles[turning].std(axis=0).max()) > _LEANS
     size = number / _TYPICAL if slow else _TYPICAL / number
     return Finding(
-        f"propellers that fit between the hubs lift about {size:.0f} times {'less' if slow else 'more'} than the mass "
-        f"of {vehicle.mass_kg:g} kg at {np.sqrt(power[turning].mean() / speed.shape[1]):.3g} rad/s",
+        f"propellers that fit between the hubs lift about {size:.0f} times {'less' if slow else 'more'} than the "
+        f"weight of {vehicle.mass_kg:g} kg at {np.sqrt(power[turning].mean() / speed.shape[1]):.3g} rad/s",
         "check the unit of import.signals.rotor_speed (rad/s, rpm or Hz), vehicle.mass_kg (kg) and position_m of "
         f"vehicle.rotors (m){', or whether it took off' if slow else ''}",
         ("rotors", "vehicle"),

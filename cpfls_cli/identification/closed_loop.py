@@ -162,7 +162,7 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
         half=half,
         runs=len(runs),
         paths=len(given.repeats.paths()),
-        alone=len(parts) - len(given.flights),
+        alone=len(parts) - len({given.runs[run.number].flight for run in runs}),
         flights=len(parts),
         setpoints=() if repeated else given.names,
     )
@@ -262,7 +262,8 @@ def _runs(given: Instruments, rows: Sequence[Array], period: float) -> list[_Run
         along = (place[known] // length).astype(np.int64)
         block = np.column_stack([np.full(len(along), first), along])
         both = fast[number][known], others[known]
-        found.append(_Run(number, np.flatnonzero(known), rows[number][known], *both, block))
+        if known.any():
+            found.append(_Run(number, np.flatnonzero(known), rows[number][known], *both, block))
     return found
 
 
@@ -286,8 +287,9 @@ def _known(given: Instruments, values: Sequence[Array], period: float, *, fast: 
             asked.append(_fast(columns, period) if fast else columns)
             own = values[number].reshape(len(setpoint), -1)
             known[number] = np.isfinite(asked[-1]).all(axis=1) & np.isfinite(own).all(axis=1)
-    size = sum(int(there.sum()) for there in known.values())
-    if not size or not FOLDS * asked[0].shape[1] < size < _MOST / asked[0].shape[1]:
+    width = asked[0].shape[1] if asked else 0
+    told, every = sum(int(there.sum()) for there in known.values()), sum(len(values[number]) for number in known)
+    if told <= FOLDS * width or every * width > _MOST:
         return {}
     predicted = foretold(
         np.concatenate([each[there] for each, there in zip(asked, known.values(), strict=True)]),

@@ -142,7 +142,7 @@ def test_an_interrupt_while_evidence_is_gathered_leaves_the_whole_model(
             plain["vehicle/inertia_functions/coefficients"][()], whole["vehicle/inertia_functions/coefficients"][()]
         )
     monkeypatch.undo()
-    assert result.stderr.rstrip().endswith("the same command with --resume judges")
+    assert result.stderr.rstrip().endswith("the same command with --resume judges it")
     assert cpfls(*words, "--resume").exit_code == 0
     assert output.read_bytes() == validated[0].read_bytes()
     assert [path.name for path in tmp_path.iterdir()] == ["model.h5"]

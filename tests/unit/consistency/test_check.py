@@ -135,7 +135,7 @@ FAULTS = {
             ),
             unknown=("thrust_factor",),
         ),
-        "times more than the mass of",
+        "times more than the weight of",
     ),
     "a digit of the mass": (lambda s: with_vehicle(s, mass_kg=0.6), "times the weight on average"),
 }
