@@ -42,7 +42,7 @@ class Common:
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False
     verbose: Annotated[
         bool,
-        typer.Option("--verbose", "-v", help="Say what is read and written, how large it is and how long it took."),
+        typer.Option("--verbose", "-v", help="Show the whole answer, what is read and written, and how long it took."),
     ] = False
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check config, inputs and output; compute and write nothing.")

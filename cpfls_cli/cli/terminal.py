@@ -5,11 +5,12 @@ from __future__ import annotations
 import io
 import json
 import os
+import shlex
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,11 +22,16 @@ from cpfls_cli.cli.options import Common
 from cpfls_cli.errors import CpflsError, InputError, NotAnArtifactError, visible
 
 if TYPE_CHECKING:
+    from cpfls_cli.report.content import Text
     from cpfls_cli.report.outcome import Outcome
 
 _BAR_WIDTH = 20
+# Unasked notes leave the answer on a small screen.
+_NOTE_LINES, _NOTE_WIDTH = 5, 80
 # 128 plus the number of SIGPIPE: what a shell reports of the tools that this signal ends.
 _CLOSED_PIPE = 141
+# How often a log hears of long work, with -v and without.
+_ASKED_S, _UNASKED_S = 1.0, 60.0
 
 
 @contextmanager
@@ -68,20 +74,41 @@ def tell(outcome: Outcome, common: Common) -> None:
     if common.as_json:
         print(json.dumps(as_json(outcome.summary), allow_nan=False), flush=True)
     elif not common.quiet:
-        print("\n".join(_lines(outcome)), flush=True)
+        print("\n".join(_lines(outcome, whole=common.verbose)), flush=True)
     if not common.quiet:
-        for warning in warnings_of(outcome.blocks):
-            _complain(warning, "note")
+        for note in _notes(warnings_of(outcome.blocks), whole=common.verbose):
+            _complain(note, "note")
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
 
 
-def _lines(outcome: Outcome) -> Iterator[str]:
-    from cpfls_cli.report.terminal import terminal_lines
+def _lines(outcome: Outcome, *, whole: bool) -> Iterator[str]:
+    """Write an answer, the commands that go on with it, and what more of it there is."""
+    from cpfls_cli.report.terminal import folded_words, terminal_lines
 
-    if not sys.stdout.isatty():
-        return terminal_lines(outcome.blocks)
-    return terminal_lines(outcome.blocks, shutil.get_terminal_size().columns, colour="NO_COLOR" not in os.environ)
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    colour = width is not None and "NO_COLOR" not in os.environ
+    yield from terminal_lines(outcome.blocks, width, colour=colour, whole=whole)
+    if outcome.next:
+        yield "next:"
+        # No line break of ours in it, so that it can be pasted.
+        yield from (f"  {visible(shlex.join(map(str, command)))}" for command in outcome.next)
+    more = () if whole else folded_words(outcome.blocks)
+    if more:
+        yield f"more with -v: {'; '.join(more)}"
+
+
+def _notes(warnings: Sequence[Text], *, whole: bool) -> Iterator[str]:
+    """Give the notes that are shown, and how many more there are: the first few lines, and what must always be seen."""
+    room, left = _NOTE_LINES, 0
+    for warning in warnings:
+        room -= -(-len(f"cpfls: note: {warning.text}") // _NOTE_WIDTH)
+        if whole or warning.always or room >= 0 or warning is warnings[0]:
+            yield warning.text
+        else:
+            left += 1
+    if left:
+        yield f"{left} more note{'s' if left > 1 else ''}: -v shows {'them' if left > 1 else 'it'}"
 
 
 @contextmanager
@@ -91,14 +118,14 @@ def progress_bar(title: str, common: Common) -> Iterator[Callable[..., None]]:
     Yields
     ------
     callable
-        Takes steps done, steps in all, and a note; does nothing where standard error is not a terminal.
+        Takes steps done, steps in all, and a note; where standard error is no terminal it writes a line now and then.
     """
-    if common.quiet or not (common.verbose or sys.stderr.isatty()):
+    if common.quiet:
         yield _silent
         return
     if not sys.stderr.isatty():
-        with _log_shown(title):
-            yield _log_progress(title)
+        with _log_shown(title) if common.verbose else nullcontext():
+            yield _log_progress(title, asked=common.verbose)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
@@ -142,14 +169,14 @@ def _silent(done: float, total: int, note: str = "") -> None:
     """Show nothing."""
 
 
-def _log_progress(title: str) -> Callable[..., None]:
-    """Write a line at most once a second, for logs."""
-    last = [time.monotonic()]
+def _log_progress(title: str, *, asked: bool) -> Callable[..., None]:
+    """Write a line at most once a second, for logs, and the last; unasked once a minute."""
+    last, every = [time.monotonic()], _ASKED_S if asked else _UNASKED_S
 
     def show(done: float, total: int, note: str = "") -> None:
-        if time.monotonic() - last[0] >= 1.0 or done == total:
+        if time.monotonic() - last[0] >= every or (asked and done == total):
             last[0] = time.monotonic()
-            print(f"{title}: {done / total:4.0%}  {visible(note)}", file=sys.stderr)
+            print(f"{title}: {done / total:4.0%}  {visible(note)}", file=sys.stderr, flush=True)
 
     return show
 

@@ -70,7 +70,7 @@ class Artifact(Mapping[str, Any]):
         from cpfls_cli.commands.show import description
         from cpfls_cli.report.terminal import terminal_lines
 
-        return "\n".join(terminal_lines(description(Outline.of(artifact_of(self._record)))))
+        return "\n".join(terminal_lines(description(Outline.of(artifact_of(self._record))), whole=True))
 
     @property
     def path(self) -> Path:

@@ -346,5 +346,5 @@ def _warn(outcome: Outcome, caller: int) -> None:
     """Pass on what a command notes on standard error, as warnings of whoever called the library."""
     from cpfls_cli.report.terminal import warnings_of
 
-    for sentence in warnings_of(outcome.blocks):
-        warnings.warn(sentence, stacklevel=caller)
+    for warning in warnings_of(outcome.blocks):
+        warnings.warn(warning.text, stacklevel=caller)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
@@ -23,10 +23,17 @@ Drawn = Literal["line", "points", "bars", "band", "map", "mark"]
 
 @dataclass(frozen=True)
 class Text:
-    """A paragraph."""
+    """A paragraph.
+
+    Attributes
+    ----------
+    always : bool
+        Of one that warns: whether a terminal shows it however many others there are.
+    """
 
     text: str
     tone: Tone = "plain"
+    always: bool = False
     kind: ClassVar[str] = "text"
 
 
@@ -160,10 +167,19 @@ class Listing:
 
 @dataclass(frozen=True)
 class Folded:
-    """Tables that only some readers want, folded away."""
+    """Blocks that only some readers want: a page folds them away, a terminal names them and shows them on request.
+
+    Attributes
+    ----------
+    summary : str
+        What they are, in a few words.
+    shown : bool
+        Whether a page shows them open.
+    """
 
     summary: str
-    tables: Sequence[Table]
+    blocks: Sequence[Block]
+    shown: bool = False
     kind: ClassVar[str] = "folded"
 
 
@@ -189,6 +205,12 @@ class Box:
 Block = Box | Text | Facts | Table | Plot | Listing | Folded | Heading
 
 
+def unfolded(blocks: Iterable[Block]) -> Iterator[Block]:
+    """List blocks with those folded away in their place."""
+    for block in blocks:
+        yield from unfolded(block.blocks) if isinstance(block, Folded) else (block,)
+
+
 @dataclass(frozen=True)
 class Section:
     """One section of the page; its name is the anchor."""
@@ -199,14 +221,13 @@ class Section:
 
     @property
     def plots(self) -> list[str]:
-        """Names of its plots."""
-        return [block.name for block in self.blocks if isinstance(block, Plot)]
+        """Names of its plots, also of those folded away, in order."""
+        return [block.name for block in unfolded(self.blocks) if isinstance(block, Plot)]
 
     @property
     def tables(self) -> list[str]:
         """Names of its tables, also of those folded away, in order."""
-        shown = [block.tables if isinstance(block, Folded) else [block] for block in self.blocks]
-        return [table.name for tables in shown for table in tables if isinstance(table, Table)]
+        return [block.name for block in unfolded(self.blocks) if isinstance(block, Table)]
 
 
 @dataclass(frozen=True)

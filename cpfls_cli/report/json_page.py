@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.report.content import Block, Document, Facts, Folded, Origin, Panel, Plot, Series, Table
+from cpfls_cli.report.content import Block, Document, Facts, Folded, Origin, Panel, Plot, Series, Table, Text
 
 _DIGITS = 6
 
@@ -39,9 +39,11 @@ def _block(block: Block) -> dict[str, Any]:
         case Table():
             return _table(block)
         case Folded():
-            return {"kind": block.kind, "summary": block.summary, "tables": [_table(table) for table in block.tables]}
+            return {"kind": block.kind, "summary": block.summary, "blocks": [_block(inner) for inner in block.blocks]}
         case Facts():
             return {"kind": block.kind, "rows": [list(row) for row in block.rows]}
+        case Text():
+            return {"kind": block.kind, "text": block.text, "tone": block.tone}
         case Plot():
             words = {"name": block.name, "caption": block.caption, "description": block.description}
             return {"kind": "figure", **words, "panels": [_panel(panel) for panel in block.picture.panels]}

@@ -37,8 +37,8 @@ def _block(block: Block) -> Iterator[str]:
             yield from _table(block)
         case Folded():
             yield f"**{_plain(block.summary)}**"
-            for table in block.tables:
-                yield from _table(table)
+            for inner in block.blocks:
+                yield from _block(inner)
         case Plot():
             yield f"*{_plain(block.caption)}*"
             seen = f"Figure `{block.name}`: {_plain(block.description)}."

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cpfls_cli.report.content import Block, Text
@@ -25,11 +26,14 @@ class Outcome:
         For people, on standard output; texts of tone ``warning`` go to standard error.
     exit_code : int
         Not 0 where the work was stopped.
+    next : tuple of sequences of str or Path
+        Commands to go on with, word by word, with the names of this run.
     """
 
     summary: Mapping[str, Any]
     blocks: tuple[Block, ...] = ()
     exit_code: int = 0
+    next: tuple[Sequence[str | Path], ...] = ()
 
 
 def nothing_written(job: Job) -> Outcome:

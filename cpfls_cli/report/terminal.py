@@ -4,36 +4,44 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable, Iterator, Sequence
+from textwrap import wrap
 
 from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text as RichText
 
 from cpfls_cli.errors import visible
-from cpfls_cli.report.content import Block, Box, Facts, Folded, Heading, Listing, Plot, Table, Text, Tone
+from cpfls_cli.report.content import Block, Box, Facts, Folded, Heading, Listing, Plot, Table, Text, Tone, unfolded
 
 _STYLES: dict[Tone, str] = {"plain": "", "note": "", "good": "green", "warning": "bold red"}
-# Where nothing is a terminal no line is cut or folded, so that other programs can read it.
+# Where nothing is a terminal no number or word is cut or folded, so that other programs can read it.
 _UNLIMITED = 100_000
+# Wider tables are hard to read: their sentences are broken.
+_WIDEST = 100
 
 
-def terminal_lines(blocks: Iterable[Block], width: int | None = None, *, colour: bool = False) -> Iterator[str]:
+def terminal_lines(
+    blocks: Iterable[Block], width: int | None = None, *, colour: bool = False, whole: bool = False
+) -> Iterator[str]:
     """Write blocks as lines; texts that warn are left to `warnings_of`.
 
     Parameters
     ----------
     width : int or None
         Columns of the terminal; None where there is none and lines are as long as they are.
+    whole : bool
+        Show what is folded away too, but figures.
     """
     for block in blocks:
         match block:
             case Text() if block.tone == "warning":
                 pass
             case Text() | Heading():
-                yield visible(block.text)
+                yield from _broken(block.text, width)
             case Box():
-                yield visible(f"{block.label}: {block.title}")
-                yield from (visible(f"  {sentence}") for sentence in block.sentences)
+                yield from _broken(f"{block.label}: {block.title}", width)
+                for each in block.sentences:
+                    yield from _broken(each, width, "  ")
             case Facts():
                 drawn = _grid(colour, header=False)
                 drawn.add_column(no_wrap=True)
@@ -45,34 +53,65 @@ def terminal_lines(blocks: Iterable[Block], width: int | None = None, *, colour:
                 yield from _table(block, width, colour)
             case Listing():
                 yield from visible(block.text.rstrip()).split("\n")
+            case Folded() if whole:
+                yield from _broken(f"{block.summary}:", width)
+                yield from terminal_lines(block.blocks, width, colour=colour, whole=True)
             case Plot() | Folded():
                 pass
 
 
-def warnings_of(blocks: Iterable[Block]) -> tuple[str, ...]:
-    """List the texts that warn."""
-    return tuple(block.text for block in blocks if isinstance(block, Text) and block.tone == "warning")
+def folded_words(blocks: Iterable[Block]) -> tuple[str, ...]:
+    """Say what is folded away."""
+    return tuple(dict.fromkeys(block.summary for block in blocks if isinstance(block, Folded)))
+
+
+def warnings_of(blocks: Iterable[Block]) -> tuple[Text, ...]:
+    """List the texts that warn, also of those folded away."""
+    return tuple(block for block in unfolded(blocks) if isinstance(block, Text) and block.tone == "warning")
+
+
+def _broken(text: str, width: int | None, indent: str = "") -> list[str]:
+    """Break a sentence between words where a terminal has no room for it."""
+    line = indent + visible(text)
+    if width is None or len(line) <= width:
+        return [line]
+    return wrap(
+        line, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False, drop_whitespace=True
+    )
 
 
 def _table(table: Table, width: int | None, colour: bool) -> Iterator[str]:
     if table.caption:
-        yield visible(table.caption)
+        yield from _broken(table.caption, width)
+    lines = _printed(_drawn(table, width is None, colour), width, colour)
+    widest = max((RichText.from_ansi(line).cell_len for line in lines), default=0)
+    if width is not None and widest > width:
+        # No word is broken; what that takes beyond the width, other columns have to give.
+        lines = _printed(_drawn(table, False, colour), 2 * width - widest, colour)
+    if width is None and widest > _WIDEST and table.sentences:
+        lines = _printed(_drawn(table, True, colour, widest - _WIDEST), width, colour)
+    yield from lines
+
+
+def _drawn(table: Table, whole: bool, colour: bool, excess: int = 0) -> RichTable:
+    """Lay out a table, its numbers and words on one line if `whole`; columns of sentences give what is in excess."""
     drawn = _grid(colour, header=any(table.header))
-    for column, title in enumerate(table.header):
-        left = column in table.words or column in table.sentences
-        texts = [title, *(visible(row[column].text) for row in table.cells)]
+    cells = [[visible(cell.text) for cell in row] for row in table.cells]
+    texts = [[visible(title), *(row[column] for row in cells)] for column, title in enumerate(table.header)]
+    long = {column: max(map(len, texts[column])) for column in table.sentences}
+    for column, (title, *_) in enumerate(texts):
+        word = max((len(word) for text in texts[column] for word in text.split()), default=0)
+        share = excess * long.get(column, 0) // max(sum(long.values()), 1)
         drawn.add_column(
-            RichText(visible(title)),
-            justify="left" if left else "right",
-            no_wrap=width is None,
-            min_width=max((len(word) for text in texts for word in text.split()), default=0),
+            RichText(title),
+            justify="left" if column in table.words or column in table.sentences else "right",
+            no_wrap=whole and column not in long,
+            min_width=word,
+            max_width=max(long[column] - share, word) if excess and column in long else None,
         )
     for row in table.cells:
         drawn.add_row(*(RichText(visible(cell.text), _STYLES[cell.tone] if colour else "") for cell in row))
-    lines = _printed(drawn, width, colour)
-    # No word is broken; what that takes beyond the width, other columns have to give.
-    excess = max((RichText.from_ansi(line).cell_len for line in lines), default=0) - (width or _UNLIMITED)
-    yield from _printed(drawn, width - excess, colour) if width and excess > 0 else lines
+    return drawn
 
 
 def _grid(colour: bool, *, header: bool) -> RichTable:

@@ -11,7 +11,7 @@ from unittest.mock import patch
 from cpfls_cli.config.study import Study, resolved
 from cpfls_cli.pages.page import report_page
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.report.content import Box, Document, Facts, Plot, Section, Table, Text
+from cpfls_cli.report.content import Box, Document, Facts, Folded, Plot, Section, Table, Text
 from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import html_page
 from cpfls_cli.report.json_page import json_page
@@ -35,6 +35,8 @@ def phrases(block):
             return [value for _, value in block.rows]
         case Text():
             return [block.text]
+        case Folded():
+            return [phrase for inner in block.blocks for phrase in phrases(inner)]
     return []
 
 
@@ -59,14 +61,15 @@ def in_all_forms(source, blocks, beside=()):
             if hasattr(module, "plot"):
                 drawing.enter_context(patch.object(module, "plot", _undrawn))
         pages = {form: report_page(sources, "0", form).text for form in (Form.HTML, Form.MARKDOWN, Form.JSON)}
-    return _plain({"terminal": "\n".join(terminal_lines(blocks)), **pages})
+    return _plain({"terminal": "\n".join(terminal_lines(blocks, whole=True)), **pages})
 
 
 def blocks_in_all_forms(blocks):
     """Write blocks alone in each form; give the text, one line for each row of a table."""
     document = Document("Title", "0", [Section("answer", "Answer", blocks)], [])
     pages = {Form.HTML: html_page(document), Form.MARKDOWN: markdown_page(document), Form.JSON: json_page(document)}
-    return _plain({"terminal": "\n".join([*terminal_lines(blocks), *warnings_of(blocks)]), **pages})
+    shown = [*terminal_lines(blocks, whole=True), *(warning.text for warning in warnings_of(blocks))]
+    return _plain({"terminal": "\n".join(shown), **pages})
 
 
 def _plain(pages):

@@ -5,12 +5,15 @@ import pty
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from cpfls_cli import compiling
 from cpfls_cli.cli.options import Common
-from cpfls_cli.cli.terminal import progress_bar
+from cpfls_cli.cli.terminal import progress_bar, tell
+from cpfls_cli.report.content import Folded, Text
+from cpfls_cli.report.outcome import Outcome
 from tests.builders.forked import Forked
 
 
@@ -99,6 +102,60 @@ def test_time_left_of_a_resumed_search_is_that_of_its_own_pace(monkeypatch):
             clock[0] += 3.0
         (task,) = bars[0].tasks
         assert task.time_remaining == pytest.approx((26 - 9.5) * 6.0, abs=1.0)
+
+
+@pytest.fixture
+def told(capsys):
+    """Tell an outcome; give the lines of both streams."""
+
+    def call(outcome, **options):
+        tell(outcome, Common(**options))
+        return [stream.splitlines() for stream in capsys.readouterr()]
+
+    return call
+
+
+def test_an_answer_ends_with_the_next_command_and_what_more_there_is(told):
+    blocks = (Text("the answer"), Folded("why", [Text("because")]), Folded("how", []))
+    outcome = Outcome({}, blocks, next=(("cpfls", "check", Path("a name.h5")),))
+    following = ["next:", "  cpfls check 'a name.h5'"]
+    assert told(outcome) == [["the answer", *following, "more with -v: why; how"], []]
+    assert told(outcome, verbose=True) == [["the answer", "why:", "because", "how:", *following], []]
+    assert told(outcome, quiet=True) == [[], []]
+
+
+def test_notes_leave_the_answer_on_the_screen(told):
+    notes = [f"note {number} {'x' * 80}" for number in range(5)]
+    warned = [Text(note, "warning", always=number == 4) for number, note in enumerate(notes)]
+    shown = [f"cpfls: note: {notes[index]}" for index in (0, 1, 4)]
+    assert told(Outcome({}, tuple(warned)))[1] == [*shown, "cpfls: note: 2 more notes: -v shows them"]
+    assert told(Outcome({}, tuple(warned)), verbose=True)[1] == [f"cpfls: note: {note}" for note in notes]
+    # One that is longer than that is shown all the same.
+    assert told(Outcome({}, (Text("x" * 1000, "warning"),)))[1] == [f"cpfls: note: {'x' * 1000}"]
+
+
+@pytest.mark.parametrize(
+    ("options", "shown"),
+    [
+        ({}, ["gap:  40%  half of it", "gap:  80%  most of it"]),
+        ({"verbose": True}, ["gap:  20%  ", "gap:  40%  half of it", "gap:  80%  most of it", "gap: 100%  "]),
+        ({"quiet": True}, []),
+    ],
+)
+def test_a_log_hears_of_long_work_once_a_minute(monkeypatch, capsys, options, shown):
+    clock = [0.0]
+    monkeypatch.setattr("cpfls_cli.cli.terminal.time.monotonic", lambda: clock[0])
+    with progress_bar("gap", Common(**options)) as show:
+        for second, done, note in (
+            (2, 1, ""),
+            (61, 2, "half of it"),
+            (61.5, 3, ""),
+            (125, 4, "most of it"),
+            (126, 5, ""),
+        ):
+            clock[0] = second
+            show(done, 5, note)
+    assert capsys.readouterr().err.splitlines() == shown
 
 
 def test_an_encoding_without_the_signs_of_the_tables_ends_no_command(study, tmp_path):

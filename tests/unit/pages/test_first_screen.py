@@ -283,7 +283,7 @@ def test_notes_on_flights_are_folded_and_each_stands_once():
     )
     (folded,) = notes_on_flights([first, second])
     assert folded.summary == "2 notes on the flights and their import"
-    assert [row[0] for row in folded.tables[0].rows] == ["a.csv: gaps.", "b.csv: late."]
+    assert [row[0] for row in folded.blocks[0].rows] == ["a.csv: gaps.", "b.csv: late."]
     assert list(notes_on_flights([diagnosis()])) == []
     assert counted_notes(["one"]) == "1 note on the flights and their import"
 

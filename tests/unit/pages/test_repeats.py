@@ -122,7 +122,7 @@ def test_bars_hold_all_and_the_table_every_band():
     assert len(panels) == 6
     before = [series.y for series in panels[1].series if len(series.y) == 5]
     assert len(before) == 8
-    (table,) = folded.tables
+    (table,) = folded.blocks
     assert len(table.rows) == 36
     assert table.rows[9][:3] == ["torque about y (pitch)", "0.5 to 1.5", "rad/s²"]
     assert table.rows[9][3:] == ["4.0", "40 ± 4 %", "90 %", "4.0", "0 ± 4 %", "100 %"]

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from cpfls_cli.report.content import Box, Cell, Facts, Folded, Heading, Listing, Plot, Table, Text
-from cpfls_cli.report.terminal import terminal_lines, warnings_of
+from cpfls_cli.report.terminal import folded_words, terminal_lines, warnings_of
 
 TABLE = Table(
     "errors",
@@ -62,7 +62,37 @@ def test_sentences_stand_as_they_are_and_pictures_stay_on_the_page():
 def test_what_warns_is_apart():
     blocks = [Text("all is well"), Text("beware", "warning"), Text("note this", "note")]
     assert lines(*blocks) == ["all is well", "note this"]
-    assert warnings_of(blocks) == ("beware",)
+    assert warnings_of(blocks) == (Text("beware", "warning"),)
+    assert warnings_of([Folded("More", blocks)]) == warnings_of(blocks)
+
+
+def test_what_is_folded_away_is_named_and_shown_on_request():
+    blocks = [Text("the answer"), Folded("why", [Text("because"), Folded("numbers", [Facts([("one", "1")])])])]
+    assert lines(*blocks) == ["the answer"]
+    assert folded_words(blocks) == ("why",)
+    assert lines(*blocks, whole=True) == ["the answer", "why:", "because", "numbers:", "one  1"]
+
+
+def test_a_terminal_breaks_sentences_between_words():
+    box = Box("Verdict", "good", ["one reason that is long"])
+    assert lines(Text("a long sentence"), box, width=15) == [
+        "a long sentence",
+        "Verdict: good",
+        "  one reason",
+        "  that is long",
+    ]
+    assert lines(Text("a long sentence", "note"), width=14) == ["a long", "sentence"]
+
+
+def test_a_wide_table_breaks_its_sentences_where_there_is_no_terminal():
+    sentence = " ".join(f"word{number}" for number in range(30))
+    rows = [["1.5", sentence], ["-2", sentence]]
+    shown = lines(Table("t", "", ("A number", "What it is"), rows, frozenset({1}), frozenset({1})))
+    assert max(map(len, shown)) <= 100
+    assert " ".join(" ".join(shown).split()).count("word29") == 2
+    # Numbers and words stay whole, however many there are.
+    wide = Table("t", "", [f"column-{number}" for number in range(20)], [["1"] * 20])
+    assert len(lines(wide)) == 2
 
 
 def test_colours_only_where_they_are_asked_for():
