@@ -46,8 +46,8 @@ from benchmarks.shared.learners import (
     sparse,
 )
 from benchmarks.shared.sliding_loads import SlidingLoads
-from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.evaluator import uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.search import search

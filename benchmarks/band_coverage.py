@@ -36,8 +36,8 @@ from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, newton_euler_torque
-from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import TorqueData, axis_scale
+from cpfls_cli.identification.evaluator import decode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.samples import Ready

@@ -26,9 +26,8 @@ import numpy as np
 
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
 from cpfls_cli.identification import least_squares
-from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, encode
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.evaluator import Evaluator, Problem, refine
+from cpfls_cli.identification.evaluator import LARGEST_GENE, Evaluator, Problem, decode, encode, refine
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings

@@ -29,9 +29,8 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution.archive import Evaluation
 from cpfls_cli.evolution.engine import evolve
 from cpfls_cli.evolution.settings import EvolutionSettings
-from cpfls_cli.excitation.objective import condition_number
+from cpfls_cli.excitation.objective import condition_number, path_of, variables_of
 from cpfls_cli.excitation.optimise import optimised_rotation
-from cpfls_cli.excitation.variables import path_of, variables_of
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.trajectory.rotation import RotationLimits, RotationMotion, RotationPath, full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings

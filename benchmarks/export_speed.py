@@ -21,8 +21,7 @@ pin_threads()
 
 import numpy as np
 
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.dynamics.visited import CELLS
+from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.export.source import c_source
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.regressor.motion import Motion

@@ -23,8 +23,7 @@ from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import generator
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.flights.training import read_training
-from cpfls_cli.identification.chromosome import decode
-from cpfls_cli.identification.evaluator import Evaluator
+from cpfls_cli.identification.evaluator import Evaluator, decode
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import score_of
 from cpfls_cli.identification.samples import Ready, Samples

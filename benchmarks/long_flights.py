@@ -40,9 +40,8 @@ from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.files import seal_of, text_sha256
 from cpfls_cli.flights.flight_source import flight_source
-from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.data import TorqueSource
-from cpfls_cli.identification.evaluator import Problem, refine
+from cpfls_cli.identification.evaluator import Problem, decode, refine
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.report.canvas import GREY, legend_above, plot, stacked, style_of
 

@@ -30,18 +30,17 @@ from benchmarks.gap import vehicle_of
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import CpflsError, SettingError
+from cpfls_cli.gap.balance.weak_flight import Preparation
 from cpfls_cli.gap.diagnose import DiagnosisRun, diagnose
 from cpfls_cli.gap.naming.ranking import best_floor
 from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, planned_signals
 from cpfls_cli.gap.next_flight.rivals import physical_values, questions_left, usual
-from cpfls_cli.gap.next_flight.room import Room, room_of
+from cpfls_cli.gap.next_flight.room import HarmonicPath, Room, room_of
 from cpfls_cli.gap.next_flight.search import goal, next_flight
 from cpfls_cli.gap.next_flight.separation import Question, SizedEffect, apart, beyond_numbers, gathered
-from cpfls_cli.gap.preparation import Preparation
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.simulation.measured import measure
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
-from cpfls_cli.trajectory.harmonics import HarmonicPath
 from cpfls_cli.trajectory.settings import NextFlightSettings, TrajectorySettings
 from cpfls_cli.weak_form.windows import Recording, common_windows
 

@@ -32,8 +32,7 @@ from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.load import load_study
 from cpfls_cli.evolution.ranking import pareto_front
 from cpfls_cli.flights.training import read_training
-from cpfls_cli.identification.chromosome import uniform_chromosome
-from cpfls_cli.identification.evaluator import Evaluator
+from cpfls_cli.identification.evaluator import Evaluator, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.search import choose
 from cpfls_cli.identification.settings import IdentificationSettings

@@ -13,9 +13,8 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.excitation.optimise import optimised_rotation
-from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import TorqueData, TorqueSource
-from cpfls_cli.identification.evaluator import Evaluator
+from cpfls_cli.identification.evaluator import Evaluator, decode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import score_of
 from cpfls_cli.identification.search import choose, search

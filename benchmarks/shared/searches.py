@@ -22,8 +22,7 @@ from scipy.optimize import differential_evolution
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution.archive import Evaluation
 from cpfls_cli.evolution.engine import start, step
-from cpfls_cli.identification.chromosome import LARGEST_GENE, encode, uniform_chromosome
-from cpfls_cli.identification.evaluator import Evaluator
+from cpfls_cli.identification.evaluator import LARGEST_GENE, Evaluator, encode, uniform_chromosome
 from cpfls_cli.identification.settings import IdentificationSettings
 
 # In place of an objective that has no value.

@@ -17,8 +17,8 @@ from cpfls_cli.inertia import six_parameters
 from cpfls_cli.validation.trust import capped
 
 if TYPE_CHECKING:
+    from cpfls_cli.gap.before_after import LeftOut
     from cpfls_cli.gap.extended import Refit
-    from cpfls_cli.gap.playback import LeftOut
     from cpfls_cli.playback.model import VehicleModel
     from cpfls_cli.vehicle.settings import VehicleSettings
 

@@ -18,9 +18,9 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.models import learned_by, read_base
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
+from cpfls_cli.gap.before_after import errors_by_horizon, left_out, played_pairs
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
-from cpfls_cli.gap.playback import errors_by_horizon, left_out, played_pairs
 from cpfls_cli.gap.whole_vehicle import require_body, whole_vehicle
 from cpfls_cli.pages.extended import warnings
 from cpfls_cli.pages.model import answer

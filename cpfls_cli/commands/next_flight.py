@@ -25,7 +25,7 @@ from cpfls_cli.errors import ComputationError, InputError, SettingError
 from cpfls_cli.export.mission import waypoint_lines
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.balance.weak_flight import WeakFlight
+from cpfls_cli.gap.balance.weak_flight import Preparation, WeakFlight
 from cpfls_cli.gap.naming.ranking import best_floor
 from cpfls_cli.gap.naming.results import Alternative, GapVerdict
 from cpfls_cli.gap.next_flight.logged import (
@@ -40,7 +40,6 @@ from cpfls_cli.gap.next_flight.rivals import physical_values, questions_between,
 from cpfls_cli.gap.next_flight.room import Room, room_of
 from cpfls_cli.gap.next_flight.search import Goal, NextFlight, goal, next_flight
 from cpfls_cli.gap.next_flight.separation import Answer, Question
-from cpfls_cli.gap.preparation import Preparation
 from cpfls_cli.pages.next_flight import advice_words, notes_blocks, size_words
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trajectory import answer, demand_sentences, figure_names, path_figures, plan_blocks

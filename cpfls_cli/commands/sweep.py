@@ -16,8 +16,7 @@ from cpfls_cli.pages.sweep import answer
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.search.resumable import SearchOptions, Watch
-from cpfls_cli.search.sweep_plan import sweep_plan
-from cpfls_cli.search.sweep_runs import PartialSweep, finish_runs
+from cpfls_cli.search.sweep_runs import PartialSweep, finish_runs, sweep_plan
 
 
 def run(

@@ -15,8 +15,7 @@ from cpfls_cli.artifacts.spec import InputFile, rows_of
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.dynamics.visited import CELLS
+from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Missing, Off, sized
 from cpfls_cli.export.sheet import Sheet

@@ -11,11 +11,10 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.channels import channel_warnings, filter_warnings
 from cpfls_cli.consistency.check import findings_of
 from cpfls_cli.consistency.clocks import actuation_delay
-from cpfls_cli.consistency.faults import CheckedFault, findings
 from cpfls_cli.consistency.findings import AuditFinding, capitalised, contradictions, doubts
 from cpfls_cli.consistency.gyroscope import GyroFit
 from cpfls_cli.consistency.repairs import ChannelRepair, shifted
-from cpfls_cli.consistency.sensors import sensors_of
+from cpfls_cli.consistency.sensors import CheckedFault, findings, sensors_of
 from cpfls_cli.effects.hooks import ReadingError
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.excitation.objective import Objective, condition_number
-from cpfls_cli.excitation.variables import path_of, variables_of
+from cpfls_cli.excitation.objective import Objective, condition_number, path_of, variables_of
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.rounding import at_most, levelled
 from cpfls_cli.trajectory.rotation import RotationLimits, RotationPath, full_rotation

@@ -10,9 +10,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import vertical
-from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.effects.polynomial import STATE_TERMS
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.scales import hover_speed

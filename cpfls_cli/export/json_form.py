@@ -9,9 +9,8 @@ import numpy as np
 
 from cpfls_cli.artifacts.model import GustsGroup
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import VERTICAL
-from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.effects.polynomial import FACTORS
 from cpfls_cli.export.points import PERIOD
 from cpfls_cli.export.sheet import EXPORTER, GUST_RECIPE, Sheet, base_of, rule_labels

@@ -12,9 +12,8 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import body_torque
-from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.model import VehicleModel

@@ -11,9 +11,8 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import VERTICAL, vertical
-from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.effects.polynomial import FACTORS
 from cpfls_cli.export.points import PERIOD, Expected, ReferencePoints, ReferenceRun
 from cpfls_cli.export.sheet import Sheet, rule_labels

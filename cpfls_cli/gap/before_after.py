@@ -4,22 +4,183 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, Preparation, weak_flight
 from cpfls_cli.gap.extended import ExtendedModel, plain
 from cpfls_cli.gap.naming.held_out import HeldOut
-from cpfls_cli.gap.playback import PlayedPair, WorstStretch, errors_by_horizon, played_pairs, worst_stretch
-from cpfls_cli.gap.preparation import Preparation
 from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
 from cpfls_cli.gap.residual.views import GapStretch, Whiteness, stretches, whiteness
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.whole_vehicle import whole_vehicle
-from cpfls_cli.playback.replay import Replay
+from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.player import Runs, apart, free_runs, made_ready
+from cpfls_cli.playback.replay import MODEL, STATED, Played, Replay, drawn_runs, replay
+from cpfls_cli.rounding import largest
 from cpfls_cli.weak_form.windows import Recording, Windows, common_windows
+
+# Samples between starts of free runs, which are alike.
+_EVERY = 5
+# Shown: two free runs of a second, which is when they part; an effect left out is measured where errors still add up.
+_STRETCH_S, _RUN_S, _LEFT_S = 2.0, 1.0, 0.5
+
+
+@dataclass(frozen=True)
+class PlayedPair(Played):
+    """A flight, a model with effects, and the model as given, which takes the log as it is.
+
+    Attributes
+    ----------
+    logged : PlaybackFlight
+        With the faults of the sensors, so that a fault shows.
+    """
+
+    logged: PlaybackFlight
+
+    def runs(self, prediction: str, starts: IntArray, horizon: int) -> Runs:
+        """Predict from samples of the flight."""
+        if prediction == STATED:
+            return free_runs(self.stated, self.logged, starts, horizon)
+        return super().runs(prediction, starts, horizon)
+
+    @property
+    def as_given(self) -> Played:
+        """The flight as logged and the model as given."""
+        return Played(self.logged, self.stated, self.stated)
+
+
+def played_pairs(recordings: Sequence[Recording], model: VehicleModel, given: VehicleModel) -> list[PlayedPair]:
+    """Make flights, a model with effects and the model as given ready for playback.
+
+    Raises
+    ------
+    InputError
+        If a flight lacks a signal that an effect needs.
+    """
+    pairs = []
+    for recording in recordings:
+        flight = LoggedFlight.of(recording.name, recording.signals)
+        along, player = made_ready(model, flight)
+        logged, stated = (along, player) if given is model else made_ready(given, flight)
+        pairs.append(PlayedPair(along, player, stated, logged))
+    return pairs
+
+
+class LeftOut(NamedTuple):
+    """What one effect of a model does along flights.
+
+    Attributes
+    ----------
+    wrench : array, shape (6,), N m and N
+        Root mean square.
+    ends : array, shape (4,)
+        How far half a second of playback ends off without it: means of the norms of position, velocity, attitude and
+        rate, SI; NaN for what a flight does not show.
+    """
+
+    name: str
+    wrench: Array
+    ends: Array
+
+
+def left_out(model: VehicleModel, names: Sequence[str], recordings: Sequence[Recording]) -> list[LeftOut]:
+    """Play a model back along flights, as it is and without single effects.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of effects.
+
+    Raises
+    ------
+    InputError
+        If a flight lacks a signal that an effect needs.
+    """
+    return [_left_out(model, name, recordings) for name in names]
+
+
+def _left_out(model: VehicleModel, name: str, recordings: Sequence[Recording]) -> LeftOut:
+    others = tuple(effect for effect in model.effects if effect.name != name)
+    squares, ends, runs, samples = np.zeros(6), np.zeros(4), 0, 0
+    for pair in played_pairs(recordings, model, replace(model, effects=others)):
+        difference = pair.model.wrench(pair.flight) - pair.stated.wrench(pair.logged)
+        squares, samples = squares + (difference**2).sum(axis=0), samples + len(difference)
+        horizon = min(max(1, round(_LEFT_S / pair.flight.motion.period)), len(pair.flight) - 1)
+        starts = pair.flight.starts(horizon, _EVERY)
+        both = [pair.runs(prediction, starts, horizon) for prediction in (MODEL, STATED)]
+        off = np.where(pair.flight.shown, apart(*both), np.nan)
+        ends, runs = ends + len(starts) * off, runs + len(starts)
+    return LeftOut(name, np.sqrt(squares / samples), ends / runs)
+
+
+def errors_by_horizon(pairs: Sequence[PlayedPair], horizon_s: float) -> Replay:
+    """Play back from every fifth sample of the flights.
+
+    Parameters
+    ----------
+    pairs : sequence of PlayedPair
+        Of one rate.
+    horizon_s : float, s
+        At most; one sample at least.
+    """
+    asked = max(1, round(horizon_s / pairs[0].flight.motion.period))
+    longest = min(asked, *(len(pair.flight) - 1 - _EVERY for pair in pairs))
+    return replay(pairs, longest, _EVERY)
+
+
+@dataclass(frozen=True)
+class WorstStretch:
+    """Measured and simulated body rates over the stretch of flights in which the model as given is farthest off.
+
+    Attributes
+    ----------
+    flight : int
+        Number of the flight.
+    first : int
+        Sample of the flight at which it begins.
+    measured, before, after : array, shape (run, sample, 3), rad/s, body frame
+        Each run starts from the measured rates.
+    axis : int
+        Body axis on which the model as given is worst.
+    """
+
+    flight: int
+    first: int
+    measured: Array
+    before: Array
+    after: Array
+    axis: int
+
+
+def worst_stretch(pairs: Sequence[PlayedPair]) -> WorstStretch:
+    """Find where free runs of the model as given, one second each and one after another, are farthest off.
+
+    Raises
+    ------
+    InputError
+        If a flight is shorter than one run.
+    """
+    samples = max(2, round(_RUN_S / pairs[0].flight.motion.period))
+    found = [_worst(index, pair, samples) for index, pair in enumerate(pairs)]
+    return largest(found, lambda stretch: float(((stretch.before - stretch.measured) ** 2).mean()))
+
+
+def _worst(index: int, pair: PlayedPair, samples: int) -> WorstStretch:
+    starts = pair.flight.starts(samples - 1, samples)
+    before = drawn_runs(pair.as_given, starts, samples - 1).model
+    after = drawn_runs(pair, starts, samples - 1)
+    square = ((before - after.measured) ** 2).sum(axis=1)
+    joined = min(len(starts), round(_STRETCH_S / _RUN_S))
+    begin = int(np.convolve(square.sum(axis=1), np.ones(joined), mode="valid").argmax())
+    runs = slice(begin, begin + joined)
+    axis = int(square[runs].sum(axis=0).argmax())
+    return WorstStretch(index, int(starts[begin]), after.measured[runs], before[runs], after.model[runs], axis)
+
 
 # Shown around a stretch at least, and points in a window of a picture, which look like a curve.
 _SHORTEST_S = 4.0

@@ -12,10 +12,10 @@ from cpfls_cli.consistency.audit import Audit, audit
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
+from cpfls_cli.gap.before_after import PlayedPair, errors_by_horizon, played_pairs
 from cpfls_cli.gap.naming.leftover import not_excited
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import NotExcited
-from cpfls_cli.gap.playback import PlayedPair, errors_by_horizon, played_pairs
 from cpfls_cli.gap.residual.dependence import Dependence, joined_states, rank_dependence, state_signals
 from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
 from cpfls_cli.gap.residual.views import GapStretch, HeatMap, heat_map, stretches

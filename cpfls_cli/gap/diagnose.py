@@ -15,7 +15,7 @@ from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, has_force
-from cpfls_cli.gap.balance.weak_flight import WeakFlight
+from cpfls_cli.gap.balance.weak_flight import Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
@@ -33,7 +33,6 @@ from cpfls_cli.gap.naming.leftover import Leftover, beside_the_unnamed, not_exci
 from cpfls_cli.gap.naming.ranking import SearchStep, rank_effects
 from cpfls_cli.gap.naming.results import Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
 from cpfls_cli.gap.naming.search import forward_selection
-from cpfls_cli.gap.preparation import Preparation
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.windows import Recording, common_windows

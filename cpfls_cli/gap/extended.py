@@ -19,6 +19,7 @@ from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import (
     CHANNELS,
     Candidate,
+    Preparation,
     WeakFlight,
     nuisance,
 )
@@ -26,7 +27,6 @@ from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, weighted_e
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import NamedEffect
-from cpfls_cli.gap.preparation import Preparation
 from cpfls_cli.gap.settings import VISIBLE, GapSettings
 from cpfls_cli.weak_form.windows import Recording, common_windows
 

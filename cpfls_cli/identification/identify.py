@@ -8,16 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions, visited_cells
 from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
-from cpfls_cli.dynamics.visited import visited_cells
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.engine import History
-from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.closed_loop import freed_torque, loop_along, told_by
 from cpfls_cli.identification.cross_validation import RidgeCurve, with_folds
 from cpfls_cli.identification.data import TorqueSource, axis_scale
-from cpfls_cli.identification.evaluator import Evaluator
+from cpfls_cli.identification.evaluator import Evaluator, decode, uniform_chromosome
 from cpfls_cli.identification.excitation import RuleExcitation, axis_evidence, rule_excitation
 from cpfls_cli.identification.findings import FitDiagnostics, findings
 from cpfls_cli.identification.judge import Baseline, Score, fit_baselines, score_of

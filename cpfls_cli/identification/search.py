@@ -13,9 +13,8 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.evolution.archive import Archive, Evaluate, Evaluation
 from cpfls_cli.evolution.engine import End, EvolutionState, History, ended, start, step
-from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import TorqueSource
-from cpfls_cli.identification.evaluator import OBJECTIVES, Evaluator
+from cpfls_cli.identification.evaluator import OBJECTIVES, Evaluator, decode, uniform_chromosome
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import Choice, IdentificationSettings
 from cpfls_cli.rounding import at_most, levelled

@@ -1,24 +1,266 @@
-"""The runs of a sweep one after the other: each kept as soon as it is finished, so that a stopped sweep goes on."""
+"""The runs of a sweep: settings, samples, seeds and their order; each is kept as soon as it is finished."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+
+from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.job import Job, header_of
-from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.selection import SelectionRecord
+from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import write_record
-from cpfls_cli.artifacts.sweep import RunGroup, SweepRecord
+from cpfls_cli.artifacts.sweep import ALL_SAMPLES, RunGroup, SettingGroup, SweepRecord
 from cpfls_cli.config.load import parse_config
-from cpfls_cli.config.study import generator, settings_of
-from cpfls_cli.errors import InputError
-from cpfls_cli.identification.identify import Identification, identify
-from cpfls_cli.identification.search import NothingFoundError, SearchStep, StopReason, is_end
+from cpfls_cli.config.overrides import Variant, variants
+from cpfls_cli.config.study import Study, generator, settings_of
+from cpfls_cli.errors import ComputationError, ConfigError, InputError
+from cpfls_cli.flights.inputs import choosing_source, held_out_parts
+from cpfls_cli.flights.training import SplitFlights, TrainingData, split_training, uniform_regressor
+from cpfls_cli.identification.data import TorqueSource, gathered
+from cpfls_cli.identification.identify import TRAINING, Identification, identify
+from cpfls_cli.identification.search import NothingFoundError, SearchStep, StopReason, is_end, require_flights
 from cpfls_cli.inertia import six_parameters
+from cpfls_cli.reduction.survey import survey
+from cpfls_cli.reduction.training_set import check_streamed, reduce_streamed
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.search.checkpoint import Checkpoint, Leftover, StoppedSearch, differences
 from cpfls_cli.search.resumable import Resumable, SearchOptions, Watch
-from cpfls_cli.search.sweep_plan import SweepPlan
+
+# Work of an evaluation that does not grow with the samples, in samples.
+_FIXED_WORK = 1000
+
+
+class SweepSamples:
+    """Training data by setting; what two settings have in common is made once.
+
+    Parameters
+    ----------
+    job : Job
+        A dry run only checks that samples could be chosen.
+    inputs : mapping of str to InputFile
+        By role; the flights among them.
+    """
+
+    def __init__(self, job: Job, flights: Sequence[Path], inputs: Mapping[str, InputFile]) -> None:
+        self._job, self._flights, self._inputs = job, flights, inputs
+        self._splits: dict[Any, SplitFlights] = {}
+        self._data: dict[Any, tuple[TrainingData, float]] = {}
+
+    def of(self, variant: Variant) -> tuple[TrainingData, float]:
+        """Choose the samples of a setting, as `cpfls reduce` would, and give their condition number."""
+        study = variant.study
+        cut = (study.identification.training_share, study.identification.embargo_s)
+        if cut not in self._splits:
+            self._splits[cut] = split_training(self._flights, study, self._inputs)
+        split = self._splits[cut]
+        key = (
+            *cut,
+            study.reduction if variant.reduced else None,
+            *(getattr(study.identification, f.name) for f in fields(StructureSettings)),
+        )
+        if key not in self._data:
+            self._data[key] = self._chosen(split, study, variant)
+        return self._data[key]
+
+    def _shown(self, name: str) -> Callable[[int, int], None]:
+        """Show how many samples are chosen; the bar is for the searches."""
+        return lambda done, most: self._job.progress(0, 1, f"choosing samples: {name}, {done} of {most}")
+
+    def _chosen(self, split: SplitFlights, study: Study, variant: Variant) -> tuple[TrainingData, float]:
+        training, settings, rng = split.training, study.reduction, generator(study, "reduce")
+        everything = TrainingData(training, training, split.rests, split.training_indices, split.parts)
+        with settings_of("reduction", study):
+            surveyed = survey(uniform_regressor(training, study), settings.rank_tolerance)
+            if not variant.reduced:
+                return everything, surveyed.condition_number
+            if self._job.dry_run:
+                check_streamed(surveyed, settings, rng)
+                return everything, surveyed.condition_number
+            selection = reduce_streamed(surveyed, settings, rng, self._shown(variant.name))
+        chosen, condition = np.sort(selection.indices), selection.condition_number
+        data = TrainingData(
+            training, gathered(training, chosen), split.rests, split.training_indices[chosen], split.parts
+        )
+        return data, condition if np.isfinite(condition) else float("nan")
+
+
+@dataclass(frozen=True)
+class SweptSetting:
+    """One setting of a sweep with all that its runs have in common.
+
+    Attributes
+    ----------
+    uniform_condition_number : float
+        Of the samples learned from, at uniform partitions; NaN below the rank of all.
+    held_out : mapping of str to TorqueSource
+        What is judged beside the training part, by name.
+    kept : TorqueSource or None
+        What its model is chosen on, beside its objectives.
+    """
+
+    variant: Variant
+    data: TrainingData
+    uniform_condition_number: float
+    held_out: Mapping[str, TorqueSource]
+    kept: TorqueSource | None
+
+    @property
+    def criterion(self) -> str:
+        """What chooses its samples."""
+        return self.variant.study.reduction.criterion if self.variant.reduced else ALL_SAMPLES
+
+    @property
+    def selection(self) -> InputFile:
+        """The samples learned from, as if they were a file."""
+        digest = hashlib.sha256(self.data.indices.astype("<i8").tobytes())
+        return InputFile(f"samples of '{self.variant.name}'", digest.hexdigest(), SelectionRecord.FORMAT.name)
+
+    @property
+    def genes(self) -> int:
+        """Weights of its chromosomes."""
+        return model_structure(self.variant.study.identification).genes
+
+    @property
+    def work(self) -> int:
+        """Roughly how long a run takes, beside other settings."""
+        settings = self.variant.study.identification
+        evaluations = settings.population * (1 + settings.generation_gap * settings.generations)
+        return round(evaluations * (len(self.data.learned) + _FIXED_WORK))
+
+
+@dataclass(frozen=True)
+class SweepPlan:
+    """All runs of a sweep: every setting with the first seed, then every setting with the next.
+
+    Attributes
+    ----------
+    parts : tuple of str
+        What models are judged on; the training part first.
+    """
+
+    settings: tuple[SweptSetting, ...]
+    seeds: tuple[int, ...]
+    parts: tuple[str, ...]
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return len(self.settings) * len(self.seeds)
+
+    def setting(self, run: int) -> SweptSetting:
+        """Give the setting of a run."""
+        return self.settings[run % len(self.settings)]
+
+    def seed(self, run: int) -> int:
+        """Give the seed of a run."""
+        return self.seeds[run // len(self.settings)]
+
+    def study(self, run: int) -> Study:
+        """Give the study of a run."""
+        return self.setting(run).variant.study.model_copy(update={"seed": self.seed(run)})
+
+    @property
+    def no_runs(self) -> RunGroup:
+        """Its runs before the first is finished."""
+        return RunGroup.none(len(self.parts), max(setting.genes for setting in self.settings))
+
+    def record(self, runs: RunGroup) -> SweepRecord:
+        """Arrange the sweep with the runs that are finished."""
+        studies = [setting.variant.study for setting in self.settings]
+        columns = SettingGroup(
+            name=tuple(setting.variant.name for setting in self.settings),
+            overrides=tuple(json.dumps(list(s.variant.overrides), ensure_ascii=False) for s in self.settings),
+            structure=tuple(study.identification.structure for study in studies),
+            samples=np.array([len(setting.data.learned) for setting in self.settings]),
+            criterion=tuple(setting.criterion for setting in self.settings),
+            selection=tuple(setting.selection.sha256 for setting in self.settings),
+            population=np.array([study.identification.population for study in studies]),
+            generations=np.array([study.identification.generations for study in studies]),
+            judged_on=tuple(study.identification.judged_on for study in studies),
+            ranking=tuple(study.identification.ranking for study in studies),
+            uniform_condition_number=np.array([setting.uniform_condition_number for setting in self.settings]),
+        )
+        return SweepRecord(
+            setting=columns,
+            part=self.parts,
+            largest_torque=self._largest_torque,
+            run=runs,
+            complete=len(runs) == self.runs,
+        )
+
+    @cached_property
+    def _largest_torque(self) -> Array:
+        """Find the largest torque of each part, in the first setting that is judged on it; shape (parts,), N m."""
+        largest: dict[str, float] = {}
+        for setting in self.settings:
+            for part, source in {TRAINING: setting.data.training, **setting.held_out}.items():
+                if part not in largest:
+                    largest[part] = max(float(np.max(np.abs(data.torque))) for data in source.chunks())
+        return np.array([largest[part] for part in self.parts])
+
+    def work(self, runs: int) -> int:
+        """Tell roughly how long so many runs take."""
+        return sum(self.setting(run).work for run in range(runs))
+
+    @contextmanager
+    def naming(self, run: int) -> Iterator[None]:
+        """Name the run in which something failed."""
+        with naming(f"sweep setting '{self.setting(run).variant.name}', seed {self.seed(run)}"):
+            yield
+
+
+def sweep_plan(
+    job: Job,
+    flights: Sequence[Path],
+    validate: Sequence[Path],
+    inputs: Mapping[str, InputFile],
+    choose_on: Sequence[Path] = (),
+) -> SweepPlan:
+    """Gather the settings of a sweep, and choose the samples of each.
+
+    Parameters
+    ----------
+    choose_on : sequence of Path
+        That models are chosen on, in settings whose choice is `held-out`.
+    """
+    samples, settings, kept = SweepSamples(job, flights, inputs), [], choosing_source(choose_on, inputs)
+    for variant in variants(job.study):
+        with naming(f"sweep setting '{variant.name}'"):
+            data, condition_number = samples.of(variant)
+            held_out = held_out_parts(variant.study, data.rests, inputs, validate)
+            settings.append(SweptSetting(variant, data, condition_number, held_out, _kept(variant, kept)))
+    if kept is not None and all(setting.kept is None for setting in settings):
+        raise InputError("--choose-on: no setting of the sweep has identification.choice: held-out; leave it out")
+    parts = dict.fromkeys([TRAINING, *(part for setting in settings for part in setting.held_out)])
+    seeds = tuple((job.study.seed + number) % 2**63 for number in range(job.study.sweep.seeds))
+    return SweepPlan(tuple(settings), seeds, tuple(parts))
+
+
+def _kept(variant: Variant, kept: TorqueSource | None) -> TorqueSource | None:
+    choice = variant.study.identification.choice
+    chosen_on = kept if choice == "held-out" else None
+    with settings_of("identification", variant.study):
+        require_flights(choice, given=chosen_on is not None)
+    return chosen_on
+
+
+@contextmanager
+def naming(what: str) -> Iterator[None]:
+    """Name the part of a sweep in which something failed."""
+    try:
+        yield
+    except (ComputationError, ConfigError) as error:
+        raise type(error)(f"{what}: {error}") from None
+
 
 _SECTIONS = ("reduction", "identification", "sweep")
 _SEEDS = "sweep.seeds"

@@ -9,9 +9,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
-from cpfls_cli.dynamics.visited import CELLS
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.judge import score_of
 from cpfls_cli.regressor.motion import Motion

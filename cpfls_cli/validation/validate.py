@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics.equations_of_motion import Predictor
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics.rigid_body import inertia_matrix
+from cpfls_cli.errors import ComputationError
 from cpfls_cli.identification.closed_loop import told_by
-from cpfls_cli.identification.data import TorqueSource
+from cpfls_cli.identification.data import OtherTorque, TorqueData, TorqueSource
 from cpfls_cli.identification.identify import TRAINING, Identification, model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.validation.bands import definite_share
+from cpfls_cli.inertia import symmetric
+from cpfls_cli.regressor.structure import PITCH, ROLL
+from cpfls_cli.rotations import wrapped
+from cpfls_cli.validation.bands import definite_share, inertia_band
 from cpfls_cli.validation.bootstrap import Draws, bootstrap
-from cpfls_cli.validation.curves import Curves, RoundTrip, curves, round_trip
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
 from cpfls_cli.validation.paired import compare_torque, mean_missing_torque, with_constant
 from cpfls_cli.validation.physical import PeriodErrors, Physics, one_period_away, physical_sense
 from cpfls_cli.validation.replay import StepErrors, replay_steps
 from cpfls_cli.validation.residuals import ResidualAnalysis, examine_residuals
 from cpfls_cli.validation.structures import StructureComparison, compare_structures
+from cpfls_cli.validation.timeline import TimeBlocks, time_blocks
 from cpfls_cli.validation.verdict import Verdict, beside_loop, verdict
 
 Tell = Callable[[str], None]
@@ -120,3 +127,200 @@ def validate(
     )
     judged = beside_loop(verdict(grounds), result.loop)
     return Validation(structures, residuals, draws, drawn, again, steps, physics, period, judged)
+
+
+POINTS = 181
+"""Every two degrees of a whole turn."""
+
+# A flight that stays within this range would be a speck on the whole turn.
+_SMALL_RANGE = np.deg2rad(60.0)
+_MARGIN_SHARE = 0.25
+_SMALLEST_MARGIN = np.deg2rad(2.0)
+
+# Of a long flight every so many samples are enough to say where it was.
+_LOOKED_AT = 100_000
+
+# Share of the largest inertia that rounding may take a curve out of a band of no width.
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class Curves:
+    """D_ij(q) along curves of attitude.
+
+    Attributes
+    ----------
+    name : tuple of str
+        "over roll", "over pitch".
+    attitude : array, shape (curves, points, 3), rad
+    inertia : array, shape (curves, points, 3, 3), kg m^2
+        Of the model.
+    low, high : array, shape (curves, points, 3, 3), kg m^2
+        Its 95 % band. Of a model without a rigid body below it is, where training was not, what the structure does, not
+        what the vehicle does.
+    rigid_body : array, shape (curves, points, 3, 3), kg m^2
+        Of the rigid body that fits best.
+    outside : array of bool, shape (curves, points)
+        Where training was not.
+    """
+
+    name: tuple[str, ...]
+    attitude: Array
+    inertia: Array
+    low: Array
+    high: Array
+    rigid_body: Array
+    outside: BoolArray
+
+    @property
+    def relative_width(self) -> Array:
+        """Widest band of D11, D22 and D33 over the value itself, where training was, shape (3,)."""
+        moments = np.diagonal(self.inertia, axis1=2, axis2=3)
+        width = np.diagonal(self.high - self.low, axis1=2, axis2=3)
+        ratio = np.divide(width, np.abs(moments), out=np.full_like(width, np.inf), where=moments != 0)
+        return np.asarray(np.max(ratio[~self.outside], axis=0, initial=0.0))
+
+
+def curves(model: InertiaFunctions, draws: Draws, best_rigid_body: Array, training: TorqueSource) -> Curves:
+    """Evaluate a model over roll, at the median pitch of the training data, and over pitch, at their median roll.
+
+    Each curve runs from -180 to 180 degrees; where training kept within 60 degrees, over what it visited and a quarter
+    of that on both sides.
+
+    Parameters
+    ----------
+    best_rigid_body : array, shape (6,), kg m^2
+    """
+    every = len(training) // _LOOKED_AT + 1
+    visited = wrapped(np.concatenate([data.motion.attitude[::every, :2] for data in training.chunks()]))
+    attitude = np.stack([_along(visited, angle) for angle in (ROLL, PITCH)])
+    flat, shape = attitude.reshape(-1, 3), (*attitude.shape[:2], 3, 3)
+    low, high = inertia_band(model, draws, flat)
+    return Curves(
+        name=("over roll", "over pitch"),
+        attitude=attitude,
+        inertia=model.inertia(flat).value.reshape(shape),
+        low=low.reshape(shape),
+        high=high.reshape(shape),
+        rigid_body=inertia_matrix(flat, symmetric(best_rigid_body)).reshape(shape),
+        outside=model.outside(flat).reshape(attitude.shape[:2]),
+    )
+
+
+def _along(visited: Array, angle: int) -> Array:
+    """Attitudes along a curve, shape (points, 3)."""
+    attitude = np.zeros((POINTS, 3))
+    attitude[:, :2] = np.median(visited, axis=0)
+    attitude[:, angle] = np.linspace(*_ends(visited[:, angle]), POINTS)
+    return attitude
+
+
+def _ends(angle: Array) -> tuple[float, float]:
+    lowest, highest = float(np.min(angle)), float(np.max(angle))
+    if highest - lowest >= _SMALL_RANGE:
+        return -np.pi, np.pi
+    margin = max(_MARGIN_SHARE * (highest - lowest), _SMALLEST_MARGIN)
+    return lowest - margin, highest + margin
+
+
+def simulated_torque(source: TorqueSource, model: InertiaFunctions, blocks: TimeBlocks, factor: Array) -> OtherTorque:
+    """Take the motion of a source with the torque of a model, and what it missed as noise, turned over by block.
+
+    Parameters
+    ----------
+    factor : array, shape (blocks,)
+        What the errors of each block are multiplied with.
+    """
+
+    def simulated(data: TorqueData) -> Array:
+        predicted = model.torque(data.motion)
+        return predicted + factor[blocks.number(data.time), None] * (data.torque - predicted)
+
+    return OtherTorque(source, simulated)
+
+
+@dataclass(frozen=True)
+class RoundTrip:
+    """The inertia matrix identified from torque that a model gave.
+
+    Attributes
+    ----------
+    inertia : array, shape (curves, points, 3, 3), kg m^2
+        Along the curves of the model.
+    inside : array, shape (3, 3)
+        Share of the points that training visited where it lies within the model's band; NaN for an entry that is zero
+        everywhere, and where no point was visited.
+    """
+
+    inertia: Array
+    inside: Array
+
+
+def round_trip(
+    training: TorqueSource,
+    learned: TorqueSource,
+    settings: IdentificationSettings,
+    model: InertiaFunctions,
+    curves: Curves,
+    rng: np.random.Generator,
+) -> RoundTrip:
+    """Identify a model again from torque that it gave itself.
+
+    The torque of the model along the training motion gets the model's own errors as noise, those of each block of
+    samples times +1 or -1: noise as strong and as correlated as in the flight, none where the model misses nothing. It
+    is larger than the errors by what the fit has followed of it.
+
+    Nothing is integrated in time: the motion is the recorded one, and only the torque is evaluated anew.
+
+    The partitions are the model's: a search would find others that fit as well, and the question here is whether the
+    samples determine the inertia, not the breakpoints. The ridge weight is chosen anew, and its pull towards a rigid
+    body is shared by both models: a model that it pulled too far comes back all the same.
+
+    Parameters
+    ----------
+    training, learned : TorqueSource
+        What the model was identified from.
+
+    Raises
+    ------
+    ComputationError
+        If the simulation gives no finite model.
+    """
+    again = _identified_again(_simulated(training, learned, settings, model, rng), settings, model)
+    inertia = again.inertia(curves.attitude.reshape(-1, 3)).value.reshape(curves.inertia.shape)
+    return RoundTrip(inertia, _inside(inertia, curves))
+
+
+def _simulated(
+    training: TorqueSource,
+    learned: TorqueSource,
+    settings: IdentificationSettings,
+    model: InertiaFunctions,
+    rng: np.random.Generator,
+) -> tuple[TorqueSource, TorqueSource]:
+    blocks = time_blocks(training, settings.validation.block_s)
+    rows, parameters = 3 * len(learned), len(model.coefficients)
+    strength = np.sqrt(rows / max(rows - parameters, 1))
+    factor = strength * rng.choice([-1.0, 1.0], len(blocks.starts) + 1)
+    whole = simulated_torque(training, model, blocks, factor)
+    return whole, whole if learned is training else simulated_torque(learned, model, blocks, factor)
+
+
+def _identified_again(
+    sources: tuple[TorqueSource, TorqueSource], settings: IdentificationSettings, model: InertiaFunctions
+) -> InertiaFunctions:
+    solver = model_evaluator(*sources, settings).solver
+    fit = solver.fit(model.partitions)
+    if fit is None:
+        raise ComputationError("the simulation of the model gives no finite model")
+    exact, _ = solver.exact(model.partitions, fit)
+    return replace(model, coefficients=exact.coefficients, rigid_body=exact.rigid_body)
+
+
+def _inside(inertia: Array, curves: Curves) -> Array:
+    visited, slack = ~curves.outside, _ROUNDING * float(np.max(np.abs(curves.inertia)))
+    inside = (inertia >= curves.low - slack) & (inertia <= curves.high + slack)
+    zero = np.all(curves.inertia == 0.0, axis=(0, 1)) & np.all(inertia == 0.0, axis=(0, 1))
+    if not visited.any():
+        return np.full((3, 3), np.nan)
+    return np.where(zero, np.nan, np.mean(inside[visited], axis=0))

@@ -11,8 +11,7 @@ from cpfls_cli.artifacts.identified import ChosenGroup, IdentifiedRecord, Identi
 from cpfls_cli.artifacts.scores import JudgedGroup
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.commands.vehicle_sheets import bare_sheet
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.dynamics.visited import CELLS
+from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.export.points import expected
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.fuzzy.inputs import InputRange

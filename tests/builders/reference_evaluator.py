@@ -10,9 +10,8 @@ from scipy.optimize import least_squares
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution.archive import Evaluation
-from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, encode
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.evaluator import NOT_DEFINED, OBJECTIVES
+from cpfls_cli.identification.evaluator import LARGEST_GENE, NOT_DEFINED, OBJECTIVES, decode, encode
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.identification.solver import LARGEST_SQUARE, NO_RIGID_BODY, Fit
 from cpfls_cli.regressor.regressor import Breakpoints, Regressor, data_ranges

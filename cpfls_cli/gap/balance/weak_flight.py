@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, momentum_form
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.catalogue.parameter_error import shown, with_thrust
@@ -17,7 +18,8 @@ from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.noise_floor import channel_cut_offs, noise_floor
-from cpfls_cli.weak_form.windows import Windows
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.weak_form.windows import Recording, Windows
 
 _AXES = ("x", "y", "z")
 
@@ -298,3 +300,32 @@ def translation_balance(signals: Signals) -> Columns:
         return Columns(mass * felt + weight)
     momentum = mass * signals.ground_velocity
     return Columns(np.cross(signals.body_rate, momentum) + weight, momentum)
+
+
+@dataclass(frozen=True)
+class Preparation:
+    """Windows, model, settings and sensor repair that all flights of a diagnosis share.
+
+    Attributes
+    ----------
+    model : InertiaModel or None
+        None for the rigid body of the vehicle.
+    audit : Audit
+        Faults that are repaired.
+    """
+
+    windows: Windows
+    model: InertiaModel | None
+    settings: GapSettings
+    audit: Audit
+
+    def logged(self, recordings: Sequence[Recording]) -> list[WeakFlight]:
+        """Prepare flights with the faults of their sensors, but with channels that belong together."""
+        return [self._weak(recording.name, self.audit.consistent(recording.signals)) for recording in recordings]
+
+    def repaired(self, recordings: Sequence[Recording]) -> list[WeakFlight]:
+        """Prepare flights with the named faults of their sensors repaired."""
+        return [self._weak(recording.name, self.audit.repaired(recording.signals)) for recording in recordings]
+
+    def _weak(self, name: str, signals: Signals) -> WeakFlight:
+        return weak_flight(name, signals, self.windows, self.model, self.settings.force, self.settings.axes)

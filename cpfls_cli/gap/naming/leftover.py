@@ -13,8 +13,7 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, left_over, window_noise
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
-from cpfls_cli.gap.naming.bends import bends_of
-from cpfls_cli.gap.naming.earned import NamedFit, fitted
+from cpfls_cli.gap.naming.earned import NamedFit, bends_of, fitted
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.ranking import SearchStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect, NotExcited, Unexplained

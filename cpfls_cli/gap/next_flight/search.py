@@ -11,10 +11,9 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.next_flight.logged import Logging, planned_signals
-from cpfls_cli.gap.next_flight.room import Room
+from cpfls_cli.gap.next_flight.room import HarmonicPath, Room
 from cpfls_cli.gap.next_flight.separation import Answer, Evidence, Question, gathered, judged, shared_noise
 from cpfls_cli.rounding import ascending, less
-from cpfls_cli.trajectory.harmonics import HarmonicPath
 from cpfls_cli.weak_form.windows import windows
 
 # Shares of a path by which it is changed: first by what makes another one of it, then by what still shows.

@@ -7,7 +7,7 @@ directions, as if it had been made from weights before they were rounded to inte
 import numpy as np
 import pytest
 
-from cpfls_cli.identification.chromosome import decode
+from cpfls_cli.identification.evaluator import decode
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 CHROMOSOME = """

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from cpfls_cli.identification.chromosome import LARGEST_GENE, decode
 from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.evaluator import LARGEST_GENE, decode
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from tests.builders.flights import random_motion, rigid_torque

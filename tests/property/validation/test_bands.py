@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.evaluator import decode
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
 from cpfls_cli.validation import bands

@@ -5,8 +5,8 @@ import pytest
 
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque, rigid_columns
-from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.evaluator import uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
 from cpfls_cli.regressor.motion import Motion

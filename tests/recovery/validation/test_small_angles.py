@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.evaluator import uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
 from cpfls_cli.regressor.motion import Motion

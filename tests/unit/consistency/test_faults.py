@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cpfls_cli.consistency.faults import CheckedFault, findings
 from cpfls_cli.consistency.gyroscope import GyroFit
+from cpfls_cli.consistency.sensors import CheckedFault, findings
 from cpfls_cli.effects.registry import CATALOGUE
 
 NAMES = ("gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay")

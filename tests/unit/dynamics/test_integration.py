@@ -7,7 +7,7 @@ from cpfls_cli import rotations
 from cpfls_cli.dynamics.equations_of_motion import RotationState, acceleration_law, momentum_form, rigid_plant
 from cpfls_cli.dynamics.integration import advance, free_runs, runge_kutta_step
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
-from cpfls_cli.effects.swing import integrate
+from cpfls_cli.effects.catalogue.payload import integrate
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.regressor import InertiaValues
 

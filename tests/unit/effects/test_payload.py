@@ -9,8 +9,8 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
+from cpfls_cli.effects.catalogue.payload import integrate, settled_swing, swing
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.effects.swing import integrate, settled_swing, swing
 
 GRAVITY = np.array([0.0, 0.0, 9.81])
 

@@ -5,13 +5,15 @@ from cpfls_cli.excitation.objective import (
     condition_number,
     conditioning,
     conditioning_gradient,
+    design,
     motion_gradient,
+    path_of,
     penalty_gradient,
     regressor_gradient,
     regressor_of,
+    variables_of,
 )
 from cpfls_cli.excitation.optimise import adam
-from cpfls_cli.excitation.variables import design, path_of, variables_of
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.trajectory.rotation import RotationLimits, RotationPath, full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings

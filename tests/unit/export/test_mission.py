@@ -9,9 +9,9 @@ import pytest
 from cpfls_cli.artifacts.trajectory import ExcitedGroup, TrajectoryRecord
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.mission import Home, qgc_plan, system_id_lines, waypoint_lines
+from cpfls_cli.gap.next_flight.room import harmonic_trajectory, random_path
 from cpfls_cli.simulation.room_left import room_left
 from cpfls_cli.trajectory.excited import added_motion
-from cpfls_cli.trajectory.harmonics import harmonic_trajectory, random_path
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.repeats import repeated
 from cpfls_cli.trajectory.settings import ExciteSettings, TrajectorySettings, WaypointSettings

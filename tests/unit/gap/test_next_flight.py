@@ -16,7 +16,7 @@ from cpfls_cli.gap.next_flight.rivals import (
     require_tellable,
     usual,
 )
-from cpfls_cli.gap.next_flight.room import room_of
+from cpfls_cli.gap.next_flight.room import HarmonicPath, room_of
 from cpfls_cli.gap.next_flight.search import goal, next_flight
 from cpfls_cli.gap.next_flight.separation import (
     Answer,
@@ -30,7 +30,6 @@ from cpfls_cli.gap.next_flight.separation import (
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.simulation.room_left import squared_speeds
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
-from cpfls_cli.trajectory.harmonics import HarmonicPath
 from cpfls_cli.trajectory.limits import LimitSettings
 from cpfls_cli.trajectory.settings import NextFlightSettings, TrajectorySettings
 from cpfls_cli.weak_form.windows import windows

@@ -9,8 +9,8 @@ import pytest
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.before_after import errors_by_horizon, played_pairs, worst_stretch
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
-from cpfls_cli.gap.playback import errors_by_horizon, played_pairs, worst_stretch
 from cpfls_cli.gap.whole_vehicle import whole_vehicle
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel

@@ -11,8 +11,8 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Off
 from cpfls_cli.gap.balance.weak_flight import Candidate, actuated, columns_of, nuisance
+from cpfls_cli.gap.before_after import left_out
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
-from cpfls_cli.gap.playback import left_out
 from cpfls_cli.gap.whole_vehicle import of_vehicle, whole_vehicle, with_effects
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.flight import LoggedFlight

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import rigid_columns
-from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, encode, uniform_chromosome
-from cpfls_cli.identification.evaluator import Problem
+from cpfls_cli.identification.evaluator import LARGEST_GENE, Problem, decode, encode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from cpfls_cli.regressor.motion import RIGID

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cpfls_cli.dynamics.visited import outside_visited, visited_cells
+from cpfls_cli.dynamics.inertia_functions import outside_visited, visited_cells
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.excitation import rule_excitation
 from cpfls_cli.identification.samples import Ready, Samples

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, weight_jacobian
-from cpfls_cli.identification.evaluator import Problem, refine
+from cpfls_cli.identification.evaluator import LARGEST_GENE, Problem, decode, refine, weight_jacobian
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.samples import Samples
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
-from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, encode
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.evaluator import Problem, refine, stepped
+from cpfls_cli.identification.evaluator import LARGEST_GENE, Problem, decode, encode, refine, stepped
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.least_squares import SMALLEST_SINGULAR_SHARE
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings

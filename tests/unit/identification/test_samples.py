@@ -10,9 +10,9 @@ import pytest
 
 from cpfls_cli.dynamics.rigid_body import rigid_columns
 from cpfls_cli.identification import data
-from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.cross_validation import contiguous_blocks, with_folds
 from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.evaluator import decode
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import IdentificationSettings, RidgeSettings

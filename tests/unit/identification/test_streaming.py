@@ -5,8 +5,8 @@ import pytest
 
 from cpfls_cli.dynamics.rigid_body import rigid_columns
 from cpfls_cli.identification import data, samples, solver
-from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.data import Flights, TorqueData, gathered, joined, sample_times
+from cpfls_cli.identification.evaluator import decode
 from cpfls_cli.identification.excitation import axis_evidence
 from cpfls_cli.identification.identify import identify, model_evaluator
 from cpfls_cli.identification.judge import score_of

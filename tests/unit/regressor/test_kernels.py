@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.compiling import compiled
-from cpfls_cli.identification.chromosome import decode
+from cpfls_cli.identification.evaluator import decode
 from cpfls_cli.regressor import kernels
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints

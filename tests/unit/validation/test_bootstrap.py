@@ -9,8 +9,8 @@ from scipy import linalg
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import rigid_columns
 from cpfls_cli.identification import data
-from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import axis_scale
+from cpfls_cli.identification.evaluator import decode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics.inertia_functions import InertiaFunctions, visited_cells
 from cpfls_cli.dynamics.rigid_body import inertia_matrix
-from cpfls_cli.dynamics.visited import visited_cells
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import symmetric
@@ -14,7 +13,7 @@ from cpfls_cli.regressor.regressor import data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.validation.bands import inertia_band
 from cpfls_cli.validation.bootstrap import Draws
-from cpfls_cli.validation.curves import curves
+from cpfls_cli.validation.validate import curves
 
 BEST = np.array([0.6, 0.7, 1.2, 0.03, -0.02, 0.04])
 STRUCTURE = model_structure(IdentificationSettings(harmonic_order=1))
