@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from typing import Literal
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.compiling import compiled, part
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.filters import parabolas
 from cpfls_cli.rotations import cross
 
 # A cable of 0.3 m swings once in 1.1 s, 27 steps, which leave an error of a ten-thousandth.
@@ -160,12 +162,9 @@ def _felt(signals: Signals) -> tuple[Array, Array]:
     return level + np.array([0.0, 0.0, signals.vehicle.gravity_m_s2]), _smooth(signals, below, 1)
 
 
-def _smooth(signals: Signals, values: Array, derivative: int = 0) -> Array:
+def _smooth(signals: Signals, values: Array, derivative: Literal[0, 1] = 0) -> Array:
     """Fit parabolas to stretches around each sample: a step of the swing is several samples, and noise averages out."""
-    from scipy.signal import savgol_filter
-
-    samples = max(5, 2 * round(_SMOOTHING_S / signals.period) + 1)
-    return np.asarray(savgol_filter(values, samples, 2, derivative, signals.period, axis=0))
+    return parabolas(values, max(2, round(_SMOOTHING_S / signals.period)), derivative) / signals.period**derivative
 
 
 def settled_swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -> Array:
