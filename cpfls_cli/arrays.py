@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -10,6 +12,8 @@ from cpfls_cli.errors import ComputationError
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
+Numbers = npt.NDArray[Any]
+"""Real, or complex for a derivative by a complex step."""
 
 
 def require_columns(name: str, values: Array, columns: int) -> None:

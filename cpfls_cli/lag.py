@@ -7,9 +7,9 @@ from math import exp
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, Numbers
+from cpfls_cli.filters import recursion
 
 Between = Literal["cubic", "linear", "previous"]
 """What a signal is between samples.
@@ -22,9 +22,6 @@ Beside the exact delay of signals of up to 8 Hz, sampled at 100 Hz, cubics are o
 spline by 0.004 %, monotone cubics by 0.4 %, straight lines by 1 %, the nearest sample by 8 %; a lag of 30 ms alike. A
 spline overshoots a step by 10 % and spreads an outlier over the flight, cubics by 6 % and over four samples.
 """
-
-Numbers = NDArray[Any]
-"""Real, or complex for a derivative by a complex step."""
 
 # Powers of the time since a sample, in samples, by which the samples at -1, 0, 1 and 2 count until the next one.
 _CURVES: dict[Between, Array] = {
@@ -89,15 +86,12 @@ def lagged(values: Numbers, ratio: Any, between: Between = "cubic") -> Lagged:
         tau in samples, at least 0. A complex one carries a derivative.
     between : {"cubic", "linear", "previous"}
     """
-    # Slow to load, and who lists or shows effects filters nothing.
-    from scipy.signal import lfilter
-
     extended = _extended(values, between)
     parts = [extended[first : first + len(values)] for first in range(4)]
     decay = np.exp(-1 / ratio) if np.real(ratio) > _FORGOTTEN else 0.0
     end = _sum(_CURVES[between] @ _moments(ratio, decay), parts)
     if decay != 0.0:
-        end = lfilter([1.0], [1.0, -decay], end, axis=0, zi=decay * values[:1])[0]
+        end = recursion([-decay], np.concatenate([end[:1] + decay * values[:1], end[1:]]))
     start = np.concatenate([values[:1], end[:-1]])
     # The equation of the lag, averaged over the step.
     mean = _sum(_CURVES[between] @ (1.0 / np.arange(1, 5)), parts) - ratio * (end - start)

@@ -4,62 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from math import pi, tan
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.hooks import Link, RotorMotion
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.filters import SecondOrder
 from cpfls_cli.lag import delayed
 
 _HIGHEST = 0.45
 """Frequency of a filter over that of the sampling, above which it is taken to be there."""
 
 
-@dataclass(frozen=True)
-class SecondOrder:
-    """A filter ``(a s^2 + b w s + c w^2) / (s^2 + 2 zeta w s + w^2)``, by the bilinear transform with w kept.
-
-    Attributes
-    ----------
-    over, under : array, shape (3,)
-        Coefficients of the samples put in and given out, the newest first.
-    """
-
-    over: Array
-    under: Array
-
-    @classmethod
-    def of(cls, frequency: float, damping: float, period: float, upper: tuple[float, float, float]) -> SecondOrder:
-        """Make a filter of its natural frequency in Hz, zeta, the sampling period in s, and (a, b, c)."""
-        # Time in units of 1 / w, so that s becomes (1 - 1/z) / (1 + 1/z) over this.
-        half = tan(pi * min(frequency * period, _HIGHEST))
-        square, line, one = np.array([1.0, -2.0, 1.0]), half * np.array([1.0, 0.0, -1.0]), np.array([1.0, 2.0, 1.0])
-        over, under = (
-            most * square + middle * line + least * half**2 * one
-            for most, middle, least in (upper, (1.0, 2 * damping, 1.0))
-        )
-        return cls(over / under[0], under / under[0])
-
-    def settled(self, value: Array) -> Array:
-        """Give the state after a long time at a value, shape (2, ...)."""
-        from scipy.signal import lfilter_zi
-
-        return lfilter_zi(self.over, self.under).reshape(2, *[1] * np.ndim(value)) * value
-
-    def step(self, value: Array, state: Array) -> tuple[Array, Array]:
-        """Filter one sample; give it and the next state."""
-        from scipy.signal import lfilter
-
-        passed, later = lfilter(self.over, self.under, value[None], axis=0, zi=state)
-        return passed[0], later
-
-    def along(self, values: Array) -> Array:
-        """Filter signals that were settled before, shape (time, ...)."""
-        from scipy.signal import lfilter
-
-        return np.asarray(lfilter(self.over, self.under, values, axis=0, zi=self.settled(values[0]))[0])
+def second_order(frequency: float, damping: float, period: float, upper: tuple[float, float, float]) -> SecondOrder:
+    """Make a filter of its natural frequency in Hz, zeta, the sampling period in s, and (a, b, c)."""
+    return SecondOrder.of(min(frequency * period, _HIGHEST), damping, upper)
 
 
 def with_actuation(signals: Signals, change: Callable[[Array], Array]) -> Signals:
@@ -127,7 +87,7 @@ class CommandFilter:
     upper: tuple[float, float, float]
 
     def _passing(self, shape: Mapping[str, float], period: float) -> SecondOrder:
-        return SecondOrder.of(shape["frequency_hz"], shape[self.damping], period, self.upper)
+        return second_order(shape["frequency_hz"], shape[self.damping], period, self.upper)
 
     def apply(self, signals: Signals, shape: Mapping[str, float]) -> Signals:
         """Filter what drives the rotors of a flight."""

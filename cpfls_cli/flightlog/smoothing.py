@@ -1,6 +1,5 @@
 """Zero-phase low-pass filter and time derivative of uniformly sampled signals, and body rates from an attitude."""
 
-from functools import lru_cache
 from math import ceil
 
 import numpy as np
@@ -8,6 +7,7 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import SettingError
+from cpfls_cli.filters import butterworth
 
 _PADDED_PERIODS = 3
 
@@ -34,24 +34,20 @@ def low_pass(values: Array, rate_hz: float, cutoff_hz: float | None, order: int)
     SettingError
         If the cut-off is not below half of the sampling rate.
     """
-    from scipy.signal import sosfiltfilt
-
     if cutoff_hz is None:
         return values
     if cutoff_hz >= rate_hz / 2:
         raise SettingError("lowpass_hz", f"does not lie below half of the log's rate, {rate_hz / 2:.4g} Hz")
-    sections = _designed(rate_hz, cutoff_hz, order)
-    # scipy pads by the filter's length, which is too short for its slow transient when the cut-off is low.
+    sections = butterworth(cutoff_hz / rate_hz, order)
     padding = min(len(values) - 1, ceil(_PADDED_PERIODS * rate_hz / cutoff_hz))
-    return np.asarray(sosfiltfilt(sections, values, axis=0, padlen=padding), dtype=float)
-
-
-@lru_cache
-def _designed(rate_hz: float, cutoff_hz: float, order: int) -> Array:
-    """Give the sections of a filter; to design them takes longer than to filter a log of minutes."""
-    from scipy.signal import butter
-
-    return np.asarray(butter(order, cutoff_hz, fs=rate_hz, output="sos"))
+    # Turned about its ends, so that level and slope go on while the filter settles.
+    before, after = 2 * values[0] - values[padding:0:-1], 2 * values[-1] - values[-2 : -padding - 2 : -1]
+    filtered = np.concatenate([before, values, after]).astype(float)
+    for _ in ("forward", "backward"):
+        for section in sections:
+            filtered = section.along(filtered)
+        filtered = filtered[::-1]
+    return filtered[padding : padding + len(values)]
 
 
 def derivative(time: Array, values: Array) -> Array:

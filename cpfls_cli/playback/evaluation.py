@@ -8,10 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, IntArray, Numbers
 from cpfls_cli.effects.polynomial import Probe
 from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, symmetric
-from cpfls_cli.lag import Numbers
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Body, Parameters, Terms
 from cpfls_cli.playback.model import ModelEffect, VehicleModel

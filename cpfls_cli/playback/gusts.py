@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.filters import recursion
 
 GUST_AXES = ("roll", "pitch", "yaw", "x", "y", "z")
 """Torque about the body axes, then force along them."""
@@ -42,10 +43,8 @@ class Gusts(NamedTuple):
         ----------
         Gillespie 1996, Exact numerical simulation of the Ornstein-Uhlenbeck process.
         """
-        from scipy.signal import lfilter
-
         keep = np.exp(-step / self.memory)
         white = rng.standard_normal((count, len(keep)))
         white[1:] *= np.sqrt(1.0 - keep**2)
-        columns = [lfilter([1.0], [1.0, -each], column) for each, column in zip(keep, white.T, strict=True)]
+        columns = [recursion([-each], column) for each, column in zip(keep, white.T, strict=True)]
         return np.asarray(self.size * np.stack(columns, axis=1))

@@ -8,6 +8,7 @@ from itertools import combinations, pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import contiguous
@@ -398,10 +399,11 @@ def _step(period: float) -> int:
 
 def _best_shift(one: Array, other: Array, period: float) -> tuple[float, float]:
     """Find by how many samples the other flight is ahead, and the correlation there."""
-    from scipy.signal import correlate
-
     length = period * _step(period)
-    product = sum(correlate(other[:, axis], one[:, axis], method="fft") for axis in range(one.shape[1]))
+    count = len(one) + len(other) - 1
+    padded = next_fast_len(count, real=True)
+    spectrum = (rfft(other, padded, axis=0) * rfft(one[::-1], padded, axis=0)).sum(axis=1)
+    product = irfft(spectrum, padded)[:count]
     ones, others = (np.concatenate([[0.0], np.cumsum((each**2).sum(axis=1))]) for each in (one, other))
     shifts = np.arange(-(len(one) - 1), len(other))
     first, last = np.maximum(0, -shifts), np.minimum(len(one), len(other) - shifts)

@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
-from cpfls_cli.lag import Numbers, delayed, lagged
+from cpfls_cli.arrays import Array, Numbers
+from cpfls_cli.lag import delayed, lagged
 
 Hold = Literal["linear", "previous"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.effects.actuation import SecondOrder
+from cpfls_cli.effects.actuation import second_order
 from cpfls_cli.effects.effect import Columns, Effect, Shape, of_axes
 from cpfls_cli.effects.hooks import Carrier, Pull
 from cpfls_cli.effects.signals import Signals
@@ -16,7 +16,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-    swing = SecondOrder.of(shape["frequency_hz"], shape["damping"], signals.period, (1.0, 0.0, 0.0))
+    swing = second_order(shape["frequency_hz"], shape["damping"], signals.period, (1.0, 0.0, 0.0))
     momentum = np.zeros((len(signals), 6, 3))
     momentum[:, :3] = swing.along(signals.body_rate)[:, :, None] * np.diag(signals.vehicle.inertia_kg_m2[:3])
     return Columns(np.zeros_like(momentum), momentum)

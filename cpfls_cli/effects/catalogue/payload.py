@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, stack, wrench
 from cpfls_cli.effects.hooks import Carrier, Pull
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.filters import parabolas
 from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -165,12 +167,9 @@ def _felt(signals: Signals) -> tuple[Array, Array]:
     return level + np.array([0.0, 0.0, signals.vehicle.gravity_m_s2]), _smooth(signals, below, 1)
 
 
-def _smooth(signals: Signals, values: Array, derivative: int = 0) -> Array:
+def _smooth(signals: Signals, values: Array, derivative: Literal[0, 1] = 0) -> Array:
     """Fit parabolas to stretches around each sample: a step of the swing is several samples, and noise averages out."""
-    from scipy.signal import savgol_filter
-
-    samples = max(5, 2 * round(_SMOOTHING_S / signals.period) + 1)
-    return np.asarray(savgol_filter(values, samples, 2, derivative, signals.period, axis=0))
+    return parabolas(values, max(2, round(_SMOOTHING_S / signals.period)), derivative) / signals.period**derivative
 
 
 def settled_swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -> Array:

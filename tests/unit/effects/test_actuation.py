@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.effects.actuation import DelayLine, SecondOrder
+from cpfls_cli.effects.actuation import DelayLine, second_order
 from cpfls_cli.effects.hooks import RotorMotion
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.lag import delayed, lagged
@@ -40,7 +40,7 @@ def test_filter_answers_a_wave_as_its_formula_says(upper, frequency):
     s = 1j * frequency / natural
     gain = np.polyval(upper, s) / np.polyval((1.0, 2 * damping, 1.0), s)
     wave = np.exp(2j * np.pi * frequency * time)
-    found = SecondOrder.of(natural, damping, period, upper).along(wave)
+    found = second_order(natural, damping, period, upper).along(wave)
     np.testing.assert_allclose(found[-500:], gain * wave[-500:], atol=2e-3)
 
 
