@@ -9,12 +9,13 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.airframe import Airframe, Parameters, room, stated_airframe, thrust_number, usual_airframe
+from cpfls_cli.flightlog.airframe import Airframe, Parameters, stated_airframe, usual_airframe
 from cpfls_cli.flightlog.recognised import Choice, Guess, Recognition, Rival
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.settings import SETPOINTS, ColumnMap, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import Topics
 from cpfls_cli.units import UnitName, known_unit
+from cpfls_cli.vehicle_limits import IN_ROOM, room, thrust_number
 
 _SURENESS: Final = ("data", "named", "guess")
 _WORTH_IT = 0.8
@@ -29,9 +30,6 @@ _LEAST_GAP_S, _SLOWEST_VOLTAGE_S = 0.1, 0.5
 
 _ROOM = 1.2
 """By which a limit of the rotor speeds lies above the fastest one that is logged."""
-
-_PROPELLERS = (0.003, 0.2)
-"""Thrust numbers of real propellers; see `thrust_number`."""
 
 DECIDES_ROTORS: Final = "a log with more motion beside this one, or a look at the vehicle, decides"
 _MULTIROTORS: Final = (2, 13, 14, 15, 29)
@@ -335,7 +333,7 @@ def _by_weight(guess: Guess, speeds: Array | None, mass_kg: float, arm_m: float)
     units: tuple[UnitName, UnitName] = ("rad/s", "rpm")
     diameter = room(arm_m, speeds.shape[1])
     numbers = {unit: thrust_number(mass_kg, diameter, known_unit(unit).factor * speeds) for unit in units}
-    fitting = [unit for unit, own in numbers.items() if _PROPELLERS[0] < own < _PROPELLERS[1]]
+    fitting = [unit for unit, own in numbers.items() if IN_ROOM.usual[0] < own < IN_ROOM.usual[1]]
     if len(fitting) != 1:
         return guess
     columns = replace(guess.columns, unit=fitting[0])

@@ -305,3 +305,21 @@ def test_masses_and_arms_that_nothing_flies_with_are_refused(cpfls, log, tmp_pat
     assert result.exit_code == 2
     assert f"Invalid value for '{option[0]}'" in result.stderr
     assert not (tmp_path / "study.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ("--mass", "45", "--arm", "50"),
+            ("--mass = 45: ", "0.045 kg? 45 is a mass in g", "0.05 m? 50 is an arm in mm"),
+        ),
+        (("--mass", "800", "--arm", ARM), ("--mass = 800: ", "0.8 kg? 800 is a mass in g")),
+        (("--arm", "160"), ("--arm = 160: ", "0.16 m? 160 is an arm in mm")),
+    ],
+)
+def test_a_mass_and_an_arm_that_no_vehicle_has_are_refused_with_the_likely_unit(cpfls, log, tmp_path, words, said):
+    result = cpfls("init", log, "-o", tmp_path / "study.yaml", *words)
+    assert result.exit_code == 2
+    assert all(each in result.stderr for each in said)
+    assert not (tmp_path / "study.yaml").exists()
