@@ -328,11 +328,11 @@ def init(
     logs: LogsArgument,
     output: OutputOption,
     mass: Annotated[
-        float | None, typer.Option("--mass", metavar="KG", min=1e-6, max=1e4, help="Mass as it flew, with battery, kg.")
+        float | None, typer.Option("--mass", metavar="KG", min=1e-6, help="Mass as it flew, with battery, kg.")
     ] = None,
     arm: Annotated[
         float | None,
-        typer.Option("--arm", metavar="M", min=1e-6, max=100, help="Middle to a rotor's axis, m."),
+        typer.Option("--arm", metavar="M", min=1e-6, help="Middle to a rotor's axis, m."),
     ] = None,
     *,
     common: Common,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import nan
 from pathlib import Path
 
 from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
 from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.consistency.findings import contradictions
-from cpfls_cli.errors import CpflsError, InputError
+from cpfls_cli.errors import ConfigError, CpflsError, InputError
 from cpfls_cli.flightlog.proposal import KnownLog, known_log, propose
 from cpfls_cli.flights.imported import imported
 from cpfls_cli.flights.recordings import check_flight, read_import
@@ -18,10 +19,12 @@ from cpfls_cli.pages.proposal import Stated, answer, asked_keys, config_text, su
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome
+from cpfls_cli.vehicle_limits import beyond_any_vehicle, figures_of, room
 
 
 def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
     """Write a commented config for logs of one vehicle."""
+    _require_possible(stated)
     take_inputs(job, {f"log-{number}": log for number, log in enumerate(logs)})
     check_outputs(job, job.output)
     known = []
@@ -36,6 +39,20 @@ def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
     said = (Text(contradicted(each), "warning") for each in wrong)
     told = summary(proposal, stated, output) | {"contradictions": list(wrong)}
     return Outcome(told, (*said, *answer(proposal, stated, output)))
+
+
+def _require_possible(stated: Stated) -> None:
+    """Refuse a mass and an arm that no vehicle has, before a log is read; by its arms it is taken for a quadrotor.
+
+    Raises
+    ------
+    ConfigError
+    """
+    arm = nan if stated.arm_m is None else stated.arm_m
+    known = {"mass": nan if stated.mass_kg is None else stated.mass_kg, "arm": arm, "room": room(arm, 4), "rotors": 4.0}
+    lines = [f"--{each.name} = {known[each.name]:g}: {each.why}" for each in beyond_any_vehicle(figures_of(**known))]
+    if lines:
+        raise ConfigError("\n".join(lines))
 
 
 def _contradictions(text: str, log: Path, *, whole: bool) -> tuple[str, ...]:

@@ -18,6 +18,8 @@ from cpfls_cli.config.unknown import KEYS, with_guesses
 from cpfls_cli.errors import SettingError
 from cpfls_cli.identification.settings import PRESETS
 from cpfls_cli.inertia import symmetric
+from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle_limits import beyond_any_vehicle, figures_of, figures_of_hubs
 
 _GONE = {("report", "paper"), ("report", "evaluation_times")}
 """Sections and keys that configs of before hold; inside artifacts they are left out, in a file they are refused."""
@@ -38,6 +40,17 @@ _PLAIN_WORDS = {
 }
 _OF_A_VEHICLE = ("mass_kg", "inertia_kg_m2", "rotors", "rotor_speed_max_rad_s")
 _OF_A_ROTOR = ("position_m", "spin", "thrust_factor_n_s2", "drag_factor_n_m_s2")
+_KEYS_OF = {
+    "mass": "mass_kg",
+    "gravity": "gravity_m_s2",
+    "inertia": KEYS["inertia"],
+    "speed_max": "rotor_speed_max_rad_s",
+    "arm": "rotors.{}.position_m",
+    "radius": "rotors.{}.radius_m",
+    "thrust_factor": f"rotors.{{}}.{KEYS['thrust_factor']}",
+    "drag_factor": f"rotors.{{}}.{KEYS['drag_factor']}",
+}
+"""Keys of the section `vehicle` by the names of `vehicle_limits`."""
 _MEASURED = 1.1
 """What a largest principal moment may have over the sum of the others: stated moments are measured, not exact."""
 
@@ -64,6 +77,7 @@ def check_data(data: dict[str, Any], source: str) -> tuple[Study | None, list[st
         errors = [*error.errors(), *_hidden_errors(filled, error.errors())]
         return None, [*missing, *_describe_errors(errors, filled, source)]
     wrong = missing or [f"{source}: {line}" for line in _no_body(study)]
+    wrong = wrong or [_line(location, [why], filled, source) for location, why in _no_vehicle(study.vehicle)]
     return (None if wrong else study), wrong
 
 
@@ -93,6 +107,26 @@ def _no_body(study: Study) -> Iterator[str]:
             f"principal moment {largest:.4g} is more than the other two together, {smallest + middle:.4g}; look at the "
             "units and the order Ixx, Iyy, Izz, Ixy, Ixz, Iyz"
         )
+
+
+def _no_vehicle(vehicle: VehicleSettings) -> Iterator[tuple[Location, str]]:
+    """Refuse numbers that no vehicle has, key by key; nothing of guesses."""
+    rotors, moments = vehicle.rotors, np.linalg.eigvalsh(symmetric(vehicle.inertia_kg_m2))
+    hubs = np.array([rotor.position_m for rotor in rotors])
+    known = {"mass": vehicle.mass_kg, "gravity": vehicle.gravity_m_s2, "speed_max": vehicle.rotor_speed_max_rad_s}
+    known |= figures_of_hubs(hubs)
+    if "inertia" not in vehicle.unknown:
+        known |= {"least_inertia": float(moments[0]), "inertia": float(moments[-1])}
+    if "thrust_factor" not in vehicle.unknown:
+        known["thrust_factor"] = float(np.mean([rotor.thrust_factor_n_s2 for rotor in rotors]))
+    if "drag_factor" not in vehicle.unknown:
+        known["drag_factor"] = float(np.mean([rotor.drag_factor_n_m_s2 for rotor in rotors]))
+    radii = {place: rotor.radius_m for place, rotor in enumerate(rotors) if rotor.radius_m is not None}
+    if radii:
+        known["radius"] = float(np.mean(list(radii.values())))
+    places = {"arm": int(np.argmax(np.abs(hubs).max(axis=1))), "radius": next(iter(radii), 0)}
+    for name, why in beyond_any_vehicle(figures_of(**known)):
+        yield ("vehicle", *_KEYS_OF[name].format(places.get(name, 0)).split(".")), why
 
 
 def _missing_line(source: str, key: str) -> str:

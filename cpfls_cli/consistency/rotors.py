@@ -2,17 +2,29 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import pi
+from typing import NamedTuple
 
 import numpy as np
 
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.consistency.motion import PairCheck, by_thrust
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.flightlog.airframe import airframe_from_motion, place_of, thrust_number
+from cpfls_cli.flightlog.airframe import airframe_from_motion, place_of
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle_limits import IN_ROOM, room_between, thrust_number
 
 _THRUST_TO_WEIGHT = 5.0
 """Thrust over weight, or the reverse, that no flight keeps up; a wrong unit or a slipped digit is farther off."""
+
+_CARRIES = 2.0
+"""Thrust over weight, or the reverse, that a flight has on average where unit and factors are right."""
+
+_FEWEST_ROTORS = 3
+"""Of fewer, propellers may be small."""
+
+_SPEEDS = {"rad/s": 1.0, "rpm": pi / 30, "Hz": 2 * pi}
 
 _ABOVE_THE_LIMIT = 1.5
 """Measured speeds overshoot what a data sheet states; a wrong unit of speed is a factor of six at least."""
@@ -22,13 +34,6 @@ _LIFTS = 1.25
 
 IDLE = 0.5
 """Share of the largest thrust below which rotors idle."""
-
-_THRUST_NUMBERS = (0.00075, 1.0)
-"""Of propellers as large as the room between hubs: those of 0.05 that fill a third of it, and of 0.2 that overlap by
-half. A wrong unit of speed is a factor of 91, of mass 1000."""
-
-_ABOVE = 0.2
-"""Share of the distance of the farthest hubs below which two, seen from above, are one above the other."""
 
 _TYPICAL = 0.03
 """Thrust number of vehicles of 25 g to 25 kg, of propellers as large as the room: 0.012 to 0.05."""
@@ -63,35 +68,85 @@ def beyond_propellers(parts: Sequence[Signals]) -> Finding | None:
     on the ground lift nothing, so slow ones contradict only flights that lean; of fewer than three any may be small.
     """
     vehicle = parts[0].vehicle
-    hubs = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
-    apart = np.linalg.norm(hubs[:, None] - hubs, axis=2)
-    room = apart[apart > _ABOVE * apart.max()]
+    room = room_between(_hubs(vehicle))
     flown = [part for part in parts if part.rotor_speed is not None and not part.commanded]
-    if "thrust_factor" not in vehicle.unknown or not flown or not len(room):
+    if "thrust_factor" not in vehicle.unknown or not flown or np.isnan(room):
         return None
     speed = np.concatenate([part.rotor_speed for part in flown if part.rotor_speed is not None])
-    power = (speed**2).sum(axis=1)
-    # A flight of seconds in a long log on the ground is the largest thousandth.
-    most = float(np.quantile(power, 0.999))
-    turning = power >= IDLE * most
-    if not most:
+    turning = _turning(speed)
+    if not turning.any():
         return None
-    number = thrust_number(vehicle.mass_kg, float(room.min()), speed[turning])
-    if _THRUST_NUMBERS[0] < number < _THRUST_NUMBERS[1]:
+    number = thrust_number(vehicle.mass_kg, room, speed[turning])
+    if IN_ROOM.allows(number):
         return None
-    slow = number > _THRUST_NUMBERS[1]
+    slow = number > IN_ROOM.possible[1]
     angles = np.concatenate([np.zeros((len(p), 2)) if p.attitude is None else p.attitude[:, :2] for p in flown])
     leans = float(angles[turning].std(axis=0).max()) > _LEANS
     size = number / _TYPICAL if slow else _TYPICAL / number
     return Finding(
         f"propellers that fit between the hubs lift about {size:.0f} times {'less' if slow else 'more'} than the "
-        f"weight of {vehicle.mass_kg:g} kg at {np.sqrt(power[turning].mean() / speed.shape[1]):.3g} rad/s",
+        f"weight of {vehicle.mass_kg:g} kg at {np.sqrt((speed[turning] ** 2).mean()):.3g} rad/s",
         "check the unit of import.signals.rotor_speed (rad/s, rpm or Hz), vehicle.mass_kg (kg) and position_m of "
         f"vehicle.rotors (m){', or whether it took off' if slow else ''}",
         ("rotors", "vehicle"),
         number,
-        contradiction=leans if slow else len(vehicle.rotors) > 2,
+        contradiction=leans if slow else len(vehicle.rotors) >= _FEWEST_ROTORS,
     )
+
+
+def _hubs(vehicle: VehicleSettings) -> Array:
+    return np.array([rotor.position_m for rotor in vehicle.rotors])
+
+
+def _turning(speed: Array) -> BoolArray:
+    """Mark the samples at which rotors do not idle; none where they always stand."""
+    power = (speed**2).sum(axis=1)
+    # A flight of seconds in a long log on the ground is the largest thousandth.
+    most = float(np.quantile(power, 0.999)) if len(power) else 0.0
+    return power >= IDLE * most if most else np.zeros(len(power), dtype=bool)
+
+
+class MeantUnit(NamedTuple):
+    """The unit that speeds of rotors are surely in, and how many times the weight these lift in it and as declared."""
+
+    unit: str
+    lifts: float
+    lifts_as_declared: float
+
+
+def meant_unit(vehicle: VehicleSettings, speed: Array, attitude: Array | None, declared: str) -> MeantUnit | None:
+    """Tell in which unit the speeds of a flight carry its vehicle, where no vehicle flies with them as declared.
+
+    Parameters
+    ----------
+    speed : array, shape (time, rotor), rad/s
+        As read in the unit that is declared.
+    attitude : array, shape (time, 3), rad, or None
+        Slow rotors may idle on the ground where it does not lean.
+
+    Returns
+    -------
+    MeantUnit or None
+        None where they may be right, or no other unit makes them so.
+    """
+    turning, guessed = _turning(speed), "thrust_factor" in vehicle.unknown
+    if len(vehicle.rotors) < _FEWEST_ROTORS or speed.shape[1] != len(vehicle.rotors) or not turning.any():
+        return None
+    if guessed:
+        room = room_between(_hubs(vehicle))
+        lifts = _TYPICAL / thrust_number(vehicle.mass_kg, room, speed[turning])
+        possible, usual = ((_TYPICAL / most, _TYPICAL / least) for least, most in (IN_ROOM.possible, IN_ROOM.usual))
+    else:
+        factors = np.array([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors])
+        lifts = float((speed[turning] ** 2 @ factors).mean()) / (vehicle.mass_kg * vehicle.gravity_m_s2)
+        possible, usual = (1 / _THRUST_TO_WEIGHT, _THRUST_TO_WEIGHT), (1 / _CARRIES, _CARRIES)
+    if not lifts < possible[0] and not lifts > possible[1]:
+        return None
+    if lifts < possible[0] and (attitude is None or float(attitude[turning, :2].std(axis=0).max()) <= _LEANS):
+        return None
+    read = {unit: lifts * (factor / _SPEEDS[declared]) ** 2 for unit, factor in _SPEEDS.items()}
+    fitting = [unit for unit, own in read.items() if usual[0] < own < usual[1]]
+    return MeantUnit(fitting[0], read[fitting[0]], lifts) if len(fitting) == 1 else None
 
 
 def thrust_beside_weight(parts: Sequence[Signals]) -> Finding | None:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import permutations
-from math import cos, hypot, pi, radians, sin
+from math import cos, hypot, radians, sin
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -14,7 +14,6 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
 from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.rounding import largest
-from cpfls_cli.units import STANDARD_GRAVITY
 
 Parameters = Mapping[str, float | str]
 _ACCELERATION_HZ = 12.0
@@ -34,7 +33,6 @@ _ENDS: Final = {"front": (1.0, 0.0), "right": (0.0, -1.0), "rear": (-1.0, 0.0), 
 _ROUNDED = 1e-9
 """Below which a place along an axis is 0."""
 
-_AIR_KG_M3 = 1.2
 _TURNS = ("roll", "pitch", "yaw")
 _LEAST_EXPLAINED = 0.05
 """Share of the acceleration about one axis that chance does not explain."""
@@ -341,26 +339,3 @@ def _shares(acceleration: Array, rate: Array, squared: Array) -> tuple[list[tupl
             shares.append(along**2 / power if along > 0 and power > 0 else 0.0)
         results.append((layout, (shares[0], shares[1], shares[2])))
     return results, np.asarray(np.linalg.lstsq(own, together, rcond=None)[0].T, dtype=float)
-
-
-def room(arm_m: float, rotors: int) -> float:
-    """Give the diameter of propellers at the ends of arms whose neighbours touch, m."""
-    return 2 * arm_m * sin(pi / rotors)
-
-
-def thrust_number(mass_kg: float, diameter_m: float, speed: Array) -> float:
-    """Give the thrust number ``T / (rho n^2 D^4)`` of rotors that carry a mass, were they of such a diameter.
-
-    Parameters
-    ----------
-    diameter_m : float
-        As large as they can be, where neighbours touch.
-    speed : array, shape (time, rotor), rad/s
-
-    Returns
-    -------
-    float
-        Of real propellers 0.003 to 0.2: their own number is 0.05 to 0.2, their diameter half of the room or more.
-    """
-    turns = (speed / (2 * pi)) ** 2
-    return float(mass_kg * STANDARD_GRAVITY / (_AIR_KG_M3 * turns.mean(axis=0).sum() * diameter_m**4))

@@ -9,12 +9,13 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.airframe import Airframe, Parameters, room, stated_airframe, thrust_number, usual_airframe
+from cpfls_cli.flightlog.airframe import Airframe, Parameters, stated_airframe, usual_airframe
 from cpfls_cli.flightlog.recognised import Choice, Guess, Recognition, Rival
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.settings import SETPOINTS, ColumnMap, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import Topics
 from cpfls_cli.units import UnitName, known_unit
+from cpfls_cli.vehicle_limits import IN_ROOM, room, thrust_number
 
 _SURENESS: Final = ("data", "named", "guess")
 _WORTH_IT = 0.8
@@ -30,10 +31,11 @@ _LEAST_GAP_S, _SLOWEST_VOLTAGE_S = 0.1, 0.5
 _ROOM = 1.2
 """By which a limit of the rotor speeds lies above the fastest one that is logged."""
 
-_PROPELLERS = (0.003, 0.2)
-"""Thrust numbers of real propellers; see `thrust_number`."""
-
 DECIDES_ROTORS: Final = "a log with more motion beside this one, or a look at the vehicle, decides"
+_ALIKE: Final = {True: 1.06, False: 1.12}
+"""Ratio of loads up to which two flights may be of one mass: by rotor speeds and an accelerometer; otherwise, since
+batteries empty, and who leans looks heavier. By commands three flights of one Crazyflie differ by 1.06."""
+
 _MULTIROTORS: Final = (2, 13, 14, 15, 29)
 """MAV_TYPE: quadrotor, hexarotor, octorotor, tricopter, dodecarotor."""
 
@@ -168,6 +170,7 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
         airframe = airframe.with_arm(arm_m)
     crop, crops = _crops(logs)
     warnings = [f"{one.name}: {warning}" for one in logs for warning in one.recognition.warnings]
+    doubts = [*doubts, *_two_masses(logs, mass_kg)]
     return Proposal(
         logs=tuple(logs),
         time_column=_time_column(logs),
@@ -335,12 +338,35 @@ def _by_weight(guess: Guess, speeds: Array | None, mass_kg: float, arm_m: float)
     units: tuple[UnitName, UnitName] = ("rad/s", "rpm")
     diameter = room(arm_m, speeds.shape[1])
     numbers = {unit: thrust_number(mass_kg, diameter, known_unit(unit).factor * speeds) for unit in units}
-    fitting = [unit for unit, own in numbers.items() if _PROPELLERS[0] < own < _PROPELLERS[1]]
+    fitting = [unit for unit, own in numbers.items() if IN_ROOM.usual[0] < own < IN_ROOM.usual[1]]
     if len(fitting) != 1:
         return guess
     columns = replace(guess.columns, unit=fitting[0])
     reason = f"{guess.reason}; in {fitting[0]} propellers that fit the arms carry the mass at hover"
     return replace(guess, columns=columns, reason=reason, sure="data", rivals=())
+
+
+def _two_masses(logs: Sequence[KnownLog], mass_kg: float | None) -> list[str]:
+    """Say where the rotors of two logs carry unlike loads: one mass suits only one of them."""
+    measured = [one.recognition.signal("rotor_speed") is not None for one in logs]
+    if not (all(measured) or not any(measured)):
+        return []
+    loads = sorted((load.size, one.name, load) for one in logs if (load := one.recognition.load) is not None)
+    if len(loads) < 2:
+        return []
+    (_, lighter, light), *_, (_, heavier, heavy) = loads
+    ratio = heavy.size / light.size
+    if ratio <= _ALIKE[measured[0] and light.sensed and heavy.sensed]:
+        return []
+    more = f"{100 * (ratio - 1):.0f} %"
+    masses = "" if mass_kg is None else f", {mass_kg * ratio:.3g} kg if the other has {mass_kg:.3g} kg"
+    battery = "" if measured[0] else ", or its battery is emptier"
+    what = "squared speeds" if measured[0] else "squared commands"
+    return [
+        f"{lighter} and {heavier}: in flight the {what} of the rotors are {more} higher in {heavier}, so with equal"
+        f" propellers it weighs {more} more{masses}{battery}: one vehicle.mass_kg does not suit both; run cpfls init"
+        " for each of them with its own --mass"
+    ]
 
 
 def _airframe(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:

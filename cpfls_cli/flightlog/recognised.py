@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -58,6 +58,22 @@ class Choice:
     rivals: tuple[Rival, ...] = ()
 
 
+class Load(NamedTuple):
+    """What the rotors carry in flight.
+
+    Attributes
+    ----------
+    size : float
+        Mean square of their speeds, or of commands taken for them, over the specific force that they hold: at equal
+        propellers it is as the mass.
+    sensed : bool
+        Whether an accelerometer tells that force; else it is gravity, and a flight that leans far looks heavier.
+    """
+
+    size: float
+    sensed: bool
+
+
 @dataclass(frozen=True, kw_only=True)
 class Recognition:
     """What a log is taken for.
@@ -80,6 +96,8 @@ class Recognition:
         The rotors as the motion tells them.
     speeds : array, shape (time, rotor), or None
         Rotor speeds in flight in rad/s, or commands as shares of the largest speed.
+    load : Load or None
+        None where no columns are those of rotors.
     """
 
     time_column: str
@@ -94,6 +112,7 @@ class Recognition:
     kind: str
     moved: MovedBy | None
     speeds: Array | None = field(repr=False)
+    load: Load | None = None
     warnings: tuple[str, ...] = ()
 
     def signal(self, name: SignalName) -> Guess | None:

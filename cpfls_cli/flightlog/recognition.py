@@ -17,12 +17,13 @@ from cpfls_cli.flightlog.motion_columns import tell_acceleration, tell_body_rate
 from cpfls_cli.flightlog.nameless import nameless_signals
 from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals
 from cpfls_cli.flightlog.readings import Reading
-from cpfls_cli.flightlog.recognised import Recognition, Rival, Seen, called
+from cpfls_cli.flightlog.recognised import Load, Recognition, Rival, Seen, called
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_rotors
 from cpfls_cli.flightlog.setpoint_columns import tell_setpoints
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics
 from cpfls_cli.rounding import largest
+from cpfls_cli.units import STANDARD_GRAVITY
 
 _DEGREES = 180 / np.pi
 _TORQUE_HZ, _FOLLOWS = 6.0, 0.3
@@ -236,6 +237,15 @@ def _tell_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array | None, MovedB
     return speeds, moved
 
 
+def _load(seen: Seen, speeds: Array) -> Load | None:
+    power, frame = (speeds**2).mean(axis=1), seen.choices.get("acceleration_frame")
+    sensed = frame is not None and frame.value == "body-specific-force" and "acceleration" in seen.guesses
+    force = np.abs(seen.mapped(seen.guesses["acceleration"])[:, 2]) if sensed else np.full(len(power), STANDARD_GRAVITY)
+    known = np.isfinite(power) & np.isfinite(force)
+    whole = float(force[known].sum())
+    return Load(float(power[known].sum()) / whole, sensed) if whole and power[known].any() else None
+
+
 def _doubt_columns(seen: Seen) -> None:
     """Make a guess of signals of which a column never changes, or two hold the same numbers."""
     for name, guess in tuple(seen.guesses.items()):
@@ -284,5 +294,6 @@ def _gathered(seen: Seen, flown: Flown, speeds: Array | None, moved: MovedBy | N
         kind=kind,
         moved=moved,
         speeds=speeds,
+        load=None if speeds is None else _load(seen, speeds),
         warnings=tuple(seen.warnings),
     )

@@ -19,6 +19,7 @@ from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import check
 from cpfls_cli.consistency.findings import Finding
+from cpfls_cli.consistency.rotors import meant_unit
 from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError
 from cpfls_cli.flightlog.results import ImportedFlight
@@ -28,6 +29,7 @@ from cpfls_cli.flights.imported import commanded_speed, imported, log_findings
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.logs.formats import is_log
+from cpfls_cli.units import SPEED_UNITS
 from cpfls_cli.vehicle.rotors import require_control
 from cpfls_cli.weak_form.windows import Recording, common_windows
 
@@ -109,6 +111,8 @@ def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> Rea
     parts : sequence of ImportedFlight
         Of one log, in time. Several are on the clock of the log, one on a clock of its own.
     """
+    for part in parts:
+        _require_speeds(name, part, study)
     first = parts[0]
     done = tuple(f"{what} ({count})" for what, count in log_findings(first.report).items())
     signals = [FlightRecord.of_import(part, {}).signals for part in parts]
@@ -119,6 +123,28 @@ def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> Rea
         own["time"] = own["time"] + part.report.span_s[0]
     joined = {each: np.concatenate([own[each] for own in signals]) for each in shared}
     return ReadFlight(name, joined, _units(study), ())
+
+
+def _require_speeds(log: str, part: ImportedFlight, study: Study) -> None:
+    """Refuse speeds of rotors in a unit in which no vehicle flies, where another one carries it.
+
+    Raises
+    ------
+    ConfigError
+    """
+    for name in ("rotor_speed", "rotor_command"):
+        columns, speed = study.import_.signals.get(name), getattr(part, name)
+        if columns is None or speed is None or columns.unit not in SPEED_UNITS:
+            continue
+        flown = np.isfinite(speed).all(axis=1)
+        attitude = None if part.attitude is None else part.attitude[flown]
+        meant = meant_unit(study.vehicle, speed[flown], attitude, columns.unit)
+        if meant is not None:
+            raise ConfigError(
+                f"{log}: import.signals.{name}.unit = {columns.unit}: in flight the rotors would carry "
+                f"{meant.lifts_as_declared:.3g} times the weight of {study.vehicle.mass_kg:g} kg, which no vehicle "
+                f"does; {meant.unit}? then it is {meant.lifts:.3g} times"
+            )
 
 
 def units_of(path: Path, made: Header, study: Study) -> Mapping[str, str]:

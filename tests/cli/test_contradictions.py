@@ -1,12 +1,15 @@
 """A log that contradicts itself gets no good verdict: axes, signs, units and numbers that are declared wrong."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.init import _contradictions as of_proposal
+from cpfls_cli.consistency.rotors import meant_unit
+from tests.builders.closed_loop_flights import COARSE, VEHICLE, flown, signals_of
 from tests.builders.command_line import run, undrawn
 from tests.builders.wrong_logs import WRONG, config_of, log_of
 
@@ -118,3 +121,28 @@ def test_init_reads_the_log_by_what_it_proposes(logs, whole):
     for sign, said in ((mirrored, 1), (right, 0)):
         config, (first, _) = logs(sign)
         assert len(of_proposal(config.read_text(), first, whole=whole)) == said
+
+
+@pytest.mark.parametrize("command", ["import", "vehicle", "replay", "gap"])
+def test_speeds_of_rotors_in_a_unit_in_which_nothing_flies_are_refused(logs, command, tmp_path):
+    config, (first, _) = logs((1.0, 1.0, 1.0))
+    words = {"replay": ("vehicle", first)}.get(command, (first,))
+    result = run(command, config, *words, "-o", tmp_path / "out.h5", "--set", "import.signals.rotor_speed.unit=rpm")
+    assert result.exit_code == 2
+    assert "import.signals.rotor_speed.unit = rpm: in flight the rotors would carry 0.01" in result.stderr
+    assert "rad/s? then it is 1.0" in result.stderr
+    assert not (tmp_path / "out.h5").exists()
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize(("factor", "meant"), [(1.0, None), (9.549, "rpm"), (1 / 9.549, "rad/s"), (0.159, "Hz")])
+def test_the_unit_that_carries_the_vehicle_is_told_where_the_declared_one_does_not(known, factor, meant):
+    declared = "rpm" if meant == "rad/s" else "rad/s"
+    flight = signals_of(flown(8.0, seed=1, integration_rate_hz=COARSE))
+    vehicle = VEHICLE if known else replace(VEHICLE, unknown=("thrust_factor",))
+    found = meant_unit(vehicle, factor * flight.rotor_speed, flight.attitude, declared)
+    assert (found and found.unit) == meant
+    # Nothing is known of slow rotors on the ground, nor where no unit does.
+    assert meant_unit(vehicle, 1e-4 * flight.rotor_speed, flight.attitude, declared) is None
+    if meant in ("rad/s", "Hz"):
+        assert meant_unit(vehicle, factor * flight.rotor_speed, 0.001 * flight.attitude, declared) is None

@@ -305,3 +305,43 @@ def test_masses_and_arms_that_nothing_flies_with_are_refused(cpfls, log, tmp_pat
     assert result.exit_code == 2
     assert f"Invalid value for '{option[0]}'" in result.stderr
     assert not (tmp_path / "study.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ("--mass", "45", "--arm", "50"),
+            ("--mass = 45: ", "0.045 kg? 45 is a mass in g", "0.05 m? 50 is an arm in mm"),
+        ),
+        (("--mass", "800", "--arm", ARM), ("--mass = 800: ", "0.8 kg? 800 is a mass in g")),
+        (("--arm", "160"), ("--arm = 160: ", "0.16 m? 160 is an arm in mm")),
+    ],
+)
+def test_a_mass_and_an_arm_that_no_vehicle_has_are_refused_with_the_likely_unit(cpfls, log, tmp_path, words, said):
+    result = cpfls("init", log, "-o", tmp_path / "study.yaml", *words)
+    assert result.exit_code == 2
+    assert all(each in result.stderr for each in said)
+    assert not (tmp_path / "study.yaml").exists()
+
+
+@pytest.mark.parametrize("by", ["speed", "command", "accelerometer"])
+@pytest.mark.parametrize("mass", [37.0, 44.0])
+def test_two_masses_in_one_config_are_said_by_how_much(proposed, tmp_path, own, by, mass):
+    """Of two flights with equal propellers, the rotors of the one carry 44 g where those of the other carry 37 g."""
+    columns = [f"{'cmd' if by == 'command' else 'w'}{number}" for number in range(1, 5)]
+    size = 0.6 / own.speed.mean() if by == "command" else 1.0
+    logs = []
+    for number, (seed, ratio) in enumerate([(3, 1.0), (5, (mass / 37.0) ** 0.5)]):
+        other = flight(seconds=20.0, seed=seed)
+        values = {"speed": named(size * ratio * other.speed, *columns)}
+        values |= {} if by == "accelerometer" else {"force": None}
+        logs.append(write_csv(tmp_path / f"{number}.csv", flat_log(other, **values)))
+    result, _, _ = proposed(*logs, "--mass", "0.037", "--arm", "0.05")
+    found = re.search(r"so with equal propellers it weighs (\d+) % more, (0\.\d+) kg if the other has", result.stderr)
+    assert bool(found) == (mass == 44.0)
+    if found:
+        assert int(found[1]) == pytest.approx(19, abs=3)
+        assert float(found[2]) == pytest.approx(0.044, abs=0.001)
+        assert ("or its battery is emptier" in result.stderr) == (by == "command")
+        assert "its own --mass" in result.stderr
