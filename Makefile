@@ -9,6 +9,8 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-com
 INSTALLED := .venv/.installed
 INSTALLED_DEV := .venv/.installed-dev
 INSTALLED_BENCH := .venv/.installed-bench
+INSTALLED_DOCS := .venv/.installed-docs
+INSTALLED_RELEASE := .venv/.installed-release
 export OPENBLAS_NUM_THREADS := 1
 # The tests start hundreds of processes: what they import is compiled once, whatever the environment says.
 export PYTHONDONTWRITEBYTECODE :=
@@ -16,7 +18,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help reproduce reproduce-full reproduce-larger quick hexarotor full-circle crazyflie gap-example replay-example test decides oldest lint bench blind-study blind-quick fuzz clean FORCE
+.PHONY: help reproduce reproduce-full reproduce-larger quick hexarotor full-circle crazyflie gap-example replay-example test decides oldest lint site tutorials wheel bench blind-study blind-quick fuzz clean FORCE
 
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -3
@@ -31,6 +33,9 @@ help:
 	@echo "  make decides     tests of words, names and verdicts once more, as another processor computes"
 	@echo "  make oldest      the same with the oldest packages that are allowed"
 	@echo "  make lint        formatting, lint, types, import contracts"
+	@echo "  make site        the pages of docs/ as a site that needs no network, to build/site/index.html"
+	@echo "  make tutorials   the commands of README.md and of all tutorials, as they stand, in empty folders"
+	@echo "  make wheel       wheel and source distribution, to dist, tried in an empty environment"
 	@echo "  make bench       benchmarks, as Markdown tables; hours, and goes on where it was stopped"
 	@echo "  make blind-study [SEED=N DRAWS=N NONE=N SIZE=...]   flights with hidden effects, to data/blind/tables.md"
 	@echo "  make blind-quick [SIZE=...]                          a few sets of each group in six minutes"
@@ -83,6 +88,14 @@ $(INSTALLED_DEV): pyproject.toml | $(INSTALLED)
 
 $(INSTALLED_BENCH): $(INSTALLED_DEV)
 	$(PIP) -e ".[bench,dask,simulators]"
+	@touch $@
+
+$(INSTALLED_DOCS): pyproject.toml | $(INSTALLED)
+	$(PIP) -e ".[docs]"
+	@touch $@
+
+$(INSTALLED_RELEASE): pyproject.toml | $(INSTALLED)
+	$(PIP) -e ".[release]"
 	@touch $@
 
 # Each artifact depends on its inputs and on its own part of the config, written out with all defaults and the version
@@ -351,6 +364,28 @@ lint: $(INSTALLED_DEV)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# A link or an anchor that leads nowhere, or a page in no menu, ends it.
+site: $(INSTALLED_DOCS)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+tutorials: $(INSTALLED)
+	$(BIN)/python docs/run_blocks.py README.md docs/tutorial-*.md
+
+# Equal sources give an equal wheel, byte by byte: it is built twice. Then it does what README.md begins with in an
+# environment that holds nothing else, and the source distribution is installed in its place.
+EMPTY := build/empty/bin
+wheel: export SOURCE_DATE_EPOCH := $(shell git log -1 --format=%ct 2>/dev/null || echo 1764000000)
+wheel: $(INSTALLED_RELEASE)
+	rm -rf dist build
+	$(BIN)/python -m build --outdir dist >/dev/null
+	$(BIN)/python -m build --wheel --outdir build/again >/dev/null
+	cmp dist/*.whl build/again/*.whl
+	$(PYTHON) -m venv build/empty
+	$(EMPTY)/python -m pip install --quiet --disable-pip-version-check dist/*.whl
+	$(EMPTY)/python docs/run_blocks.py README.md
+	$(EMPTY)/python -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps dist/*.tar.gz
+	$(EMPTY)/cpfls --version
 
 # Every table is also written to benchmarks/results, as JSON. Programs that measure times run one after the other, the
 # rest two at once. Stopped and started again it goes on where it was, unless the code has changed since.

@@ -1,10 +1,12 @@
-"""The pages: every relative link leads somewhere, and nothing is left to be filled in."""
+"""The pages: links lead somewhere, menus hold them all, commands exist, and nothing is left to be filled in."""
 
 import re
 from pathlib import Path
 
 import pytest
+import typer
 
+from cpfls_cli.cli.app import app
 from cpfls_cli.config.load import parse_config, validate
 
 ROOT = Path(__file__).parents[2]
@@ -44,6 +46,38 @@ def prose(page):
 def test_lines_of_prose_have_at_most_120_characters(page):
     # A link in one piece may be longer.
     assert [line for line in prose(page) if len(line) > 120 and " " in line.strip()] == []
+
+
+def test_the_menus_of_the_site_hold_every_page_once():
+    """`make site` holds it too, with links and anchors, where its packages can be had."""
+    pages = re.findall(r"^ +- .*: ([\w-]+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE)
+    made = {"index.md", "changelog.md", "contributing.md", "command-line.md", "configuration.md", "notebook.md"}
+    assert sorted(pages) == sorted({page.name for page in (ROOT / "docs").glob("*.md")} | made)
+
+
+COMMANDS = typer.main.get_command(app).commands
+OPTIONS = {
+    name: {option for each in command.params for option in [*each.opts, *each.secondary_opts]} | {"--help", "-h"}
+    for name, command in COMMANDS.items()
+}
+
+
+def commands(page):
+    """Commands in the code of a page, with the options that stand beside them."""
+    text = page.read_text(encoding="utf-8").replace("\\\n", " ")
+    blocks = re.findall(r"^```(?:sh)?\n(.*?)^```|^((?:    .*\n)+)", text, re.MULTILINE | re.DOTALL)
+    lines = [line for block in blocks for line in "".join(block).splitlines() if line.strip().startswith("cpfls ")]
+    spans = [span.replace("\n", " ") for span in re.findall(r"(?<!`)`(cpfls [^`]*)`(?!`)", text)]
+    for words in [*lines, *spans]:
+        for name, rest in re.findall(r"(?<![\w/.-])cpfls +([a-z][a-z-]*\b)(?!\d)((?:(?!cpfls ).)*)", words):
+            yield name, re.findall(r"(?<![\w-])--?[a-z][a-z-]*", rest)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_and_their_options_exist(page):
+    for name, options in commands(page):
+        assert name in OPTIONS, f"{page.name}: cpfls {name}"
+        assert set(options) <= OPTIONS[name], f"{page.name}: cpfls {name} {set(options) - OPTIONS[name]}"
 
 
 EXAMPLES = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs" / "import.md").read_text(encoding="utf-8"), re.DOTALL)
