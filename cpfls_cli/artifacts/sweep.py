@@ -210,18 +210,14 @@ def spread(values: Array) -> Spread:
 
 @dataclass(frozen=True)
 class SettingRuns:
-    """One setting of a sweep with its finished runs.
+    """One setting of a sweep with its finished runs; other fields are described at `SettingGroup`.
 
     Attributes
     ----------
-    criterion : str
-        What chose its samples; ``all`` where nothing did.
     seeds, evaluations : array of int, shape (runs,)
     mse, max_error, relative_error : array, shape (runs, parts)
         Not finite where a run found no model.
     condition_number : array, shape (runs,)
-    judged_on, ranking : str
-        What the search took its errors from, and how it ranked chromosomes.
     uniform_condition_number : float
         Of the samples learned from, at uniform partitions; NaN where it is not known.
     learned : array, shape (runs, 3), or None

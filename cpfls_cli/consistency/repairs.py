@@ -22,20 +22,12 @@ _SCALED = 0.1
 class ChannelRepair:
     """How a channel becomes what it should be: ``matrix @ reading(t + delay) + gravity e_z``, or nothing.
 
+    Other fields are described at `AuditRepairGroup`.
+
     Attributes
     ----------
     channel : str
         Field of `Signals`, shape (time, 3); of ``rotor_speed`` the delay alone counts.
-    dropped : bool
-        Whether it is left out; then nothing else counts.
-    delay_s : float
-        How late it is, s.
-    in_body : bool
-        Whether what should be in world axes was logged in body axes.
-    matrix : array, shape (3, 3)
-        Unit and axes; after the turn from body to world axes.
-    gravity_m_s2 : float
-        Added along the vertical, m/s^2.
     sentence : str
         What is wrong, who says so, what is done and what to mend; empty for a channel that goes along with another.
     finding : Finding or None

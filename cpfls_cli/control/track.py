@@ -218,20 +218,16 @@ def flown_signals(plan: Plan, tracked: Tracked, controller: int, plant: Rotation
 class Scores:
     """Tracking errors at the samples of the plan; NaN for a controller that lost its vehicle.
 
+    Other fields are described at `TrackingGroup`.
+
     Attributes
     ----------
-    error : array, shape (controller, samples, 3), rad
-        Planned less flown angles; NaN only from the loss on.
-    settled_from : float, s
-        Since the first sample: when the initial error has died down, at the latest half-way.
     rms, largest : array, shape (controller, 3), rad
         Root mean square and largest size of all samples.
     settled_rms, settled_largest : array, shape (controller, 3), rad
         Of those after that time.
     effort : array, shape (controller, 3), N m, body frame
         Root mean square of the torque.
-    clipped : array, shape (controller,)
-        Share of the commands that the actuators could not follow.
     lost : array, shape (controller,), s
         Time of the loss; NaN where none.
     """

@@ -72,16 +72,7 @@ def played_pairs(recordings: Sequence[Recording], model: VehicleModel, given: Ve
 
 
 class LeftOut(NamedTuple):
-    """What one effect of a model does along flights.
-
-    Attributes
-    ----------
-    wrench : array, shape (6,), N m and N
-        Root mean square.
-    ends : array, shape (4,)
-        How far half a second of playback ends off without it: means of the norms of position, velocity, attitude and
-        rate, SI; NaN for what a flight does not show.
-    """
+    """What one effect of a model does along flights; its fields are described at `LeftOutGroup`."""
 
     name: str
     wrench: Array
@@ -191,15 +182,12 @@ _PER_WINDOW = 16
 class StretchCurves:
     """Measured and simulated torque or force over the stretch of the largest gap.
 
+    Other fields are described at `PictureGroup`.
+
     Attributes
     ----------
     flight : int
         Number of the held-out flight.
-    time : array, shape (moment,), s
-    measured : array, shape (moment,), N m or N
-        What the measured motion takes.
-    before, after : array, shape (moment,), N m or N
-        Simulated by the model as given and with effects.
     """
 
     flight: int

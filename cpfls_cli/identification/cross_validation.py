@@ -38,7 +38,7 @@ class Blocks:
 
 @dataclass(frozen=True)
 class RidgeCurve:
-    """Cross-validated error over the ridge weight.
+    """Cross-validated error over the ridge weight; other fields are described at `RidgeGroup`.
 
     Attributes
     ----------
@@ -46,8 +46,6 @@ class RidgeCurve:
         Ascending; the last is infinite: the fuzzy part is off.
     error : array, shape (tried,)
         Mean squared error of the scaled torque over all blocks.
-    standard_error : array, shape (tried,)
-        Of the mean over blocks.
     chosen : int
         The largest weight whose error lies within one standard error of the smallest.
     """

@@ -26,17 +26,7 @@ _CLEARLY = 0.5
 
 @dataclass(frozen=True)
 class RuleExcitation:
-    """Excitation of each rule by data.
-
-    Attributes
-    ----------
-    name : tuple of str
-        Inertia function and rule, as ``D23 rule 4``.
-    firing : array, shape (rules,)
-        Largest firing strength over the samples.
-    determined : array, shape (rules,)
-        Share of the rule's coefficient directions that the samples determine.
-    """
+    """Excitation of each rule by data; its fields are described at `RulesGroup`."""
 
     name: tuple[str, ...]
     firing: Array

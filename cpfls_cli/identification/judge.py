@@ -20,24 +20,13 @@ Columns = Callable[[Motion], Array]
 
 @dataclass(frozen=True)
 class Score:
-    """Scores of a torque prediction.
+    """Scores of a torque prediction; other fields are described at `JudgedGroup`.
 
     Attributes
     ----------
-    mse : array, shape (3,), (N m)^2
-        Mean squared error by Euler axis.
-    max_error : array, shape (3,), N m
-        Largest absolute error.
-    relative_error : array, shape (3,)
-        Largest error over largest torque; NaN for an axis without torque.
-    r2 : array, shape (3,)
-        Share of the torque's variance explained; NaN for an axis whose torque does not vary.
     r2_body : array, shape (3,)
         The same for body torque, at samples where the pitch is not vertical: it is divided by cos(pitch), and errors
         with it. NaN if no such sample is left.
-    vaf : array, shape (3,)
-        Variance accounted for, ``1 - var(error) / var(torque)`` by Euler axis: R2 without the mean of the error. NaN
-        for an axis whose torque does not vary.
     """
 
     mse: Array

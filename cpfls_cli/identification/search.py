@@ -112,17 +112,7 @@ UNWATCHED = SearchRun()
 
 @dataclass(frozen=True)
 class Front:
-    """Non-dominated chromosomes of the whole search.
-
-    Attributes
-    ----------
-    chromosomes : array of int, shape (members, genes)
-    objectives : array, shape (members, 3)
-    chosen : int
-        The member that became the model.
-    held_out : array, shape (members,), or None
-        Mean squared errors on flights kept for the choice; None where the objectives alone decided.
-    """
+    """Non-dominated chromosomes of the whole search; its fields are described at `FrontGroup`."""
 
     chromosomes: IntArray
     objectives: Array

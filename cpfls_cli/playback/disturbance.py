@@ -56,15 +56,13 @@ _FAR, _NOISE, _AT_END = 12.0, 3.0, 1e-3
 class FoundGusts:
     """Sizes and memories of gusts by body axis, torque then force, with 95 % intervals.
 
+    Other fields are described at `DisturbanceGroup`.
+
     Attributes
     ----------
     size, low, high : array, shape (axis,), N m and N
         Standard deviation; where none is known, NaN, 0, and the size of all that is left. NaN where the body is not
         known either.
-    memory, memory_low, memory_high : array, shape (axis,), s
-        NaN where no size is known.
-    told_by : {"repeats", "setpoints", "none"}
-        What told gusts from what the model lacks.
     """
 
     size: Array

@@ -41,12 +41,12 @@ _MOST_NOISE = 0.1
 class LoopBounds(NamedTuple):
     """Bounds on moments of inertia, in those of a model, from how its torque and the rotation go together.
 
+    Other fields are described at `LoopGroup`.
+
     Attributes
     ----------
     low, high : array, shape (3,)
         Factors, body axes; 1 between them where the model is that of the body. NaN where the flights do not tell.
-    explained : array, shape (3,)
-        Least share of the rotation in a band that the torque explains, the noise of sensors not counted.
     """
 
     low: Array

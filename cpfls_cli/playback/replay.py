@@ -98,12 +98,7 @@ class Played:
 class SignalErrors:
     """Errors of one signal over all windows of the flights that know it.
 
-    Attributes
-    ----------
-    mae : array, shape (prediction, horizon)
-        Mean of the norms; of attitudes the geodesic distance, rad.
-    rms : array, shape (prediction, horizon, 3)
-        Root mean square by axis.
+    Its fields are described at `SignalErrorGroup`.
     """
 
     mae: Array
@@ -200,16 +195,7 @@ _OUTER = 0.05
 
 @dataclass(frozen=True)
 class Region:
-    """Where a model predicts body rates better than what knows no model.
-
-    Attributes
-    ----------
-    share : float
-        Of the windows.
-    speed : array, shape (2,), m/s, or None
-        Of the flight at the begin of nine tenths of these windows; None where a flight does not know it.
-    rate : array, shape (2,), rad/s
-    """
+    """Where a model predicts body rates better than what knows no model; its fields are described at `RegionGroup`."""
 
     share: float
     speed: Array | None
@@ -322,14 +308,7 @@ def _added(sums: _Sums, played: Played, starts: IntArray, flight: int) -> tuple[
 
 @dataclass(frozen=True)
 class Drawn:
-    """Runs of the model beside the flight, their starts included.
-
-    Attributes
-    ----------
-    measured, model : array, shape (run, horizon + 1, 3), rad/s, body frame
-    measured_position, model_position : array, shape (run, horizon + 1, 3), m, world frame, or None
-        None where position is not played back.
-    """
+    """Runs of the model beside the flight, their starts included; its fields are described at `DrawnGroup`."""
 
     measured: Array
     model: Array

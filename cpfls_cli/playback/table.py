@@ -28,16 +28,7 @@ class Remainder:
 
     Each column of the system enters with the speed in the rotor plane times the mean rotor speed, and with its square.
 
-    Attributes
-    ----------
-    breakpoints : array, shape (rules + 1,)
-        Peaks of the membership functions, share of a turn.
-    harmonic_order : int
-        Of the consequents; 0 for the seesaw.
-    rows : array of int, shape (row,)
-        Which of torque (0 to 2) and force (3 to 5) it adds to.
-    coefficients : array, shape (row, columns, 2)
-        For speed times mean rotor speed, and for squared speed.
+    Its fields are described at `RemainderGroup`.
     """
 
     breakpoints: Array

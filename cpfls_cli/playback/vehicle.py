@@ -43,21 +43,13 @@ _STEP = 1e-5
 
 
 class FoundNumber(NamedTuple):
-    """A number of a vehicle, in SI.
+    """A number of a vehicle, in SI; other fields are described at `FoundNumbersGroup`.
 
     Attributes
     ----------
-    name : str
-        Block and number.
-    value, low, high : float
-        With a 95 % interval.
-    stated : float
-        In the config; NaN for what no config states.
     determined : bool
         Whether the flights say more of it than what was believed before: to a factor of two where it cannot be
         negative, else to its natural size. What turns torque into rotation is not where it makes a body that cannot be.
-    at_bound : bool
-        Whether it lies on a bound, so that the interval says little.
     """
 
     name: str

@@ -19,21 +19,13 @@ StopReason = Literal["size", "condition-number", "all-samples", "pool"]
 class Subset:
     """Samples of a regressor and how well they determine its parameters.
 
+    Other fields are described at `SelectionRecord`.
+
     Attributes
     ----------
-    criterion : str
-        Rule that chose the samples.
-    indices : array of int, shape (size,)
-        Chosen samples, in the order in which they were chosen.
     condition_number : float
         Largest over smallest singular value of the chosen samples, over as many singular values as the full
         set's rank; infinite when the subset has a smaller rank.
-    condition_number_full : float
-        The same for all samples.
-    rank : int
-        Numerical rank of the chosen samples.
-    rank_full : int
-        Numerical rank of all samples.
     """
 
     criterion: str

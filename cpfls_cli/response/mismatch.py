@@ -41,17 +41,7 @@ _LEAST = 1e-6
 
 
 class Deviation(NamedTuple):
-    """Frequencies over which a model is right, or off in one way.
-
-    Attributes
-    ----------
-    low, high : float, Hz
-    right : bool
-    gain : float
-        Gain of the model over the measured one, geometric mean.
-    phase : float, degrees
-        Phase of the model less the measured one, mean.
-    """
+    """Frequencies over which a model is right, or off in one way; its fields are described at `DeviationGroup`."""
 
     low: float
     high: float

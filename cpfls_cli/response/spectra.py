@@ -87,7 +87,7 @@ class Stretch(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class FrequencyResponse:
-    """A frequency response and how far to trust it.
+    """A frequency response and how far to trust it; other fields are described at `ResponseRecord`.
 
     Attributes
     ----------
@@ -98,12 +98,6 @@ class FrequencyResponse:
         Of the model, by the same windows and instruments.
     direct : array of complex, shape (frequency,)
         Without instruments.
-    coherence_input, coherence_output : array, shape (frequency,)
-        Shares of input and of output that the instruments explain; without instruments 1 and that of the output.
-    random_error : array, shape (frequency,)
-        Standard error of the gain over the gain; in radians that of the phase.
-    averages : array, shape (frequency,)
-        Windows that count as independent.
     instrumented : bool
     """
 

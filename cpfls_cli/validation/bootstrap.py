@@ -124,17 +124,7 @@ class Draws:
     They scatter about the model's own. A band is wider than their spread by a factor that the number of blocks gives:
     see `cpfls_cli.validation.bands.band`.
 
-    Attributes
-    ----------
-    coefficients : array, shape (draws, parameters), kg m^2
-        Of the fuzzy inertia functions.
-    rigid_body : array, shape (draws, 6), kg m^2
-        Inertia parameters under them.
-    best_rigid_body : array, shape (draws, 6), kg m^2
-        Inertia parameters of the rigid body that fits best.
-    blocks : int
-        Blocks that samples were drawn by.
-    block_duration : float, s
+    Its fields are described at `UncertaintyGroup`.
     """
 
     coefficients: Array

@@ -23,17 +23,13 @@ _AWAY = 2 * np.pi * np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 class Physics:
     """Physical plausibility of a model over the cells of roll and pitch that training visited.
 
+    Other fields are described at `PhysicsGroup`.
+
     Attributes
     ----------
     cells : int
         Cells examined at their centres; those near a pitch of +-90 degrees, where the inertia matrix of every body is
         all but singular, are left out.
-    indefinite : int
-        Of them those where D(q) is not positive definite.
-    smallest_eigenvalue : float, kg m^2
-        Of D(q) over the cells; NaN without cells.
-    worst_attitude : array, shape (2,), rad
-        Roll and pitch where it is smallest.
     energy : float
         Largest size of ``qd^T (dD/dt - 2 C) qd`` over the sum of the sizes of its terms. Torque that is D and C does
         work on kinetic energy alone, so that it is rounding for every model with Christoffel symbols.

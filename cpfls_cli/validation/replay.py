@@ -131,23 +131,13 @@ def _starts(stretch: IntArray, steep: BoolArray, horizon: int) -> IntArray:
 
 @dataclass(frozen=True)
 class StepErrors:
-    """Root mean square errors of attitude and body rate by horizon.
+    """Root mean square errors of attitude and body rate by horizon; other fields are described at `StepsGroup`.
 
     Attributes
     ----------
-    part : str
-        Part of the data.
-    model : tuple of str
-        Predictors; the last one is `NOTHING_MOVES`.
-    samples : array of int, shape (horizon,)
-        From 1.
-    horizon : array, shape (horizon,), s
-    windows : int
-        Windows replayed.
     attitude : array, shape (predictor, horizon, 3), rad
         Of the rotation vector from the measured to the predicted attitude, body axes. NaN from where on a predictor
         has lost a window: then it has no such error.
-    body_rate : array, shape (predictor, horizon, 3), rad/s, body axes
     lost : array of int, shape (predictor, horizon)
         Windows in which a predictor's inertia was not positive definite, or which it turned faster than any step can
         follow.

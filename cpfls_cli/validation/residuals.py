@@ -37,41 +37,10 @@ _CONSTANT = 1e-9
 
 @dataclass(frozen=True)
 class ResidualAnalysis:
-    """Torque errors, measured minus predicted, on the Euler axes.
+    """Torque errors, measured minus predicted, on the Euler axes; other fields are described at `ResidualsGroup`.
 
     Attributes
     ----------
-    part : str
-        Part of the data.
-    samples : int
-        Errors examined: the leading ones of a long part.
-    available : int
-        Errors of the whole part.
-    mean : array, shape (3,), N m
-        A constant torque that the model lacks; autocorrelation does not show it.
-    mean_p : array, shape (3,)
-        p-value: small where the mean is not 0; NaN for an exact axis.
-    lag : array, shape (lag,), s
-        From one sample on.
-    autocorrelation : array, shape (lag, 3)
-        NaN for an exact axis.
-    band : float
-        ``1.96 / sqrt(samples)``.
-    ljung_box : array, shape (3,)
-        p-value: small where errors are not white; NaN for an exact axis.
-    input : tuple of str
-        Signals that errors are correlated with.
-    input_lag : array, shape (input lag,), s
-        Positive: the error follows the input.
-    correlation : array, shape (input, input lag, 3)
-        NaN for a constant input and for an exact axis.
-    histogram_edge : array, shape (bin + 1, 3), N m
-        Symmetric about 0, to the largest error.
-    histogram_count : array of int, shape (bin, 3)
-    normal_quantile : array, shape (99,)
-        Of the standard normal distribution.
-    quantile : array, shape (99, 3), N m
-        Of the errors.
     exact : array of bool, shape (3,)
         Axes whose largest error is below a billionth of the largest torque: rounding, which is never white and says
         nothing of the model.

@@ -233,20 +233,14 @@ def _fold_error(learned: Products, judged: Products, fold: int, columns: slice, 
 class StructureComparison:
     """Structures and the error of each on blocks that it did not learn from.
 
+    Other fields are described at `StructuresGroup`.
+
     Attributes
     ----------
     name : tuple of str
         The rigid body first; none where the samples are too few for the folds.
-    parameters : array of int, shape (candidates,)
-        Linear parameters of the fuzzy part.
-    error : array, shape (candidates,)
-        Mean squared error of the torque scaled by axis, on held-out blocks.
-    standard_error : array, shape (candidates,)
-        Its standard error over the blocks.
     ridge_weight : array, shape (candidates,)
         Chosen on the same blocks; 0 without a ridge, infinite where the fuzzy part is off.
-    own : array of bool, shape (candidates,)
-        Which is the structure of the model.
     """
 
     name: tuple[str, ...]

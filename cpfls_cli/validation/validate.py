@@ -146,22 +146,13 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class Curves:
-    """D_ij(q) along curves of attitude.
+    """D_ij(q) along curves of attitude; other fields are described at `CurvesGroup`.
 
     Attributes
     ----------
-    name : tuple of str
-        "over roll", "over pitch".
-    attitude : array, shape (curves, points, 3), rad
-    inertia : array, shape (curves, points, 3, 3), kg m^2
-        Of the model.
     low, high : array, shape (curves, points, 3, 3), kg m^2
         Its 95 % band. Of a model without a rigid body below it is, where training was not, what the structure does, not
         what the vehicle does.
-    rigid_body : array, shape (curves, points, 3, 3), kg m^2
-        Of the rigid body that fits best.
-    outside : array of bool, shape (curves, points)
-        Where training was not.
     """
 
     name: tuple[str, ...]
@@ -241,12 +232,10 @@ def simulated_torque(source: TorqueSource, model: InertiaFunctions, blocks: Time
 
 @dataclass(frozen=True)
 class RoundTrip:
-    """The inertia matrix identified from torque that a model gave.
+    """The inertia matrix identified from torque that a model gave; other fields are described at `RoundTripGroup`.
 
     Attributes
     ----------
-    inertia : array, shape (curves, points, 3, 3), kg m^2
-        Along the curves of the model.
     inside : array, shape (3, 3)
         Share of the points that training visited where it lies within the model's band; NaN for an entry that is zero
         everywhere, and where no point was visited.

@@ -18,17 +18,12 @@ from cpfls_cli.validation.trust import Trust, capped
 
 @dataclass(frozen=True)
 class Verdict:
-    """Verdict on a model, with its reasons.
+    """Verdict on a model, with its reasons; other fields are described at `VerdictGroup`.
 
     Attributes
     ----------
-    label : Trust
-    region : str
-        Attitudes that the verdict is about.
     reason : tuple of str
         One sentence each; the first is what decided.
-    speaks : tuple of int
-        For each reason: 1 for the model, -1 against it, 0 neither.
     """
 
     label: Trust

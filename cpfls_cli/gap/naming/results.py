@@ -62,7 +62,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """An effect that is part of the diagnosis.
+    """An effect that is part of the diagnosis; other fields are described at `EffectGroup`.
 
     Attributes
     ----------
@@ -72,12 +72,6 @@ class NamedEffect:
         Linear coefficients; empty where the effect has none.
     coefficients : tuple of Estimate
         Physical coefficients, then shapes.
-    p_value : float
-        Probability that chance explains as much, over the whole catalogue.
-    share : float
-        Part of the gap above the floor that comes back without it.
-    selection_frequency : float
-        Share of the blocks without which it would still be the first choice.
     """
 
     name: str
@@ -92,18 +86,7 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Alternative:
-    """An effect that the flights cannot tell from a named one.
-
-    Attributes
-    ----------
-    relative_gain : float
-        What it explains, as a share of what the named one explains; NaN where it could not be tried, because the
-        flights lack a signal.
-    separated_by : str
-        The flight, or the signal, that would tell.
-    beside : str
-        Another effect that is not named and without which this one would not do; empty for none.
-    """
+    """An effect that the flights cannot tell from a named one; its fields are described at `AlternativeGroup`."""
 
     name: str
     instead_of: str
@@ -114,20 +97,12 @@ class Alternative:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """A channel with a gap that nothing in the catalogue explains.
+    """A channel with a gap that nothing in the catalogue explains; other fields are described at `UnexplainedGroup`.
 
     Attributes
     ----------
-    floors : float
-        Root mean square of what is left, in floors.
-    signal : str or None
-        The one signal that it depends on most.
-    share : float
-        Share of what is left that the signal, or the narrow band, explains.
     frequency_hz : float or None
         Of a narrow band that stands out.
-    energy : str
-        ``feeds``, ``drains`` or ``neither``.
     """
 
     axis: str

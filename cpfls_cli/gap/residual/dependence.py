@@ -30,15 +30,13 @@ _ACTUATION = ("rotor torque", "rotor speed", "thrust")
 class Dependence(NamedTuple):
     """Share of a channel of the residual that one signal alone explains.
 
+    Other fields are described at `DependenceGroup`.
+
     Attributes
     ----------
-    channel : str
-        One of `CHANNELS`.
     r2 : float
         Share of the variance about the mean of each flight that the curve explains on blocks its fit did not see;
         negative where the curve is worse than none.
-    p_value : float
-        Probability that chance reaches as much in any channel with any signal.
     """
 
     channel: str

@@ -46,30 +46,14 @@ class ComesAgain:
     With the gap r of a run and r' of another at the same place of the path, mean squares are over windows and pairs;
     N^2 m^2 and N^2, NaN where unknown.
 
+    Other fields are described at `ComesAgainGroup`.
+
     Attributes
     ----------
-    low, high : array, shape (band,), Hz
-        Ends of the bands, about.
-    total : array, shape (6, band)
-        Mean of ``r r``: all of the gap.
-    again : array, shape (6, band)
-        Mean of ``r r'``: what comes again.
-    noise : array, shape (6, band)
-        What white noise of the sensors leaves of the gap; NaN where signals were filtered.
-    taken : array, shape (6, band)
-        Mean of ``h h'``, h what the motion takes.
     share, share_error : array, shape (6, band)
         Of the gap that comes again, and its standard error over blocks of the path.
     explained, explained_error : array, shape (6, band)
         Of what the motion takes and comes again, the share that the model explains.
-    resists : array, shape (6,), kg m^2 and kg
-        Moments of inertia and mass.
-    flights : tuple of str
-        That repeat each other.
-    paths, runs : int
-        How many different paths, and runs of them.
-    blocks : array of int, shape (band,)
-        Of the paths, that tell the errors.
     """
 
     low: Array

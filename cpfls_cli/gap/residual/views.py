@@ -27,19 +27,7 @@ _FEWEST_PER_LAG = 4
 
 
 class GapStretch(NamedTuple):
-    """A stretch of a flight with a large gap.
-
-    Attributes
-    ----------
-    flight : int
-        Number of the flight.
-    start_s, end_s : float
-        On the clock of the flight, s.
-    channel : str
-        One of `CHANNELS`.
-    rms_floors : float
-        Root mean square of the residual, in floors.
-    """
+    """A stretch of a flight with a large gap; its fields are described at `StretchGroup`."""
 
     flight: int
     start_s: float
