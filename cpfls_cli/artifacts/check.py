@@ -52,13 +52,7 @@ class Checkable(Protocol):
 
 
 def check_artifact(artifact: Checkable) -> list[str]:
-    """Find everything in an artifact that its format does not allow.
-
-    Returns
-    -------
-    list of str
-        One sentence per finding; empty for a good artifact.
-    """
+    """Find everything in an artifact that its format does not allow, a sentence each."""
     return [*check_structure(artifact), *check_values(artifact)]
 
 

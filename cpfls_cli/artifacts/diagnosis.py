@@ -281,15 +281,7 @@ class DiagnosisRecord(Record):
         warnings: Sequence[str],
         base: VehicleModel,
     ) -> Self:
-        """Arrange a diagnosis.
-
-        Parameters
-        ----------
-        split : str
-            Why these flights trained and those were held out.
-        base : VehicleModel
-            The identified model that misses something, or the vehicle.
-        """
+        """Arrange a diagnosis; `split` says why these flights trained, `base` is the model that misses something."""
         diagnosis = diagnosed.diagnosis
         effects, named = diagnosis.effects or diagnosis.closest, bool(diagnosis.effects)
         alone = diagnosis.torque_alone

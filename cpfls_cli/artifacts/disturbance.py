@@ -57,14 +57,7 @@ class DisturbanceGroup:
         return group_of(cls, found, name=GUST_AXES[: len(found.size)])
 
     def axes(self, inertia: Array, mass: float) -> Iterator[GustAxis]:
-        """Give each axis as the acceleration of a body.
-
-        Parameters
-        ----------
-        inertia : array, shape (6,), kg m^2
-            Moments first.
-        mass : float, kg
-        """
+        """Give each axis as the acceleration of a body of these inertia parameters, kg m^2, and this mass, kg."""
         bodies = np.append(inertia[:3], [mass] * 3)
         columns = (self.size, self.low, self.high, self.memory, self.memory_low, self.memory_high)
         for place, name in enumerate(self.name):

@@ -79,15 +79,7 @@ class ExtendedRecord(ModelRecord):
         playback: PlaybackChangeGroup,
         left_out: Sequence[LeftOut],
     ) -> Self:
-        """Arrange a refit.
-
-        Parameters
-        ----------
-        stated : VehicleSettings
-            That the effects were fitted with.
-        left_out : sequence of LeftOut
-            What no table of weights holds, along them.
-        """
+        """Arrange a refit; `stated` is the vehicle that the effects were fitted with."""
         fitted, unseen, moments = refit.model, refit.unseen, stated.inertia_kg_m2
         rigid_body = six_parameters(moments) if fitted.base is None else np.zeros(6)
         correction = np.array([*fitted.parameters[:3] * np.array(moments[:3]), 0.0, 0.0, 0.0])

@@ -90,13 +90,7 @@ class NoiseGroup:
 
     @classmethod
     def of(cls, std: Mapping[str, Array]) -> Self | None:
-        """Arrange the noise of the signals with three axes; None where none is noisy.
-
-        Parameters
-        ----------
-        std : mapping of str to array
-            Standard deviation of the noise of each channel, by signal.
-        """
+        """Arrange the standard deviations of the noise of signals with three axes; None where none is noisy."""
         names = [name for name, deviations in std.items() if np.shape(deviations) == (3,)]
         return cls(signal=tuple(names), std=np.array([std[name] for name in names])) if names else None
 
@@ -160,13 +154,7 @@ class TrackingGroup:
     def of(
         cls, plan: Plan, controllers: Sequence[str], scores: Scores, model: InertiaFunctions, attitude: Array
     ) -> Self:
-        """Arrange a comparison.
-
-        Parameters
-        ----------
-        attitude : array, shape (time, 3), rad
-            Of the flight under the model's controller.
-        """
+        """Arrange a comparison; the attitude, shape (time, 3), rad, is the one under the model's controller."""
         return cls(
             controller=tuple(controllers),
             time=plan.time[:: plan.parts],
@@ -194,12 +182,9 @@ class TrackingGroup:
         return bool(np.isfinite(self.lost_at[self.controller.index(controller)]))
 
     def ratio(self, other: str) -> Array | None:
-        """Divide the settled error of the model's controller by that of another one.
+        """Divide the settled error of the model's controller by another one's, shape (3,).
 
-        Returns
-        -------
-        array, shape (3,), or None
-            None where the model's lost the vehicle, or the other one leaves no error to divide by.
+        None where the model's lost the vehicle, or the other one leaves no error to divide by.
         """
         model, reference = (self.settled_rms[self.controller.index(name)] for name in ("model", other))
         return model / reference if np.isfinite(model).all() and np.all(reference > 0) else None
@@ -321,15 +306,7 @@ class FlightRecord(Record):
         effects: SimulatedEffects | None = None,
         tracking: TrackingGroup | None = None,
     ) -> Self:
-        """Arrange a simulated flight.
-
-        Parameters
-        ----------
-        signals : mapping of str to array
-            By the names of the fields.
-        noise_std : mapping of str to array
-            Standard deviation of the noise of each channel, by signal.
-        """
+        """Arrange a simulated flight: signals by the names of the fields, and standard deviations of their noise."""
         named: Mapping[str, Any] = signals
         return cls(
             **named,
@@ -340,13 +317,7 @@ class FlightRecord(Record):
 
     @classmethod
     def of_import(cls, flight: ImportedFlight, findings: Mapping[str, int]) -> Self:
-        """Arrange an imported flight.
-
-        Parameters
-        ----------
-        findings : mapping of str to int
-            What was found in the log and done about it, with how often.
-        """
+        """Arrange an imported flight, with what was found in the log and done about it, and how often."""
         report = flight.report
         estimate = report.delay
         names = [name for name in cls.signal_names() if name not in SETPOINTS]

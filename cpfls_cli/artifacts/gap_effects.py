@@ -32,39 +32,17 @@ _EVALUATED = ("wrench", "actuator")
 
 
 def above_noise(floors: Array) -> BoolArray:
-    """Tell which gaps are above noise.
-
-    Parameters
-    ----------
-    floors : array, shape (channel,)
-        Gaps in noise floors; NaN where unknown, which is not above noise.
-    """
+    """Tell which gaps, in noise floors, shape (channel,), are above noise; NaN, where unknown, is not."""
     return np.asarray(floors > CLEAR)
 
 
 def worse_axes(before: Array, after: Array) -> list[int]:
-    """List the axes about which a clear gap grows.
-
-    Parameters
-    ----------
-    before, after : array, shape (6,), floors
-    """
+    """List the axes about which a clear gap grows; both gaps have shape (6,) and are in floors."""
     return [int(c) for c in np.flatnonzero((before[:3] > CLEAR) & (after[:3] > WORSE * before[:3]))]
 
 
 def gap_summary(value: Array, floors: Array) -> dict[str, Any]:
-    """Describe the gap of each channel for machines.
-
-    Parameters
-    ----------
-    value : array, shape (6,), N m and N
-    floors : array, shape (6,)
-
-    Returns
-    -------
-    dict
-        Lists over x, y, z; not finite where unknown.
-    """
+    """Describe the gap of each channel, shape (6,), for machines: lists over x, y, z; not finite where unknown."""
     return {
         "torque_n_m": [float(v) for v in value[:3]],
         "floors": [float(v) for v in floors[:3]],
@@ -212,15 +190,7 @@ class ParameterGroup:
 
     @classmethod
     def of(cls, known: Mapping[str, Estimate], linear: Array) -> Self:
-        """Arrange the vehicle's own numbers.
-
-        Parameters
-        ----------
-        known : mapping of str to Estimate
-            Numbers whose interval is known.
-        linear : array, shape (parameter,)
-            All of them, in the order of the catalogue.
-        """
+        """Arrange the vehicle's own numbers, all in the order of the catalogue, and the intervals that are known."""
         coefficients = VEHICLE_NUMBERS.coefficients
         estimates = [known.get(coefficient.name) for coefficient in coefficients]
         return cls(
@@ -254,17 +224,7 @@ class NamedEffectsGroup:
 
     @classmethod
     def of(cls, effects: Sequence[NamedEffect], named: bool, known: Mapping[str, Estimate], linear: Array) -> Self:
-        """Arrange effects.
-
-        Parameters
-        ----------
-        named : bool
-            Whether the verdict names them.
-        known : mapping of str to Estimate
-            The vehicle's own numbers, as far as their interval is known.
-        linear : array, shape (parameter,)
-            All of them, in the order of the catalogue.
-        """
+        """Arrange effects, whether or not the verdict names them, and the vehicle's own numbers."""
         return cls(
             effect=EffectGroup.of(effects, named),
             coefficient=CoefficientGroup.of(effects),
@@ -338,12 +298,7 @@ class GapChangeGroup:
 
     @classmethod
     def of(cls, before: GapSize, after: GapSize, floor: Array) -> Self:
-        """Arrange the gap before and after.
-
-        Parameters
-        ----------
-        floor : array, shape (6,), N m and N
-        """
+        """Arrange the gap before and after; the floor has shape (6,), N m and N."""
         return cls(
             channel=CHANNELS,
             before=before.value,

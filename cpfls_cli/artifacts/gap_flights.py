@@ -59,13 +59,7 @@ class FlightGroup:
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], roles: Sequence[str]) -> Self:
-        """Say what each flight is.
-
-        Parameters
-        ----------
-        roles : sequence of str
-            Of each: given, training or held-out.
-        """
+        """Say what each flight is; a role is given, training or held-out."""
         lengths = [len(recording.signals) for recording in recordings]
         return columns_of(
             cls,
@@ -160,13 +154,7 @@ class FlightsGroup:
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], roles: Sequence[str]) -> Self:
-        """Put flights one after another.
-
-        Parameters
-        ----------
-        roles : sequence of str
-            Of each: given, training or held-out.
-        """
+        """Put flights one after another."""
         return cls(each=FlightGroup.of(recordings, roles), signals=SignalsGroup.of(recordings))
 
     def names(self, *roles: str) -> list[str]:

@@ -166,21 +166,7 @@ class IdentifiedRecord(ModelRecord):
         vehicle: VehicleModel,
         parts: LearnedGroup,
     ) -> Self:
-        """Arrange an identification and the evidence on it.
-
-        Parameters
-        ----------
-        base : str
-            ``none`` or ``rigid-body``.
-        learned : array of int
-            Indices of the samples that trained.
-        evidence : Validation or None
-            None where it was not gathered.
-        vehicle : VehicleModel
-            Mass and rotors as stated, with the inertia that was identified.
-        parts : LearnedGroup
-            How much of each flight trained.
-        """
+        """Arrange an identification and the evidence on it; the vehicle is the stated one with another inertia."""
         baselines = {baseline.name: baseline.parameters for baseline in result.baselines}
         return cls(
             vehicle=IdentifiedVehicleGroup.of(vehicle),

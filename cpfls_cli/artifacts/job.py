@@ -64,38 +64,20 @@ class Job:
 
 
 def begin(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
-    """Check inputs and output of a job before anything is computed, and take note of the inputs by role.
-
-    Raises
-    ------
-    InputError
-        If an input is missing or is the output, or the output cannot or must not be written.
-    """
+    """Check inputs and output of a job before anything is computed, and take note of the inputs by role."""
     files = take_inputs(job, inputs)
     check_outputs(job, job.output)
     return files
 
 
 def check_outputs(job: Job, *paths: Path, replaceable: bool = False) -> None:
-    """Refuse outputs that cannot or must not be written, such as an input of the job.
-
-    Parameters
-    ----------
-    replaceable : bool
-        Whether they may be replaced without --force.
-    """
+    """Refuse outputs that cannot or must not be written, such as an input; replaceable ones need no --force."""
     for path in paths:
         check_output(path, job.force or replaceable, job.inputs)
 
 
 def take_inputs(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
-    """Check inputs, and take note of what they hold.
-
-    Raises
-    ------
-    InputError
-        If one is missing, or no file.
-    """
+    """Check inputs, and take note of what they hold."""
     for path in inputs.values():
         _check_input(path)
         job.reads(path)

@@ -54,14 +54,9 @@ class LearnedGroup:
 
 
 def as_inputs(role: str, flights: Sequence[LearnedFlight]) -> tuple[dict[str, InputFile], LearnedGroup | None]:
-    """Make flights that were learned from inputs of another artifact, with numbers behind their role.
+    """Make flights that were learned from inputs of another artifact, by numbered role, and tell how much of each.
 
-    Returns
-    -------
-    inputs : dict of str to InputFile
-        By role.
-    learned : LearnedGroup or None
-        None where there are none, or an old file does not say how much of them was learned from.
+    None for that where there are none, or an old file does not say.
     """
     inputs = {f"{role}-{number}": flight.file for number, flight in enumerate(flights, start=1)}
     parts = [(flight.samples, flight.of) for flight in flights if flight.samples is not None and flight.of is not None]
@@ -87,11 +82,5 @@ def learned_in(inputs: Mapping[str, InputFile], parts: LearnedGroup | None, role
 
 
 def part_learned(learned: Iterable[LearnedFlight], hashes: Collection[str]) -> LearnedFlight | None:
-    """Find what was learned from a flight; None where nothing was.
-
-    Parameters
-    ----------
-    hashes : collection of str
-        SHA-256 of its file, and of the log that it was imported from where that is known.
-    """
+    """Find what was learned from a flight of these hashes, its file's and its log's; None where nothing was."""
     return next((flight for flight in learned if flight.file.sha256 in hashes), None)

@@ -40,11 +40,6 @@ def locked(path: Path, title: str) -> Iterator[None]:
 
     The system frees the lock of a process that ends, however it ends. Where it has none, or the folder cannot be
     written, nothing is locked.
-
-    Parameters
-    ----------
-    title : str
-        Of the command, for who finds its output locked.
     """
     path = Path(os.path.abspath(path))
     lock = path.parent / f".{path.name}.lock"
@@ -98,15 +93,7 @@ def _tidy(path: Path) -> None:
 
 
 def check_output(path: Path, force: bool, inputs: Iterable[Path] = ()) -> None:
-    """Refuse an output that cannot or must not be written, before anything is computed.
-
-    Parameters
-    ----------
-    force : bool
-        Allow an existing file to be replaced.
-    inputs : iterable of Path
-        What the command reads: never replaced.
-    """
+    """Refuse an output that cannot or must not be written, such as an input, before anything is computed."""
     refuse_inputs(path, inputs)
     if os.path.islink(path):
         raise InputError(f"{path}: is a symbolic link to {os.readlink(path)}; -o names the file itself")
@@ -167,13 +154,7 @@ def _asked_for(path: Path) -> Iterator[None]:
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
-    """Give a temporary name beside a file, and remove what is left of it afterwards.
-
-    Parameters
-    ----------
-    path : Path
-        The file to be written in the end; the caller moves the temporary file there with `os.replace`.
-    """
+    """Give a temporary name beside a file, to be moved there by `os.replace`; what is left of it is removed."""
     try:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
     except OSError as error:
@@ -299,15 +280,7 @@ def _writing(path: Path) -> Iterator[None]:
 
 
 def check_folder(folder: Path, force: bool, names: Sequence[str]) -> None:
-    """Refuse a folder that cannot or must not be filled.
-
-    Parameters
-    ----------
-    force : bool
-        Allow files in it to be replaced.
-    names : sequence of str
-        Files that may be written.
-    """
+    """Refuse a folder that cannot or must not be filled with files of these names."""
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: is a file; -o names a folder")
     if folder.exists() and any(folder.iterdir()) and not force:
@@ -327,12 +300,7 @@ def check_folder(folder: Path, force: bool, names: Sequence[str]) -> None:
 def filled_folder(folder: Path, names: Sequence[str]) -> Iterator[Path]:
     """Give a temporary folder beside a folder, and move its files in place at the end.
 
-    Parameters
-    ----------
-    folder : Path
-        Made where it does not exist; a link to a folder is followed.
-    names : sequence of str
-        Files that may be written; those of an earlier run that are not written again are removed.
+    Of the names, files of an earlier run that are not written again are removed; a link to a folder is followed.
     """
     folder = folder.resolve()
     try:

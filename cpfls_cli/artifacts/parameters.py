@@ -159,13 +159,7 @@ def _why_not_fitted(key: str) -> str:
 
 
 def vehicle_section(record: VehicleRecord) -> dict[str, Any]:
-    """Write the section `vehicle` of a config with what was found; null for what was not known and still is not.
-
-    Returns
-    -------
-    dict
-        Plain data, in the order of a config.
-    """
+    """Write the section `vehicle` of a config with what was found; null for what was not known and still is not."""
     known = {each.key: each for each in parameters_of(record)}
     vehicle, rotors = record.vehicle, record.vehicle.rotor
 

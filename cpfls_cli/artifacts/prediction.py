@@ -73,16 +73,7 @@ class PredictionRecord(Record):
     def of(
         cls, model: InertiaFunctions, time: Array, motion: Motion, measured: Array | None, draws: Draws | None
     ) -> Self:
-        """Predict along a flight.
-
-        Parameters
-        ----------
-        time : array, shape (time,), s
-        measured : array, shape (time, 3), N m, or None
-            Generalised torque of the flight; None where it holds none.
-        draws : Draws or None
-            Of the bootstrap; None for a model without bands.
-        """
+        """Predict along a flight, whose generalised torque, shape (time, 3), N m, is None where it holds none."""
         torque, inertia = model.torque(motion), model.inertia(motion.attitude)
         inertia_low = inertia_high = torque_low = torque_high = None
         if draws is not None:

@@ -152,13 +152,7 @@ class PlaybackGroup:
 
     @classmethod
     def of(cls, flights: Sequence[Played], replay: Replay, prediction: Sequence[str], **more: Any) -> Self:
-        """Arrange a replay without its windows.
-
-        Parameters
-        ----------
-        prediction : sequence of str
-            What to call the predictions; those beyond are left out.
-        """
+        """Arrange a replay without its windows; predictions beyond those named are left out."""
         rows = len(prediction)
         groups = {signal: SignalErrorGroup.of(found, rows) for signal, found in replay.errors.items()}
         assert groups["body_rate"] is not None, "every flight has rates"
@@ -227,15 +221,10 @@ class HeldOutGroup(PlaybackGroup):
 
 
 def better_to(errors: ErrorsByHorizon, signal: str) -> float:
-    """Find the longest horizon up to which the errors of the model add up to less than those of both its rivals.
+    """Find the longest horizon, s, up to which the errors of the model add up to less than those of both its rivals.
 
     They are "nothing moves" and "rate stays". Sums are compared, because over the first samples noise of the start
-    decides, and there nothing beats a state that stays.
-
-    Returns
-    -------
-    float
-        In s; 0 where there is none, NaN for a signal that no flight knows.
+    decides, and there nothing beats a state that stays. 0 where there is none, NaN for a signal that no flight knows.
     """
     group = errors.errors[signal]
     if group is None:
@@ -302,14 +291,7 @@ class WindowGroup:
 
     @classmethod
     def of(cls, windows: ReplayWindows, times: Sequence[Array], period: float) -> Self:
-        """Arrange windows.
-
-        Parameters
-        ----------
-        times : sequence of array, s
-            Of the samples of each flight.
-        period : float, s
-        """
+        """Arrange windows, given the times of the samples of each flight and the period, s."""
         start = np.empty(len(windows.start))
         for index, time in enumerate(times):
             own = windows.flight == index

@@ -83,13 +83,7 @@ class JudgedGroup:
         return int(self.samples[self.parts.index(part)])
 
     def of_axes(self, measure: str, model: str, part: str) -> Array:
-        """Get a measure by axis.
-
-        Returns
-        -------
-        array, shape (3,)
-            NaN where this model or part was not judged, or not by this measure.
-        """
+        """Get a measure by axis, shape (3,); NaN where this model or part was not judged, or not by this measure."""
         table = getattr(self, measure)
         if table is None or model not in self.models or part not in self.parts:
             return np.full(3, np.nan)
@@ -115,13 +109,7 @@ class JudgedGroup:
         return float("nan") if np.isnan(values).all() else float(np.nanmin(values))
 
     def winner(self, part: str, axis: int) -> Winner:
-        """Tell whether the model or the rigid body has the smaller mean squared error about an axis.
-
-        Returns
-        -------
-        {"model", "rigid-body", "tie"}
-            A tie is a difference of at most one per cent, or of nothing but rounding.
-        """
+        """Tell whether model or rigid body has the smaller mean squared error; one per cent or rounding is a tie."""
         model, rigid, scale = (float(self.of_axes("mse", name, part)[axis]) for name in (MODEL, RIGID_BODY, ZERO))
         floor = _ROUNDING * scale if np.isfinite(scale) else 0.0
         if max(model, rigid) <= floor or abs(model - rigid) <= _TIE * max(model, rigid) or np.isnan(model + rigid):

@@ -51,17 +51,7 @@ class SelectionRecord(Record):
 
     @classmethod
     def of(cls, selection: Selection, indices: IntArray, candidates: int, random: Array) -> Self:
-        """Arrange a selection.
-
-        Parameters
-        ----------
-        indices : array of int, shape (selected,)
-            Into all samples of the flights, in order of selection.
-        candidates : int
-            Samples that could be selected.
-        random : array, shape (draw,)
-            Condition numbers of random selections of equal size.
-        """
+        """Arrange a selection, its indices into all samples of the flights, beside random ones of equal size."""
         return group_of(
             cls,
             selection,

@@ -277,25 +277,13 @@ class Record:
 
 
 def group_of(kind: type[_Class], result: object, /, **given: Any) -> _Class:
-    """Arrange a result as a group: each field holds the attribute of its name, but for those that are given.
-
-    Raises
-    ------
-    AttributeError
-        If a field is neither given nor an attribute.
-    """
+    """Arrange a result as a group: each field holds the attribute of its name, but for those that are given."""
     names = (entry.name for entry in _entries(kind))  # type: ignore[arg-type]  # classes are hashable
     return kind(**{name: getattr(result, name) for name in names if name not in given}, **given)
 
 
 def columns_of(kind: type[_Class], rows: Iterable[object], /, **given: Any) -> _Class:
-    """Arrange results as a group of columns: each field holds the attributes of its name, one for each result.
-
-    Parameters
-    ----------
-    **given : object
-        Columns that are no attribute of the results, by field.
-    """
+    """Arrange results as a group of columns, each given or the attributes of its name, one for each result."""
     listed = list(rows)
     columns = {
         entry.name: _read(entry.kind, [getattr(row, entry.name) for row in listed])

@@ -92,13 +92,7 @@ class Artifact:
 
 
 def read_record(path: Path, wanted: type[R], *needed: str) -> R:
-    """Read an artifact of one format that keeps to it.
-
-    Parameters
-    ----------
-    *needed : str
-        Fields at the top of the record that this command cannot do without.
-    """
+    """Read an artifact of one format that keeps to it, with the fields that this command cannot do without."""
     artifact = read_artifact(path, wanted.spec())
     names = [wanted.path(name) for name in needed]
     missing = [name for name in names if name not in artifact.data]
@@ -239,13 +233,7 @@ def findings_of(path: Path) -> tuple[Format, list[str]]:
 
 
 def format_name(path: Path) -> str | None:
-    """Tell the format of a file without reading it whole.
-
-    Returns
-    -------
-    str or None
-        None where the file is not an artifact.
-    """
+    """Tell the format of a file without reading it whole; None where it is no artifact."""
     known = _known(path, _origin_of)
     return None if known is None else known.spec.name
 
@@ -273,28 +261,14 @@ def _read(dataset: h5py.Dataset) -> Any:
 
 
 def write_artifact(path: Path, artifact: Artifact) -> None:
-    """Write an artifact under a temporary name, then move it in place.
-
-    Parameters
-    ----------
-    artifact : Artifact
-        Datasets that its format does not know are refused.
-    """
+    """Write an artifact under a temporary name, then move it in place."""
     _refuse_result(path, check_artifact(artifact))
     with sealed_output(path) as output:
         _write(output, _parts(artifact), len(artifact.data["time"]) if artifact.spec.compressed else 0)
 
 
 def write_parts(path: Path, parts: Iterable[Record], samples: int) -> None:
-    """Write a record of a compressed format, no more than a part of it in memory; the bytes are those of the whole.
-
-    Parameters
-    ----------
-    parts : iterable of Record
-        `PART` samples each, but for the last.
-    samples : int
-        Of all parts.
-    """
+    """Write a record of a compressed format, `PART` samples in memory at a time; the bytes are those of the whole."""
     with sealed_output(path) as output:
         _write(output, map(artifact_of, parts), samples)
         with h5py.File(output, "r") as file:
@@ -391,24 +365,12 @@ def _describe(dataset: h5py.h5d.DatasetID, spec: DatasetSpec) -> None:
 
 
 def file_sha256(path: Path) -> str:
-    """Hash a file; one that was opened as an artifact before is not read again.
-
-    Returns
-    -------
-    str
-        Hexadecimal SHA-256.
-    """
+    """Hash a file; one that was opened as an artifact before is not read again."""
     return read_content(path).sha256
 
 
 def count_rows(path: Path, spec: Format, first: str) -> int | None:
-    """Count the rows of a dataset.
-
-    Returns
-    -------
-    int or None
-        None where the file is no artifact of this format or lacks the dataset; reading it whole says why.
-    """
+    """Count the rows of a dataset; None where the file lacks it or is of no such format, as reading it whole tells."""
     known = _known(path, _origin_of)
     if known is None or not spec.includes(known.spec) or not known.shapes.get(first):
         return None
@@ -416,13 +378,7 @@ def count_rows(path: Path, spec: Format, first: str) -> int | None:
 
 
 def check_rows(path: Path, spec: Format, names: Sequence[str]) -> None:
-    """Refuse datasets of an artifact that break its format, some rows at a time.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Paths of the datasets that are needed; others are not looked at.
-    """
+    """Refuse datasets of these names that break the format of an artifact, some rows at a time."""
     with opened(path, spec) as stored:
         missing = [name for name in names if name not in stored.data]
         if missing:
@@ -432,22 +388,7 @@ def check_rows(path: Path, spec: Format, names: Sequence[str]) -> None:
 
 
 def read_rows(path: Path, names: Sequence[str], start: int, stop: int, rows: int) -> Iterator[list[Array]]:
-    """Read some rows of datasets, a few at a time.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Paths of datasets of equal length.
-    start, stop : int
-        First row, and the one after the last.
-    rows : int
-        Read at a time.
-
-    Yields
-    ------
-    list of array
-        One for each dataset.
-    """
+    """Read rows of datasets of equal length, up to the one before `stop`, so many at a time."""
     with opened(path) as stored:
         datasets = [stored.data[name] for name in names]
         for first in range(start, stop, rows):

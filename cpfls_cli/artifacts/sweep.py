@@ -87,15 +87,7 @@ class RunGroup:
 
     @classmethod
     def none(cls, parts: int, genes: int) -> Self:
-        """Begin a sweep of which no run is finished.
-
-        Parameters
-        ----------
-        parts : int
-            How many parts of data models are judged on.
-        genes : int
-            Weights of the longest chromosome of the sweep.
-        """
+        """Begin a sweep of which no run is finished, for so many parts of data and genes of its longest chromosome."""
         whole, scores = np.zeros(0, dtype=np.int64), np.zeros((0, parts))
         return cls(
             setting=whole,
@@ -124,13 +116,7 @@ class RunGroup:
         return type(self)(**joined)
 
     def with_run(self, setting: int, seed: int, parts: Sequence[str], result: Identification | None) -> Self:
-        """Add a run.
-
-        Parameters
-        ----------
-        result : Identification or None
-            None where no chromosome gave a finite model.
-        """
+        """Add a run, without a result where no chromosome gave a finite model."""
         chromosome = np.full(self.chromosome.shape[1], _NO_GENE, dtype=np.int32)
         condition_number, generations, evaluations, settled = np.nan, 0, 0, 0
         if result is not None:
@@ -195,13 +181,7 @@ class Spread:
 
 
 def spread(values: Array) -> Spread:
-    """Measure how far replicates lie apart: ``s^2 = sum (x - mean x)^2 / (n - 1)``.
-
-    Parameters
-    ----------
-    values : array, shape (replicates,)
-        Not finite where a replicate found nothing.
-    """
+    """Measure how far finite replicates lie apart: ``s^2 = sum (x - mean x)^2 / (n - 1)``."""
     known = values[np.isfinite(values)]
     mean = float(np.mean(known)) if len(known) else float("nan")
     variance = float(np.var(known, ddof=1)) if len(known) > 1 else float("nan")

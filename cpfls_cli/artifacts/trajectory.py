@@ -231,17 +231,7 @@ class TrajectoryRecord(Record):
         }
 
     def derivative(self, name: str) -> Array:
-        """Get a derivative of the displacement from the start.
-
-        Parameters
-        ----------
-        name : str
-            One of `DERIVATIVES`.
-
-        Returns
-        -------
-        array, shape (time, 3), m and s, world frame
-        """
+        """Get a derivative of the displacement from the start, shape (time, 3), m and s, world frame."""
         values: Array | None = self.position if name == "displacement" else getattr(self, name)
         assert values is not None, "a held vehicle has no displacement"
         return values - values[0] if name == "displacement" else values

@@ -77,16 +77,5 @@ def check_ignored(study: Study) -> None:
 
 
 def progress_of(progress: Progress, start: float = 0.0, end: float = 1.0) -> Callable[[float, str], None]:
-    """Show a part of the work on the progress of a job.
-
-    Parameters
-    ----------
-    start, end : float
-        Shares of the whole.
-
-    Returns
-    -------
-    callable
-        Takes the share of the part that is done and a note.
-    """
+    """Show a part of the work, from one share of the whole to another, on the progress of a job."""
     return lambda done, note: progress(start + (end - start) * done, 1, note)

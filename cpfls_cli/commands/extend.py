@@ -57,10 +57,7 @@ def finish_extended(
 ) -> ExtendedRecord:
     """Write an extended model, with the flights that its effects and its base learned from as inputs.
 
-    Parameters
-    ----------
-    of_base : sequence of LearnedFlight or None
-        None where the base is the model of the diagnosis.
+    `of_base` is None where the base is the model of the diagnosis.
     """
     known = diagnosis.model_learned_from if of_base is None else of_base
     flights, parts = as_inputs("flight", joined_flights(diagnosis.learned_from, known))

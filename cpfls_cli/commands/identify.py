@@ -151,24 +151,7 @@ def _evidence(
     wrong: Sequence[str],
     signal: int | None,
 ) -> tuple[Validation | None, int | None]:
-    """Gather the evidence on a model; an interrupt leaves the model without it.
-
-    Parameters
-    ----------
-    held_out : mapping of str to TorqueSource
-        What nothing was learned from, by name.
-    wrong : sequence of str
-        What of the flights contradicts itself.
-    signal : int or None
-        Number of a signal that came before.
-
-    Returns
-    -------
-    evidence : Validation or None
-        None if disabled or interrupted.
-    signal : int or None
-        Number of the signal that came before or meanwhile.
-    """
+    """Gather the evidence on a model, none if disabled or interrupted, and the number of the signal that came."""
     settings = job.study.identification
     if not settings.validation.enabled or signal is not None:
         return None, signal

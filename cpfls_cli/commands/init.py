@@ -56,13 +56,7 @@ def _require_possible(stated: Stated) -> None:
 
 
 def _contradictions(text: str, log: Path, *, whole: bool) -> tuple[str, ...]:
-    """Read the leading log by the config that is proposed, and say what of it contradicts itself then.
-
-    Parameters
-    ----------
-    whole : bool
-        Whether the config states its vehicle; else motion alone is held against motion.
-    """
+    """Read the leading log by the config that is proposed, and say what of it contradicts itself, or its vehicle."""
     data = parse_config(text, "the config that is proposed")
     if not whole:
         data = {"import": data["import"] | {"torque_source": None}}

@@ -76,13 +76,7 @@ def mission_paths(job: Job, mission: Mission) -> dict[Path, str]:
 
 
 def mission_texts(job: Job, mission: Mission, record: TrajectoryRecord) -> dict[Path, str]:
-    """Write a path as the files that are asked for.
-
-    Raises
-    ------
-    InputError
-        If an autopilot cannot fly it so.
-    """
+    """Write a path as the files that are asked for."""
     vehicle = job.study.vehicle
     most = sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors) * vehicle.rotor_speed_max_rad_s**2
     hover = vehicle.mass_kg * vehicle.gravity_m_s2 / most

@@ -177,10 +177,7 @@ def _left_open(study: Study, path: Path) -> Case:
 def _open_effects(
     study: Study, record: DiagnosisRecord, flights: Sequence[WeakFlight], path: Path
 ) -> tuple[list[Alternative], list[Effect]]:
-    """List the rivals that a diagnosis leaves, or else what its flights could not show and another could.
-
-    Nothing where the config names effects that the diagnosis did not weigh.
-    """
+    """List the rivals that a diagnosis leaves, or what its flights could not show; nothing for effects not weighed."""
     asked = _effects(study)
     # Between an effect and two that together do the same no path decides: the log has to.
     rivals = [each for each in record.alternative.rows() if not each.beside]

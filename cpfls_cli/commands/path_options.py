@@ -18,13 +18,7 @@ def option_overrides(
     height: float | None,
     duration: float | None,
 ) -> list[str]:
-    """Write the options as overrides of the config, so that the artifact's config has them too.
-
-    Returns
-    -------
-    list of str
-        ``section.key=value`` each.
-    """
+    """Write the options as overrides of the config, so that the artifact's config has them too."""
     settles = to_tell is not None or diagnosis is not None
     if settles and waypoints is not None:
         raise InputError(f"--waypoints {waypoints}: --to-tell and --for choose the path themselves; leave it out")

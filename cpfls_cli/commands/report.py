@@ -40,13 +40,7 @@ def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcom
 
 
 def read_sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:
-    """Read artifacts of any format for a report, each under a name of its own.
-
-    Parameters
-    ----------
-    hashes : sequence of str
-        SHA-256 of the files.
-    """
+    """Read artifacts of any format for a report, each under a name of its own."""
     labels = unique_labels([_printable(path.name) for path in paths], hashes)
     given = zip(paths, labels, hashes, strict=True)
     return [source_of_record(read_any(path), path, label, sha256) for path, label, sha256 in given]

@@ -143,13 +143,7 @@ def _rms(values: Array) -> float:
 
 
 def option_overrides(mode: str | None, effects: Sequence[str], *, gusts: bool = False) -> list[str]:
-    """Write ``--mode``, ``--effect`` and ``--gusts`` as overrides of the config, which its artifact then holds.
-
-    Returns
-    -------
-    list of str
-        ``section.key=value`` each.
-    """
+    """Write ``--mode``, ``--effect`` and ``--gusts`` as overrides of the config, which its artifact then holds."""
     given: dict[str, list[float] | dict[str, float]] = {}
     for text in effects:
         _add_effect(text, given)

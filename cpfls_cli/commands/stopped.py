@@ -20,20 +20,8 @@ def stopped(
 ) -> Outcome:
     """Add to what is said of a result that a signal or the time limit came before all was done, and what is kept.
 
-    Parameters
-    ----------
-    signal : int or None
-        Number of the signal that asked to stop.
-    output : Path
-        What was written.
-    unjudged : str or None
-        Where the signal left a whole model without evidence, the option with which the command judges it.
-
-    Returns
-    -------
-    Outcome
-        The same for a search that came to its end without a signal; after a signal with the exit code that a shell
-        gives a program that it ended.
+    After a signal the exit code is the one that a shell gives a program that it ended. `unjudged` is the option with
+    which the command judges a whole model that the signal left without evidence.
     """
     if not is_end(reason):
         note = f"{output}: is incomplete, because {_STOPPED[reason]}; {_REMEDY}"
@@ -50,13 +38,7 @@ def stopped(
 
 
 def without_model(reason: StopReason, signal: int | None) -> CpflsError | None:
-    """Say that a search was stopped before it had a model to write; None for a search that came to its end.
-
-    Parameters
-    ----------
-    signal : int or None
-        Number of the signal that stopped it.
-    """
+    """Say that a search was stopped before it had a model to write; None for a search that came to its end."""
     if is_end(reason):
         return None
     message = f"{_STOPPED[reason]} before a model was found, so none is written; {_REMEDY}"

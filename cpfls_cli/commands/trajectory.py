@@ -223,10 +223,7 @@ def _line_and_column(key: str, lines: list[int]) -> str:
 def _demand(
     study: Study, settings: TrajectorySettings, planned: PlannedRotation, at: PlanAt
 ) -> tuple[Flyability, tuple[str, ...]]:
-    """Find what a plan asks of its vehicle, sampled anew where a part of a move may lie between two samples.
-
-    The sentences say what is asked for beyond what the vehicle has.
-    """
+    """Find what a plan asks of its vehicle, sampled anew where needed, and say what is beyond what the vehicle has."""
     shortest = _shortest_part(planned, settings)
     step = shortest / _SAMPLES_IN_A_PART
     if step < settings.sample_time_s:

@@ -27,18 +27,7 @@ from cpfls_cli.validation.trust import Trust
 
 
 def sheet_of(path: Path, name: str, file: InputFile, *, force: bool) -> Sheet:
-    """Read any model.
-
-    Parameters
-    ----------
-    force : bool
-        Take a model that says itself that nobody should use it, and one whose search was stopped; both are marked.
-
-    Raises
-    ------
-    InputError
-        If it is no good model, or one that needs `force`.
-    """
+    """Read any model; one that nobody should use, or whose search was stopped, needs `force` and is marked."""
     record = read_record(path, ModelRecord)
     sheet = _bare_sheet(path, record)
     if isinstance(sheet.model.fuzzy, InertiaFunctions):

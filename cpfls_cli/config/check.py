@@ -58,15 +58,7 @@ Location = tuple[str, ...]
 
 
 def check_data(data: dict[str, Any], source: str) -> tuple[Study | None, list[str]]:
-    """Validate plain data as a study, or list every error.
-
-    Returns
-    -------
-    study : Study or None
-        None where there are errors.
-    errors : list of str
-        One line for each wrong key.
-    """
+    """Validate plain data as a study, None where there are errors, with a line for each wrong key."""
     # A section that is named but left empty means its defaults.
     named = {key: {} if value is None and key in SECTIONS else _known(key, value) for key, value in data.items()}
     filled = with_guesses(_with_preset(named))
@@ -96,10 +88,7 @@ def gone_lines(data: dict[str, Any], source: str) -> list[str]:
 
 
 def _no_body(study: Study) -> Iterator[str]:
-    """Refuse moments of inertia of no body: each principal moment is at most the sum of the other two.
-
-    It is a rule of configs alone: what is found in noisy flights may break it, and is told as what it is.
-    """
+    """Refuse, of configs alone, moments of inertia of no body: a principal one is at most the sum of the others."""
     smallest, middle, largest = np.linalg.eigvalsh(symmetric(study.vehicle.inertia_kg_m2))
     if largest > (smallest + middle) * _MEASURED:
         yield (
@@ -165,20 +154,7 @@ def _with_preset(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _describe_errors(errors: Iterable[ErrorDetails], data: dict[str, Any], source: str) -> list[str]:
-    """Describe every wrong key of a config.
-
-    Parameters
-    ----------
-    errors : iterable of ErrorDetails
-        From the validating library.
-    data : dict
-        What was validated.
-
-    Returns
-    -------
-    list of str
-        One line for each key: ``file: dotted.key = value: what is wrong (did you mean ...?)``.
-    """
+    """Describe every wrong key: ``file: dotted.key = value: what is wrong (did you mean ...?)``."""
     # Where a key allows several types, each of them has an error of its own; a line joins them.
     reasons: dict[Location, dict[Sequence[int | str], str]] = {}
     not_of_length: set[Location] = set()

@@ -57,13 +57,7 @@ class Key:
 
 @cache
 def keys_of(settings: type) -> tuple[Key, ...]:
-    """List the keys of a settings class.
-
-    Parameters
-    ----------
-    settings : type
-        A settings dataclass, or `Study`.
-    """
+    """List the keys of a settings class."""
     hints = get_type_hints(settings, include_extras=True)
     if settings is Study:
         names = {name: field.alias or name for name, field in Study.model_fields.items()}
@@ -77,20 +71,7 @@ def _key(name: str, hint: Any) -> Key:
 
 
 def known_keys(location: Sequence[str], deep: bool = False) -> list[str]:
-    """List the valid keys of a section of a config.
-
-    Parameters
-    ----------
-    location : sequence of str
-        Keys down from the root; the index or name of an entry is passed over.
-    deep : bool
-        List dotted paths of everything below instead.
-
-    Returns
-    -------
-    list of str
-        Empty where the location is no section.
-    """
+    """List the valid keys of a section, or the dotted paths of all below; names and indices of entries do not count."""
     settings: type | None = Study
     parts = iter(location)
     for part in parts:

@@ -18,19 +18,7 @@ ASK = "ASK"
 
 
 def load_study(path: Path, overrides: Sequence[str] = (), seed: int | None = None, *, sweep: bool = False) -> Study:
-    """Load and validate a study.
-
-    Parameters
-    ----------
-    path : Path
-        YAML file.
-    overrides : sequence of str
-        ``section.key=value`` each; the value is read as YAML.
-    seed : int, optional
-        Takes the place of the config's seed.
-    sweep : bool
-        Check the settings of the sweep too.
-    """
+    """Load and validate a study, with overrides ``section.key=value`` (YAML), and its sweep if asked."""
     data = read_overridden(path, overrides, seed)
     # Nobody's file is of the vehicle that a study begins with: without the section its keys are missing.
     data.setdefault("vehicle", {})
@@ -80,15 +68,7 @@ def parse_config(text: str, source: str) -> dict[str, Any]:
 
 
 def validate(data: dict[str, Any], source: str, *, sweep: bool = False, wrong: Sequence[str] = ()) -> Study:
-    """Validate plain data as a study.
-
-    Parameters
-    ----------
-    sweep : bool
-        Check the settings of the sweep too; only what sweeps needs them to fit the other keys.
-    wrong : sequence of str
-        What is known to be wrong already.
-    """
+    """Validate plain data as a study, beside what is known to be wrong; what sweeps need is checked for them alone."""
     _refuse_asked(data, source)
     study, found = check_data(data, source)
     errors = [*wrong, *found]

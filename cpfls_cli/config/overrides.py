@@ -22,15 +22,7 @@ _PRESET = "identification.preset"
 
 
 def apply_override(data: dict[str, Any], override: str) -> None:
-    """Apply one override to the data of a config.
-
-    Parameters
-    ----------
-    data : dict
-        Changed in place. A list that the config leaves out is taken from the default study.
-    override : str
-        ``section.key=value``; an entry of a list is named by its index, from 0.
-    """
+    """Apply ``section.key=value`` in place; entries of lists go by index, a list left out is the default one."""
     key, separator, text = override.partition("=")
     try:
         if not separator:
@@ -99,13 +91,7 @@ class Variant:
 
 
 def variants(study: Study) -> tuple[Variant, ...]:
-    """Build the studies of a sweep, one for each setting.
-
-    Returns
-    -------
-    tuple of Variant
-        In the order of the config; the study itself where it names no settings.
-    """
+    """Build the studies of a sweep, one for each setting, or the study itself where it names none."""
     data, common = resolved(study), study.sweep.set
     if not study.sweep.settings:
         return (_variant(data, _AS_CONFIGURED, common),)
@@ -113,20 +99,7 @@ def variants(study: Study) -> tuple[Variant, ...]:
 
 
 def setting_errors(data: Mapping[str, Any], source: str, known: Sequence[str]) -> list[str]:
-    """List the errors of the settings of a sweep, each at the key where it overrides the config.
-
-    Parameters
-    ----------
-    data : mapping
-        Plain data of a config.
-    known : sequence of str
-        Errors without the settings; they are not repeated.
-
-    Returns
-    -------
-    list of str
-        One line for each wrong key of each setting.
-    """
+    """List errors of the settings of a sweep that the config has not without them, at the keys that they override."""
     sweep = data.get(_SWEEP)
     common = _mapping(_mapping(sweep).get("set"))
     settings = _mapping(sweep).get("settings")

@@ -76,13 +76,7 @@ class Study(BaseModel):
 
 
 def resolved(study: Study, sections: Sequence[str] = ()) -> dict[str, Any]:
-    """Write a study as plain data with every default filled in.
-
-    Parameters
-    ----------
-    sections : sequence of str
-        Only these sections or single keys (``section.key``), and the seed; all if empty.
-    """
+    """Write a study as plain data with every default; of some sections or keys ``section.key`` those and the seed."""
     data: dict[str, Any] = study.model_dump(mode="json", by_alias=True)
     if not sections:
         return data
@@ -115,13 +109,7 @@ def _written(data: str) -> str:
 
 @contextmanager
 def settings_of(section: str, study: Study) -> Iterator[None]:
-    """Name the config key and its value where the numerics refuse a setting that does not suit the data.
-
-    Parameters
-    ----------
-    section : str
-        Section of the config whose settings are in use.
-    """
+    """Name the config key and its value where the numerics refuse a setting that does not suit the data."""
     try:
         yield
     except SettingError as error:

@@ -40,10 +40,7 @@ rotors.
 def with_guesses(data: dict[str, Any]) -> dict[str, Any]:
     """Put guesses in the place of what the section `vehicle` leaves null, and name them under its key `unknown`.
 
-    Parameters
-    ----------
-    data : dict
-        Plain data of a config, not yet validated; what is wrong in it stays, for the validation to say.
+    What is wrong in data that are not validated yet stays, for the validation to say.
     """
     vehicle = data.get("vehicle")
     if not isinstance(vehicle, dict):
@@ -101,10 +98,7 @@ def _guesses(vehicle: dict[str, Any], rotors: list[dict[str, Any]]) -> dict[Unkn
 def require_known(study: Study, command: str, *, whole: bool = True) -> None:
     """Refuse a vehicle with unknown numbers for a command that would take their guesses for facts.
 
-    Parameters
-    ----------
-    whole : bool
-        False for a command whose model, known by now, is none of a whole vehicle with numbers of its own.
+    `whole` is False for a command whose model, known by now, is none of a whole vehicle with numbers of its own.
     """
     unknown = study.vehicle.unknown
     torque = study.import_.torque_source
@@ -124,40 +118,18 @@ def require_known(study: Study, command: str, *, whole: bool = True) -> None:
 
 
 def _inertia(mass: float, positions: Sequence[Sequence[float]]) -> tuple[float, float, float]:
-    """Guess moments of inertia, kg m^2.
-
-    Parameters
-    ----------
-    mass : float, kg
-    positions : sequence of (float, float, float), m
-        Of the hubs.
-    """
+    """Guess moments of inertia, kg m^2, of a mass in kg and hubs at these positions in m."""
     x, y, z = (mass * (share * _arm(positions)) ** 2 for share in _GYRATION)
     return x, y, z
 
 
 def _thrust_factor(mass: float, gravity: float, rotors: int, speed_max: float) -> float:
-    """Guess the thrust factor of each rotor, N s^2, from the speed at which such vehicles hover.
-
-    Parameters
-    ----------
-    mass : float, kg
-    gravity : float, m/s^2
-    rotors : int
-    speed_max : float, rad/s
-    """
+    """Guess the thrust factor of each rotor, N s^2, from the speed at which such vehicles hover."""
     return mass * gravity / (rotors * (_HOVER * speed_max) ** 2)
 
 
 def _drag_factor(thrust_factor: float, positions: Sequence[Sequence[float]]) -> float:
-    """Guess the drag factor, N m s^2.
-
-    Parameters
-    ----------
-    thrust_factor : float, N s^2
-    positions : sequence of (float, float, float), m
-        Of the hubs.
-    """
+    """Guess the drag factor, N m s^2, from the thrust factor, N s^2, and the positions of the hubs, m."""
     return _DRAG_LEVER * _arm(positions) * thrust_factor
 
 

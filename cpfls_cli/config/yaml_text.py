@@ -61,13 +61,7 @@ _StudyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _ma
 
 
 def parse_yaml(text: str, source: str) -> Any:
-    """Parse one YAML document.
-
-    Returns
-    -------
-    object
-        Built of dict, list, str, int, float, bool and None.
-    """
+    """Parse one YAML document into dict, list, str, int, float, bool and None."""
     try:
         return deepcopy(_parsed(text))
     except yaml.MarkedYAMLError as error:
@@ -96,13 +90,7 @@ def _parsed(text: str) -> Any:
 
 
 def _written_out(node: yaml.Node, known: dict[int, int]) -> int:
-    """Count the values of a document with every alias written out, before that is done.
-
-    Parameters
-    ----------
-    known : dict of int to int
-        Counts by identity of the node; 0 for those that are being counted.
-    """
+    """Count the values of a document with every alias written out; a node that is being counted counts 0."""
     if id(node) in known:
         if not known[id(node)]:
             raise yaml.constructor.ConstructorError(None, None, "an anchor that holds itself", node.start_mark)
@@ -125,13 +113,7 @@ def _written_out(node: yaml.Node, known: dict[int, int]) -> int:
 
 
 def to_yaml(data: Any) -> str:
-    """Write plain data as YAML, keys in their given order.
-
-    Parameters
-    ----------
-    data : object
-        Built of dict, list, str, int, float, bool and None.
-    """
+    """Write plain data, as `parse_yaml` gives them, as YAML with keys in their given order."""
     return str(yaml.dump(data, Dumper=_StudyDumper, sort_keys=False, default_flow_style=False, width=100))
 
 

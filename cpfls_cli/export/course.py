@@ -75,17 +75,7 @@ class Course:
         return replace(self.flight, motion=own, speed=_finer_speed(self.flight, finer), stretches=stretches)
 
     def errors(self, states: State) -> Array:
-        """Compare runs with what was measured, as `cpfls_cli.playback.player.Runs` does.
-
-        Parameters
-        ----------
-        states : State
-            At the samples behind each start, shape (run, horizon, ...).
-
-        Returns
-        -------
-        array, shape (run, horizon, 4, 3)
-        """
+        """Compare runs with what was measured, shape (run, horizon, 4, 3), as `cpfls_cli.playback.player.Runs` does."""
         return less_measured(states, self.flight.motion, self.starts[:, None] + 1 + np.arange(self.horizon))
 
 

@@ -152,27 +152,13 @@ class Held:
 def held_by(
     model: VehicleModel, holds: Holds, response: RotorResponse, body: Body | None = None, *, squares: bool = False
 ) -> Held:
-    """Take what a target holds of a vehicle.
-
-    Parameters
-    ----------
-    response : RotorResponse
-        Of the target's rotors.
-    body : Body or None
-        Mass, gravity and inertia of the target; None for those of the model.
-    """
+    """Take what a target of these rotors and this body, or the model's, holds of a vehicle."""
     table = WrenchTable(holds(model.table.weights)[:, : len(STATE_TERMS)])
     return Held(table, response, body or model.body, squares)
 
 
 def constant_body(model: VehicleModel) -> Body:
-    """Take the inertia of a vehicle for targets that hold but one: the mean over the attitudes that training visited.
-
-    Raises
-    ------
-    InputError
-        If that is the inertia of no body.
-    """
+    """Take the inertia of a vehicle for targets that hold but one: the mean over attitudes that training visited."""
     if model.fuzzy is None:
         return model.body
     assert isinstance(model.fuzzy, InertiaFunctions), "an inertia over attitude is that of an identified model"
@@ -187,13 +173,7 @@ def constant_body(model: VehicleModel) -> Body:
 
 
 def of_a_body(body: Body, margin: float = 0.0) -> Body:
-    """Take the nearest inertia that a body can have: no principal moment is more than the sum of the others.
-
-    Parameters
-    ----------
-    margin : float, kg m^2
-        By which the sum is larger at least.
-    """
+    """Take the nearest inertia of a body: each principal moment is less, by a margin, than the sum of the others."""
     moments, axes = np.linalg.eigh(body.inertia)
     excess = moments[2] - moments[0] - moments[1] + margin
     if excess <= 0.0:
@@ -207,17 +187,7 @@ def of_a_body(body: Body, margin: float = 0.0) -> Body:
 def missing(
     model: VehicleModel, held: Held, holds: Holds, floor: Array, wind: tuple[float, float, float]
 ) -> list[Missing]:
-    """List what a target does not hold, each with its size.
-
-    Parameters
-    ----------
-    holds : callable
-        That `held` was made with.
-    floor : array, shape (6,), N m and N
-        Noise floors; NaN where unknown.
-    wind : tuple of float, m/s
-        Of the flights that the model was made with.
-    """
+    """List what a target does not hold, each with its size beside noise floors, shape (6,), N m and N."""
     flight = probe_flight(model)
     whole = player_of(model, flight)
     found = [_of_table(name, left, whole, flight, floor) for name, left in _left(model, holds) if left.any()]
@@ -281,13 +251,7 @@ def _sized(name: str, wrench: Array, floor: Array, off: Off) -> Missing:
 
 
 def sized(title: str, size: Array, floor: Array, off: Off, where: str = Missing.where) -> Missing:
-    """Tell the size of a part.
-
-    Parameters
-    ----------
-    size, floor : array, shape (6,), N m and N
-        Root mean square of the part, and noise floors, NaN where unknown.
-    """
+    """Tell the size of a part, its root mean square, shape (6,), N m and N, beside noise floors."""
     floors = size / floor
     largest = float(np.nanmax(floors)) if np.isfinite(floors).any() else float("nan")
     torque, force = (float(np.where(part < _ROUNDING, 0.0, part).max()) for part in (size[:3], size[3:]))

@@ -99,18 +99,7 @@ HOW_TO_EVALUATE = (
 
 
 def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
-    """Write a model as strict JSON.
-
-    Parameters
-    ----------
-    told : sequence of str
-        Further paragraphs on what it is worth.
-
-    Returns
-    -------
-    str
-        In ASCII; null in place of what is not finite, or what the model does not have.
-    """
+    """Write a model, and what it is worth, as strict JSON in ASCII; null for what is not finite, or not there."""
     found, vehicle = sheet.identified, sheet.model.vehicle
     points, runs, attitudes = sheet.references
     document = {

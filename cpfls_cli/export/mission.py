@@ -56,13 +56,7 @@ class Home:
 
 
 def waypoint_lines(record: TrajectoryRecord) -> str:
-    """Write a path as CSV: time, position, yaw and velocity; of an excited one acceleration, attitude, what is added.
-
-    Raises
-    ------
-    InputError
-        If the vehicle is held.
-    """
+    """Write a path as CSV: time, position, yaw, velocity; of an excited one acceleration, attitude, what is added."""
     assert record.position is not None, "a path in space"
     assert record.velocity is not None, "a path in space"
     names: tuple[str, ...] = _POINTS

@@ -60,12 +60,7 @@ Wrenches = Callable[[Signals], Mapping[str, Array]]
 def numbers_of(model: VehicleModel, wrenches: Wrenches, *, alike: bool) -> Numbers:
     """Arrange the numbers of a simulator whose rotors give thrust and yaw torque by their squared speeds.
 
-    Parameters
-    ----------
-    wrenches : callable
-        What it knows beside thrust, yaw torque and the places of the rotors.
-    alike : bool
-        Whether one thrust factor and one torque factor are those of all rotors.
+    `wrenches` tells what it knows beside these; `alike` asks for one thrust and one torque factor of all rotors.
     """
     rotors = model.rotors
     hubs = places(model, alike=alike)

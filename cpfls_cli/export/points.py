@@ -63,13 +63,7 @@ class Expected:
 
 
 def expected(model: InertiaFunctions, motion: Motion) -> Expected:
-    """Compute what an export has to give along a motion.
-
-    Returns
-    -------
-    Expected
-        The torque of the rigid body is computed about the body axes, where it is finite at every attitude.
-    """
+    """Compute what an export has to give along a motion; the rigid body's torque is about body axes, always finite."""
     q, qd, qdd = motion.attitude, motion.rate, motion.acceleration
     inertia = model.inertia(q)
     fuzzy = Regressor(model.structure, motion, model.ranges).torque(model.partitions, model.coefficients)
@@ -98,10 +92,7 @@ def _scale(inertia: InertiaValues, motion: Motion, fuzzy: bool) -> Array:
 def attitude_points(model: InertiaFunctions, rng: np.random.Generator) -> Expected:
     """Draw a few states, half of them where training went, and compute what the model gives there.
 
-    Returns
-    -------
-    Expected
-        In the middle of cells, away from a vertical pitch, so that single precision agrees as well.
+    They lie in the middle of cells, away from a vertical pitch, so that single precision agrees as well.
     """
     centres = (np.arange(CELLS) + 0.5) * (2.0 * np.pi / CELLS) - np.pi
     upright = np.abs(np.cos(centres)) > _UPRIGHT
@@ -180,18 +171,7 @@ def reference_points(model: VehicleModel, rng: np.random.Generator, count: int =
 
 
 def term_sizes(model: VehicleModel, air: Array, rate: Array, rotor: Array) -> Array:
-    """Sum the sizes of the terms of torque and force, which their rounding errors are relative to.
-
-    Parameters
-    ----------
-    air, rate : array, shape (samples, 3), m/s and rad/s, body frame
-    rotor : array, shape (samples, 1 + 4 rotors)
-
-    Returns
-    -------
-    array, shape (samples, 6)
-        Above zero.
-    """
+    """Sum the sizes of the terms of torque and force, shape (samples, 6), which rounding errors are relative to."""
     sizes = wrench_of(np.abs(model.table.weights), np.abs(model.table.terms(air, rate)), np.abs(rotor))
     return np.where(sizes > 0.0, sizes, 1.0)
 

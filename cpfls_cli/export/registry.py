@@ -123,18 +123,7 @@ class Exported:
 
 
 def exported(sheet: Sheet, form: str, file: str) -> Exported:
-    """Write a model in a form.
-
-    Parameters
-    ----------
-    form : str
-        Of `FORMS`.
-
-    Raises
-    ------
-    InputError
-        If it cannot hold the model at all.
-    """
+    """Write a model in one of `FORMS`."""
     chosen = FORMS[form]
     try:
         held, holds = chosen.held(sheet.model)
@@ -157,13 +146,7 @@ def _left(sheet: Sheet, held: Held, holds: Holds, title: str) -> tuple[tuple[Mis
 
 
 def require_package(form: str) -> None:
-    """Refuse to fly with a package that is not installed.
-
-    Raises
-    ------
-    InputError
-        With the command that installs it.
-    """
+    """Refuse to fly with a package that is not installed."""
     package = TARGETS[form].package
     try:
         import_module(package or "cpfls_cli")

@@ -36,13 +36,7 @@ class CSource:
 
 
 def c_source(sheet: Sheet, stem: str, told: Sequence[str] = ()) -> CSource:
-    """Write a model as C99.
-
-    Parameters
-    ----------
-    told : sequence of str
-        Further paragraphs of the head.
-    """
+    """Write a model as C99, with further paragraphs in its head."""
     points, runs, attitudes = sheet.references
     peaks = airflow_peaks(sheet)
     rows = zip(*(column.tolist() for column in sheet.weights), strict=True)
@@ -136,15 +130,7 @@ def _c_part(part: Sequence[Any] | Array, indent: int) -> str:
 
 
 def python_source(sheet: Sheet, file: str, library: str = "numpy", told: Sequence[str] = ()) -> str:
-    """Write a model as a module of Python.
-
-    Parameters
-    ----------
-    library : {"numpy", "casadi", "jax"}
-        That it computes with.
-    told : sequence of str
-        Further paragraphs of the head.
-    """
+    """Write a model as a module of Python that computes with one library, with further paragraphs in its head."""
     model, weights, rules = sheet.model, sheet.weights, sheet.rules
     points, runs, attitudes = sheet.references
     coefficients = np.zeros(0) if rules is None else rules.coefficients
@@ -186,13 +172,7 @@ def _python_rules(model: InertiaFunctions) -> dict[str, Any]:
 
 
 def visited_rows(model: InertiaFunctions) -> list[str]:
-    """Draw the region that training visited.
-
-    Returns
-    -------
-    list of str
-        ``#`` for a visited cell, ``.`` for another; a line for each roll.
-    """
+    """Draw the region that training visited, ``#`` for a visited cell, ``.`` for another; a line for each roll."""
     return ["".join(row) for row in np.where(model.visited, "#", ".")]
 
 

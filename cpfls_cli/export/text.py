@@ -20,18 +20,7 @@ _LONGEST_NAME = 48
 
 
 def comment_lines(paragraphs: Sequence[str]) -> list[str]:
-    """Break text into lines for a comment of C or Python.
-
-    Parameters
-    ----------
-    paragraphs : sequence of str
-        Of any origin: what could end a comment, or start one, is taken apart.
-
-    Returns
-    -------
-    list of str
-        Each starts with a space, or is empty.
-    """
+    """Break text of any origin into lines for a comment of C or Python; what could end or start one is taken apart."""
     lines: list[str] = []
     for paragraph in paragraphs:
         safe = comment_text(paragraph)
@@ -61,25 +50,14 @@ def literal_text(text: str) -> str:
 
 
 def identifier(stem: str) -> str:
-    """Make a prefix for the names in source code out of the name of a file.
-
-    Returns
-    -------
-    str
-        Letters, digits and underscores, a letter first.
-    """
+    """Make a prefix for names in source code of a file's name: letters, digits and underscores, a letter first."""
     cleaned = re.sub(r"[^A-Za-z0-9]+", "_", stem).strip("_")
     named = cleaned if cleaned[:1].isalpha() else f"model_{cleaned}"
     return named[:_LONGEST_NAME].rstrip("_")
 
 
 def checked_identifier(name: str) -> str:
-    """Refuse a prefix that is no identifier.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse a prefix that is no identifier."""
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         raise InputError(
             f"--name {name or repr(name)}: is no identifier; use letters, digits and underscores, a letter first"
@@ -100,14 +78,7 @@ def c_row(values: Iterable[float]) -> str:
 
 
 def c_rows(values: Array, labels: Sequence[str]) -> str:
-    """Write the rows of a table of C, each in braces, under a comment that names it.
-
-    Parameters
-    ----------
-    values : array, shape (rows, columns)
-    labels : sequence of str
-        One for each row.
-    """
+    """Write the rows of a table of C, each in braces, under a comment that names it."""
     return "\n".join(
         f"    /* {label} */\n    {{\n{filled(c_row(row), 8)}\n    }},"
         for label, row in zip(labels, values, strict=True)
@@ -115,14 +86,7 @@ def c_rows(values: Array, labels: Sequence[str]) -> str:
 
 
 def python_rows(values: Array, indent: int) -> str:
-    """Write a table as nested lists of Python.
-
-    Parameters
-    ----------
-    values : array, shape (columns,) or (rows, columns)
-    indent : int
-        Spaces before each line.
-    """
+    """Write a table of one row or several as nested lists of Python."""
     if values.ndim == 1:
         return filled("[" + ", ".join(number(value) for value in values) + "]", indent)
     rows = ",\n".join(python_rows(row, indent + 4) for row in values)
@@ -130,26 +94,14 @@ def python_rows(values: Array, indent: int) -> str:
 
 
 def filled(text: str, indent: int) -> str:
-    """Break a list of numbers into lines.
-
-    Parameters
-    ----------
-    indent : int
-        Spaces before each line.
-    """
+    """Break a list of numbers into indented lines."""
     blank = " " * indent
     wide = {"break_long_words": False, "break_on_hyphens": False}
     return textwrap.fill(text, _NUMBER_COLUMNS, initial_indent=blank, subsequent_indent=blank + " ", **wide)  # type: ignore[arg-type]
 
 
 def strict_json(document: Mapping[str, Any]) -> str:
-    """Write a document as strict JSON.
-
-    Returns
-    -------
-    str
-        In ASCII; null in place of what is not finite.
-    """
+    """Write a document as strict JSON in ASCII; null in place of what is not finite."""
     return f"{_written(document, 0)}\n"
 
 

@@ -58,23 +58,9 @@ def verified(
     horizon: int,
     windows: int,
 ) -> Verification:
-    """Fly an exported vehicle from samples of a flight, and compare it with the playback of its model.
+    """Fly an exported vehicle from samples of a flight as logged, and compare it with the playback of its model.
 
-    Parameters
-    ----------
-    form : str
-        Of `TARGETS`.
-    flight : PlaybackFlight
-        As logged, faults of sensors taken out.
-    model : tuple of PlaybackFlight and Player
-        What `cpfls replay` plays back along the flight, in the wind that it says; the export flies in the same.
-    windows : int
-        At most; spread over the flight.
-
-    Raises
-    ------
-    InputError
-        If the flight does not say what the vehicle needs to be flown.
+    At most so many windows are spread over the flight; the export flies in the wind that the playback says.
     """
     _require(flight, exported.held)
     flight = in_the_air(flight, model[1].wind)
@@ -122,10 +108,7 @@ def _largest(errors: Array) -> Array:
 
 
 def _limit(form: str, text: str, course: Course, finer: int) -> tuple[Array, Array]:
-    """Fly with the step of the target, and with halves of it, from which follows a step of no length.
-
-    What a step leaves is ``a h + b h^2 + ...``, of which each more flight takes one term out.
-    """
+    """Fly with the step of the target and with halves of it: each takes a term of ``a h + b h^2 + ...`` out."""
     target = TARGETS[form]
     steps = [replace(course, finer=finer * 2**level) for level in range(target.levels)]
     once, *rest = found = [course.errors(target.fly(text, each)) for each in steps]

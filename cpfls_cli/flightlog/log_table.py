@@ -118,13 +118,7 @@ class LogTable:
 
 
 def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, str, str | None]:
-    """Find the column of stamps: it never falls, and its name or its steps say what it counts; and any doubt of that.
-
-    Raises
-    ------
-    InputError
-        If no column can be one.
-    """
+    """Find the column of stamps, which never falls and says by name or steps what it counts; and any doubt of that."""
     rising = [name for name, values in fields.items() if _rises(np.asarray(values, dtype=float))]
     rising.sort(key=lambda name: (_time_rank(name), list(fields).index(name)))
     for name in rising:

@@ -189,12 +189,7 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
 
 
 def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
-    """Refuse two logs whose parameters, systems or rotors say that they are of two vehicles.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse two logs whose parameters, systems or rotors say that they are of two vehicles."""
     differing = []
     names = [one.system.partition(" ")[0] for one in (first, other)]
     if names[0] != names[1]:
@@ -222,13 +217,7 @@ def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
 
 
 def _time_column(logs: Sequence[KnownLog]) -> str | None:
-    """Give the clock that suits all logs.
-
-    Raises
-    ------
-    InputError
-        If flat logs have stamps of other names or units.
-    """
+    """Give the clock that suits all logs."""
     first = logs[0]
     if all(first.recognition.time_column in one.columns for one in logs):
         wrong = [one for one in logs if one.recognition.time_unit != first.recognition.time_unit]

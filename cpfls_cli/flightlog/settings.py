@@ -133,13 +133,7 @@ def _expected_columns(name: SignalName, signal: SignalMap) -> int:
 
 
 def _check_signal(name: SignalName, signal: SignalMap) -> None:
-    """Check the number of columns and the unit against the kind of signal.
-
-    Raises
-    ------
-    SettingError
-        Naming the key below the section `import`.
-    """
+    """Check the number of columns and the unit against the kind of signal."""
     expected = _expected_columns(name, signal)
     # A flight keeps one unit of a signal, whichever columns it came from.
     kinds = UNITS_OF_SIGNAL[name]

@@ -79,13 +79,7 @@ class FlightFile:
         return self.stop - self.start
 
     def chunks(self) -> Iterator[TorqueData]:
-        """Yield the samples, `CHUNK` at a time.
-
-        Raises
-        ------
-        InputError
-            If another file, or none, lies where this one was.
-        """
+        """Yield the samples, `CHUNK` at a time."""
         self._require_same_file()
         for rows in read_rows(self.path, self.names, self.start, self.stop, CHUNK):
             yield _torque_data(rows)
@@ -106,13 +100,7 @@ class FlightFile:
 
 
 def flight_source(path: Path, *, torque: bool = True) -> TorqueSource:
-    """Open a flight.
-
-    Raises
-    ------
-    InputError
-        If it is no flight, lacks a signal or breaks its format.
-    """
+    """Open a flight."""
     names = (*_NEEDED, _TORQUE) if torque else _NEEDED
     paths = tuple(FlightRecord.path(name) for name in names)
     samples = count_rows(path, FlightRecord.spec(), paths[0])
@@ -132,15 +120,7 @@ def _torque_data(rows: Sequence[Array]) -> TorqueData:
 
 
 def part_of(source: TorqueSource, samples: slice) -> TorqueSource:
-    """Take consecutive samples of a flight.
-
-    Parameters
-    ----------
-    source : TorqueSource
-        As `flight_source` gives it.
-    samples : slice
-        With a start and a stop.
-    """
+    """Take consecutive samples of a flight, a slice with a start and a stop."""
     if isinstance(source, FlightFile):
         return replace(source, start=source.start + samples.start, stop=source.start + samples.stop)
     assert isinstance(source, TorqueData)
@@ -199,13 +179,7 @@ class FlightStretches:
         return int(self.known.stop - self.known.start)
 
     def __iter__(self) -> Iterator[FlightStretch]:
-        """Read one stretch after the other.
-
-        Raises
-        ------
-        InputError
-            As `signals_of`.
-        """
+        """Read one stretch after the other."""
         first, stop = self.known.start, self.known.stop
         for start in range(first, stop, STRETCH):
             end = min(start + STRETCH, stop)
@@ -218,13 +192,7 @@ class FlightStretches:
 
 
 def flight_stretches(path: Path, study: Study) -> FlightStretches:
-    """Open a flight or import a log, and cut it into stretches; one of more than `IN_MEMORY` samples stays in its file.
-
-    Raises
-    ------
-    InputError
-        As `read_flights`.
-    """
+    """Open a flight or import a log in stretches; one of more than `IN_MEMORY` samples stays in its file."""
     samples = None if is_log(path) else count_rows(path, FlightRecord.spec(), FlightRecord.path("time"))
     if samples is None or samples <= IN_MEMORY:
         flight = read_flight(path, study)
@@ -255,11 +223,7 @@ def flight_stretches(path: Path, study: Study) -> FlightStretches:
 def check_file(path: Path, study: Study, *, driven: bool = False) -> tuple[Finding, ...]:
     """Hold a flight against itself, its middle where it stays in its file; nothing of a flight of another vehicle.
 
-    Parameters
-    ----------
-    driven : bool
-        Whether what drives it is held against the vehicle of the config in any case; else where the rotors of the
-        config give its torque.
+    What drives it is held against the vehicle of the config if `driven`, else where its rotors give its torque.
     """
     try:
         return check_flight(_enough_of(path, study), study, driven=driven or torque_source_of(path, study) in _ROTORS)

@@ -31,15 +31,7 @@ _DROPPED: Final = MappingProxyType(
 
 
 def imported(log: Path, study: Study) -> ImportedFlight:
-    """Import a log in memory.
-
-    Raises
-    ------
-    InputError
-        If the log cannot be read or lacks columns that the config names.
-    ConfigError
-        If a key of the section `import` does not suit the log; the message names both.
-    """
+    """Import a log in memory."""
     read = read_log(log, study.import_)
     study = study.model_copy(update={"import_": read.settings})
     with _naming(log), settings_of("import", study):
@@ -62,13 +54,7 @@ def _naming(log: Path) -> Iterator[None]:
 
 
 def log_findings(report: ImportReport) -> dict[str, int]:
-    """Count what was found in a log, by reason and treatment; what was not found is left out.
-
-    Returns
-    -------
-    dict of str to int
-        Rows, then gaps, then values of all columns together.
-    """
+    """Count what was found in a log: rows by reason, then gaps, then values of all columns together."""
     rows = {_DROPPED[reason]: count for reason, count in report.dropped.items()}
     gaps = {f"gaps in the time stamps, up to {report.longest_gap_s:.3g} s: interpolated": report.gaps}
     values = {
@@ -101,27 +87,7 @@ def _rotor_torque(study: Study) -> Callable[[LogSignals], Array]:
 
 
 def commanded_speed(command: Array | None, unit: str, speed_max: float) -> Array | None:
-    """Take a command in 0..1 as a share of the largest rotor speed; speeds are taken as they are.
-
-    Parameters
-    ----------
-    command : array, shape (time, rotor), or None
-        In the SI unit of `unit`, as a flight holds it.
-    unit : str
-        `import.signals.rotor_command.unit` of the study; a flight carries it in `/config`.
-    speed_max : float
-        `vehicle.rotor_speed_max_rad_s`, rad/s.
-
-    Returns
-    -------
-    array, shape (time, rotor), rad/s, or None
-        None where there is no command.
-
-    Raises
-    ------
-    InputError
-        If the unit is neither a share nor a speed.
-    """
+    """Take a command in 0..1, shape (time, rotor), as a share of the largest speed, rad/s; speeds stay as they are."""
     if command is None or unit in SPEED_UNITS:
         return command
     if unit != "1":

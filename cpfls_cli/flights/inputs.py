@@ -37,29 +37,12 @@ def hashes_of(path: Path, file: InputFile) -> tuple[str, ...]:
 
 
 def known_by(paths: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> list[tuple[str, tuple[str, ...]]]:
-    """List flights once each: file name, and the hashes that it is known by.
-
-    Parameters
-    ----------
-    inputs : mapping of str to InputFile
-        Of the command, by role.
-    """
+    """List flights once each: file name, and the hashes that it is known by."""
     return list(dict.fromkeys((inputs[role].name, hashes_of(path, inputs[role])) for role, path in paths.items()))
 
 
 def choosing_source(flights: Sequence[Path], inputs: Mapping[str, InputFile]) -> TorqueSource | None:
-    """Open the flights to choose on; None where there are none.
-
-    Parameters
-    ----------
-    inputs : mapping of str to InputFile
-        All inputs of the command by role.
-
-    Raises
-    ------
-    InputError
-        If one of them is another input too: what was chosen on a flight has been fitted to it.
-    """
+    """Open the flights to choose on, None where there are none; a model was fitted to what is another input too."""
     for role, path in numbered_roles("choose-on", flights).items():
         others = {other: file for other, file in inputs.items() if other != role}
         same = next((other for other, file in others.items() if file.sha256 == inputs[role].sha256), None)
@@ -79,20 +62,7 @@ _USED = {
 def held_out_parts(
     study: Study, rests: Mapping[str, TorqueSource], inputs: Mapping[str, InputFile], validate: Sequence[Path]
 ) -> dict[str, TorqueSource]:
-    """Gather what is judged but not learned from, under names of their own.
-
-    Parameters
-    ----------
-    rests : mapping of str to TorqueSource
-        What of the flights that train is held out.
-
-    Raises
-    ------
-    ConfigError
-        If a part was to be held out, and nothing is left for it.
-    InputError
-        If one of the flights trains too.
-    """
+    """Gather what is judged but not learned from, under names of their own: rests of flights that train, and others."""
     if study.identification.training_share < 1 and not rests:
         raise ConfigError(
             f"identification.embargo_s = {study.identification.embargo_s:g}: leaves nothing of the flight to be "

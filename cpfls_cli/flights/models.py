@@ -20,20 +20,9 @@ from cpfls_cli.playback.model import VehicleModel
 
 
 def read_model(path: Path, study: Study, *, forecast: bool = False) -> VehicleModel:
-    """Read any model of the vehicle of a study.
+    """Read any model of the vehicle of a study, or take the vehicle itself for the word `VEHICLE`.
 
-    Parameters
-    ----------
-    path : Path
-        An artifact, or the word `VEHICLE`.
-    forecast : bool
-        Whether it is to forecast along logged rotor speeds: where a file holds a model for that beside the vehicle,
-        that one is taken.
-
-    Raises
-    ------
-    InputError
-        If it is none, or of another vehicle than that of the config.
+    To forecast along logged rotor speeds, a model for that is taken where the file holds one beside the vehicle.
     """
     if is_vehicle(path):
         return VehicleModel(vehicle=study.vehicle)
@@ -43,13 +32,7 @@ def read_model(path: Path, study: Study, *, forecast: bool = False) -> VehicleMo
 
 
 def read_observer(path: Path, past_s: float) -> Observer:
-    """Read the observer by which the forecast of a model uses so much of the flight before a start.
-
-    Raises
-    ------
-    InputError
-        If it holds none.
-    """
+    """Read the observer by which the forecast of a model uses so much of the flight before a start."""
     known = not is_vehicle(path) and holds(path, VehicleRecord)
     held = read_record(path, VehicleRecord).history if known else None
     if held is None:
@@ -73,13 +56,7 @@ def learned_by(path: Path | None) -> tuple[LearnedFlight, ...]:
 
 
 def read_base(path: Path | None, study: Study) -> VehicleModel:
-    """Read what effects are sought for: an identified model, or the rigid body of the vehicle where there is none.
-
-    Raises
-    ------
-    InputError
-        If it is no identified model, or one of another vehicle.
-    """
+    """Read what effects are sought for: an identified model, or the rigid body of the vehicle where there is none."""
     rigid = VehicleModel(vehicle=study.vehicle)
     if path is None:
         return rigid
@@ -87,13 +64,7 @@ def read_base(path: Path | None, study: Study) -> VehicleModel:
 
 
 def rebuilt(path: Path, record: ModelRecord) -> VehicleModel:
-    """Rebuild the model of a record; the path is for messages.
-
-    Raises
-    ------
-    InputError
-        If this program does not know an effect, or numbers do not fit each other.
-    """
+    """Rebuild the model of a record; the path is for messages."""
     try:
         return vehicle_model(record.vehicle)
     except InputError as error:

@@ -48,20 +48,7 @@ _SAME_PERIOD = 1e-3
 
 
 def flights_to_play(paths: Sequence[Path], study: Study, hold: Hold | None = None) -> tuple[LoggedFlight, ...]:
-    """Read flights, and import those that are logs.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-        Artifacts of the format ``cpfls/flight``, or logs that the section `import` describes.
-    hold : {"linear", "previous"} or None
-        What a speed is between samples; None: measured ones a straight line, commands what they were.
-
-    Raises
-    ------
-    InputError
-        If a flight is of another vehicle, has no actuation, is not uniform in time, or has another rate than the first.
-    """
+    """Read flights of one rate, and import those that are logs; `hold` is what a speed is between samples, or usual."""
     read = [
         read_import(path.name, _parts(path, study), study) if is_log(path) else read_flight(path, study)
         for path in paths
@@ -178,13 +165,7 @@ def _of_full_battery(flights: Sequence[LoggedFlight], read: Sequence[ReadFlight]
 
 
 def played(model: VehicleModel, flight: LoggedFlight, stated: VehicleSettings) -> Played:
-    """Make a flight and a model ready for playback, beside the vehicle that the config states.
-
-    Raises
-    ------
-    InputError
-        If the flight lacks a signal that the model needs.
-    """
+    """Make a flight and a model ready for playback, beside the vehicle that the config states."""
     along, player = made_ready(model, flight)
     if model.is_rigid_body and model.vehicle == stated and model.fuzzy is None:
         return Played(along, player, player)

@@ -70,18 +70,7 @@ class ReadFlight:
 
 
 def read_flights(paths: Sequence[Path], study: Study) -> Recordings:
-    """Read flights, and import those that are logs.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-        Artifacts of the format ``cpfls/flight``, or logs that the section `import` describes.
-
-    Raises
-    ------
-    InputError
-        If a flight is of another vehicle, has no actuation, or is not uniform in time.
-    """
+    """Read flights, and import those that are logs."""
     flights = [read_flight(path, study) for path in paths]
     made = [_recording(flight, study) for flight in flights]
     recordings, notes = with_voltage([recording for recording, _ in made], flights)
@@ -90,13 +79,7 @@ def read_flights(paths: Sequence[Path], study: Study) -> Recordings:
 
 
 def read_flight(path: Path, study: Study) -> ReadFlight:
-    """Read a flight, or import it if it is a log.
-
-    Raises
-    ------
-    InputError
-        If it is of another vehicle.
-    """
+    """Read a flight, or import it if it is a log."""
     if is_log(path):
         return read_import(path.name, [imported(path, study)], study)
     record = read_record(path, FlightRecord)
@@ -104,13 +87,7 @@ def read_flight(path: Path, study: Study) -> ReadFlight:
 
 
 def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> ReadFlight:
-    """Join the parts of a log that were imported.
-
-    Parameters
-    ----------
-    parts : sequence of ImportedFlight
-        Of one log, in time. Several are on the clock of the log, one on a clock of its own.
-    """
+    """Join the parts of a log that were imported: several are on the clock of the log, one on a clock of its own."""
     for part in parts:
         _require_speeds(name, part, study)
     first = parts[0]
@@ -126,12 +103,7 @@ def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> Rea
 
 
 def _require_speeds(log: str, part: ImportedFlight, study: Study) -> None:
-    """Refuse speeds of rotors in a unit in which no vehicle flies, where another one carries it.
-
-    Raises
-    ------
-    ConfigError
-    """
+    """Refuse speeds of rotors in a unit in which no vehicle flies, where another one carries it."""
     for name in ("rotor_speed", "rotor_command"):
         columns, speed = study.import_.signals.get(name), getattr(part, name)
         if columns is None or speed is None or columns.unit not in SPEED_UNITS:
@@ -148,13 +120,7 @@ def _require_speeds(log: str, part: ImportedFlight, study: Study) -> None:
 
 
 def units_of(path: Path, made: Header, study: Study) -> Mapping[str, str]:
-    """Give the units that the import of a flight read, empty for one that was simulated.
-
-    Raises
-    ------
-    InputError
-        If the flight is of another vehicle than that of the config.
-    """
+    """Give the units that the import of a flight read, empty for one that was simulated."""
     made_by = stored_study(made.config, path)
     require_same_vehicle(path, made_by.vehicle, study.vehicle)
     return _units(made_by) if "log" in made.inputs else {}
@@ -181,23 +147,9 @@ def require_rotors(study: Study) -> None:
 
 
 def signals_of(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> tuple[Signals, tuple[str, ...]]:
-    """Arrange a stretch of a flight for the evaluation of effects.
+    """Arrange a stretch of a flight for the evaluation of effects, and say what was taken for granted.
 
-    Parameters
-    ----------
-    known : mapping of str to array
-        The stretch: time and signals, all known; setpoints that are not known in all of it are left out.
-
-    Returns
-    -------
-    signals : Signals
-    notes : tuple of str
-        What was taken for granted.
-
-    Raises
-    ------
-    InputError
-        If it is not uniform in time, or has no actuation.
+    Time and signals are all known; setpoints that are not known in all of it are left out.
     """
     signals, notes = _of_motion(flight, known, study)
     return _actuated(signals, flight, known, study), notes
@@ -273,18 +225,7 @@ def all_known(signals: Mapping[str, Array]) -> BoolArray:
 
 
 def known_stretches(name: str, known: BoolArray, time: Array) -> list[slice]:
-    """List the stretches without a pause in which everything is known: what of a flight can be used.
-
-    Parameters
-    ----------
-    known : array of bool, shape (time,)
-    time : array, shape (time,), s
-
-    Raises
-    ------
-    InputError
-        If none has as many samples as effects with derivatives need.
-    """
+    """List the stretches without a pause in which everything is known: what of a flight can be used."""
     steps = np.diff(time)
     paused = steps > _PAUSE * np.median(steps) if len(steps) else np.zeros(0, dtype=bool)
     number = np.concatenate([[1], 1 + np.cumsum(paused | (known[1:] != known[:-1]))])
@@ -308,13 +249,7 @@ def longest_known(name: str, known: BoolArray, time: Array) -> tuple[slice, tupl
 def with_voltage(
     recordings: Sequence[Recording], flights: Sequence[ReadFlight]
 ) -> tuple[list[Recording], tuple[str, ...]]:
-    """Take a voltage in V as a share of the largest of all flights.
-
-    Parameters
-    ----------
-    flights : sequence of ReadFlight
-        That the recordings are of, one for each.
-    """
+    """Take a voltage in V as a share of the largest of all flights."""
     full = [_largest_volts(r.signals, s) for r, s in zip(recordings, flights, strict=True)]
     if not any(full):
         return list(recordings), ()
@@ -385,15 +320,7 @@ class FlightSplit:
 def split_flights(given: Sequence[Recording], held_out: Sequence[Recording], settings: GapSettings) -> FlightSplit:
     """Split flights for learning and judging.
 
-    Parameters
-    ----------
-    held_out : sequence of Recording
-        Flights that are held out; if there are none, the last third of the flights is, or of one flight its last third.
-
-    Raises
-    ------
-    InputError
-        If a flight or a part is too short, or their rates differ.
+    If none are held out, the last third of the flights is, or of one flight its last third.
     """
     if held_out:
         common_windows([*given, *held_out], settings)

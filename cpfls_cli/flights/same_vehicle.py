@@ -19,13 +19,7 @@ R = TypeVar("R", bound=Record)
 
 
 def require_same_vehicle(path: Path, given: VehicleSettings, wanted: VehicleSettings) -> None:
-    """Refuse a file that was made with another vehicle than that of the config.
-
-    Raises
-    ------
-    InputError
-        Naming the keys that differ.
-    """
+    """Refuse a file that was made with another vehicle than that of the config."""
     different = _different(given, wanted)
     if different:
         raise InputError(
@@ -35,13 +29,7 @@ def require_same_vehicle(path: Path, given: VehicleSettings, wanted: VehicleSett
 
 
 def read_of_vehicle(path: Path, wanted: type[R], study: Study) -> R:
-    """Read an artifact that must have been made with the vehicle of the config.
-
-    Raises
-    ------
-    InputError
-        If it is no good artifact of the format, or was made with another vehicle.
-    """
+    """Read an artifact that must have been made with the vehicle of the config."""
     record = read_record(path, wanted)
     made_with = _with_what_was_open(_vehicle_of(path, record.origin), study.vehicle)
     require_same_vehicle(path, made_with, study.vehicle)
@@ -60,18 +48,7 @@ def _with_what_was_open(given: VehicleSettings, wanted: VehicleSettings) -> Vehi
 
 
 def other_vehicles(paths: Sequence[Path], study: Study) -> tuple[str, ...]:
-    """Name flights that were made with another vehicle than that of the config.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-        That judge a model, or choose it; one whose config this version cannot read is passed over.
-
-    Returns
-    -------
-    tuple of str
-        A sentence for each.
-    """
+    """Say which flights were made with another vehicle, a sentence each; configs that are not read are passed over."""
     differences = [(path, _difference_of(path, study)) for path in dict.fromkeys(paths)]
     return tuple(
         f"{path}: was made with another vehicle; not the same: {different}; what it says of the model is of that one"

@@ -99,18 +99,7 @@ def flight_roles(flights: Sequence[Path]) -> dict[str, Path]:
 def split_training(
     flights: Sequence[Path], study: Study, inputs: Mapping[str, InputFile] | None = None, *, torque: bool = True
 ) -> SplitFlights:
-    """Open flights and split each as the study says.
-
-    Parameters
-    ----------
-    torque : bool
-        Whether their torque is needed.
-
-    Raises
-    ------
-    InputError
-        If one is no good flight, or is given twice.
-    """
+    """Open flights and split each as the study says."""
     _refuse_twice(flights, inputs)
     settings, sources = study.identification, [flight_source(path, torque=torque) for path in flights]
     splits = [split_flight(sample_times(source), settings.training_share, settings.embargo_s) for source in sources]
@@ -120,18 +109,7 @@ def split_training(
 def read_training(
     flights: Sequence[Path], selection: Path | None, study: Study, inputs: Mapping[str, InputFile] | None = None
 ) -> TrainingData:
-    """Open flights and find what of them trains.
-
-    Parameters
-    ----------
-    selection : Path, optional
-        Made from these very flights.
-
-    Raises
-    ------
-    InputError
-        If the selection was made from other flights, or holds samples of a held-out part.
-    """
+    """Open flights and find what of them trains, all or what was selected from these very flights."""
     split = split_training(flights, study, inputs)
     training, candidates = split.training, split.training_indices
     if selection is None:
@@ -189,18 +167,7 @@ def _require_made_from(flights: Mapping[Path, str], selection: Path, record: Sel
 
 
 def uniform_regressor(training: TorqueSource, study: Study) -> Callable[[], Iterator[Array]]:
-    """Write out the regressor at uniform partitions, block by block.
-
-    Parameters
-    ----------
-    training : TorqueSource
-        The parts of flights that train.
-
-    Returns
-    -------
-    callable
-        Gives the blocks in the order of the samples, as often as it is called.
-    """
+    """Write out the regressor at uniform partitions, block by block, as often as what is given is called."""
     structure = model_structure(study.identification)
     partitions = uniform_breakpoints(structure)
     ranges = joined_ranges(data_ranges(structure, data.motion.attitude) for data in training.chunks())

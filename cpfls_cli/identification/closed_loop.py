@@ -268,15 +268,7 @@ def _runs(given: Instruments, rows: Sequence[Array], period: float) -> list[_Run
 
 
 def _known(given: Instruments, values: Sequence[Array], period: float, *, fast: bool = False) -> dict[int, Array]:
-    """Give what instruments know of the values of runs, by number of those that have any; NaN where it is nothing.
-
-    Parameters
-    ----------
-    values : sequence of array, shape (time, ...)
-        Of each run.
-    fast : bool
-        Whether they are what is fast of a signal.
-    """
+    """Give what instruments know of the values, or of their fast part, of runs by number; NaN where it is nothing."""
     if given.kind == "repeats":
         repeated = sorted(number for path in given.repeats.paths() for number in path)
         return {number: given.repeats.others(number, values) for number in repeated}
@@ -338,14 +330,7 @@ def _by_block(rows: Iterable[tuple[Array, Array, IntArray]]) -> Array:
 
 
 def _solved(crossed: Array, held: Array | None = None) -> tuple[Array, Array]:
-    """Solve for the inertia parameters, with half of the 95 % intervals of the logarithms of the moments, (3,).
-
-    Parameters
-    ----------
-    crossed : array, shape (block, 6, 7)
-    held : array, shape (6,), kg m^2, or None
-        Parameters of which those of yaw are not sought.
-    """
+    """Solve for inertia parameters but those held of yaw, with half of the 95 % intervals of log moments, (3,)."""
     total = crossed.sum(axis=0)
     found, without = (_parameters(each, held) for each in (total[None], total - crossed))
     error = np.sqrt(np.diag(jackknife_covariance(without)))[:3]

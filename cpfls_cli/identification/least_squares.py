@@ -261,10 +261,7 @@ def _factored(matrix: Array, tolerance: float) -> _Inverse | None:
 
 
 def _extreme(apply: Callable[[Array], Array], size: int) -> tuple[float, Array] | None:
-    """Find the largest eigenvalue of a symmetric operator, and directions of the largest ones, largest first.
-
-    Lanczos with full reorthogonalisation; None where it does not settle soon.
-    """
+    """Find the largest eigenvalue of a symmetric operator, and directions, by Lanczos; None if it does not settle."""
     basis = np.zeros((_STEPS + 1, size))
     basis[0] = np.random.default_rng(0).standard_normal(size)
     basis[0] /= np.linalg.norm(basis[0])

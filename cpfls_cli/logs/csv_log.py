@@ -35,18 +35,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
 
 
 def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
-    """Read columns of a CSV; those that are not wanted by name only, so that a message can suggest them.
-
-    Returns
-    -------
-    dict of str to array, shape (rows,)
-        Empty fields are NaN, and columns that are not wanted empty arrays.
-
-    Raises
-    ------
-    InputError
-        If the file is empty, not text, has rows of unequal length or fields that are not numbers.
-    """
+    """Read columns of a CSV, empty fields as NaN; those that are not wanted by name only, for a message to suggest."""
     with _rows(path) as (names, lines):
         repeated = sorted(name for name, count in Counter(names).items() if count > 1 and name in wanted)
         if repeated:

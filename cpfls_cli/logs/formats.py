@@ -159,20 +159,7 @@ def is_log(path: Path) -> bool:
 
 
 def log_contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
-    """Read a log.
-
-    Parameters
-    ----------
-    wanted : collection of str, optional
-        Columns of a flat log, or ``topic.field``, that are read as numbers; all without it, where columns that hold no
-        numbers are left out.
-
-    Raises
-    ------
-    InputError
-        If the name ends in no suffix of a log or in that of another format, the file cannot be read, or the package
-        that reads it is not installed.
-    """
+    """Read the wanted columns of a log, flat or ``topic.field``, as numbers; if none is named, all that are numbers."""
     form = _format_of(path)
     if _first_line(path).startswith(_ENCRYPTED_MAGIC):
         raise InputError(f"{path}: is encrypted: decrypt it first, as PX4's Tools/decrypt_ulog.py does")
@@ -187,13 +174,7 @@ def log_contents(path: Path, wanted: Collection[str] | None = None) -> LogConten
 
 
 def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
-    """Read the columns of a log that a config maps, on one clock.
-
-    Raises
-    ------
-    InputError
-        As `log_contents`; or if `time_column` names no stamps, or a topic is too slow.
-    """
+    """Read the columns of a log that a config maps, on one clock."""
     on_one_clock = import_module("cpfls_cli.flightlog.topics").on_one_clock
     contents = log_contents(path, settings.mapped_columns)
     try:

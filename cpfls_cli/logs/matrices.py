@@ -58,11 +58,6 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
 
     A matrix has its samples along its longer axis, and stamps whose attribute states a unit of time are converted to
     s. What is wider than 64 columns, or holds no numbers, is left out.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is an artifact of this program, or holds no arrays of numbers.
     """
     try:
         hdf5 = h5py.is_hdf5(path)

@@ -42,16 +42,6 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
 
     Stamps are those of the sender, from the header or the field ``timestamp`` (microseconds, as PX4 sends it), and
     those of the recorder where there are none; ``timestamp_received`` is always the recorder's.
-
-    Parameters
-    ----------
-    wanted : collection of str, optional
-        Only topics of these columns are read; the others are named.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read as a bag, or holds no messages with numbers.
     """
     try:
         with Reader(path) as reader:

@@ -239,13 +239,7 @@ def _outside(flight: PlaybackFlight) -> tuple[str, ...]:
 
 
 def _of_one_kind(flights: Sequence[PlaybackFlight], repeated: Collection[int]) -> list[tuple[str, ...]]:
-    """Name the setpoints of each flight that most samples have: one answer is foretold of all that have them.
-
-    Parameters
-    ----------
-    repeated : collection of int
-        Flights that others repeat, which are told by those.
-    """
+    """Name the setpoints that most samples of flights have, but of repeated ones: one answer is foretold of all."""
     held = [{(name, flight.setpoints[name].shape[1]) for name in _outside(flight)} for flight in flights]
     voting = [number for number in range(len(flights)) if number not in repeated] or range(len(flights))
 

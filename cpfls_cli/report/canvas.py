@@ -101,15 +101,7 @@ _ROWS = 25
 
 
 def plot(name: str, caption: str, description: str, height: float, draw: Callable[[Figure], None]) -> Plot:
-    """Describe a figure, which is drawn when it is asked for.
-
-    Parameters
-    ----------
-    height : float
-        Inches, at a width of 7.6.
-    draw : callable
-        Fills an empty figure.
-    """
+    """Describe a figure, which `draw` fills when it is asked for; its height is in inches, at a width of 7.6."""
     return Plot(name, caption, _Drawing(name, description, height, draw), description)
 
 
@@ -225,13 +217,7 @@ def style_of(index: int) -> dict[str, Any]:
 
 
 def kept_samples(values: Array, largest: int = _LARGEST) -> IntArray:
-    """Choose the samples that draw a curve: the lowest and the highest of every stretch, and both ends.
-
-    Parameters
-    ----------
-    largest : int
-        About how many samples to keep; a shorter curve is kept whole.
-    """
+    """Choose about so many samples to draw a curve: the lowest and highest of every stretch, and both ends."""
     samples = len(values)
     if samples <= largest:
         return np.arange(samples)

@@ -15,13 +15,7 @@ _DIGITS = 6
 
 
 def json_page(document: Document) -> str:
-    """Write a document as one JSON object.
-
-    Returns
-    -------
-    str
-        Numbers of figures have six digits; null where one is not known or goes to the edge of its panel.
-    """
+    """Write a document as one JSON object; numbers have six digits, null if unknown or at the edge of a panel."""
     page = {
         "title": document.title,
         "cpfls_version": document.version,

@@ -17,13 +17,7 @@ _FEWEST, _MOST = 2, 15
 
 
 def number(value: float, digits: int = 4) -> str:
-    """Write a number with so many significant digits, a small or large one with a power of ten.
-
-    Returns
-    -------
-    str
-        ``—`` where the number is not known, ``∞`` where it has no bound.
-    """
+    """Write a number with so many significant digits, perhaps a power of ten; ``—`` if unknown, ``∞`` without bound."""
     if math.isnan(value):
         return UNKNOWN
     if math.isinf(value):
@@ -100,11 +94,8 @@ def r_squared(value: float) -> str:
 def with_interval(value: float, low: float, high: float) -> tuple[str, str, str]:
     """Write a value and the ends of its interval alike, half the width of the interval to two digits.
 
-    Returns
-    -------
-    tuple of str
-        Each with ``-`` for minus and ``e`` for a power of ten that is the same for all; four digits each where the
-        interval is not known or has no width.
+    Each has ``-`` for minus and ``e`` for a power of ten that is the same for all; four digits where the interval is
+    not known or has no width.
     """
     width = high - low
     if not (math.isfinite(width) and math.isfinite(value) and width > 0):

@@ -239,12 +239,7 @@ def differences(
 ) -> Iterator[str]:
     """List the keys and inputs that differ between a command that was stopped and the one that is to go on from it.
 
-    Parameters
-    ----------
-    old, new : mapping of str to object
-        The keys that the result depends on, with dots.
-    unimportant : str, optional
-        What the roles of inputs begin with that the result does not depend on.
+    Keys, with dots, are those that the result depends on; inputs whose roles begin with `unimportant` are left out.
     """
     if then.version != now.version:
         yield f"written by cpfls {then.version}, this is {now.version}"

@@ -111,10 +111,7 @@ class Resumable:
     def run(self, options: SearchOptions, watch: Watch, progress: Callable[[SearchStep], None]) -> SearchRun:
         """Arrange how the search is run; from here on a checkpoint that is not resumed is given up.
 
-        Returns
-        -------
-        SearchRun
-            Interrupts are deferred as long as its workers are employed, which is as long as it searches.
+        Interrupts are deferred as long as its workers are employed, which is as long as it searches.
         """
         if self.stopped is None:
             self.checkpoint.remove()
@@ -160,16 +157,9 @@ def begin_search(
 
 
 def resumable(output: Path, header: Header, *, resume: bool, force: bool) -> Resumable:
-    """Find the checkpoint of a search, and read it where the search is to go on.
+    """Find the checkpoint beside the output of a search, and read it where the search is to go on.
 
-    Parameters
-    ----------
-    output : Path
-        What the search is for; the checkpoint lies beside it.
-    header : Header
-        Config, seed and inputs of the search.
-    force : bool
-        Allow a checkpoint to be given up.
+    `force` allows a checkpoint to be given up.
     """
     checkpoint = Checkpoint.beside(output, header)
     if resume:

@@ -225,13 +225,7 @@ def sweep_plan(
     inputs: Mapping[str, InputFile],
     choose_on: Sequence[Path] = (),
 ) -> SweepPlan:
-    """Gather the settings of a sweep, and choose the samples of each.
-
-    Parameters
-    ----------
-    choose_on : sequence of Path
-        That models are chosen on, in settings whose choice is `held-out`.
-    """
+    """Gather the settings of a sweep, and choose the samples of each."""
     samples, settings, kept = SweepSamples(job, flights, inputs), [], choosing_source(choose_on, inputs)
     for variant in variants(job.study):
         with naming(f"sweep setting '{variant.name}'"):
@@ -276,18 +270,7 @@ class PartialSweep(Leftover):
     OUTPUT: ClassVar = SweepRecord
 
     def take_up(self, *, resume: bool, force: bool) -> SweepRecord | None:
-        """Read what a stopped sweep left, where the sweep is to go on.
-
-        Parameters
-        ----------
-        force : bool
-            Allow it to be given up.
-
-        Returns
-        -------
-        SweepRecord or None
-            None for a sweep that starts.
-        """
+        """Read what a stopped sweep left, where it is to go on; None for one that starts, `force` to give it up."""
         Checkpoint.beside(self.output, self.header).require_own()
         if not resume:
             self.require_permission(force=force)
@@ -330,15 +313,7 @@ def _keys(header: Header) -> dict[str, Any]:
 def finish_runs(
     job: Job, plan: SweepPlan, runs: RunGroup, partial: PartialSweep, options: SearchOptions, watch: Watch
 ) -> tuple[RunGroup, StopReason]:
-    """Go on from the first run that is not finished, and keep every run as soon as it is.
-
-    Returns
-    -------
-    RunGroup
-        All that are finished in the end.
-    StopReason
-        Why no more of them are.
-    """
+    """Go on from the first run that is not finished, keep each as soon as it is, and say why no more of them are."""
     for number in range(len(runs), plan.runs):
         if (reason := watch.should_stop()) is not None:
             return runs, reason

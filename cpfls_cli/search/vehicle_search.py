@@ -63,12 +63,7 @@ def begin_vehicle_search(
 ) -> tuple[dict[str, InputFile], VehicleCheckpoint, Kept | None]:
     """Check inputs, checkpoint and output of a search for the structure of a vehicle before anything is computed.
 
-    Returns
-    -------
-    files : dict of str to InputFile
-    checkpoint : VehicleCheckpoint
-    kept : mapping of Structure to sequence of Solution, or None
-        Where to go on; None to start.
+    The solutions that are kept tell where to go on; None to start.
     """
     files = take_inputs(job, inputs)
     checkpoint = VehicleCheckpoint.beside(job.output, header_of(job.study, files))

@@ -147,10 +147,7 @@ def _itinerary(settings: TrajectorySettings) -> tuple[Leg, ...]:
 
 
 def _duration_of(settings: TrajectorySettings, legs: tuple[Leg, ...]) -> float:
-    """Compute the duration of a path, s: as set, or up to the first sample at which all is at rest.
-
-    A run that is repeated ends at a sample, so that all runs are sampled alike.
-    """
+    """Compute the duration of a path, s: as set, or up to the first sample at rest, which all runs then share."""
     if settings.duration_s is not None:
         duration = settings.duration_s
         if settings.repeat == 1:

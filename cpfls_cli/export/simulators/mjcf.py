@@ -66,13 +66,7 @@ def mjcf_held(model: VehicleModel) -> tuple[Held, Holds]:
 
 
 def mjcf_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) -> str:
-    """Write a vehicle as MJCF.
-
-    Parameters
-    ----------
-    told : sequence of str
-        What it does not hold.
-    """
+    """Write a vehicle as MJCF, with what it does not hold."""
     root = ElementTree.Element("mujoco", model=sheet.name)
     root.append(ElementTree.Comment(xml_text([*sheet.facts, "", *told, "", *_USE])))
     drag = -float(held.table.weights[3, _DRAG[0], 0])

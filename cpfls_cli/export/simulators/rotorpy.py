@@ -31,13 +31,7 @@ _INTEGRATOR = {"method": "DOP853", "rtol": 1e-9, "atol": 1e-9}
 
 
 def rotorpy_held(model: VehicleModel) -> tuple[Held, Holds]:
-    """Take what RotorPy flies of a vehicle.
-
-    Raises
-    ------
-    InputError
-        If it has not four rotors.
-    """
+    """Take what RotorPy flies of a vehicle."""
     if model.rotors != _ROTORS:
         raise InputError(
             f"RotorPy allocates thrust and torque to four rotors, this vehicle has {model.rotors}; --format mjcf, sdf, "
@@ -64,13 +58,7 @@ def _wrenches(signals: Signals) -> Mapping[str, Array]:
 
 
 def rotorpy_text(sheet: Sheet, held: Held, told: Sequence[str], file: str) -> str:
-    """Write a vehicle as a module with RotorPy's dictionary.
-
-    Parameters
-    ----------
-    told : sequence of str
-        What it does not hold.
-    """
+    """Write a vehicle as a module with RotorPy's dictionary, with what it does not hold."""
     model = sheet.model
     found = held.numbers
     given = {

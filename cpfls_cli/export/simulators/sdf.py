@@ -68,13 +68,7 @@ def _wrenches(signals: Signals) -> Mapping[str, Array]:
 
 
 def sdf_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) -> str:
-    """Write a vehicle as SDF.
-
-    Parameters
-    ----------
-    told : sequence of str
-        What it does not hold.
-    """
+    """Write a vehicle as SDF, with what it does not hold."""
     root = ElementTree.Element("sdf", version="1.9")
     root.append(ElementTree.Comment(xml_text([*sheet.facts, "", *told, "", _spin_in_words(sheet, held), *_USE])))
     model = ElementTree.SubElement(root, "model", name=sheet.name)

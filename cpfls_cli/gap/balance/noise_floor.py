@@ -135,10 +135,7 @@ def _extrapolated(terms: Array, power: Array, window_terms: Array) -> float:
 
 
 def _best_pair(relative: Array) -> int:
-    """Choose a flat and a rising spectrum, of which neither can be negative, that leave least of one: their number.
-
-    Two columns have a formula, and all pairs are tried at once.
-    """
+    """Choose a flat and a rising spectrum, neither negative, that leave least of one, of all pairs by formula."""
     # What is left does not depend on the unit, and fourth powers stay within range.
     scaled = relative / relative.max()
     flat, rising = scaled[:, ::2, None], scaled[:, None, 1::2]

@@ -239,10 +239,7 @@ def _held(change: Change, at: Array, least: BoolArray | None) -> BoolArray:
 
 
 def _change(hypothesis: System, shown: BoolArray, least: BoolArray | None) -> Change:
-    """Give the bounds of the coefficients; those whose physical numbers are others are free.
-
-    The vehicle's own numbers are free where `least` is None.
-    """
+    """Give the bounds of coefficients, none where physical numbers are others, or of the vehicle without `least`."""
     vehicle = hypothesis.vehicle
     pairs: list[tuple[float, float]] = []
     for candidate, place in hypothesis.places:

@@ -145,10 +145,7 @@ def exchanged(
 def _do_without(
     flights: Sequence[WeakFlight], others: list[Candidate], kept: Sequence[Candidate], floor: Array
 ) -> list[Candidate] | None:
-    """Refine effects without one of them, if they then explain as much; None if they do not.
-
-    The derivatives by the shapes promise more, or less, where the shapes have to move far.
-    """
+    """Refine effects without one of them, if they then explain as much; None if they do not."""
     if not any(candidate.effect.shapes for candidate in others):
         return others
     plain, without = system(flights), refined(flights, others, floor)
