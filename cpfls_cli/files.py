@@ -66,7 +66,7 @@ def read_content(path: Path) -> Content:
     return _read_content(state_of(path))
 
 
-class State(NamedTuple):
+class FileState(NamedTuple):
     """A file as it lies there: whatever changes it changes one of these too."""
 
     path: Path
@@ -76,14 +76,14 @@ class State(NamedTuple):
     changed_ns: int
 
 
-def state_of(path: Path) -> State:
+def state_of(path: Path) -> FileState:
     """Take note of a file, so that what was found in it need not be looked for again."""
     known = path.stat()
-    return State(path.absolute(), known.st_ino, known.st_size, known.st_mtime_ns, known.st_ctime_ns)
+    return FileState(path.absolute(), known.st_ino, known.st_size, known.st_mtime_ns, known.st_ctime_ns)
 
 
 @lru_cache(maxsize=256)
-def _read_content(state: State) -> Content:
+def _read_content(state: FileState) -> Content:
     digest, left, block = _sha256(), max(0, state.size - _SEAL_BYTES), memoryview(bytearray(_BLOCK))
     with state.path.open("rb", buffering=0) as stream:
         while left and (count := stream.readinto(block[: min(left, _BLOCK)])):

@@ -172,7 +172,7 @@ class PictureGroup:
 
 
 @record
-class RunGroup:
+class FreeRunsGroup:
     """Free runs of a held-out stretch."""
 
     flight: str = dataset("held-out flight of the stretch whose free runs went astray most")
@@ -242,7 +242,7 @@ class DiagnosisRecord(Record):
     residual: ResidualChangeGroup = group()
     whiteness: WhitenessGroup | None = group(default=None)
     picture: PictureGroup | None = group(default=None)
-    run: RunGroup | None = group(default=None)
+    run: FreeRunsGroup | None = group(default=None)
     not_excited: NotExcitedGroup = group()
     audit: AuditGroup = group("")
     note: tuple[str, ...] = dataset("what a reader should know", "note")
@@ -301,7 +301,7 @@ class DiagnosisRecord(Record):
             residual=ResidualChangeGroup.of(diagnosed.held_out, change),
             whiteness=WhitenessGroup.of(change),
             picture=PictureGroup.of(change, held),
-            run=RunGroup.of(change, held),
+            run=FreeRunsGroup.of(change, held),
             not_excited=NotExcitedGroup.of(diagnosis.not_excited),
             audit=AuditGroup.of(diagnosed.audit),
             note=diagnosis.notes,

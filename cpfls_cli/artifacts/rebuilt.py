@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.artifacts.audit import AuditGroup, AuditRepairGroup
 from cpfls_cli.artifacts.model import USUAL, EffectsGroup, InertiaFunctionsGroup, VehicleGroup
 from cpfls_cli.artifacts.spec import rows_of
-from cpfls_cli.artifacts.vehicle_model import HistoryGroup
+from cpfls_cli.artifacts.vehicle_model import ObserverGroup
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.consistency.repairs import ChannelRepair
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
@@ -48,7 +48,7 @@ def vehicle_model(group: VehicleGroup) -> VehicleModel:
     )
 
 
-def observer(group: HistoryGroup, past_s: float) -> Observer:
+def observer(group: ObserverGroup, past_s: float) -> Observer:
     """Rebuild the observer of a forecast that uses so much of the past."""
     return Observer(rate=group.rate, memory_s=group.memory, past_s=past_s)
 

@@ -39,7 +39,7 @@ from cpfls_cli.artifacts.spec import (
     Record,
 )
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.files import State, read_content, state_of, text_sha256
+from cpfls_cli.files import FileState, read_content, state_of, text_sha256
 
 R = TypeVar("R", bound=Record)
 T = TypeVar("T")
@@ -150,7 +150,7 @@ def _read_whole(path: Path, *wanted: Format) -> Artifact:
         return artifact
 
 
-def _known(path: Path, look: Callable[[State], T | None]) -> T | None:
+def _known(path: Path, look: Callable[[FileState], T | None]) -> T | None:
     """Give what was found in a file while it stays as it is; None where it is no good: who reads it then says why."""
     try:
         return look(state_of(path))
@@ -159,7 +159,7 @@ def _known(path: Path, look: Callable[[State], T | None]) -> T | None:
 
 
 @lru_cache(maxsize=16)
-def _small(state: State) -> Artifact | None:
+def _small(state: FileState) -> Artifact | None:
     if state.size > _KEPT_BYTES:
         return None
     with opened(state.path) as stored:
@@ -177,7 +177,7 @@ class _Origin(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _origin_of(state: State) -> _Origin:
+def _origin_of(state: FileState) -> _Origin:
     # Who asks what a small one is mostly reads it next.
     known = _known(state.path, _small)
     if known is not None:

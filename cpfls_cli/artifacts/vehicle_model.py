@@ -243,7 +243,7 @@ class ResponsesGroup:
 
 
 @record
-class HistoryGroup:
+class ObserverGroup:
     """The observer by which the forecast uses the past: of a disturbance until a run starts."""
 
     past: float = dataset("how much of the flight before a start its numbers were fitted with", units="s")
@@ -278,7 +278,7 @@ class VehicleRecord(ModelRecord):
     instruments: InstrumentsGroup | None = group(default=None)
     responses: ResponsesGroup | None = group(default=None)
     forecast: VehicleGroup | None = group(default=None, apart=True)
-    history: HistoryGroup | None = group(default=None)
+    history: ObserverGroup | None = group(default=None)
     held_out: HeldOutGroup | None = group(default=None)
     share: SharesGroup = group()
     airspeed: float = dataset("speed in the rotor plane that 95 % of the training samples stay below", units="m/s")
@@ -318,7 +318,7 @@ class VehicleRecord(ModelRecord):
             instruments=None if found.constants is None else InstrumentsGroup.of(found.instruments, found.constants),
             responses=ResponsesGroup.of(responses, instrumented=found.constants is not None) if responses else None,
             forecast=None if found.forecast is None else VehicleGroup.of(replace(found.forecast, commanded=commanded)),
-            history=None if found.history is None else HistoryGroup.of(found.history),
+            history=None if found.history is None else ObserverGroup.of(found.history),
             held_out=held_out,
             share=SharesGroup(
                 name=tuple(share.name for share in found.shares),

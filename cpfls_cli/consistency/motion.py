@@ -33,7 +33,7 @@ TINY = 1e-100
 """Square of what does not move."""
 
 
-class Channel(NamedTuple):
+class MotionChannel(NamedTuple):
     """A channel of the motion.
 
     Attributes
@@ -63,23 +63,23 @@ _ACCELERATIONS = {
 }
 _NO_FORCE = "the force comes from other channels, if there are any"
 CHANNELS = {
-    "position": Channel("position", "import.signals.position", {"mm": 0.001, "cm": 0.01, "ft": 0.3048}),
-    "velocity": Channel(
+    "position": MotionChannel("position", "import.signals.position", {"mm": 0.001, "cm": 0.01, "ft": 0.3048}),
+    "velocity": MotionChannel(
         "velocity",
         "import.signals.velocity and import.world_frame",
         {"km/h": 1 / 3.6, "ft/s": 0.3048, "cm/s": 0.01, "mm/s": 0.001},
         "effects of the air are not tested",
     ),
-    "acceleration": Channel(
+    "acceleration": MotionChannel(
         "acceleration", "import.signals.acceleration and import.acceleration_frame", _ACCELERATIONS, _NO_FORCE
     ),
-    "specific_force": Channel(
+    "specific_force": MotionChannel(
         "accelerometer",
         "import.signals.acceleration, import.acceleration_frame and import.body_frame",
         _ACCELERATIONS,
         _NO_FORCE,
     ),
-    "thrust": Channel("thrust of the rotors", "vehicle.rotors"),
+    "thrust": MotionChannel("thrust of the rotors", "vehicle.rotors"),
 }
 """Channels of the motion, by field of `Signals`."""
 

@@ -8,7 +8,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.motion_columns import GOOD, NEAR_GRAVITY, nearest, over_ground
 from cpfls_cli.flightlog.names import Named
-from cpfls_cli.flightlog.readings import CLEAR, Verdict, Witnesses, euler_readings, read_axes, read_quaternion
+from cpfls_cli.flightlog.readings import CLEAR, TakenReading, Witnesses, euler_readings, read_axes, read_quaternion
 from cpfls_cli.flightlog.recognised import Rival, Seen, Sure, called
 from cpfls_cli.flightlog.settings import SignalName
 from cpfls_cli.flightlog.vocabulary import ANGLES, SENSED
@@ -29,7 +29,7 @@ _SIGNALS_OF: Final[Mapping[str, tuple[SignalName, ...]]] = {
 _DECIDES = "a flight of which one lean, turn or climb is known, or the documentation of the log, decides"
 
 
-def read_attitude(seen: Seen) -> Verdict | None:
+def read_attitude(seen: Seen) -> TakenReading | None:
     """Read the attitude and all axes with it; None without one."""
     euler = seen.first("attitude")
     for named in seen.candidates.get("quaternion", ()):
@@ -68,7 +68,7 @@ def _witnesses(seen: Seen) -> Witnesses:
     return Witnesses(seen.rate_hz, measured, over_ground(seen), _lift(seen), sensed, known)
 
 
-def _read_euler(seen: Seen, named: Named) -> Verdict:
+def _read_euler(seen: Seen, named: Named) -> TakenReading:
     time, values = seen.log.values(named.group.columns)
     unit, reason, sure, rivals = _angle_unit(named, named.scale * values)
     if named.unit not in (None, unit):
@@ -120,7 +120,7 @@ def _angle_unit(named: Named, values: Array) -> tuple[UnitName, str, Sure, tuple
     return "rad", f"{called(named)}; leans by {tilt:.2g} at most", "data" if not rivals else "guess", rivals
 
 
-def _tell_quaternion(seen: Seen, named: Named, verdict: Verdict) -> None:
+def _tell_quaternion(seen: Seen, named: Named, verdict: TakenReading) -> None:
     best, own = verdict.best, verdict.best.attitude
     order = "xyzw" if own.scalar_last else "wxyz"
     told = best.explained > CLEAR
@@ -157,7 +157,7 @@ def _tell_quaternion(seen: Seen, named: Named, verdict: Verdict) -> None:
         seen.choose("quaternion_order", order, "the more usual one", "guess", Rival(f"quaternion_order: {rival}", why))
 
 
-def doubt_reading(seen: Seen, verdict: Verdict) -> None:
+def doubt_reading(seen: Seen, verdict: TakenReading) -> None:
     """Say which columns are not what they are named, and make guesses of what other readings take otherwise."""
     best = verdict.best
     if best.attitude.order not in ((0, 1, 2), (0, 1, 2, 3)):

@@ -37,7 +37,7 @@ _MOST_CLOCK_HZ = 50.0
 
 
 @dataclass(frozen=True)
-class Flown:
+class FlownPart:
     """What of a log is a flight.
 
     Attributes
@@ -55,7 +55,7 @@ class Flown:
     flies: bool = True
 
 
-def find_flown(time: Array, level: Array | None, height: Array | None, rate: Array | None) -> Flown:
+def find_flown(time: Array, level: Array | None, height: Array | None, rate: Array | None) -> FlownPart:
     """Find the longest stretch of a log that is flown.
 
     Parameters
@@ -76,11 +76,11 @@ def find_flown(time: Array, level: Array | None, height: Array | None, rate: Arr
     period = float(time[1] - time[0])
     active, told = _active(level, height, rate, period)
     if active is None:
-        return Flown(None, (told,), flies=False)
+        return FlownPart(None, (told,), flies=False)
     if not active.any():
-        return Flown(None, (f"nothing flies in it: {told} all the time",), flies=False)
+        return FlownPart(None, (f"nothing flies in it: {told} all the time",), flies=False)
     if _still(active, height, rate):
-        return Flown(None, ("nothing flies in it: the vehicle neither turns nor moves",), flies=False)
+        return FlownPart(None, ("nothing flies in it: the vehicle neither turns nor moves",), flies=False)
     return _longest(time, active, told, level)
 
 
@@ -164,7 +164,7 @@ def _still(active: BoolArray, height: Array | None, rate: Array | None) -> bool:
     return turning < _STILL_RAD_S or (turning < _SOFT_RAD_S and height is not None and not moves)
 
 
-def _longest(time: Array, active: BoolArray, told: str, level: Array | None) -> Flown:
+def _longest(time: Array, active: BoolArray, told: str, level: Array | None) -> FlownPart:
     numbers, count = label(active)
     stretches = [np.flatnonzero(numbers == number) for number in range(1, count + 1)]
     longest = max(stretches, key=len)
@@ -183,7 +183,7 @@ def _longest(time: Array, active: BoolArray, told: str, level: Array | None) -> 
         words = ", ".join(f"{a:.1f} to {b:.1f} s" for a, b in others)
         reasons.append(f"it flies again at {words}; import.crop_s takes one stretch, the longest")
     whole = not reasons or (longest[0] == 0 and longest[-1] == len(time) - 1)
-    return Flown(None if whole else (round(begin, 2), round(end, 2)), tuple(reasons))
+    return FlownPart(None if whole else (round(begin, 2), round(end, 2)), tuple(reasons))
 
 
 def _how(level: Array | None, part: slice, told: str) -> str:

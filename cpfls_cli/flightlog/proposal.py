@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import Airframe, Parameters, stated_airframe, usual_airframe
-from cpfls_cli.flightlog.recognised import Choice, Guess, Recognition, Rival
+from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Recognition, Rival
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.settings import SETPOINTS, ColumnMap, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import Topics
@@ -110,7 +110,7 @@ class Proposal:
     time_column: str | None
     time_unit: str
     signals: tuple[Guess, ...]
-    choices: tuple[Choice, ...]
+    choices: tuple[KeyChoice, ...]
     crop_s: tuple[float, float] | None
     crops: Mapping[str, tuple[float, float] | None]
     gap_s: float
@@ -296,7 +296,7 @@ def _require_same_map(name: SignalName, surest: tuple[KnownLog, Guess], other: t
     )
 
 
-def _merged_choices(logs: Sequence[KnownLog]) -> tuple[Choice, ...]:
+def _merged_choices(logs: Sequence[KnownLog]) -> tuple[KeyChoice, ...]:
     merged = []
     for key in dict.fromkeys(choice.key for one in logs for choice in one.recognition.choices):
         found = [(one, choice) for one in logs for choice in one.recognition.choices if choice.key == key]

@@ -164,7 +164,7 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class TakenReading:
     """The reading that is taken, and others that the data do not part from it.
 
     Attributes
@@ -259,7 +259,7 @@ def permuted_quaternions(values: Array, time: Array, grid: Array, most: int) -> 
                 yield Attitude(on_clock(rotation, time, grid), order, sign, price, rest == (-1.0, -1.0, -1.0))
 
 
-def read_axes(usual: Iterable[Attitude], witnesses: Witnesses) -> Verdict:
+def read_axes(usual: Iterable[Attitude], witnesses: Witnesses) -> TakenReading:
     """Choose among ways to read an attitude the one that needs least to be otherwise than named."""
     tried = list(usual)
     upright = max(attitude.upright for attitude in tried)
@@ -271,10 +271,10 @@ def read_axes(usual: Iterable[Attitude], witnesses: Witnesses) -> Verdict:
     good.sort(key=lambda own: (own.price, own.columns))
     best = good[0]
     tied = (own for own in good[1:] if own.price < max(2 * best.price, 1) and own.differs(best))
-    return Verdict(best, tuple(tied), tuple(readings))
+    return TakenReading(best, tuple(tied), tuple(readings))
 
 
-def read_quaternion(values: Array, named: bool, time: Array, grid: Array, witnesses: Witnesses) -> Verdict:
+def read_quaternion(values: Array, named: bool, time: Array, grid: Array, witnesses: Witnesses) -> TakenReading:
     """Read four columns as usual, or in another order and with other signs where that leaves less to explain away."""
     verdict = read_axes(quaternion_readings(values, named, time, grid), witnesses)
     if verdict.best.price < _ODD_ENOUGH:

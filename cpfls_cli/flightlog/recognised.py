@@ -9,7 +9,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.agreement import handed
 from cpfls_cli.flightlog.airframe import MovedBy
-from cpfls_cli.flightlog.flown import Flown
+from cpfls_cli.flightlog.flown import FlownPart
 from cpfls_cli.flightlog.log_table import LogTable
 from cpfls_cli.flightlog.nameless import OF_A_MATRIX
 from cpfls_cli.flightlog.names import Named
@@ -48,7 +48,7 @@ class Guess:
 
 
 @dataclass(frozen=True)
-class Choice:
+class KeyChoice:
     """A key of the section `import` that holds for the whole log."""
 
     key: str
@@ -103,9 +103,9 @@ class Recognition:
     time_column: str
     time_unit: str
     signals: tuple[Guess, ...]
-    choices: tuple[Choice, ...]
+    choices: tuple[KeyChoice, ...]
     left_out: tuple[str, ...]
-    flown: Flown
+    flown: FlownPart
     rate_hz: float
     slowest_s: float
     slowest_but_voltage_s: float
@@ -139,7 +139,7 @@ class Seen:
     part: slice
     level: Array | None
     guesses: dict[SignalName, Guess] = field(default_factory=dict)
-    choices: dict[str, Choice] = field(default_factory=dict)
+    choices: dict[str, KeyChoice] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
@@ -189,7 +189,7 @@ class Seen:
 
     def choose(self, key: str, value: str, reason: str, sure: Sure, *rivals: Rival) -> None:
         """Take a value of a key that holds for the whole log."""
-        self.choices[key] = Choice(key, value, reason, sure, rivals)
+        self.choices[key] = KeyChoice(key, value, reason, sure, rivals)
 
     def doubt(self, name: SignalName, *rivals: Rival) -> None:
         """Make a guess of what was told."""

@@ -11,7 +11,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.agreement import first_derivative, slow
 from cpfls_cli.flightlog.airframe import MovedBy, Parameters, airframe_from_motion
 from cpfls_cli.flightlog.attitude_columns import BODY_OF, doubt_reading, read_attitude
-from cpfls_cli.flightlog.flown import Flown, find_flown
+from cpfls_cli.flightlog.flown import FlownPart, find_flown
 from cpfls_cli.flightlog.log_table import LogTable, holding_values, make_grid, refuse_dead_rotors
 from cpfls_cli.flightlog.motion_columns import tell_acceleration, tell_body_rate, tell_places
 from cpfls_cli.flightlog.nameless import nameless_signals
@@ -118,7 +118,7 @@ def _level(log: LogTable, rotors: RotorColumns) -> Array | None:
     return np.asarray(level / largest)
 
 
-def _find_flown(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], level: Array | None) -> Flown:
+def _find_flown(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], level: Array | None) -> FlownPart:
     position, gyro = (next(iter(candidates.get(name, ())), None) for name in ("position", "body_rate"))
     height = rate = None
     if position is not None:
@@ -130,7 +130,7 @@ def _find_flown(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]],
     return find_flown(log.grid - log.grid[0], level, height, rate)
 
 
-def _part(log: LogTable, flown: Flown) -> slice:
+def _part(log: LogTable, flown: FlownPart) -> slice:
     begin, end = flown.span_s or (0.0, np.inf)
     inside = np.flatnonzero((log.grid - log.grid[0] >= begin) & (log.grid - log.grid[0] <= end))
     return slice(int(inside[0]), int(inside[-1]) + 1)
@@ -263,7 +263,7 @@ def _doubt_columns(seen: Seen) -> None:
             seen.doubt(name)
 
 
-def _gathered(seen: Seen, flown: Flown, speeds: Array | None, moved: MovedBy | None, kind: str) -> Recognition:
+def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy | None, kind: str) -> Recognition:
     log = seen.log
     signals = tuple(seen.guesses[name] for name in _ORDER if name in seen.guesses)
     asked = tuple(seen.guesses[name] for name in SETPOINTS if name in seen.guesses)

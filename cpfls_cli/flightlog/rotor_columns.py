@@ -9,7 +9,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.airframe import Parameters
 from cpfls_cli.flightlog.names import Named
-from cpfls_cli.flightlog.recognised import Choice, Guess, Rival, Sure
+from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival, Sure
 from cpfls_cli.flightlog.settings import SignalMap
 from cpfls_cli.flightlog.vocabulary import ASKED, RANGES
 from cpfls_cli.units import SPEED_UNITS, UnitName
@@ -74,7 +74,7 @@ class RotorColumns:
 
     speed: RotorGuess | None
     command: RotorGuess | None
-    command_is: Choice | None
+    command_is: KeyChoice | None
     left_out: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -253,11 +253,11 @@ def _stated_range(named: Named, parameters: Parameters) -> tuple[float, float, s
     return None
 
 
-def _meaning(command: RotorGuess, parameters: Parameters, system: str) -> Choice:
+def _meaning(command: RotorGuess, parameters: Parameters, system: str) -> KeyChoice:
     """Tell whether a command is a share of thrust or of speed."""
 
-    def choose(value: str, reason: str, *rivals: Rival, sure: Sure = "named") -> Choice:
-        return Choice("rotor_command_is", value, reason, sure, rivals)
+    def choose(value: str, reason: str, *rivals: Rival, sure: Sure = "named") -> KeyChoice:
+        return KeyChoice("rotor_command_is", value, reason, sure, rivals)
 
     if command.kind == "Crazyflie":
         if "motor.m" in command.columns.columns[0]:

@@ -30,7 +30,7 @@ from cpfls_cli.gap.naming.earned import NamedFit, Refusal, earned
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.naming.leftover import Leftover, beside_the_unnamed, not_excited, untried
-from cpfls_cli.gap.naming.ranking import SearchStep, rank_effects
+from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.settings import GapSettings
@@ -146,7 +146,7 @@ def not_judged(unseen: HeldOut) -> Iterator[str]:
 
 def _searched(
     weak: Sequence[WeakFlight], settings: GapSettings, rng: np.random.Generator, progress: Callable[[float, str], None]
-) -> tuple[list[Effect], list[SearchStep], NamedFit, list[Refusal]]:
+) -> tuple[list[Effect], list[RankedStep], NamedFit, list[Refusal]]:
     """Search for effects that earn their names; once more without those that stand on a bound, or beyond.
 
     Such an effect takes up what others would explain, and has to go before they can be seen.
@@ -191,7 +191,7 @@ def _concluded(
     remainder: Leftover,
     differ: tuple[str, ...],
     notes: Sequence[str],
-    steps: Sequence[SearchStep],
+    steps: Sequence[RankedStep],
     settings: GapSettings,
     torque_alone: tuple[tuple[str, float], ...],
     audited: Audit,

@@ -96,7 +96,7 @@ _SMALL_ERROR = 1e-9
 
 
 @dataclass(frozen=True)
-class Point:
+class ChromosomePoint:
     """A chromosome with the linear parameters that its partitions need, at a given ridge.
 
     Attributes
@@ -137,7 +137,7 @@ class Problem:
     solver: Solver
     start: Fit
 
-    def point(self, genes: IntArray, products: Products) -> Point:
+    def point(self, genes: IntArray, products: Products) -> ChromosomePoint:
         """Solve for the linear parameters of a chromosome, whose products are given."""
         total = products.sum()
         equations = self.solver.equations(total, self.start.ridge_weight, self.start.column_size)
@@ -149,9 +149,9 @@ class Problem:
             square = float(
                 self.solver.learned.errors(partitions, *parameters)[0].sum() + equations.penalty @ solution**2
             )
-        return Point(genes, products, equations, solution, factor, scale, square)
+        return ChromosomePoint(genes, products, equations, solution, factor, scale, square)
 
-    def linearised(self, point: Point) -> tuple[Array, Array]:
+    def linearised(self, point: ChromosomePoint) -> tuple[Array, Array]:
         """Give ``J^T J`` and ``J^T r`` of residual r and Jacobian J by the weights, by Kaufman's approximation.
 
         With M the derivatives of the torque by the weights at fixed parameters and A the columns, the Jacobian is
@@ -171,7 +171,7 @@ class Problem:
         return 0.5 * (normal + normal.T), -by_weight.T @ moved.residual
 
 
-def refine(problem: Problem, genes: IntArray, products: Products, evaluations: int) -> Point:
+def refine(problem: Problem, genes: IntArray, products: Products, evaluations: int) -> ChromosomePoint:
     """Refine a chromosome by a projected Levenberg-Marquardt method.
 
     Parameters
@@ -212,7 +212,7 @@ def refine(problem: Problem, genes: IntArray, products: Products, evaluations: i
     return best
 
 
-def _changed(before: Point, after: Point, normal: Array, gradient: Array) -> float:
+def _changed(before: ChromosomePoint, after: ChromosomePoint, normal: Array, gradient: Array) -> float:
     """Factor of the damping after a good step: how much of what was promised has come."""
     step = (after.genes - before.genes) / LARGEST_GENE
     promised = -float(2.0 * gradient @ step + step @ normal @ step)

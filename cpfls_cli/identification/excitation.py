@@ -10,7 +10,7 @@ from scipy import linalg
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics.rigid_body import rigid_columns, vertical
 from cpfls_cli.identification.data import TorqueData, TorqueSource, axis_scale
-from cpfls_cli.identification.judge import Explained
+from cpfls_cli.identification.judge import VarianceExplained
 from cpfls_cli.identification.least_squares import Triangle
 from cpfls_cli.identification.samples import Samples
 from cpfls_cli.identification.solver import regressor_blocks
@@ -109,7 +109,7 @@ def axis_evidence(source: TorqueSource, rank_tolerance: float) -> AxisEvidence:
     rows = ((_columns(data) * scale[:, None], data.torque * scale) for data in source.chunks())
     triangle = Triangle.of((columns.reshape(-1, columns.shape[2]), torque.reshape(-1)) for columns, torque in rows)
     parameters = triangle.solve(rank_tolerance).coefficients
-    explained, count, torque, acceleration = Explained(), 0, np.zeros(3), np.zeros(3)
+    explained, count, torque, acceleration = VarianceExplained(), 0, np.zeros(3), np.zeros(3)
     for data in source.chunks():
         motion, known = data.motion, ~vertical(data.motion.attitude)
         by_both = _columns(data) @ parameters

@@ -56,7 +56,7 @@ def score_of(source: TorqueSource, torque: Callable[[Motion], Array]) -> Score:
     return sums.score()
 
 
-class Explained:
+class VarianceExplained:
     """Sums for the share of the variance explained, ``1 - sum e^2 / sum (y - mean y)^2``, chunk by chunk."""
 
     def __init__(self) -> None:
@@ -112,7 +112,7 @@ class ScoreSums:
     def __init__(self) -> None:
         """Begin with no samples."""
         self._largest, self._largest_error = np.zeros(3), np.zeros(3)
-        self._euler, self._body = Explained(), Explained()
+        self._euler, self._body = VarianceExplained(), VarianceExplained()
 
     def add(self, data: TorqueData, predicted: Array) -> None:
         """Add samples, and the torque predicted for them."""

@@ -15,7 +15,7 @@ import scipy.io
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.files import State, is_sealed, state_of
+from cpfls_cli.files import FileState, is_sealed, state_of
 from cpfls_cli.logs.formats import LogContents
 from cpfls_cli.units import known_unit
 
@@ -95,7 +95,7 @@ class _Probed(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _probed(state: State) -> _Probed:
+def _probed(state: FileState) -> _Probed:
     """Read an HDF5 file in another process first: in a damaged one HDF5 may turn for ever, and heeds no signal then."""
     limit = _SECONDS + state.size / _BYTES_PER_SECOND
     try:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord, PictureGroup, RunGroup
+from cpfls_cli.artifacts.diagnosis import DiagnosisRecord, FreeRunsGroup, PictureGroup
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.pages.disagreement import lead
 from cpfls_cli.pages.effects import (
@@ -145,7 +145,7 @@ def _effects(record: DiagnosisRecord, index: int) -> Iterator[Block]:
         yield parameters_table(f"parameters-{index}", effects)
 
 
-def free_runs_figure(name: str, run: RunGroup, after: str, *, repaired: bool) -> Plot:
+def free_runs_figure(name: str, run: FreeRunsGroup, after: str, *, repaired: bool) -> Plot:
     """Draw measured and simulated body rates over the stretch in which they disagreed most.
 
     Parameters

@@ -12,7 +12,7 @@ from typing import Any, Final
 from cpfls_cli.config.load import ASK
 from cpfls_cli.flightlog.airframe import Airframe, RotorPlace
 from cpfls_cli.flightlog.proposal import DECIDES_ROTORS, Proposal
-from cpfls_cli.flightlog.recognised import Choice, Guess, Rival
+from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival
 from cpfls_cli.flightlog.settings import ColumnMap
 from cpfls_cli.report.content import Block, Cell, Table, Text
 from cpfls_cli.report.numbers import number
@@ -78,7 +78,7 @@ def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
         yield Text(f"then: cpfls vehicle {output} flight.h5 -o vehicle.h5")
 
 
-def _row(name: str, value: str, unit: str, entry: Guess | Choice) -> list[str | Cell]:
+def _row(name: str, value: str, unit: str, entry: Guess | KeyChoice) -> list[str | Cell]:
     return [name, value, unit, Cell(_SURE[entry.sure], "warning" if entry.sure == "guess" else "plain"), entry.reason]
 
 
@@ -132,7 +132,7 @@ def summary(proposal: Proposal, stated: Stated, output: str) -> dict[str, Any]:
     }
 
 
-def _grounds(entry: Guess | Choice) -> dict[str, Any]:
+def _grounds(entry: Guess | KeyChoice) -> dict[str, Any]:
     rivals = [{"text": rival.text, "reason": rival.reason} for rival in entry.rivals]
     return {"told_by": entry.sure, "reason": entry.reason, "rivals": rivals}
 

@@ -7,7 +7,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import SettingError
 from cpfls_cli.reduction.lazy_search import TIE_TOLERANCE, first_best
-from cpfls_cli.reduction.selection import Run, StopReason
+from cpfls_cli.reduction.selection import SelectionRun, StopReason
 from cpfls_cli.reduction.settings import CriterionName, ReductionSettings
 from cpfls_cli.reduction.survey import RowSpace
 from cpfls_cli.rounding import at_most
@@ -59,7 +59,7 @@ def starting_samples(space: RowSpace, criterion: CriterionName, limit: int) -> I
     return start
 
 
-def stop_reason(run: Run, settings: ReductionSettings, limit: int) -> StopReason | None:
+def stop_reason(run: SelectionRun, settings: ReductionSettings, limit: int) -> StopReason | None:
     """Return the limit that ends a selection, None while there is none.
 
     Parameters

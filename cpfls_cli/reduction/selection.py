@@ -74,7 +74,7 @@ class Selection(Subset):
         return not self.full_rank
 
 
-class Run:
+class SelectionRun:
     """Samples chosen so far, their factor and the trace.
 
     Parameters

@@ -13,7 +13,7 @@ from cpfls_cli.reduction.criteria import EXCHANGE_INFORMATION, make_criterion
 from cpfls_cli.reduction.exchange import exchange_samples
 from cpfls_cli.reduction.factor import TriangularFactor
 from cpfls_cli.reduction.limits import every_nth, sample_limit, starting_samples, stop_reason
-from cpfls_cli.reduction.selection import Run, Selection, Subset
+from cpfls_cli.reduction.selection import Selection, SelectionRun, Subset
 from cpfls_cli.reduction.settings import ReductionSettings
 from cpfls_cli.reduction.survey import RowSpace, Survey, space_of
 
@@ -51,7 +51,7 @@ def choose(space: RowSpace, settings: ReductionSettings, progress: Progress | No
     if settings.criterion in EXCHANGE_INFORMATION:
         return _exchanged(space, start, limit, settings, progress)
     criterion = make_criterion(space, settings.criterion)
-    return _one_by_one(Run(space, criterion, start), limit, settings, progress)
+    return _one_by_one(SelectionRun(space, criterion, start), limit, settings, progress)
 
 
 def check_space(space: RowSpace, settings: ReductionSettings) -> None:
@@ -72,13 +72,13 @@ def _exchanged(
     information = EXCHANGE_INFORMATION[settings.criterion]
     exchanged = exchange_samples(space, start, limit, information, settings.condition_number)
     chosen = replace(space, rows=space.rows[exchanged.indices])
-    run = Run(chosen, make_criterion(chosen, "D"), starting_samples(chosen, "D", chosen.samples))
+    run = SelectionRun(chosen, make_criterion(chosen, "D"), starting_samples(chosen, "D", chosen.samples))
     selection = _one_by_one(run, chosen.samples, settings, progress)
     indices = exchanged.indices[selection.indices]
     return replace(selection, indices=indices, exchanges=exchanged.exchanges)
 
 
-def _one_by_one(run: Run, limit: int, settings: ReductionSettings, progress: Progress | None) -> Selection:
+def _one_by_one(run: SelectionRun, limit: int, settings: ReductionSettings, progress: Progress | None) -> Selection:
     while not (reason := stop_reason(run, settings, limit)):
         run.step()
         if progress is not None:

@@ -53,7 +53,7 @@ class StoppedSearch:
 
 
 @dataclass(frozen=True)
-class Leftover:
+class KeptFile:
     """A file beside the output from which a stopped command can go on.
 
     Attributes
@@ -153,7 +153,7 @@ class Leftover:
 
 
 @dataclass(frozen=True)
-class Checkpoint(Leftover):
+class Checkpoint(KeptFile):
     """Where a search leaves its state after every generation."""
 
     WORK: ClassVar = "search"

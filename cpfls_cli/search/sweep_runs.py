@@ -32,7 +32,7 @@ from cpfls_cli.inertia import six_parameters
 from cpfls_cli.reduction.survey import survey
 from cpfls_cli.reduction.training_set import check_streamed, reduce_streamed
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
-from cpfls_cli.search.checkpoint import Checkpoint, Leftover, StoppedSearch, differences
+from cpfls_cli.search.checkpoint import Checkpoint, KeptFile, StoppedSearch, differences
 from cpfls_cli.search.resumable import Resumable, SearchOptions, Watch
 
 # Work of an evaluation that does not grow with the samples, in samples.
@@ -262,7 +262,7 @@ _END: StopReason = "generations"
 
 
 @dataclass(frozen=True)
-class PartialSweep(Leftover):
+class PartialSweep(KeptFile):
     """Where a sweep leaves its finished runs."""
 
     WORK: ClassVar = "sweep"

@@ -15,14 +15,14 @@ from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.playback.structure import Judged, Kept, Rules, Solution, Structure
-from cpfls_cli.search.checkpoint import Leftover, differences, keys_of
+from cpfls_cli.search.checkpoint import KeptFile, differences, keys_of
 
 _OF_VEHICLE = ("vehicle", "import", "playback")
 """Sections of the config that the search depends on."""
 
 
 @dataclass(frozen=True)
-class VehicleCheckpoint(Leftover):
+class VehicleCheckpoint(KeptFile):
     """Where a search for the structure of a vehicle leaves what it has judged."""
 
     WORK: ClassVar = "search"

@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import SettingError
 from cpfls_cli.trajectory.limits import Limits, LimitSettings
-from cpfls_cli.trajectory.moves import Move, Outcome, moves_of, plan_move, plan_moves
+from cpfls_cli.trajectory.moves import Move, MoveOutcome, moves_of, plan_move, plan_moves
 from cpfls_cli.trajectory.profile import BaseProfile, Holds, covering
 
 Measure = Literal["along-path", "per-axis"]
@@ -217,7 +217,7 @@ def synchronised(displacements: Array, limits: Limits, period: float | None = No
         If a displacement is not finite, or a limit or the period is not greater than zero; it names the key.
     """
     alone = plan_moves(displacements, limits, period)
-    taken = np.where(alone.outcome == Outcome.SOLVED, alone.duration, 0.0)
+    taken = np.where(alone.outcome == MoveOutcome.SOLVED, alone.duration, 0.0)
     stretched = alone.spans * np.divide(taken.max(initial=0.0), taken, out=np.ones_like(taken), where=taken > 0)
     moves = moves_of(displacements, stretched, limits.broadcast(len(displacements)), alone.outcome)
     return tuple(moves[axis] for axis in range(len(displacements)))

@@ -24,7 +24,7 @@ _DOUBLING = np.array([1.0, 1.0, 2.0, 4.0, 8.0])[:, np.newaxis]
 _NEWTON_STEPS = 5
 
 
-class Outcome(IntEnum):
+class MoveOutcome(IntEnum):
     """Outcome of planning; `words` describes it."""
 
     SOLVED = 0
@@ -35,7 +35,7 @@ class Outcome(IntEnum):
     @property
     def solved(self) -> bool:
         """Whether a move was found, including one of zero displacement."""
-        return self in (Outcome.SOLVED, Outcome.ZERO_DISPLACEMENT)
+        return self in (MoveOutcome.SOLVED, MoveOutcome.ZERO_DISPLACEMENT)
 
     @property
     def words(self) -> str:
@@ -44,12 +44,12 @@ class Outcome(IntEnum):
 
 
 _WORDS = {
-    Outcome.SOLVED: "solved: the shortest move of the family that keeps all limits",
-    Outcome.ZERO_DISPLACEMENT: "the displacement is zero: nothing moves, and it takes no time",
-    Outcome.NO_LIMIT: "no solution: nothing limits the move, so none is the shortest; give a limit on "
+    MoveOutcome.SOLVED: "solved: the shortest move of the family that keeps all limits",
+    MoveOutcome.ZERO_DISPLACEMENT: "the displacement is zero: nothing moves, and it takes no time",
+    MoveOutcome.NO_LIMIT: "no solution: nothing limits the move, so none is the shortest; give a limit on "
     f"{', '.join(LIMIT_NAMES[:-1])} or {LIMIT_NAMES[-1]}, or a period",
-    Outcome.OUT_OF_RANGE: "no solution: the move's times are too long or too short for floating-point numbers; bring "
-    "the displacement and the limits nearer to 1",
+    MoveOutcome.OUT_OF_RANGE: "no solution: the move's times are too long or too short for floating-point numbers; "
+    "bring the displacement and the limits nearer to 1",
 }
 
 
@@ -70,7 +70,7 @@ class Move:
     profile: BaseProfile
     duration: float
     active: tuple[str, ...]
-    outcome: Outcome
+    outcome: MoveOutcome
 
     @property
     def peaks(self) -> Peaks:
@@ -96,7 +96,7 @@ class Moves:
     active : array, shape (6, moves), bool
         Which limits are reached: velocity, acceleration, jerk, snap, crackle, pop.
     outcome : array, shape (moves,)
-        Values of `Outcome`.
+        Values of `MoveOutcome`.
     """
 
     displacement: Array
@@ -113,7 +113,7 @@ class Moves:
     def __getitem__(self, index: int) -> Move:
         snap, jerk, acceleration, velocity = self.holds[:, index].tolist()
         holds = Holds(snap=snap, jerk=jerk, acceleration=acceleration, velocity=velocity)
-        outcome = Outcome(int(self.outcome[index]))
+        outcome = MoveOutcome(int(self.outcome[index]))
         covered = float(self.displacement[index]) if outcome.solved else 0.0
         return Move(
             profile=covering(covered, float(self.period[index]), holds),
@@ -138,9 +138,9 @@ def moves_of(displacement: Array, spans: Array, bounds: Array, outcome: IntArray
     bounds : array, shape (6, moves)
         Limits.
     outcome : array, shape (moves,)
-        Values of `Outcome`; what is not solved rests.
+        Values of `MoveOutcome`; what is not solved rests.
     """
-    moving = outcome == Outcome.SOLVED
+    moving = outcome == MoveOutcome.SOLVED
     exact = np.where(moving, spans, 0.0)
     holds = holds_of(exact)
     exact = spans_of(exact[0], holds)
@@ -150,7 +150,7 @@ def moves_of(displacement: Array, spans: Array, bounds: Array, outcome: IntArray
         period=exact[0],
         holds=holds,
         peaks=peaks,
-        duration=np.where(outcome <= Outcome.ZERO_DISPLACEMENT, exact.sum(axis=0), np.inf),
+        duration=np.where(outcome <= MoveOutcome.ZERO_DISPLACEMENT, exact.sum(axis=0), np.inf),
         active=np.isfinite(bounds) & (peaks[1:] >= bounds * (1 - _REACHED)),
         outcome=outcome,
     )
@@ -217,10 +217,10 @@ def _outcome(displacement: Array, bounds: Array, spans: Array, period: float | A
     # Limits are not kept only where numbers overflowed or vanished on the way.
     within = (peaks_of(displacement, spans)[1:] <= bounds * (1 + _ROUNDING)).all(axis=0)
     solved = np.isfinite(duration) & (duration > 0) & within
-    outcome = np.where(solved, Outcome.SOLVED, Outcome.OUT_OF_RANGE)
+    outcome = np.where(solved, MoveOutcome.SOLVED, MoveOutcome.OUT_OF_RANGE)
     limited = np.isfinite(bounds).any(axis=0) | (period is not None)
-    outcome = np.where(limited, outcome, Outcome.NO_LIMIT)
-    return np.where(displacement == 0, Outcome.ZERO_DISPLACEMENT, outcome).astype(np.int64)
+    outcome = np.where(limited, outcome, MoveOutcome.NO_LIMIT)
+    return np.where(displacement == 0, MoveOutcome.ZERO_DISPLACEMENT, outcome).astype(np.int64)
 
 
 def _shortest_spans(displacement: Array, limits: Array, period: Array | None) -> Array:

@@ -29,7 +29,7 @@ NOTHING_MOVES = "nothing-moves"
 
 
 @dataclass(frozen=True)
-class ReplayWindows:
+class MeasuredWindows:
     """Measured motion and torque in windows of equal length.
 
     Attributes
@@ -103,7 +103,7 @@ def plan_windows(source: TorqueSource, horizon: int, most: int) -> WindowPlan:
     return WindowPlan(starts[spread], horizon, sample_period(time))
 
 
-def read_windows(source: TorqueSource, plan: WindowPlan) -> Iterator[ReplayWindows]:
+def read_windows(source: TorqueSource, plan: WindowPlan) -> Iterator[MeasuredWindows]:
     """Read the measurements in the windows, some windows at a time."""
     at_once = max(_SAMPLES_AT_ONCE // (plan.horizon + 1), 1)
     for first in range(0, len(plan.start), at_once):
@@ -111,7 +111,7 @@ def read_windows(source: TorqueSource, plan: WindowPlan) -> Iterator[ReplayWindo
         samples, index = np.unique(wanted, return_inverse=True)
         data, index = gathered(source, samples), index.reshape(wanted.shape)
         attitude, rate = data.motion.attitude, data.motion.rate
-        yield ReplayWindows(
+        yield MeasuredWindows(
             time=data.time[index],
             rotation=rotations.rotation_matrix(attitude)[index],
             body_rate=rotations.body_rate(attitude, rate)[index],
@@ -227,7 +227,7 @@ class _SquaredErrors:
         self.windows = 0
         self.window_error: list[Array] = []
 
-    def add(self, measured: ReplayWindows, run: Iterator[RotationState]) -> None:
+    def add(self, measured: MeasuredWindows, run: Iterator[RotationState]) -> None:
         by_window = np.zeros((len(measured.time), 3))
         for step, state in enumerate(run):
             turned, rate = _errors(measured, step + 1, state)
@@ -243,15 +243,15 @@ class _SquaredErrors:
         return np.where(whole[:, None], np.sqrt(squares / max(self.windows, 1)), np.nan)
 
 
-def _errors(measured: ReplayWindows, sample: int, state: RotationState) -> tuple[Array, Array]:
+def _errors(measured: MeasuredWindows, sample: int, state: RotationState) -> tuple[Array, Array]:
     away = measured.rotation[:, sample].swapaxes(1, 2) @ state.rotation
     return Rotation.from_matrix(away).as_rotvec(), state.body_rate - measured.body_rate[:, sample]
 
 
-def _still(measured: ReplayWindows) -> Iterator[RotationState]:
+def _still(measured: MeasuredWindows) -> Iterator[RotationState]:
     return iter([measured.start] * (measured.time.shape[1] - 1))
 
 
-def _run(predictor: Predictor, windows: ReplayWindows) -> Iterator[RotationState]:
+def _run(predictor: Predictor, windows: MeasuredWindows) -> Iterator[RotationState]:
     fastest = float(np.max(np.linalg.norm(windows.body_rate, axis=2), initial=0.0))
     return free_runs(acceleration_law(predictor), windows.start, windows.time, windows.torque, fastest)

@@ -11,7 +11,7 @@ import pytest
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.store import read_record, write_record
-from cpfls_cli.artifacts.vehicle_model import HistoryGroup
+from cpfls_cli.artifacts.vehicle_model import ObserverGroup
 from cpfls_cli.commands import verify_export
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
@@ -434,7 +434,7 @@ def test_code_holds_gusts_and_says_how_to_play_them(cpfls, gusty, folder):
 def test_a_replay_uses_the_past_where_a_vehicle_holds_an_observer(
     cpfls, refuse, config, written, noisy, vehicle, tmp_path
 ):
-    history = HistoryGroup(past=0.5, rate=np.full(6, 20.0), memory=np.full(6, 0.2))
+    history = ObserverGroup(past=0.5, rate=np.full(6, 20.0), memory=np.full(6, 0.2))
     model, told = written("remembers.h5", history=history), []
     for options in ((), ("--history", "0.5")):
         output = tmp_path / f"{len(told)}.h5"

@@ -15,7 +15,7 @@ from cpfls_cli.gap.balance.refine import compensation, refined, weighted_residua
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.ranking import (
     NEAR,
-    SearchStep,
+    RankedStep,
     best_floor,
     block_index,
     chance_of_ranks,
@@ -43,7 +43,7 @@ def beside_its_like(chosen: Sequence[Candidate], index: int) -> bool:
     return chosen[index].effect.actuation is not None and len(late(chosen)) > 1
 
 
-def moved(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], step: SearchStep) -> Sequence[Scored]:
+def moved(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], step: RankedStep) -> Sequence[Scored]:
     """Score anew, with all shapes moved, what lies between command and rotors and comes near the best, if that does.
 
     Between the points of a grid an effect with more shapes comes closer to what one with fewer is. The candidates stay
@@ -57,7 +57,7 @@ def moved(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], step: Sear
     return ascending((replace(scored, candidate=own) for scored, own in there), lambda scored: -scored.gain)
 
 
-def parted(refitted: System, step: SearchStep) -> System:
+def parted(refitted: System, step: RankedStep) -> System:
     """Take two effects for a last one with two shapes, where they leave less, or enough less with a number more."""
     others, last = refitted.chosen[:-1], len(refitted.chosen) - 1
     if not _stands_for_two(refitted.chosen, last):
@@ -71,7 +71,7 @@ def parted(refitted: System, step: SearchStep) -> System:
     return best
 
 
-def without_companion(refitted: System, step: SearchStep, settings: GapSettings) -> System:
+def without_companion(refitted: System, step: RankedStep, settings: GapSettings) -> System:
     """Take two effects for one with two shapes, where beside them what was added last is not needed.
 
     What one filter leaves of another one and a lag is small, and follows the motion as much as the effects do that
@@ -99,7 +99,7 @@ def without_companion(refitted: System, step: SearchStep, settings: GapSettings)
     return refitted
 
 
-def settled(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], index: int, step: SearchStep) -> list[Scored]:
+def settled(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], index: int, step: RankedStep) -> list[Scored]:
     """Score an effect between command and rotors and its like beside another one, once all shapes have moved.
 
     Points of a grid would not do: where a lag stands for a delay, the width of a notch moves with it.
@@ -183,19 +183,19 @@ def _stands_for_two(chosen: Sequence[Candidate], index: int) -> bool:
     return effect.actuation is not None and len(effect.shapes) > 1 and not beside_its_like(chosen, index)
 
 
-def _tried(step: SearchStep) -> list[Candidate]:
+def _tried(step: RankedStep) -> list[Candidate]:
     """List the effects between command and rotors that were not refused."""
     return late([scored.candidate for scored in step.ranking if np.isfinite(scored.gain)])
 
 
-def _pairs(flights: Sequence[WeakFlight], others: Sequence[Candidate], step: SearchStep) -> list[System]:
+def _pairs(flights: Sequence[WeakFlight], others: Sequence[Candidate], step: RankedStep) -> list[System]:
     """Fit each two effects between command and rotors that have one shape."""
     single = [candidate for candidate in _tried(step) if len(candidate.effect.shapes) == 1]
     return [refined(flights, [*others, *pair], step.floor) for pair in combinations(single, 2)]
 
 
 def _wider_pairs(
-    flights: Sequence[WeakFlight], others: Sequence[Candidate], own: Candidate, step: SearchStep
+    flights: Sequence[WeakFlight], others: Sequence[Candidate], own: Candidate, step: RankedStep
 ) -> list[System]:
     """Fit another effect between command and rotors that has two shapes with each one that has one shape."""
     tried = _tried(step)
@@ -204,12 +204,12 @@ def _wider_pairs(
     return [refined(flights, [*others, *pair], step.floor) for pair in product(double, single)]
 
 
-def _enough(step: SearchStep, beside: Scored) -> float:
+def _enough(step: RankedStep, beside: Scored) -> float:
     """Compute the least gain, in squared floors, of what is added to a hypothesis."""
     return least_gain(max(step.above_floor - beside.gain, 0.0), len(step.hypothesis.residual))
 
 
-def _rescored(refitted: System, step: SearchStep) -> Scored:
+def _rescored(refitted: System, step: RankedStep) -> Scored:
     """Score the last effect of a hypothesis by what that leaves of each block."""
     plain = system(refitted.flights)
     square = weighted_residual(refitted, step.floor, plain.rotor_wrench) ** 2

@@ -17,7 +17,7 @@ from cpfls_cli.gap.naming.earned import NamedFit, Refusal, fitted, on_bound
 from cpfls_cli.gap.naming.estimate import channel_weight, estimates
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out, share_removed
 from cpfls_cli.gap.naming.leftover import Leftover, leftover
-from cpfls_cli.gap.naming.ranking import SearchStep, block_index
+from cpfls_cli.gap.naming.ranking import RankedStep, block_index
 from cpfls_cli.gap.settings import CLEAR, ERRORS, VISIBLE, WORSE, GapSettings
 from cpfls_cli.rounding import ascending, largest, levelled, smallest
 
@@ -199,7 +199,7 @@ def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | No
 
 
 def differences(
-    first: Judgement, last: Judgement, start: SearchStep, judge: Judge, settings: GapSettings
+    first: Judgement, last: Judgement, start: RankedStep, judge: Judge, settings: GapSettings
 ) -> tuple[str, ...]:
     """Say what differs between the flights that were learned from and those held out, where one model cannot fit both.
 

@@ -15,7 +15,7 @@ from cpfls_cli.gap.balance.balance_system import System, left_over, window_noise
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
 from cpfls_cli.gap.naming.earned import NamedFit, bends_of, fitted
 from cpfls_cli.gap.naming.estimate import Estimates
-from cpfls_cli.gap.naming.ranking import SearchStep, rank_effects
+from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect, NotExcited, Unexplained
 from cpfls_cli.gap.residual.dependence import (
     Dependence,
@@ -163,7 +163,7 @@ def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[
 
 
 def beside_the_unnamed(
-    found: NamedFit, last: SearchStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
+    found: NamedFit, last: RankedStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
 ) -> tuple[Estimates, tuple[str, ...]]:
     """Widen the intervals of named effects by what is more than chance and too small for a name.
 
@@ -205,7 +205,7 @@ def beside_the_unnamed(
 
 
 def _beyond_chance(
-    step: SearchStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
+    step: RankedStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
 ) -> list[Candidate]:
     """Add effects to the chosen ones as long as one explains more than chance."""
     flights, chosen = step.hypothesis.flights, list(step.hypothesis.chosen)

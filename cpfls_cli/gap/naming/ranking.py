@@ -41,7 +41,7 @@ _CHANCE = 0.02
 
 
 @dataclass(frozen=True)
-class SearchStep:
+class RankedStep:
     """All candidates ranked beside a hypothesis.
 
     Attributes
@@ -86,7 +86,7 @@ def rank_effects(
     settings: GapSettings,
     rng: np.random.Generator | None,
     also: Sequence[Candidate] = (),
-) -> SearchStep:
+) -> RankedStep:
     """Score all effects beside those chosen.
 
     Parameters
@@ -116,7 +116,7 @@ def rank_effects(
     once: dict[str, Scored] = {}
     for each in scored:
         once.setdefault(each.candidate.effect.name, each)
-    return SearchStep(hypothesis, floor, tuple(once.values()), chance, above_floor, block)
+    return RankedStep(hypothesis, floor, tuple(once.values()), chance, above_floor, block)
 
 
 def best_floor(hypothesis: System) -> Array:

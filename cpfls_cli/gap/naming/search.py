@@ -16,7 +16,7 @@ from cpfls_cli.gap.naming.ranking import (
     CLOSE,
     LEAST_SHARE,
     NEAR,
-    SearchStep,
+    RankedStep,
     least_gain,
     least_margin,
     more_left,
@@ -39,7 +39,7 @@ def forward_selection(
     settings: GapSettings,
     rng: np.random.Generator,
     progress: Callable[[int], None] = lambda _: None,
-) -> tuple[tuple[Candidate, ...], list[SearchStep]]:
+) -> tuple[tuple[Candidate, ...], list[RankedStep]]:
     """Add effects one at a time while each explains more than chance and a relevant part of the residual.
 
     Parameters
@@ -54,7 +54,7 @@ def forward_selection(
         The last one has nothing to add.
     """
     chosen: tuple[Candidate, ...] = ()
-    steps: list[SearchStep] = []
+    steps: list[RankedStep] = []
     tried: set[frozenset[str]] = {frozenset()}
     while True:
         step = rank_effects(flights, chosen, effects, settings, rng)
@@ -77,7 +77,7 @@ def forward_selection(
         step.hypothesis.cache.clear()
 
 
-def acceptable(step: SearchStep, settings: GapSettings) -> bool:
+def acceptable(step: RankedStep, settings: GapSettings) -> bool:
     """Tell whether the best candidate explains more than chance and a relevant part of the residual."""
     if not step.ranking or step.ranking[0].gain == REFUSED:
         return False
@@ -85,12 +85,12 @@ def acceptable(step: SearchStep, settings: GapSettings) -> bool:
     return best.gain >= _enough(step) and step.p_value(best.gain) <= settings.significance
 
 
-def _enough(step: SearchStep) -> float:
+def _enough(step: RankedStep) -> float:
     """Compute the least gain of an effect that is named, in squared floors."""
     return least_gain(step.above_floor, len(step.hypothesis.residual))
 
 
-def quiet_enough(gain: float, step: SearchStep, refitted: System) -> bool:
+def quiet_enough(gain: float, step: RankedStep, refitted: System) -> bool:
     """Tell whether an effect explains motion, not noise.
 
     Columns of rates hold the noise of the gyroscope, and so does the inertial torque: where rates about two axes go

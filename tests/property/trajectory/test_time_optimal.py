@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.trajectory.limits import LIMIT_NAMES, Limits
-from cpfls_cli.trajectory.moves import Outcome, plan_moves
+from cpfls_cli.trajectory.moves import MoveOutcome, plan_moves
 
 CASES = 50_000
 
@@ -47,7 +47,7 @@ def peaks_upward(batch):
 
 def test_a_move_is_found_wherever_anything_limits_it(batch):
     limited = np.isfinite(batch.limits).any(axis=0) | (batch.period is not None)
-    expected = np.where(limited, Outcome.SOLVED, Outcome.NO_LIMIT)
+    expected = np.where(limited, MoveOutcome.SOLVED, MoveOutcome.NO_LIMIT)
     np.testing.assert_array_equal(batch.moves.outcome, expected)
     assert np.isfinite(batch.moves.duration[limited]).all()
 
@@ -66,7 +66,7 @@ def test_no_derivative_is_above_its_limit_and_the_displacement_is_covered(batch)
 
 
 def test_a_chosen_move_reaches_a_limit(batch):
-    reached = batch.moves.active.any(axis=0) | (batch.moves.outcome == Outcome.NO_LIMIT)
+    reached = batch.moves.active.any(axis=0) | (batch.moves.outcome == MoveOutcome.NO_LIMIT)
     if batch.period is None:
         assert reached.all()
     else:
@@ -85,7 +85,7 @@ def test_a_looser_limit_never_makes_a_move_longer(batch, order):
 
 def test_samples_stay_within_the_peaks_and_end_at_rest(batch):
     for index in range(0, CASES, CASES // 400):
-        if batch.moves.outcome[index] != Outcome.SOLVED:
+        if batch.moves.outcome[index] != MoveOutcome.SOLVED:
             continue
         move = batch.moves[index]
         peaks = np.array(astuple(move.peaks))

@@ -9,7 +9,7 @@ from scipy.stats import gumbel_r
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import refined
-from cpfls_cli.gap.naming.ranking import SearchStep, rank_effects
+from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.search import acceptable, exchanged, forward_selection
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import candidate, fly, weak
@@ -95,7 +95,7 @@ def test_what_is_chosen_is_not_looked_at_again_and_each_effect_is_listed_once():
 
 
 def step_of(chance):
-    return SearchStep(system([]), np.ones(6), (), chance, 1.0, np.zeros(0))
+    return RankedStep(system([]), np.ones(6), (), chance, 1.0, np.zeros(0))
 
 
 def test_p_value_is_the_share_of_shifts_that_do_as_well():

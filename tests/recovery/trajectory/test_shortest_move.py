@@ -5,7 +5,7 @@ import pytest
 
 from benchmarks.shared.brute_force import shortest_duration
 from cpfls_cli.trajectory.limits import LIMIT_NAMES, Limits
-from cpfls_cli.trajectory.moves import Outcome, plan_moves
+from cpfls_cli.trajectory.moves import MoveOutcome, plan_moves
 
 
 @pytest.mark.parametrize("chosen", [True, False], ids=["chosen-period", "given-period"])
@@ -16,7 +16,7 @@ def test_brute_force_finds_the_same_duration(chosen):
     limits[rng.random((6, count)) < 0.3] = np.inf
     period = None if chosen else 10 ** rng.uniform(-2, 1, count)
     moves = plan_moves(displacement, Limits(**dict(zip(LIMIT_NAMES, limits, strict=True))), period)
-    for index in np.flatnonzero(moves.outcome == Outcome.SOLVED):
+    for index in np.flatnonzero(moves.outcome == MoveOutcome.SOLVED):
         given = None if period is None else float(period[index])
         shortest = shortest_duration(float(displacement[index]), limits[:, index], given, rng)
         assert moves.duration[index] == pytest.approx(shortest, rel=1e-6), index

@@ -5,7 +5,7 @@ import pytest
 
 from cpfls_cli.trajectory.legs import synchronised
 from cpfls_cli.trajectory.limits import Limits
-from cpfls_cli.trajectory.moves import Outcome, plan_moves
+from cpfls_cli.trajectory.moves import MoveOutcome, plan_moves
 
 DISPLACEMENTS = np.array([10.0, -4.0, 0.0, 0.5])
 LIMITS = Limits(
@@ -23,7 +23,8 @@ def moves():
 
 
 def test_all_axes_begin_and_end_together_within_their_limits(moves):
-    assert [move.duration for move in moves if move.outcome == Outcome.SOLVED] == pytest.approx([moves[0].duration] * 3)
+    solved = [move for move in moves if move.outcome == MoveOutcome.SOLVED]
+    assert [move.duration for move in solved] == pytest.approx([moves[0].duration] * 3)
     assert [move.profile.displacement for move in moves] == DISPLACEMENTS.tolist()
     peaks = np.array([astuple(move.peaks)[1:] for move in moves]).T
     assert (peaks <= LIMITS.broadcast(4) * (1 + 1e-12)).all()
@@ -31,7 +32,7 @@ def test_all_axes_begin_and_end_together_within_their_limits(moves):
 
 
 def test_an_axis_that_stays_is_told(moves):
-    assert [move.outcome for move in moves].index(Outcome.ZERO_DISPLACEMENT) == 2
+    assert [move.outcome for move in moves].index(MoveOutcome.ZERO_DISPLACEMENT) == 2
     assert moves[2].profile.duration == 0.0
 
 
@@ -46,9 +47,9 @@ def test_each_axis_takes_as_long_as_the_slowest_alone():
 def test_axes_that_nothing_limits_have_no_solution():
     limits = Limits(velocity=np.array([1.0, np.inf]))
     each = synchronised(np.array([1.0, 1.0]), limits)
-    assert [move.outcome for move in each] == [Outcome.SOLVED, Outcome.NO_LIMIT]
+    assert [move.outcome for move in each] == [MoveOutcome.SOLVED, MoveOutcome.NO_LIMIT]
 
 
 def test_nothing_moves_where_nothing_is_asked():
     moves = synchronised(np.zeros(3), Limits(velocity=1.0))
-    assert [(move.outcome, move.duration) for move in moves] == [(Outcome.ZERO_DISPLACEMENT, 0.0)] * 3
+    assert [(move.outcome, move.duration) for move in moves] == [(MoveOutcome.ZERO_DISPLACEMENT, 0.0)] * 3

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.trajectory.limits import LIMIT_NAMES, Limits
-from cpfls_cli.trajectory.moves import Outcome, plan_move, plan_moves
+from cpfls_cli.trajectory.moves import MoveOutcome, plan_move, plan_moves
 from cpfls_cli.trajectory.profile import covering
 
 PAPER = {"velocity": 8.0, "acceleration": 2.0, "jerk": 1.0, "snap": 1.0, "crackle": 2.0, "pop": 2 * np.pi}
@@ -82,7 +82,7 @@ def test_a_given_period_bounds_the_snap_by_crackle_and_pop():
 
 def test_zero_displacement_is_no_move():
     move = plan_move(0.0, Limits(velocity=1.0))
-    assert (move.outcome, move.duration, move.active) == (Outcome.ZERO_DISPLACEMENT, 0.0, ())
+    assert (move.outcome, move.duration, move.active) == (MoveOutcome.ZERO_DISPLACEMENT, 0.0, ())
     assert move.outcome.solved
     assert astuple(move.peaks) == (0.0,) * 7
     np.testing.assert_array_equal(move.profile.sample(np.array([-1.0, 0.0, 1.0])), 0.0)
@@ -98,7 +98,7 @@ def test_nothing_that_limits_is_no_solution_and_says_what_would_help():
 @pytest.mark.parametrize(("displacement", "limit"), [(1e300, 1e-300), (1e-300, 1e300)])
 def test_times_that_numbers_cannot_hold_are_no_solution(displacement, limit):
     move = plan_move(displacement, Limits(velocity=limit, pop=limit))
-    assert (move.outcome, move.duration) == (Outcome.OUT_OF_RANGE, np.inf)
+    assert (move.outcome, move.duration) == (MoveOutcome.OUT_OF_RANGE, np.inf)
     assert "bring the displacement and the limits nearer to 1" in move.outcome.words
 
 
