@@ -75,7 +75,7 @@ def _title(file: str) -> str:
 
 def _command_line() -> str:
     group = typer.main.get_command(app)
-    top = click.Context(group, info_name="cpfls", terminal_width=100, max_content_width=100)
+    top = click.Context(group, info_name="cpfls", terminal_width=92, max_content_width=92)
     lines = ["# Command line", "", "What `cpfls COMMAND --help` prints.", ""]
     for name in group.list_commands(top):
         command = group.get_command(top, name)
