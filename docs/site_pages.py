@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import json
 import posixpath
 import re
-from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +12,8 @@ import click
 import typer
 from mkdocs.structure.files import File, Files
 
-import cpfls_cli
 from cpfls_cli.cli.app import app
+from cpfls_cli.config.keys import commented_default
 
 ROOT = Path(__file__).parents[1]
 ELSEWHERE = {
@@ -77,7 +75,7 @@ def _title(file: str) -> str:
 
 def _command_line() -> str:
     group = typer.main.get_command(app)
-    top = click.Context(group, info_name="cpfls", terminal_width=100, max_content_width=100)
+    top = click.Context(group, info_name="cpfls", terminal_width=92, max_content_width=92)
     lines = ["# Command line", "", "What `cpfls COMMAND --help` prints.", ""]
     for name in group.list_commands(top):
         command = group.get_command(top, name)
@@ -87,11 +85,8 @@ def _command_line() -> str:
 
 
 def _configuration() -> str:
-    printed = io.StringIO()
-    with redirect_stdout(printed):
-        cpfls_cli.run("config")
     lines = ["# Config", "", "What `cpfls config` prints: every key, what it means, and its default.", ""]
-    for section in re.split(r"^(?=\w+:)", printed.getvalue(), flags=re.MULTILINE):
+    for section in re.split(r"^(?=\w+:)", commented_default(), flags=re.MULTILINE):
         if key := re.match(r"(\w+):", section):
             lines += [f"## {key[1]}", ""]
         if section.strip():

@@ -7,6 +7,7 @@ import pytest
 import typer
 
 from cpfls_cli.cli.app import app
+from cpfls_cli.config.keys import commented_default
 from cpfls_cli.config.load import parse_config, validate
 
 ROOT = Path(__file__).parents[2]
@@ -78,6 +79,27 @@ def test_commands_and_their_options_exist(page):
     for name, options in commands(page):
         assert name in OPTIONS, f"{page.name}: cpfls {name}"
         assert set(options) <= OPTIONS[name], f"{page.name}: cpfls {name} {set(options) - OPTIONS[name]}"
+
+
+DEFAULT = parse_config(commented_default(), "the default config")
+
+
+def is_key(name):
+    """Whether a config has a key; what stands below one that is empty by default is free."""
+    node = DEFAULT
+    for part in name.split("."):
+        if not isinstance(node, dict) or not node:
+            return node in ({}, None)
+        if part not in node:
+            return False
+        node = node[part]
+    return True
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_keys_that_are_set_exist(page):
+    keys = re.findall(r"--set\s+[\"']?([\w.]+)=", page.read_text(encoding="utf-8"))
+    assert [key for key in keys if key not in ("section.key", "KEY") and not is_key(key)] == []
 
 
 EXAMPLES = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs" / "import.md").read_text(encoding="utf-8"), re.DOTALL)

@@ -27,6 +27,13 @@ def test_the_workflow_runs_what_has_to_be_green():
     assert os.access(ROOT / ".ci" / "run", os.X_OK)
 
 
+def test_every_commit_is_checked_as_lint_checks():
+    hooks = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8"))["repos"][0]["hooks"]
+    recipe = re.search(r"^lint:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)[1]
+    linters = re.findall(r"\$\(BIN\)/(.*?)(?: \.)?$", recipe, re.MULTILINE)
+    assert [hook["entry"].removeprefix(".venv/bin/") for hook in hooks] == linters
+
+
 def test_every_extra_that_a_message_names_exists_and_has_its_row():
     code = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "cpfls_cli").rglob("*.py"))
     named = {*re.findall(r"install_command\([\"'](\w+)", code), *(form.extra for form in LOG_FORMATS if form.extra)}
