@@ -61,7 +61,7 @@ class Killed(BaseException):
 @pytest.fixture(scope="module")
 def once(words):
     """The command with one seed of two settings, both of whose runs are stopped."""
-    settings = '[{name: "classic", set: {identification.structure: fls, reduction.size: null}}, {name: "fewer samples"}]'
+    settings = "[{name: classic, set: {identification.structure: fls, reduction.size: null}}, {name: fewer samples}]"
     return (*words, "--set", "sweep.seeds=1", "--set", f"sweep.settings={settings}")
 
 
