@@ -1,6 +1,7 @@
 """Fixtures of all packages of tests."""
 
 import gc
+import os
 import signal
 
 import pytest
@@ -10,6 +11,9 @@ from tests.builders import command_line
 
 # A shell without job control has what it starts in the background ignore interrupts, and all that this starts in turn.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# What is written is read on the same machine: waiting for its disk takes ten ms a file, and no test asks for it.
+os.fsync = lambda _: None
 
 # As the program itself does: a tenth of the time of the tests went into looking for garbage among what stays.
 gc.set_threshold(20_000, *gc.get_threshold()[1:])

@@ -73,9 +73,16 @@ def rotor_terms(speed: Array, acceleration: Array) -> Array:
 
 @dataclass(frozen=True)
 class Probe:
-    """Motions and rotor speeds at random, and their terms, for one vehicle."""
+    """Motions and rotor speeds at random, and their terms, for one vehicle.
+
+    Attributes
+    ----------
+    share : array, shape (time, rotor)
+        Rotor speeds as shares of the one at which the vehicle hovers; the same for all vehicles of as many rotors.
+    """
 
     signals: Signals
+    share: Array
     rotor: Array
     state: Array
 
@@ -87,7 +94,10 @@ class Probe:
     @cached_property
     def joint(self) -> tuple[Array, Array, Array]:
         """Products of the terms in their own sizes, their pseudo-inverse, and the sizes."""
-        return _joint(self.state.tobytes(), self.rotor[:, self.turning].tobytes(), len(self.state))
+        joint, inverse, scale = _joint(self.state.tobytes(), self.share.tobytes(), len(self.state))
+        rotors = self.share.shape[1]
+        sizes = scales.hover_speed(self.signals.vehicle) ** np.repeat([0.0, 1.0, 2.0], [1, rotors, rotors])
+        return joint, inverse, scale * np.tile(sizes, self.state.shape[1])
 
     @classmethod
     @lru_cache(maxsize=8)
@@ -95,7 +105,8 @@ class Probe:
         """Draw motions of the size that the vehicle has; what they are inverted by is worked out once for each."""
         rng = np.random.default_rng(0)
         rotors = len(vehicle.rotors)
-        speed = scales.hover_speed(vehicle) * rng.uniform(0.5, 1.5, (_PROBES, rotors))
+        share = rng.uniform(0.5, 1.5, (_PROBES, rotors))
+        speed = scales.hover_speed(vehicle) * share
         signals = Signals(
             time=np.arange(_PROBES, dtype=float),
             body_rate=rng.uniform(-2.0, 2.0, (_PROBES, 3)),
@@ -106,13 +117,14 @@ class Probe:
             rotor_speed=speed,
         )
         terms = rotor_terms(speed, np.zeros_like(speed))
-        return cls(signals, terms, state_terms(signals.air_velocity, signals.body_rate))
+        return cls(signals, share, terms, state_terms(signals.air_velocity, signals.body_rate))
 
 
 @lru_cache(maxsize=16)
-def _joint(state: bytes, rotor: bytes, probes: int) -> tuple[Array, Array, Array]:
-    """Work out `Probe.joint` once for all vehicles that hover alike: a fit changes other numbers more often."""
-    terms, turning = (np.frombuffer(values).reshape(probes, -1) for values in (state, rotor))
+def _joint(state: bytes, share: bytes, probes: int) -> tuple[Array, Array, Array]:
+    """Work out `Probe.joint` once for all vehicles of as many rotors, with speeds as shares of that of hovering."""
+    terms, speed = (np.frombuffer(values).reshape(probes, -1) for values in (state, share))
+    turning = np.hstack([np.ones((probes, 1)), speed, speed**2])
     products = (terms[:, :, None] * turning[:, None]).reshape(probes, -1)
     scale = np.sqrt(np.mean(products**2, axis=0))
     return products / scale, np.asarray(np.linalg.pinv(products / scale)), scale

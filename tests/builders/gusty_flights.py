@@ -136,7 +136,7 @@ def _sines(rng, turns, size, samples):
 
 
 _CROSS = np.array([[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]], float)
-_ONE = np.eye(3)
+_ONE, _LEVEL, _ALONG_Z = np.eye(3), np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 
 def _skew(vector):
@@ -158,35 +158,39 @@ def _flown(flights, path, pushes, shoves, noise):
     inertia, mixer = np.array([truth.inertia for truth in truths]), np.array([truth.mixer for truth in truths])
     unmix, hover = np.linalg.inv(mixer), np.array([[t.mass * GRAVITY / 4 / t.thrust_factor] for t in truths])
     outer, loop = np.minimum(2.0, bandwidth / 6), bandwidth * np.array([1.0, 1.0, 0.4])
+    near, follow, stiff, damped = outer**2, 1.6 * outer, loop**2, 1.4 * loop
+    least, most, towards = 0.05 * hover, 4 * hover, STEP_S / lag
     position, velocity = path[0, :, :3], path[0, :, 3:6]
     turn, rate, speed = np.tile(np.eye(3), (len(flights), 1, 1)), np.zeros_like(position), np.tile(np.sqrt(hover), 4)
     logs = []
     for now in range(len(path)):
         measured = rate + noise[now]
-        wanted = path[now, :, 6:] + outer**2 * (path[now, :, :3] - position)
-        wanted = _clipped(wanted + 1.6 * outer * (path[now, :, 3:6] - velocity), -6.0, 6.0) + UP
+        wanted = path[now, :, 6:] + near * (path[now, :, :3] - position)
+        wanted = _clipped(wanted + follow * (path[now, :, 3:6] - velocity), -6.0, 6.0) + UP
         up = wanted / np.sqrt((wanted**2).sum(axis=1, keepdims=True))
         # The heading is kept, so the vehicle leans about an axis of the level plane.
         lean = _skew(up) @ turn[:, :, 2, None]
         error = -(turn.transpose(0, 2, 1) @ lean)[:, :, 0]
         error[:, 2] = -turn[:, 1, 0]
-        torque = inertia * (loop**2 * error - 1.4 * loop * measured)
+        torque = inertia * (stiff * error - damped * measured)
         thrust = mass * (wanted * turn[:, :, 2]).sum(axis=1, keepdims=True)
         squared = (unmix @ np.concatenate([thrust, torque], axis=1)[:, :, None])[:, :, 0]
         if now % EVERY == 0:
             logs.append([position, velocity, turn, measured, speed, up])
-        before, speed = speed, speed + STEP_S / lag * (np.sqrt(_clipped(squared, 0.05 * hover, 4 * hover)) - speed)
+        before, speed = speed, speed + towards * (np.sqrt(_clipped(squared, least, most)) - speed)
         wrench = (mixer @ (0.5 * (before**2 + speed**2))[:, :, None])[:, :, 0]
-        gyroscopic = (_skew(rate) @ (inertia * rate)[:, :, None])[:, :, 0]
+        across = _skew(rate)
+        gyroscopic = (across @ (inertia * rate)[:, :, None])[:, :, 0]
         spin_up = (wrench[:, 1:] - damping * rate - gyroscopic) / inertia + pushes[now]
         # In the middle of the step, as all that turns and pushes is.
-        midway = turn @ (_ONE + 0.5 * STEP_S * _skew(rate))
-        force = -drag * (velocity[:, None] @ midway)[:, 0] * [1.0, 1.0, 0.0] + wrench[:, :1] * [0.0, 0.0, 1.0]
+        midway = turn @ (_ONE + 0.5 * STEP_S * across)
+        force = -drag * (velocity[:, None] @ midway)[:, 0] * _LEVEL + wrench[:, :1] * _ALONG_Z
         faster = (midway @ force[:, :, None])[:, :, 0] / mass + shoves[now] - UP
         position, velocity = position + STEP_S * (velocity + 0.5 * STEP_S * faster), velocity + STEP_S * faster
         angle = STEP_S * (rate + 0.5 * STEP_S * spin_up)
         small = _skew(angle)
-        turn = turn @ (_ONE + small + 0.5 * small @ small + small @ small @ small / 6)
+        twice = small @ small
+        turn = turn @ (_ONE + small + 0.5 * twice + twice @ small / 6)
         rate = rate + STEP_S * spin_up
     return [np.array(each) for each in zip(*logs, strict=True)]
 

@@ -9,10 +9,10 @@ from tests.builders.command_line import undrawn
 
 
 @pytest.fixture(scope="module")
-def answer(cpfls, gap_config, pipeline, with_attitude, tmp_path_factory):
+def answer(cpfls, brief_config, pipeline, with_attitude, tmp_path_factory):
     folder = tmp_path_factory.mktemp("model") / "gap"
     with undrawn():
-        result = cpfls("gap", gap_config, *with_attitude, "--model", pipeline.model, "-o", folder, "--json")
+        result = cpfls("gap", brief_config, *with_attitude, "--model", pipeline.model, "-o", folder, "--json")
     assert result.exit_code == 0, result.stderr
     return folder, json.loads(result.stdout)
 
@@ -30,27 +30,27 @@ def test_offset_is_found_beside_the_model(answer):
     assert effects["com_offset"]["coefficients"]["c_x"]["value"] == pytest.approx(0.008, rel=0.1)
 
 
-def test_later_stages_need_no_model_again(cpfls, gap_config, answer, tmp_path):
+def test_later_stages_need_no_model_again(cpfls, brief_config, answer, tmp_path):
     folder, _ = answer
-    said = cpfls("diagnose", gap_config, folder / "disagreement.h5", "-o", tmp_path / "d.h5")
+    said = cpfls("diagnose", brief_config, folder / "disagreement.h5", "-o", tmp_path / "d.h5")
     assert said.exit_code == 0, said.stderr
     assert (tmp_path / "d.h5").read_bytes() == (folder / "diagnosis.h5").read_bytes()
 
 
-def test_a_flight_without_attitude_is_refused(refuse, gap_config, pipeline, shifted, tmp_path):
-    (message,) = refuse("compare", gap_config, shifted[0], "--model", pipeline.model, "-o", tmp_path / "x.h5")
+def test_a_flight_without_attitude_is_refused(refuse, brief_config, pipeline, shifted, tmp_path):
+    (message,) = refuse("compare", brief_config, shifted[0], "--model", pipeline.model, "-o", tmp_path / "x.h5")
     assert "the model needs the attitude" in message
 
 
-def test_extended_model_predicts_and_is_compared(cpfls, gap_config, answer, with_attitude, tmp_path):
+def test_extended_model_predicts_and_is_compared(cpfls, brief_config, answer, with_attitude, tmp_path):
     folder, summary = answer
     assert summary["extended"]["written"]
-    assert cpfls("import", gap_config, with_attitude[1], "-o", tmp_path / "f.h5").exit_code == 0
+    assert cpfls("import", brief_config, with_attitude[1], "-o", tmp_path / "f.h5").exit_code == 0
     extended = folder / "extended.h5"
-    result = cpfls("predict", gap_config, extended, tmp_path / "f.h5", "-o", tmp_path / "p.h5", "--json")
+    result = cpfls("predict", brief_config, extended, tmp_path / "f.h5", "-o", tmp_path / "p.h5", "--json")
     assert result.exit_code == 0, result.stderr
     assert json.loads(result.stdout)["samples"] == 2400
-    words = ("compare", gap_config, with_attitude[1], "--model", extended, "-o", tmp_path / "d.h5", "--json")
+    words = ("compare", brief_config, with_attitude[1], "--model", extended, "-o", tmp_path / "d.h5", "--json")
     result = cpfls(*words)
     assert result.exit_code == 0, result.stderr
     # What was held out for the diagnosis, seen again through the extended model.

@@ -60,8 +60,9 @@ class Killed(BaseException):
 
 @pytest.fixture(scope="module")
 def once(words):
-    """The command with one seed, of which no more than the first two runs are stopped."""
-    return (*words, "--set", "sweep.seeds=1")
+    """The command with one seed of two settings, both of whose runs are stopped."""
+    settings = "[{name: classic, set: {identification.structure: fls, reduction.size: null}}, {name: fewer samples}]"
+    return (*words, "--set", "sweep.seeds=1", "--set", f"sweep.settings={settings}")
 
 
 @pytest.fixture(scope="module")

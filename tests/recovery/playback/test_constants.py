@@ -94,11 +94,17 @@ def _limited_information(torque, turning, asked):
     return moments[0, 1] / moments[1, 1]
 
 
-@pytest.mark.parametrize("axis", [0, 1])
-def test_limited_information_maximum_likelihood_finds_the_same_body(axis):
-    """Another estimator by hand: one axis, one band, lags of the velocity that is asked for."""
+@pytest.fixture(scope="module")
+def shaken():
+    """Flights whose paths shake, and what they tell."""
     flown = list(gusty_flights([Flight(SMALL, GUSTS, path, 5, reach=2.5) for path in range(3)], 40.0))
-    found = find_constants(SMALL.vehicle, flown, instruments(flown))
+    return flown, find_constants(SMALL.vehicle, flown, instruments(flown))
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_limited_information_maximum_likelihood_finds_the_same_body(shaken, axis):
+    """Another estimator by hand: one axis, one band, lags of the velocity that is asked for."""
+    flown, found = shaken
     place = found.fitted.free.index[LOG_INERTIA[axis]]
     band = band_windows(0.01, 0.3, 0.8)
     torque = [band.average(flight.speed**2 @ SMALL.mixer[1 + axis]) for flight in flown]
