@@ -19,9 +19,9 @@ SMALLEST_SINGULAR_SHARE = 3e-7
 _WELL_CONDITIONED = 3e3
 _LOWEST_DIRECTIONS = 3
 # Columns from which a tridiagonal form is worth its calls, and what it may work in, numbers a column.
-_FEW, _WORK = 50, 64
+_FEW, _WORK = 64, 64
 # Columns from which Lanczos is worth its calls; its steps at most, and the residual at which an eigenvalue is exact.
-_MANY = 200
+_MANY = 700
 _STEPS = 80
 _SETTLED = 1e-9
 
