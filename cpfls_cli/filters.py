@@ -80,7 +80,8 @@ class SecondOrder:
         driven = self.over[0] * change
         driven[1:] += self.over[1] * change[:-1]
         driven[2:] += self.over[2] * change[:-2]
-        return self.level * values[0] + recursion(self.under[1:], driven)
+        filtered: Numbers = self.level * values[0] + recursion(self.under[1:], driven)
+        return filtered
 
 
 def butterworth(cycles: float, order: int) -> list[SecondOrder]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import linalg
+from scipy.linalg import lapack
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, Numbers
 
 Project = Callable[[Array, Array], tuple[Array, Array]]
 SMALLEST_SINGULAR_SHARE = 3e-7
@@ -16,8 +18,10 @@ SMALLEST_SINGULAR_SHARE = 3e-7
 # Up to here the squares have digits enough; above, the lowest directions are multiplied out once more.
 _WELL_CONDITIONED = 3e3
 _LOWEST_DIRECTIONS = 3
+# Columns from which a tridiagonal form is worth its calls, and what it may work in, numbers a column.
+_FEW, _WORK = 64, 64
 # Columns from which Lanczos is worth its calls; its steps at most, and the residual at which an eigenvalue is exact.
-_MANY = 200
+_MANY = 700
 _STEPS = 80
 _SETTLED = 1e-9
 
@@ -169,9 +173,9 @@ def solve_normal(equations: NormalEquations, rank_tolerance: float, project: Pro
     """Solve normal equations as accurately as a decomposition of the columns would.
 
     The eigenvalues are the squares of the singular values, so a condition number near 1e6 would be left with four
-    digits. Where it is large, the residual and the columns along the lowest eigenvectors are therefore computed from
-    the samples themselves: one step of iterative refinement for the parameters, Rayleigh-Ritz for the lowest singular
-    value.
+    digits. Where it is large and the rank full, the residual and the columns along the lowest eigenvectors are
+    therefore computed from the samples themselves: one step of iterative refinement for the parameters, Rayleigh-Ritz
+    for the lowest singular value.
 
     Parameters
     ----------
@@ -190,13 +194,15 @@ def solve_normal(equations: NormalEquations, rank_tolerance: float, project: Pro
     if inverse is None:
         return NormalSolution(np.zeros_like(equations.moment), float("inf"))
     parameters, smallest = inverse.apply(equations.moment), inverse.smallest
+    if inverse.missing:
+        # No refinement: the condition number is this, whatever the smallest singular value is.
+        return NormalSolution(parameters, (1.0 + inverse.missing) / tolerance)
     if inverse.largest > _WELL_CONDITIONED**2 * smallest:
         square, back = project(parameters, inverse.lowest)
         parameters = parameters + inverse.apply(back - equations.penalty * parameters)
         penalised = square + (inverse.lowest.T * equations.penalty) @ inverse.lowest
         smallest = np.linalg.eigvalsh(penalised)[0]
-    condition = float(np.sqrt(inverse.largest / smallest))
-    return NormalSolution(parameters, condition if inverse.missing == 0 else (1.0 + inverse.missing) / tolerance)
+    return NormalSolution(parameters, float(np.sqrt(inverse.largest / smallest)))
 
 
 @dataclass(frozen=True)
@@ -207,29 +213,31 @@ class _Inverse:
     ----------
     apply : callable
         Multiplies a vector.
-    largest, smallest : float
-        Eigenvalues; the smallest of those that do not count as zero.
-    lowest : array, shape (parameters, up to 3)
-        Orthonormal directions of the smallest ones.
     missing : int
         Eigenvalues that count as zero.
+    largest, smallest : float
+        Eigenvalues; 0 where some count as zero.
+    lowest : array, shape (parameters, up to 3)
+        Orthonormal directions of the smallest ones; none where some count as zero.
     """
 
     apply: Callable[[Array], Array]
-    largest: float
-    smallest: float
-    lowest: Array
     missing: int
+    largest: float = 0.0
+    smallest: float = 0.0
+    lowest: Array = field(default_factory=lambda: np.empty((0, 0)))
 
 
 def _inverted(matrix: Array, tolerance: float) -> _Inverse | None:
     """Invert a matrix whose eigenvalues below a share of the largest count as zero; None where all are zero.
 
-    Where it is large, a Cholesky decomposition and few steps of Lanczos tell all that is asked, if it has full rank.
+    A Cholesky decomposition does that, beside the few eigenvectors that are asked for: of a large matrix by few steps
+    of Lanczos, if it has full rank, of others by a tridiagonal form. Where it fails all eigenvectors are computed.
     """
-    found = _factored(matrix, tolerance) if len(matrix) >= _MANY else None
-    if found is not None:
-        return found
+    with suppress(np.linalg.LinAlgError):
+        found = _factored(matrix, tolerance) if len(matrix) >= _MANY else _reduced(matrix, tolerance)
+        if found is not None:
+            return found
     eigenvalues, vectors = np.linalg.eigh(matrix)
     kept = eigenvalues > tolerance * eigenvalues[-1]
     if not kept.any():
@@ -239,16 +247,49 @@ def _inverted(matrix: Array, tolerance: float) -> _Inverse | None:
     def apply(right_side: Array) -> Array:
         return np.asarray(basis @ (inverse * (basis.T @ right_side)))
 
-    missing = len(eigenvalues) - len(inverse)
-    return _Inverse(apply, eigenvalues[-1], 1.0 / inverse[0], basis[:, :_LOWEST_DIRECTIONS], missing)
+    if missing := len(eigenvalues) - len(inverse):
+        return _Inverse(apply, missing)
+    return _Inverse(apply, 0, eigenvalues[-1], eigenvalues[0], basis[:, :_LOWEST_DIRECTIONS])
+
+
+def _reduced(matrix: Array, tolerance: float) -> _Inverse | None:
+    """Invert by Cholesky and the lowest eigenvectors, from a tridiagonal form; None where all are had as soon.
+
+    Directions that count as zero get the largest eigenvalue, and nothing of a vector that is multiplied.
+    """
+    size = len(matrix)
+    if size < _FEW:
+        return None
+    form, diagonal, beside, reflectors, _ = lapack.dsytrd(matrix, lower=1, lwork=_WORK * size)
+
+    def turned_back(vectors: Numbers) -> Numbers:
+        below = lapack.dormqr("L", "N", form[1:, :-1], reflectors, vectors[1:], _WORK * size)[0]
+        return np.concatenate([vectors[:1], below])
+
+    last = (size - 1, size - 1)
+    (largest,) = linalg.eigvalsh_tridiagonal(diagonal, beside, select="i", select_range=last, check_finite=False)
+    if not largest > 0:
+        return None
+    near_zero = (-largest, tolerance * largest)
+    none = turned_back(
+        linalg.eigh_tridiagonal(diagonal, beside, select="v", select_range=near_zero, check_finite=False)[1]
+    )
+    factor = linalg.cho_factor(matrix + largest * none @ none.T, check_finite=False)
+
+    def apply(right_side: Array) -> Array:
+        inside = right_side - none @ (none.T @ right_side)
+        return np.asarray(linalg.cho_solve(factor, inside, check_finite=False))
+
+    if missing := none.shape[1]:
+        return _Inverse(apply, missing)
+    lowest = (0, _LOWEST_DIRECTIONS - 1)
+    values, vectors = linalg.eigh_tridiagonal(diagonal, beside, select="i", select_range=lowest, check_finite=False)
+    return _Inverse(apply, 0, largest, values[0], turned_back(vectors))
 
 
 def _factored(matrix: Array, tolerance: float) -> _Inverse | None:
     """Invert by Cholesky; None where the rank may not be full."""
-    try:
-        factor = linalg.cho_factor(matrix, check_finite=False)
-    except np.linalg.LinAlgError:
-        return None
+    factor = linalg.cho_factor(matrix, check_finite=False)
 
     def apply(right_side: Array) -> Array:
         return np.asarray(linalg.cho_solve(factor, right_side, check_finite=False))
@@ -257,7 +298,7 @@ def _factored(matrix: Array, tolerance: float) -> _Inverse | None:
     # Far enough from zero that no rounding decides the rank.
     if upper is None or lower is None or not 1.0 / lower[0] > 4.0 * tolerance * upper[0]:
         return None
-    return _Inverse(apply, upper[0], 1.0 / lower[0], lower[1], 0)
+    return _Inverse(apply, 0, upper[0], 1.0 / lower[0], lower[1])
 
 
 def _extreme(apply: Callable[[Array], Array], size: int) -> tuple[float, Array] | None:

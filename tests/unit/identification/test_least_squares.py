@@ -83,10 +83,11 @@ def test_no_rows_at_all_are_an_error():
 PARAMETERS = 40
 
 
-@pytest.fixture(params=["eigenvectors", "Cholesky first"])
-def both_ways(request, monkeypatch):
-    """As few columns are solved, and as many are."""
-    monkeypatch.setattr(least_squares, "_MANY", PARAMETERS if request.param == "Cholesky first" else PARAMETERS + 1)
+@pytest.fixture(params=["all eigenvectors", "tridiagonal form", "Lanczos"])
+def each_way(request, monkeypatch):
+    """As few columns are solved, as some are, and as many."""
+    monkeypatch.setattr(least_squares, "_FEW", PARAMETERS + (request.param == "all eigenvectors"))
+    monkeypatch.setattr(least_squares, "_MANY", PARAMETERS + (request.param != "Lanczos"))
 
 
 def columns(singular_values, rows=200, seed=32):
@@ -116,7 +117,7 @@ def decay(condition, kind, scale=1.0):
     return scale * values
 
 
-@pytest.mark.usefixtures("both_ways")
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("scale", [1.0, 1e6, 1e-6])
 @pytest.mark.parametrize("kind", ["even", "one", "cluster"])
 @pytest.mark.parametrize("condition", [3.0, 5e3, 2e4, 1e5, 1e6])
@@ -127,7 +128,7 @@ def test_condition_number_has_six_digits(condition, kind, scale):
     assert found == pytest.approx(condition, rel=1e-6)
 
 
-@pytest.mark.usefixtures("both_ways")
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("kind", ["even", "one", "cluster"])
 @pytest.mark.parametrize("condition", [3.0, 5e3, 2e4, 1e5, 1e6])
 def test_residual_is_that_of_the_decomposition(condition, kind):
@@ -138,7 +139,7 @@ def test_residual_is_that_of_the_decomposition(condition, kind):
     np.testing.assert_allclose(residual, best, atol=1e-7 * np.abs(best).max())
 
 
-@pytest.mark.usefixtures("both_ways")
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("condition", [3.0, 2e4, 1e6])
 def test_penalised_system_is_solved_with_its_penalty(condition):
     A, y, _ = columns(decay(condition, "even"))
@@ -160,7 +161,7 @@ def test_losing_rank_never_improves_the_conditioning():
     assert found == pytest.approx([8, 2e6, 3e6])
 
 
-@pytest.mark.usefixtures("both_ways")
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("rank_tolerance", [1e-10, 1e-6, 1e-4])
 @pytest.mark.parametrize("seed", range(3))
 def test_conditioning_is_ordered_to_the_end(rank_tolerance, seed):
@@ -178,7 +179,7 @@ def test_conditioning_is_ordered_to_the_end(rank_tolerance, seed):
     assert solved(*columns(fewer, seed=seed)[:2], rank_tolerance=rank_tolerance).conditioning > worse[-1]
 
 
-@pytest.mark.usefixtures("both_ways")
+@pytest.mark.usefixtures("each_way")
 def test_dependent_columns_get_the_parameters_of_smallest_norm():
     values = np.geomspace(1.0, 0.1, PARAMETERS)
     values[-5:] = 0.0
