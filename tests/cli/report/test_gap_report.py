@@ -144,6 +144,7 @@ def test_a_fault_of_a_sensor_stands_under_sensors(tmp_path):
     assert "without the faults of the sensors" in page.text
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_title_of_the_config_wins(tmp_path):
     page = shown(tmp_path, made.disagreement(), options=("--set", "report.title=My vehicle"))
     assert "<h1>My vehicle</h1>" in page.html

@@ -204,6 +204,7 @@ def test_the_tables_show_the_numbers_of_the_artifacts(study, full):
         assert f"{selection.number(key):.5g}" in full.page.text
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_paper_s_numbers_stand_beside_those_of_its_own_report_alone(study, full):
     text = Page(paper_page(study.config, full.given).text).text
     for printed in ("56254", "59771", "+22.54 %", "5506.4", "0.1531", "121.5 × 10⁻⁶", "Paper"):
