@@ -65,7 +65,7 @@ def test_failure_while_computing_leaves_the_old_output(refuse, pipeline, study, 
     output = tmp_path / "flight.h5"
     output.write_text("precious")
     # A rotor this slow cannot carry the vehicle, which only the computation finds out.
-    weak = ("--set", "vehicle.rotor_speed_max_rad_s=10")
+    weak = ("--set", "vehicle.rotor_speed_max_rad_s=150")
     lines = refuse("simulate", study, pipeline.trajectory, "-o", output, "--force", *weak, code=1)
     assert lines[-1].startswith(f"{pipeline.trajectory}: no flight was written; ")
 
