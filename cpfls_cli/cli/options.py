@@ -84,6 +84,11 @@ def _in_own_words(error: typer.BadParameter) -> str:
     return f"{message} (did you mean {near[0]!r}?)" if near else message
 
 
+@functools.cache
+def _common_hints() -> dict[str, Any]:
+    return get_type_hints(Common, include_extras=True)
+
+
 def with_common(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command the common options; it receives them as its keyword argument `common`.
 
@@ -93,7 +98,7 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
         With a signature that the command-line library reads.
     """
     hints = get_type_hints(command, include_extras=True)
-    common_hints = get_type_hints(Common, include_extras=True)
+    common_hints = _common_hints()
     arguments = [name for name, hint in hints.items() if any(isinstance(o, ArgumentInfo) for o in get_args(hint))]
     command_parameters = [
         parameter.replace(annotation=hints[name])

@@ -5,14 +5,16 @@ from __future__ import annotations
 import io
 from collections.abc import Iterable, Iterator, Sequence
 from textwrap import wrap
-
-from rich.console import Console
-from rich.table import Table as RichTable
-from rich.text import Text as RichText
+from typing import TYPE_CHECKING
 
 from cpfls_cli.errors import visible
 from cpfls_cli.report.content import Block, Box, Facts, Folded, Heading, Listing, Plot, Table, Text, Tone, unfolded
 
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
+    from rich.text import Text as RichText
+
+# Rich is loaded where there is a table: sentences do not wait for it.
 _STYLES: dict[Tone, str] = {"plain": "", "note": "", "good": "green", "warning": "bold red"}
 # Where nothing is a terminal no number or word is cut or folded, so that other programs can read it.
 _UNLIMITED = 100_000
@@ -47,7 +49,7 @@ def terminal_lines(
                 drawn.add_column(no_wrap=True)
                 drawn.add_column(no_wrap=width is None)
                 for term, value in block.rows:
-                    drawn.add_row(RichText(visible(term)), RichText(visible(value)))
+                    drawn.add_row(_rich(visible(term)), _rich(visible(value)))
                 yield from _printed(drawn, width, colour)
             case Table():
                 yield from _table(block, width, colour)
@@ -83,6 +85,8 @@ def _broken(text: str, width: int | None, indent: str = "") -> list[str]:
 def _table(table: Table, width: int | None, colour: bool) -> Iterator[str]:
     if table.caption:
         yield from _broken(table.caption, width)
+    from rich.text import Text as RichText
+
     lines = _printed(_drawn(table, width is None, colour), width, colour)
     widest = max((RichText.from_ansi(line).cell_len for line in lines), default=0)
     if width is not None and widest > width:
@@ -103,23 +107,33 @@ def _drawn(table: Table, whole: bool, colour: bool, excess: int = 0) -> RichTabl
         word = max((len(word) for text in texts[column] for word in text.split()), default=0)
         share = excess * long.get(column, 0) // max(sum(long.values()), 1)
         drawn.add_column(
-            RichText(title),
+            _rich(title),
             justify="left" if column in table.words or column in table.sentences else "right",
             no_wrap=whole and column not in long,
             min_width=word,
             max_width=max(long[column] - share, word) if excess and column in long else None,
         )
     for row in table.cells:
-        drawn.add_row(*(RichText(visible(cell.text), _STYLES[cell.tone] if colour else "") for cell in row))
+        drawn.add_row(*(_rich(visible(cell.text), _STYLES[cell.tone] if colour else "") for cell in row))
     return drawn
 
 
+def _rich(text: str, style: str = "") -> RichText:
+    from rich.text import Text as RichText
+
+    return RichText(text, style)
+
+
 def _grid(colour: bool, *, header: bool) -> RichTable:
+    from rich.table import Table as RichTable
+
     style = "bold" if colour else ""
     return RichTable(box=None, pad_edge=False, padding=(0, 1), show_header=header, header_style=style)
 
 
 def _printed(drawn: RichTable, width: int | None, colour: bool) -> Sequence[str]:
+    from rich.console import Console
+
     stream = io.StringIO()
     console = Console(
         file=stream,
