@@ -17,6 +17,7 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 _SEAL = b"cpfls sha256 "
 _SEAL_BYTES = len(_SEAL) + 64 + 1
 _BLOCK = 1 << 20
+_LEAST_S, _BYTES_PER_SECOND = 10.0, 2e7
 
 
 class Content(NamedTuple):
@@ -38,6 +39,11 @@ def is_hdf5(path: Path) -> bool:
     """Tell whether a file begins as HDF5 does."""
     with path.open("rb") as stream:
         return stream.read(len(_HDF5)) == _HDF5
+
+
+def longest_read_s(size: int) -> float:
+    """Say how long to read a file of so many bytes may take, s, before it is taken to have no end."""
+    return _LEAST_S + size / _BYTES_PER_SECOND
 
 
 def is_sealed(path: Path) -> bool:

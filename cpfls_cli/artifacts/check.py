@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 
 from cpfls_cli.artifacts.formats import record_of_format
+from cpfls_cli.artifacts.patience import patient
 from cpfls_cli.artifacts.spec import (
     CONFIG,
     FIXED,
@@ -178,9 +179,12 @@ def opened(path: Path, *wanted: Format) -> Iterator[Stored]:
     """
     _require_sealed(path)
     try:
-        with h5py.File(path, "r") as file:
-            _refuse_links(file)
-            stored = stored_of(path, file)
+        with patient(path):
+            file = h5py.File(path, "r")
+        with file:
+            with patient(path):
+                _refuse_links(file)
+                stored = stored_of(path, file)
             if wanted and not any(each.includes(stored.spec) for each in wanted):
                 asked = " or ".join(f"{w.name} (made by {w.makers})" for w in wanted)
                 made = f" made by {stored.spec.makers}" if stored.spec.kind else ""

@@ -28,6 +28,7 @@ from cpfls_cli.artifacts.check import (
 )
 from cpfls_cli.artifacts.formats import record_of_format
 from cpfls_cli.artifacts.output import EnduringFile, sealed_output
+from cpfls_cli.artifacts.patience import patient
 from cpfls_cli.artifacts.spec import (
     CONFIG,
     INPUTS,
@@ -142,7 +143,7 @@ def read_artifact(path: Path, *wanted: Format) -> Artifact:
 
 
 def _read_whole(path: Path, *wanted: Format) -> Artifact:
-    with opened(path, *wanted) as stored:
+    with opened(path, *wanted) as stored, patient(path):
         require_all(path, stored)
         refuse(path, check_structure(stored))
         artifact = Artifact(stored.spec, stored.header, {name: _read(own) for name, own in stored.data.items()})
@@ -213,7 +214,7 @@ class Outline:
 
 def read_outline(path: Path) -> Outline:
     """Read what an artifact holds, in little memory however large it is."""
-    with opened(path) as stored:
+    with opened(path) as stored, patient(path):
         require_all(path, stored)
         refuse(path, check_artifact(stored))
         small = (name for name, own in stored.data.items() if own.ndim == 0 or _is_short_text(own))
@@ -227,7 +228,7 @@ def _is_short_text(dataset: h5py.Dataset | Array) -> bool:
 
 def findings_of(path: Path) -> tuple[Format, list[str]]:
     """List what in an artifact breaks its format, in little memory however large it is."""
-    with opened(path) as stored:
+    with opened(path) as stored, patient(path):
         require_all(path, stored)
         return stored.spec, check_artifact(stored)
 
@@ -379,7 +380,7 @@ def count_rows(path: Path, spec: Format, first: str) -> int | None:
 
 def check_rows(path: Path, spec: Format, names: Sequence[str]) -> None:
     """Refuse datasets of these names that break the format of an artifact, some rows at a time."""
-    with opened(path, spec) as stored:
+    with opened(path, spec) as stored, patient(path):
         missing = [name for name in names if name not in stored.data]
         if missing:
             raise InputError(f"{path}: lacks {', '.join(missing)}; this stage needs {', '.join(names)}")
@@ -393,4 +394,6 @@ def read_rows(path: Path, names: Sequence[str], start: int, stop: int, rows: int
         datasets = [stored.data[name] for name in names]
         for first in range(start, stop, rows):
             last = min(first + rows, stop)
-            yield [np.asarray(dataset[first:last], dtype=float) for dataset in datasets]
+            with patient(path):
+                read = [np.asarray(dataset[first:last], dtype=float) for dataset in datasets]
+            yield read

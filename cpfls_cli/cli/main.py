@@ -7,6 +7,7 @@ import gc
 import os
 import sys
 
+from cpfls_cli.artifacts.patience import end_what_hangs
 from cpfls_cli.cli.interrupts import interruptible, leave_on_interrupt
 
 _THREAD_LIMITS = (
@@ -29,6 +30,7 @@ def run() -> None:
     atexit.register(gc.freeze)
     _open_standard_streams()
     leave_on_interrupt()
+    end_what_hangs()
     use_one_thread()
     # To look for plugins of the validating library among all packages takes a tenth of the time of a short command.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")

@@ -35,6 +35,8 @@ _SAME_UNIT = 0.15
 _UNIT_ERROR, _THRUST_ERROR = 0.05, 0.25
 # Share of a channel that other axes have to explain.
 _EXPLAINED = 0.8
+# Growth of what is left between two channels from which on a repair sets them apart; noise and a shift make less.
+_APART = 1.2
 _FORWARD_LEFT_UP = np.diag([1.0, -1.0, -1.0])
 _DONE = "It is set right before the balance"
 
@@ -52,11 +54,14 @@ class Settled:
         Of the repaired flights.
     against_thrust : Finding or None
         That the world is upside down, turned or mirrored against thrust and attitude; None where it is not.
+    dropped : tuple of Finding
+        Of repairs that another channel contradicts, so that nothing is done.
     """
 
     repairs: tuple[ChannelRepair, ...]
     checks: tuple[PairCheck, ...]
     against_thrust: Finding | None = None
+    dropped: tuple[Finding, ...] = ()
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -64,7 +69,7 @@ class Settled:
         mended = (repair.finding for repair in self.repairs if repair.finding is not None)
         between_sensors = (problem for check in self.checks if check.pair.exact for problem in check.problems)
         world = () if self.against_thrust is None else (self.against_thrust,)
-        return (*mended, *world, *between_sensors)
+        return (*mended, *world, *self.dropped, *between_sensors)
 
 
 @dataclass(frozen=True)
@@ -105,6 +110,7 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
         With the sampling period of the windows, and a late attitude set right.
     """
     repairs: tuple[ChannelRepair, ...] = ()
+    dropped: tuple[Finding, ...] = ()
     # What was made of the accelerometer is no second witness.
     own = tuple(replace(signals, acceleration=None) if is_derived(signals) else signals for signals in flights)
     now = _Compared.of(own, windows)
@@ -113,12 +119,12 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
         # Judged by the thrust every channel of such a world is wrong.
         return Settled((), now.checks, against_thrust)
     for _ in range(_ROUNDS):
-        found = _mended(now)
+        found, dropped = _mended(now)
         if not found:
             break
         repairs = (*repairs, *found)
         now = _Compared.of(now.repaired(*found), windows)
-    return Settled(repairs, now.checks)
+    return Settled(repairs, now.checks, dropped=dropped)
 
 
 def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:
@@ -166,21 +172,26 @@ def _about_the_vertical(check: PairCheck) -> tuple[complex, complex]:
     return complex(np.vdot(first, second) / size), complex((first * second).sum() / size)
 
 
-def _mended(now: _Compared) -> tuple[ChannelRepair, ...]:
+def _mended(now: _Compared) -> tuple[tuple[ChannelRepair, ...], tuple[Finding, ...]]:
+    """Repair the first suspect that can be, and say of those before it which repair another channel contradicts."""
+    dropped: list[Finding] = []
     for channel, sure in _suspects(now.checks):
         contradicted = (check.pair for check in now.checks if check.problems and channel in check.pair)
         witnesses = [
             CHANNELS[name].words for pair in contradicted for name in (pair.first, pair.second) if name != channel
         ]
         read = _read_rightly(now, channel)
-        if read is not None and (sure or read[0].is_mistake):
-            return _told(now, *read, witnesses)
-        if read is not None and _nearer_the_thrust(now, read[0]):
-            return _told(now, *read, [*witnesses, CHANNELS["thrust"].words])
+        opposed = () if read is None else _opposed(now, read[0])
+        if read is not None and opposed:
+            dropped.append(_contradicted(now, *read, witnesses, opposed))
+        elif read is not None and (sure or read[0].is_mistake):
+            return _told(now, *read, witnesses), ()
+        elif read is not None and _nearer_the_thrust(now, read[0]):
+            return _told(now, *read, [*witnesses, CHANNELS["thrust"].words]), ()
         # Noise on both sides can look like one contradiction, not like two.
-        if sure and read is None and len(set(witnesses)) > 1:
-            return (_left_out(now, channel, witnesses),)
-    return ()
+        elif sure and read is None and len(set(witnesses)) > 1:
+            return (_left_out(now, channel, witnesses),), ()
+    return (), tuple(dropped)
 
 
 def _suspects(checks: Sequence[PairCheck]) -> list[tuple[str, bool]]:
@@ -230,6 +241,33 @@ def _nearer_the_thrust(now: _Compared, repair: ChannelRepair) -> bool:
     repaired = now.repaired(*now.with_position(repair))
     before, after = (_off_the_thrust(each, repair.channel, now.windows) for each in (now.flights, repaired))
     return before is not None and after is not None and _surely_less(after, before)
+
+
+def _opposed(now: _Compared, repair: ChannelRepair) -> tuple[str, ...]:
+    """Name the channels that know better than a repair: a position whose derivative is the velocity, and the thrust."""
+    along = now.with_position(repair)
+    if repair.in_body and len(along) > 1:
+        # No derivative of a position is its velocity in body axes, nor is a position in body axes anything.
+        return (CHANNELS["position"].words,)
+    if any(signals.commanded for signals in now.flights):
+        return ()
+    before, after = (_off_the_thrust(each, repair.channel, now.windows) for each in (now.flights, now.repaired(*along)))
+    farther = before is not None and after is not None and _surely_farther(before, after)
+    return (CHANNELS["thrust"].words,) if farther else ()
+
+
+def _surely_farther(before: Array, after: Array) -> bool:
+    return bool(after.sum() > _APART * before.sum()) and _surely_less(before, after)
+
+
+def set_apart(flights: Sequence[Signals], repaired: Sequence[Signals], windows: Windows) -> tuple[str, ...]:
+    """Name the channels of the motion that a repair of a clock surely sets apart from each other."""
+    names: dict[str, None] = {}
+    for before, after in zip(checked(flights, windows), checked(repaired, windows), strict=True):
+        rest, left = (((each.first - each.second) ** 2).sum(axis=1) for each in (before, after))
+        if _surely_farther(rest, left):
+            names |= dict.fromkeys(before.pair.channels)
+    return tuple(names)
 
 
 def _off_the_thrust(flights: Sequence[Signals], channel: str, windows: Windows) -> Array | None:
@@ -360,6 +398,25 @@ def _told(
         repairable=True,
     )
     return (first.told(finding, _DONE), *others)
+
+
+def _contradicted(
+    now: _Compared,
+    repair: ChannelRepair,
+    what: Sequence[str],
+    witnesses: Sequence[str],
+    opposed: Sequence[str],
+) -> Finding:
+    channel = CHANNELS[repair.channel]
+    clock = [f"is {off_clock(repair.delay_s)}"] if repair.delay_s else []
+    verb = "contradicts" if len(opposed) == 1 else "contradict"
+    return Finding(
+        f"the {channel.words} {joined([*what, *clock])}, judged by the {joined(witnesses)}, which the "
+        f"{joined(opposed)} {verb}, so nothing is set right",
+        f"check {channel.keys}",
+        (channel.words, *witnesses, *opposed),
+        contradiction=bool(what) and _grave(repair.channel, now.checks),
+    )
 
 
 def _grave(channel: str, checks: Sequence[PairCheck]) -> bool:

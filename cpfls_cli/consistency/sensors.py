@@ -14,7 +14,7 @@ from cpfls_cli.consistency.channels import least_noise
 from cpfls_cli.consistency.clocks import attitude_on_clock, rotors_on_clock
 from cpfls_cli.consistency.findings import AuditFinding, FaultNumber, Finding
 from cpfls_cli.consistency.gyroscope import GyroFit, fit_gyro, kinematics, scan
-from cpfls_cli.consistency.majority import Settled, settled
+from cpfls_cli.consistency.majority import Settled, set_apart, settled
 from cpfls_cli.consistency.repairs import ChannelRepair
 from cpfls_cli.consistency.rotors import tells_thrust, weighed
 from cpfls_cli.effects.effect import Effect
@@ -22,6 +22,7 @@ from cpfls_cli.effects.hooks import FaultFit, SensorTest
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.weak_form.windows import Windows
+from cpfls_cli.words import joined
 
 # Largest probability of chance, after Holm over all that is tested: an audit that cries wolf is not read.
 _SIGNIFICANCE = 1e-3
@@ -187,20 +188,39 @@ def sensors_of(flights: Sequence[Signals], windows: Windows) -> Sensors:
     """Hold the sensors of flights with the same hardware, at the sampling period of the windows, against each other."""
     gyroscope = _gyroscope(flights, windows)
     late = gyroscope.late(windows)
-    clocks, notes = attitude_on_clock(late.coefficients[0].value, flights, windows) if late else ((), ())
+    found, notes = attitude_on_clock(late.coefficients[0].value, flights, windows) if late else ((), ())
+    clocks, flights, dropped = _uncontradicted(found, flights, windows)
     if clocks:
-        flights = [repair.applied(signals) for signals in flights for repair in clocks]
         gyroscope = _gyroscope(flights, windows)
     # Nothing is known of the rotors where nothing is known of the gyroscope's own clock.
     rotors = None if gyroscope.late(windows) else rotors_on_clock(flights, windows)
     if rotors is not None:
-        flights = [rotors.applied(signals) for signals in flights]
-        clocks = (*clocks, rotors)
+        own, flights, doubted = _uncontradicted((rotors,), flights, windows)
+        clocks, dropped = (*clocks, *own), (*dropped, *doubted)
     told = tells_thrust(flights)
     motion = settled(flights if told else [weighed(signals) for signals in flights], windows)
     mended = [repair.finding for repair in clocks if repair.finding is not None]
-    wrong = (*gyroscope.findings(windows), *mended, *motion.findings)
+    wrong = (*gyroscope.findings(windows), *mended, *dropped, *motion.findings)
     return Sensors(gyroscope, clocks, notes, tuple(flights), motion, wrong)
+
+
+def _uncontradicted(
+    clocks: tuple[ChannelRepair, ...], flights: Sequence[Signals], windows: Windows
+) -> tuple[tuple[ChannelRepair, ...], Sequence[Signals], tuple[Finding, ...]]:
+    """Set clocks right where that sets no channels of the motion apart; else say which know better."""
+    if not clocks:
+        return (), flights, ()
+    repaired = [repair.applied(signals) for signals in flights for repair in clocks]
+    apart = set_apart(flights, repaired, windows)
+    if not apart:
+        return clocks, repaired, ()
+    why = f", which {joined(apart)} contradict, so nothing is set right"
+    told = (repair.finding for repair in clocks if repair.finding is not None)
+    dropped = (
+        replace(each, what=f"{each.what}{why}", remedy=f"check the clocks of {joined(each.channels)}", repairable=False)
+        for each in told
+    )
+    return (), flights, tuple(dropped)
 
 
 def _gross(fault: AuditFinding) -> Finding | None:

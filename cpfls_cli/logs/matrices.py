@@ -15,13 +15,11 @@ import scipy.io
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.files import FileState, is_sealed, state_of
+from cpfls_cli.files import FileState, is_sealed, longest_read_s, state_of
 from cpfls_cli.logs.formats import LogContents
 from cpfls_cli.units import known_unit
 
 _MOST_COLUMNS = 64
-_SECONDS, _BYTES_PER_SECOND = 10.0, 2e7
-"""How long another process may read a file: at least so long, and longer with its size."""
 _PROBE = """
 import sys, h5py
 
@@ -97,7 +95,7 @@ class _Probed(NamedTuple):
 @lru_cache(maxsize=64)
 def _probed(state: FileState) -> _Probed:
     """Read an HDF5 file in another process first: in a damaged one HDF5 may turn for ever, and heeds no signal then."""
-    limit = _SECONDS + state.size / _BYTES_PER_SECOND
+    limit = longest_read_s(state.size)
     try:
         done = subprocess.run(
             [sys.executable, "-c", _PROBE, state.path, str(_most(state.size))],

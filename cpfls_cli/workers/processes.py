@@ -149,7 +149,8 @@ def _start(started: list[_Process], count: int) -> None:
 @contextmanager
 def _interrupts_held_back() -> Iterator[None]:
     """Block signals, also in the processes started meanwhile, which would take them before they run our code."""
-    if sys.platform == "win32":
+    # The first tells the type checker what the second tells the interpreter.
+    if sys.platform == "win32" or not hasattr(signal, "pthread_sigmask"):
         yield
         return
     # The resource tracker starts with the first process, and would let signals through again.

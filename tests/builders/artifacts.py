@@ -1,8 +1,10 @@
 """Artifacts that were changed by another program, and sealed again as if it had been cpfls."""
 
+import struct
 from contextlib import contextmanager
 
 import h5py
+import numpy as np
 
 from cpfls_cli.files import seal_of
 
@@ -18,3 +20,16 @@ def edited(path, mode="r+"):
 def seal(path):
     """End a file that HDF5 has closed in the seal that fits it; HDF5 has cut off the one of before."""
     path.write_bytes((content := path.read_bytes()) + seal_of(content))
+
+
+def circular(path):
+    """Let the list of free space in the heap of names, by which HDF5 finds the root group, lead to itself; and seal."""
+    with h5py.File(path, "w") as file:
+        file.attrs["format"] = "cpfls/flight"
+        file["time"] = np.arange(3.0)
+    content = bytearray(path.read_bytes())
+    heap = content.index(b"HEAP")
+    _, head, names = struct.unpack("<QQQ", content[heap + 8 : heap + 32])
+    content[names + head : names + head + 8] = struct.pack("<Q", head)
+    path.write_bytes(content + seal_of(content))
+    return path

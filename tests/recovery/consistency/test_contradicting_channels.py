@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, filtfilt, lfilter
 
@@ -158,6 +159,49 @@ def test_a_late_gyroscope_is_not_taken_for_an_early_attitude(flights):
     found = audit([replace(signals, body_rate=late(signals.body_rate, 0.03)) for signals in flights], WINDOWS)
     assert [fault.name for fault in found.named] == ["channel_delay"]
     assert found.repairs == ()
+
+
+def with_velocity_of_the_body(signals):
+    """Let position and velocity agree, and turned by the attitude fit thrust and motion."""
+    velocity = to_body(signals, signals.velocity)
+    path = cumulative_trapezoid(velocity, dx=PERIOD, axis=0, initial=0)
+    noise = 0.02 * np.random.default_rng(1).standard_normal(path.shape)
+    return replace(signals, velocity=velocity, position=path + noise)
+
+
+def test_a_position_knows_better_than_a_velocity_that_fits_in_body_axes(flights):
+    given = [with_velocity_of_the_body(signals) for signals in flights]
+    found = audit(given, WINDOWS)
+    assert found.repairs == ()
+    assert found.repaired(given[0]) is given[0]
+    [said] = [each for each in (*found.warnings, *found.contradictions) if "so nothing is set right" in each]
+    assert "the velocity is in body axes" in said.lower()
+    assert "which the position contradicts" in said
+    alone = audit([replace(signals, position=None) for signals in given], WINDOWS)
+    assert ["is in body axes" in sentence for sentence in alone.settled] == [True]
+
+
+def test_thrust_knows_better_than_a_clock_that_a_wrong_velocity_asks_for(flights):
+    found = audit([with_velocity_of_the_body(sensing(headed(signals, -60.0))) for signals in flights], WINDOWS)
+    assert found.repairs == ()
+    [said] = [warning for warning in found.warnings if "which the thrust of the rotors contradicts" in warning]
+    assert "The accelerometer is late by" in said
+
+
+def test_velocity_and_accelerometer_know_better_than_gyroscope_and_rotors(lively):
+    """Both come late over one wire; that the attitude is early says nobody else."""
+
+    def wired(signals):
+        return replace(
+            sensing(signals), body_rate=late(signals.body_rate, 0.04), rotor_speed=late(signals.rotor_speed, 0.04)
+        )
+
+    found = audit([wired(signals) for signals in lively], WINDOWS)
+    assert not any(repair.channel == "attitude" for repair in found.repairs)
+    [said] = [warning for warning in found.warnings if "so nothing is set right" in warning]
+    assert "The attitude is early by" in said
+    assert "which velocity, accelerometer and thrust of the rotors contradict" in said
+    assert "check the clocks of attitude, gyroscope and rotors" in said
 
 
 def test_commands_do_not_tell_whose_clock_is_wrong(flights):

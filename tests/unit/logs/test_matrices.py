@@ -105,7 +105,7 @@ def test_what_keeps_hdf5_busy_for_ever(tmp_path, monkeypatch):
     hdf5(tmp_path / "log.h5")
     # As damage does, where HDF5 follows addresses in a circle.
     monkeypatch.setattr(matrices, "_PROBE", "while True: pass")
-    monkeypatch.setattr(matrices, "_SECONDS", 0.3)
+    monkeypatch.setattr(matrices, "longest_read_s", lambda _: 0.3)
     with pytest.raises(InputError, match=r"log\.h5: damaged: HDF5 does not come to an end with it within"):
         log_contents(tmp_path / "log.h5")
     assert not matrices.is_log(tmp_path / "log.h5")

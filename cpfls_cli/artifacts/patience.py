@@ -1,0 +1,141 @@
+"""How long HDF5 may read a file: a process beside this one ends it, with a message, where it never comes back.
+
+In a damaged file HDF5 may follow addresses in a circle. It holds the interpreter then, so that neither a thread nor a
+handler of signals runs. A seal shows damage, but not where somebody has sealed it again.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+from cpfls_cli.errors import visible
+from cpfls_cli.files import longest_read_s
+
+if TYPE_CHECKING:
+    import subprocess
+
+_WATCH = """
+import os, queue, signal, sys, threading
+
+told = queue.Queue()
+
+def listen():
+    while chunk := os.read(0, 65536):
+        told.put(chunk)
+    os._exit(0)
+
+threading.Thread(target=listen, daemon=True).start()
+wait, path, rest = None, "", b""
+while True:
+    try:
+        chunk = told.get(timeout=wait)
+    except queue.Empty:
+        break
+    # A handler of signals that finds the interpreter held leaves the number of the signal here.
+    stopped = bool(wait) and any(number in chunk for number in STOPS)
+    *lines, rest = (rest + chunk.translate(None, STOPS)).split(b"\\n")
+    for line in lines:
+        seconds, _, name = line.decode("utf-8", "surrogateescape").partition(" ")
+        wait, path, why = float(seconds) or None, name, f"HDF5 does not come to an end with it within {seconds} s"
+    if stopped and wait:
+        wait, why = 1.0, "interrupted while HDF5 does not come to an end with it"
+os.write(2, f"cpfls: error: {path}: damaged: {why}\\n".encode("utf-8", "surrogateescape"))
+os.kill(int(sys.argv[1]), getattr(signal, "SIGKILL", signal.SIGTERM))
+os._exit(0)
+"""
+_STOPS = bytes([signal.SIGINT, signal.SIGTERM])
+_GOES_ON = b"0 \n"
+
+
+class _Watch:
+    """The process beside this one, started where the first file is read; nothing is watched where it cannot be."""
+
+    def __init__(self) -> None:
+        self.wanted = False
+        self.depth = 0
+        self._process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def on(self) -> bool:
+        """Whether there is such a process, or shall be."""
+        return self.wanted or self._process is not None
+
+    def tell(self, line: bytes) -> None:
+        """Say what is read and how long that may take, or that it has come to an end."""
+        pipe = self._pipe()
+        if pipe is not None:
+            with suppress(OSError):
+                os.write(pipe.fileno(), line)
+
+    def wake(self) -> int | None:
+        """Let signals reach the process beside; give what they reached before, None where that cannot be changed."""
+        pipe = self._pipe()
+        if pipe is None or os.name != "posix":
+            return None
+        try:
+            return signal.set_wakeup_fd(pipe.fileno(), warn_on_full_buffer=False)
+        except (ValueError, OSError):
+            # Not the main thread, which alone gets signals.
+            return None
+
+    def _pipe(self) -> IO[bytes] | None:
+        if self._process is None and self.wanted:
+            # It loads slowly, and no file is read by `cpfls config`.
+            import subprocess
+
+            self.wanted = False
+            code = _WATCH.replace("STOPS", repr(_STOPS))
+            with suppress(OSError, ValueError):
+                self._process = subprocess.Popen(
+                    [sys.executable, "-I", "-S", "-c", code, str(os.getpid())],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.DEVNULL,
+                    bufsize=0,
+                    # Ctrl-C is for the program; the end of the pipe ends this one.
+                    start_new_session=True,
+                )
+                assert self._process.stdin is not None, "asked for"
+                with suppress(OSError, AttributeError):
+                    os.set_blocking(self._process.stdin.fileno(), False)
+                atexit.register(self._end)
+        return None if self._process is None else self._process.stdin
+
+    def _end(self) -> None:
+        if self._process is not None and self._process.stdin is not None:
+            self._process.stdin.close()
+            self._process.wait()
+
+
+_WATCHED = _Watch()
+
+
+def end_what_hangs() -> None:
+    """Let files be watched from now on: for a program of its own, which may be ended."""
+    _WATCHED.wanted = True
+
+
+@contextmanager
+def patient(path: Path) -> Iterator[None]:
+    """Read a file with HDF5 in here, and nothing else."""
+    watch = _WATCHED
+    if watch.depth or not watch.on:
+        yield
+        return
+    watch.depth += 1
+    seconds = longest_read_s(path.stat().st_size)
+    watch.tell(f"{seconds:.0f} {visible(str(path)).replace(chr(10), ' ')}\n".encode("utf-8", "surrogateescape"))
+    before = watch.wake()
+    try:
+        yield
+    finally:
+        if before is not None:
+            signal.set_wakeup_fd(before)
+        watch.tell(_GOES_ON)
+        watch.depth -= 1
