@@ -157,7 +157,7 @@ def find_mixed(log: LogTable) -> RotorColumns | None:
     older = Rival("rotor_command_is: speed", "before 2022 the firmware handed to the motors what it had mixed")
     said = "what a Crazyflie mixes are thrusts, before the battery is compensated"
     command = RotorGuess(guess, 1 / float(np.median(np.diff(time))), "Crazyflie")
-    command_is = Choice("rotor_command_is", "thrust", said, "named", (older,))
+    command_is = KeyChoice("rotor_command_is", "thrust", said, "named", (older,))
     return RotorColumns(speed=None, command=command, command_is=command_is, warnings=tuple(_too_slow(command)))
 
 

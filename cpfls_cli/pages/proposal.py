@@ -67,6 +67,7 @@ def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
         yield Text(f"to be filled in by hand, marked {ASK} in {output}: {_asked_words(asked)}", "warning", always=True)
     why = [] if proposal.airframe is None else [Text(f"rotors: {proposal.airframe.reason}")]
     yield Folded("the reason of each guess", [_reasons_table(proposal), *why])
+    yield from (Text(warning, "warning", always=True) for warning in proposal.warnings)
     named = [(guess.signal, guess.rivals) for guess in proposal.signals]
     for name, rivals in [*named, *((choice.key, choice.rivals) for choice in proposal.choices)]:
         for rival in rivals:
@@ -78,7 +79,6 @@ def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
         cut += [Text(f"{prefix}{reason}") for reason in reasons]
         cut += [Text(f"{prefix}not mapped: {words}", "note") for words in one.recognition.left_out]
     yield Folded("what is cut or not mapped", cut)
-    yield from (Text(warning, "warning") for warning in proposal.warnings)
 
 
 def _topic(proposal: Proposal) -> str:
@@ -93,7 +93,7 @@ def _short_row(guess: Guess, topic: str) -> list[str | Cell]:
     return [guess.signal, _in_braces(columns), f"{_unit(guess.columns)}{_guessed(guess)}"]
 
 
-def _guessed(entry: Guess | Choice) -> str:
+def _guessed(entry: Guess | KeyChoice) -> str:
     return " (a guess)" if entry.sure == "guess" else ""
 
 

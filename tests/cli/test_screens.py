@@ -6,14 +6,15 @@ from types import SimpleNamespace
 from unittest.mock import patch
 
 import pytest
+import typer
 
 from cpfls_cli.cli import terminal
+from cpfls_cli.cli.app import app
 from cpfls_cli.report.content import Table, unfolded
 from cpfls_cli.report.terminal import terminal_lines
+from tests.builders.shifted_flights import CONFIG, OFFSET, flight_table, save
 from tests.builders.studies import VEHICLE
 from tests.builders.unknown_logs import flat_log, flight, write_csv
-from tests.cli.gap.conftest import CONFIG, OFFSET, flight_table, save
-from tests.cli.test_help import COMMANDS
 
 COLUMNS, LINES, ANSWER, WIDEST = 80, 24, 15, 100
 WHOLE = ("config",)
@@ -145,5 +146,6 @@ def _without_caption(table):
 
 
 def test_every_command_is_shown(screens):
-    assert {each.command for each in screens.values()} >= {*COMMANDS} - {*WHOLE, "vehicle", "verify-export"}
+    commands = set(typer.main.get_command(app).commands)
+    assert {each.command for each in screens.values()} >= commands - {*WHOLE, "vehicle", "verify-export"}
     assert set(screens) == {*NAMES, *OF_MODELS}
