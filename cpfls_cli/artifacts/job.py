@@ -51,6 +51,8 @@ class Job:
         Gives a context in which an interrupt does not end the program, but is told to whoever asks.
     inputs : list of Path
         The config, and every input that was taken so far: no output may replace them.
+    config : Path
+        File of the study, as the commands that go on name it.
     """
 
     study: Study
@@ -61,6 +63,11 @@ class Job:
     reads: Callable[[Path], None]
     deferred_interrupts: Callable[[], AbstractContextManager[Interrupted]] = _uninterrupted
     inputs: list[Path] = field(default_factory=list)
+    config: Path = Path("CONFIG")
+
+    def beside(self, name: str) -> Path:
+        """Name a file in the folder of the output."""
+        return self.output.with_name(name)
 
 
 def begin(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:

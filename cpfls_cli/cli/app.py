@@ -673,6 +673,7 @@ def _run_with(
 
     with progress_bar(title, common) as progress:
         job = Job(study, output, common.force, common.dry_run, progress, narration.reads, deferred_interrupts, inputs)
+        job = replace(job, config=inputs[0]) if inputs else job
         with nullcontext() if common.dry_run else locked(output, title):
             outcome = call(_of(title), job)
     if not common.dry_run:

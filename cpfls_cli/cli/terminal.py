@@ -84,9 +84,10 @@ def tell(outcome: Outcome, common: Common) -> None:
 
 def _lines(outcome: Outcome, *, whole: bool) -> Iterator[str]:
     """Write an answer, the commands that go on with it, and what more of it there is."""
+    from cpfls_cli.report.content import Text
     from cpfls_cli.report.terminal import folded_words, terminal_lines
 
-    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    width = _columns()
     colour = width is not None and "NO_COLOR" not in os.environ
     yield from terminal_lines(outcome.blocks, width, colour=colour, whole=whole)
     if outcome.next:
@@ -95,7 +96,12 @@ def _lines(outcome: Outcome, *, whole: bool) -> Iterator[str]:
         yield from (f"  {visible(shlex.join(map(str, command)))}" for command in outcome.next)
     more = () if whole else folded_words(outcome.blocks)
     if more:
-        yield f"more with -v: {'; '.join(more)}"
+        yield from terminal_lines([Text(f"more with -v: {'; '.join(more)}")], width)
+
+
+def _columns() -> int | None:
+    """Give the columns of the terminal; None where standard output is none."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
 
 
 def _notes(warnings: Sequence[Text], *, whole: bool) -> Iterator[str]:

@@ -25,7 +25,7 @@ from cpfls_cli.pages.disagreement import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import KnownBy, seen_warnings
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.report.outcome import Command, Outcome, nothing_written
 from cpfls_cli.words import did_you_mean
 
 
@@ -43,7 +43,28 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     given = with_seen(given, model, learned, known_by(roles, inputs))
     record = compared(job.study, given, base, progress_of(job.progress))
     record = finish_disagreement(job, record, learned, inputs)
-    return Outcome(record.summary, tuple(answer(source_of(job, record))))
+    return Outcome(record.summary, tuple(answer(source_of(job, record))), next=(_next(job, record, flights),))
+
+
+def _next(job: Job, record: DisagreementRecord, flights: Sequence[Path]) -> Command:
+    if record.audit.contradiction:
+        return to_correct(job)
+    if not record.gap.above_noise.any():
+        return to_fly(job)
+    if not record.is_base(job.study.vehicle):
+        return "cpfls", "gap", job.config, *flights, "-o", job.beside("gap")
+    return "cpfls", "diagnose", job.config, job.output, "-o", job.beside("diagnosis.h5")
+
+
+def to_correct(job: Job) -> Command:
+    """Give the command that shows how a log is read: something of that is wrong."""
+    return "cpfls", "config", job.config, "--section", "import"
+
+
+def to_fly(job: Job) -> Command:
+    """Give the command that plans flights that tell more."""
+    signal = ("--hover", "30", "--excite", "roll,pitch", "--repeat", "4")
+    return "cpfls", "trajectory", job.config, *signal, "-o", job.beside("mission.h5")
 
 
 def with_seen(given: Recordings, model: Path | None, learned: Sequence[LearnedFlight], judged: KnownBy) -> Recordings:

@@ -14,7 +14,7 @@ from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, as_inputs
 from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.commands.compare import check_ignored, progress_of
+from cpfls_cli.commands.compare import check_ignored, progress_of, to_correct, to_fly
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import numbered_roles
@@ -22,15 +22,15 @@ from cpfls_cli.flights.recordings import FlightSplit, read_flights, seen_twice, 
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.gap.before_after import before_after
 from cpfls_cli.gap.diagnose import diagnose
-from cpfls_cli.gap.naming.results import Diagnosis
+from cpfls_cli.gap.naming.results import Diagnosis, GapVerdict
 from cpfls_cli.pages.diagnosis import answer
 from cpfls_cli.pages.effects import closest_sentence
-from cpfls_cli.pages.first_screen import counted_notes, next_steps, verdict_box
+from cpfls_cli.pages.first_screen import next_steps, notes_on_flights, verdict_box
 from cpfls_cli.pages.source import Source, source_of
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Block, Text
-from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.report.outcome import Command, Outcome, nothing_written
 
 
 def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
@@ -51,10 +51,40 @@ def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
     progress = progress_of(job.progress)
     diagnosis, record = diagnosed(job.study, split, warnings, vehicle_model(compared.base), progress)
     record = finish_diagnosis(job, record, compared, inputs)
-    notes: list[Block] = list(seen_notes(record))
-    notes += folded_notes(record.warning, f"`cpfls report CONFIG {job.output.name} -o report.html` lists them")
     answered = whole_answer(source_of(job, record), diagnosis)
-    return Outcome(whole_summary(record, diagnosis), (*answered, *notes))
+    notes: list[Block] = [*seen_notes(record), *notes_on_flights([record])]
+    to_extend = ("cpfls", "extend", job.config, job.output, "-o", job.beside("extended.h5"))
+    to_report = ("cpfls", "report", job.config, disagreement, job.output, "-o", job.beside("report.html"))
+    followed = next_command(job, record, to_extend, to_report, job.output)
+    return Outcome(whole_summary(record, diagnosis), (*answered, *notes), next=(followed,))
+
+
+def next_command(
+    job: Job,
+    record: DiagnosisRecord,
+    named: Command,
+    unnamed: Command,
+    diagnosis: Path,
+) -> Command:
+    """Give the command that goes on by the verdict.
+
+    Parameters
+    ----------
+    named, unnamed : Command
+        For a gap with a name, and for one without.
+    diagnosis : Path
+        Where the verdict is written.
+    """
+    if record.contradiction:
+        return to_correct(job)
+    match record.verdict:
+        case GapVerdict.NAMED | GapVerdict.PARTIAL:
+            return named
+        case GapVerdict.AMBIGUOUS:
+            return "cpfls", "trajectory", job.config, "--for", diagnosis, "-o", job.beside("path.h5")
+        case GapVerdict.NO_GAP | GapVerdict.NOT_EXCITED:
+            return to_fly(job)
+    return unnamed
 
 
 def finish_diagnosis(
@@ -74,7 +104,7 @@ def seen_notes(record: DiagnosisRecord) -> Iterator[Text]:
     model = inputs["disagreement"].name
     hashes = [(file.name, (file.sha256,)) for file in held_out]
     seen = seen_warnings(f"the model of {model}", record.model_learned_from, hashes)
-    return (Text(note, "warning") for note in (*twice, *seen))
+    return (Text(note, "warning", always=True) for note in (*twice, *seen))
 
 
 def diagnosed(
@@ -114,9 +144,3 @@ def whole_answer(source: Source[DiagnosisRecord], diagnosis: Diagnosis) -> Itera
     yield from answer(source)
     if not source.record.effects.closest:
         yield from (Text(closest_sentence(effect)) for effect in diagnosis.closest)
-
-
-def folded_notes(notes: Sequence[str], where: str) -> Iterator[Block]:
-    """Say on one line how many notes on the flights there are, and where they stand."""
-    if notes:
-        yield Text(f"{counted_notes(notes)}: {where}.")

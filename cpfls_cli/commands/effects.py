@@ -7,7 +7,7 @@ from typing import Any
 
 from cpfls_cli.effects.effect import Coefficient, Effect, Shape
 from cpfls_cli.effects.registry import CATALOGUE, effect
-from cpfls_cli.report.content import Block, Facts, Table, Text
+from cpfls_cli.report.content import Block, Facts, Folded, Table, Text
 from cpfls_cli.report.outcome import Outcome
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -18,10 +18,16 @@ def run(name: str | None) -> Outcome:
         entries = [_describe_effect(entry) for entry in CATALOGUE.values()]
         rows = [[entry.name, entry.kind, entry.title] for entry in CATALOGUE.values()]
         table = Table("effects", "", ("Effect", "Kind", "What it is"), rows, frozenset({0, 1, 2}))
-        hint = Text("`cpfls effects NAME` tells everything on one.")
-        return Outcome({"vehicle": _vehicle_name(), "effects": entries}, (table, hint))
+        kinds = dict.fromkeys(entry.kind for entry in CATALOGUE.values())
+        names = [(kind, ", ".join(each.name for each in CATALOGUE.values() if each.kind == kind)) for kind in kinds]
+        blocks = (Facts(names), Folded("what each is", [table]))
+        example = ("cpfls", "effects", next(iter(CATALOGUE)))
+        return Outcome({"vehicle": _vehicle_name(), "effects": entries}, blocks, next=(example,))
     chosen = effect(name)
-    return Outcome({"vehicle": _vehicle_name(), **_describe_effect(chosen)}, tuple(_effect_blocks(chosen)))
+    flown = ("cpfls", "effects")
+    return Outcome(
+        {"vehicle": _vehicle_name(), **_describe_effect(chosen)}, tuple(_effect_blocks(chosen)), next=(flown,)
+    )
 
 
 def _vehicle_name() -> str:
@@ -59,24 +65,31 @@ def _describe_coefficient(coefficient: Coefficient) -> dict[str, Any]:
 
 def _effect_blocks(entry: Effect) -> Iterator[Block]:
     yield Text(f"{entry.name}: {entry.title} ({entry.kind})")
-    facts = [("", entry.sentence), ("formula", entry.formula)]
-    facts.append(("needs", ", ".join(sorted(entry.needs)) or "rates and torque alone"))
-    facts += [("coefficient", _coefficient_text(coefficient)) for coefficient in _whole(entry).coefficients]
-    facts += [("shape", _shape_text(shape)) for shape in _whole(entry).shapes]
-    if entry.coefficients:
-        facts.append(("", f"Ranges are for the vehicle: {_vehicle_name()}."))
-    facts.append(("excitation", entry.excitation))
-    facts += [("looks like", f"{rival}; to tell: {flight}") for rival, flight in entry.rivals.items()]
-    yield Facts([*facts, ("source", entry.source)])
+    numbers = [_coefficient_range(each) for each in _whole(entry).coefficients]
+    numbers += [_shape_range(each) for each in _whole(entry).shapes]
+    yield Facts(
+        [
+            ("", entry.sentence),
+            ("formula", entry.formula),
+            ("needs", ", ".join(sorted(entry.needs)) or "rates and torque alone"),
+            *([("numbers", f"{', '.join(numbers)} (of the vehicle: {_vehicle_name()})")] if numbers else []),
+            ("excitation", entry.excitation),
+            ("looks like", ", ".join(entry.rivals)),
+        ]
+    )
+    meanings = [(each.name, each.meaning) for each in _whole(entry).coefficients]
+    meanings += [(each.name, each.meaning) for each in _whole(entry).shapes]
+    more = [*meanings, *entry.rivals.items(), ("source", entry.source)]
+    yield Folded("what its numbers mean, how to tell it from what looks like it, its source", [Facts(more)])
 
 
-def _coefficient_text(coefficient: Coefficient) -> str:
+def _coefficient_range(coefficient: Coefficient) -> str:
     low, high = coefficient.bounds(VehicleSettings())
-    return f"{coefficient.name} from {low:.3g} to {high:.3g}{_unit(coefficient.unit)}: {coefficient.meaning}"
+    return f"{coefficient.name} from {low:.3g} to {high:.3g}{_unit(coefficient.unit)}"
 
 
-def _shape_text(shape: Shape) -> str:
-    return f"{shape.name} from {shape.grid[0]:g} to {shape.grid[-1]:g}{_unit(shape.unit)}: {shape.meaning}"
+def _shape_range(shape: Shape) -> str:
+    return f"{shape.name} from {shape.grid[0]:g} to {shape.grid[-1]:g}{_unit(shape.unit)}"
 
 
 def _unit(unit: str) -> str:

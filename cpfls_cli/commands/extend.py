@@ -45,7 +45,8 @@ def run(job: Job, diagnosis: Path, model: Path | None) -> Outcome:
     own = None if model is None else learned_by(model)
     record = finish_extended(job, record, diagnosed, inputs, own)
     summary = {**record.summary, "warnings": warnings(record)}
-    return Outcome(summary, tuple(answer(source_of(job, record))))
+    to_export = ("cpfls", "export", job.output, "-o", job.output.with_suffix(".c"))
+    return Outcome(summary, tuple(answer(source_of(job, record))), next=(to_export,))
 
 
 def finish_extended(

@@ -19,7 +19,7 @@ from cpfls_cli.commands.compare import check_ignored, compared, finish_disagreem
 from cpfls_cli.commands.diagnose import (
     diagnosed,
     finish_diagnosis,
-    folded_notes,
+    next_command,
     seen_notes,
     whole_answer,
     whole_summary,
@@ -32,10 +32,11 @@ from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, 
 from cpfls_cli.gap.naming.results import Diagnosis
 from cpfls_cli.pages.disagreement import where
 from cpfls_cli.pages.extended import model_with, warnings
+from cpfls_cli.pages.first_screen import notes_on_flights
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.report.content import Block, Text
-from cpfls_cli.report.outcome import Outcome, as_json
+from cpfls_cli.report.content import Block, Folded, Text
+from cpfls_cli.report.outcome import Command, Outcome, as_json
 
 FILES = ("disagreement.h5", "diagnosis.h5", "extended.h5", "report.html", "gap.json")
 """What a folder holds in the end; no extended.h5 where the extension was refused."""
@@ -87,7 +88,15 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path
         # Without a bar of its own: the bar is that of the whole.
         report.run(replace(job, output=folder / "report.html", progress=lambda *_: None), written)
     job.progress(1, 1)
-    return Outcome(summary, tuple(_blocks(job, given, answers)))
+    return Outcome(summary, tuple(_blocks(job, answers)), next=(_next(job, answers, flights),))
+
+
+def _next(job: Job, answers: _Answers, flights: Sequence[Path]) -> Command:
+    folder = job.output
+    to_replay: Command = ("cpfls", "replay", job.config, folder / FILES[2], *flights, "-o", job.beside("replay.h5"))
+    to_answer: Command = ("cpfls", "response", job.config, *flights, "-o", job.beside("response.h5"))
+    named = to_answer if answers.extended is None else to_replay
+    return next_command(job, answers.diagnosed, named, to_answer, folder / FILES[1])
 
 
 def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path | None) -> _Given:
@@ -133,15 +142,16 @@ def _written(job: Job, given: _Given, answers: _Answers, folder: Path) -> tuple[
     return replace(answers, disagreement=first, diagnosed=second, extended=third), paths
 
 
-def _blocks(job: Job, given: _Given, answers: _Answers) -> Iterator[Block]:
+def _blocks(job: Job, answers: _Answers) -> Iterator[Block]:
     disagreement = source_of(replace(job, output=job.output / FILES[0]), answers.disagreement)
     diagnosis = source_of(replace(job, output=job.output / FILES[1]), answers.diagnosed)
     yield from seen_notes(answers.diagnosed)
     yield from whole_answer(diagnosis, answers.diagnosis)
-    yield from where(disagreement)
+    yield Folded("where they disagree", list(where(disagreement)))
     if answers.extended is None:
         yield Text(answers.refused)
     else:
         yield from (Text(warning, "warning") for warning in warnings(answers.extended))
         yield Text(model_with(str(job.output / "extended.h5"), answers.extended))
-    yield from folded_notes(given.flights.warnings, f"{job.output / 'report.html'} lists them")
+    yield Text(f"{job.output / 'report.html'}: all of it, with figures")
+    yield from notes_on_flights([answers.disagreement])

@@ -31,8 +31,9 @@ from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Text
-from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.report.outcome import Command, Outcome, nothing_written
 from cpfls_cli.search.resumable import SearchOptions, Watch, begin_search
+from cpfls_cli.validation.trust import Trust
 from cpfls_cli.validation.validate import Validation
 from cpfls_cli.validation.validate import validate as examine
 from cpfls_cli.validation.verdict import contradicted
@@ -77,9 +78,16 @@ def run(
     seconds = round(time.perf_counter() - clock, 3)
     summary = {**record.summary, "not_positive_definite": result.indefinite, "seconds": seconds}
     warnings = [Text(sentence, "warning") for sentence in others]
-    outcome = Outcome(summary, (*warnings, *answer(source_of(job, record))))
+    outcome = Outcome(summary, (*warnings, *answer(source_of(job, record))), next=(_next(job, record, flights),))
     remedy = "--resume" if search.checkpoint.path.exists() else "--force"
     return stopped(outcome, result.stop_reason, signal, job.output, unjudged=remedy if unjudged else None)
+
+
+def _next(job: Job, record: IdentifiedRecord, flights: Sequence[Path]) -> Command:
+    """Give the command that hands a good model over, or else shows why it is none."""
+    if record.trust in (Trust.SIMULATION, Trust.CONTROL, Trust.INSIDE):
+        return "cpfls", "export", job.output, "-o", job.output.with_suffix(".c")
+    return "cpfls", "report", job.config, *flights, job.output, "-o", job.beside("report.html")
 
 
 def _contradictions(flights: Sequence[Path], study: Study) -> tuple[str, ...]:

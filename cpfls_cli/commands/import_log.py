@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.consistency.numbers import beyond_belief
 from cpfls_cli.flightlog.results import ImportReport
 from cpfls_cli.flights.imported import imported, log_findings
 from cpfls_cli.flights.recordings import check_flight, doubts_on_voltage, read_import
 from cpfls_cli.pages.flight import answer, import_blocks, missing_signals
 from cpfls_cli.pages.source import source_of
-from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.report.content import Text
+from cpfls_cli.report.outcome import Command, Outcome, nothing_written
 
 
 def run(job: Job, log: Path) -> Outcome:
@@ -28,8 +32,20 @@ def run(job: Job, log: Path) -> Outcome:
     findings = (*beyond_belief(job.study.vehicle), *check_flight(read, job.study))
     wrong = (*doubts_on_voltage(read.signals, read.units), *(finding.sentence for finding in findings))
     record = finish(job, record.with_warnings((*missing_signals(record), *wrong)), inputs)
-    blocks = (*import_blocks(flight.report), *answer(source_of(job, record)))
-    return Outcome(_summary(flight.report, record), blocks)
+    never = contradictions(findings)
+    blocks = tuple(
+        replace(block, always=True) if isinstance(block, Text) and block.text in never else block
+        for block in (*import_blocks(flight.report), *answer(source_of(job, record)))
+    )
+    return Outcome(_summary(flight.report, record), blocks, next=tuple(_next(job, record)))
+
+
+def _next(job: Job, record: FlightRecord) -> Iterator[Command]:
+    """Give the command that learns from the flight: a whole vehicle of rotors alone, a model of a torque."""
+    if not record.lacks:
+        yield "cpfls", "identify", job.config, job.output, "-o", job.beside("model.h5")
+    elif record.rotor_speed is not None or record.rotor_command is not None:
+        yield "cpfls", "vehicle", job.config, job.output, "-o", job.beside("vehicle.h5")
 
 
 def _summary(report: ImportReport, record: FlightRecord) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import nan
 from pathlib import Path
 
@@ -11,15 +11,17 @@ from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.errors import ConfigError, CpflsError, InputError
-from cpfls_cli.flightlog.proposal import KnownLog, known_log, propose
+from cpfls_cli.flightlog.proposal import KnownLog, Proposal, known_log, propose
 from cpfls_cli.flights.imported import imported
 from cpfls_cli.flights.recordings import check_flight, read_import
 from cpfls_cli.logs.formats import log_contents
 from cpfls_cli.pages.proposal import Stated, answer, asked_keys, config_text, summary
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.report.content import Text
-from cpfls_cli.report.outcome import Outcome
+from cpfls_cli.report.outcome import Command, Outcome
 from cpfls_cli.vehicle_limits import beyond_any_vehicle, figures_of, room
+
+_IMPORTED = 4
 
 
 def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
@@ -36,9 +38,37 @@ def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
     wrong = _contradictions(text, logs[0], whole=not asked_keys(proposal, stated))
     if not job.dry_run:
         write_text(job.output, text)
-    said = (Text(contradicted(each), "warning") for each in wrong)
+    said = (Text(contradicted(each), "warning", always=True) for each in wrong)
     told = summary(proposal, stated, output) | {"contradictions": list(wrong)}
-    return Outcome(told, (*said, *answer(proposal, stated, output)))
+    return Outcome(told, (*said, *answer(proposal, stated, output)), next=tuple(_next(job, proposal)))
+
+
+def _next(job: Job, proposal: Proposal) -> Iterator[Command]:
+    """Give the commands that import all logs, and the one that learns from all but the last, which judges."""
+    logs = [Path(one.name) for one in proposal.logs]
+    # Many logs are taken as they are.
+    as_logs = bool(proposal.rotors) and len(logs) > _IMPORTED
+    flights = logs if as_logs else [job.beside(name) for name in _flight_names(logs)]
+    for log, flight in zip([] if as_logs else logs, flights, strict=False):
+        crop = None if proposal.crop_s else proposal.crops.get(str(log))
+        own = () if crop is None else ("--set", f"import.crop_s=[{crop[0]:g},{crop[1]:g}]")
+        yield ("cpfls", "import", job.output, log, "-o", flight, *own)
+    learned, judged = (flights[:-1], flights[-1:]) if len(flights) > 1 else (flights, [])
+    if proposal.rotors:
+        apart = [word for flight in judged for word in ("--held-out", flight)]
+        yield ("cpfls", "vehicle", job.output, *learned, *apart, "-o", job.beside("vehicle.h5"))
+    elif proposal.states_torque:
+        apart = [word for flight in judged for word in ("--validate", flight)]
+        yield ("cpfls", "identify", job.output, *learned, *apart, "-o", job.beside("model.h5"))
+
+
+def _flight_names(logs: Sequence[Path]) -> list[str]:
+    """Name the flight of each log, apart from each other and from the logs."""
+    stems = [log.name.partition(".")[0] for log in logs]
+    alike = len(set(stems)) < len(stems)
+    names = [f"{stem}-{number}" if alike else stem for number, stem in enumerate(stems, start=1)]
+    taken = {log.name for log in logs}
+    return [f"{name}-flight.h5" if f"{name}.h5" in taken else f"{name}.h5" for name in names]
 
 
 def _require_possible(stated: Stated) -> None:

@@ -15,7 +15,7 @@ from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
 from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.rebuilt import audit, vehicle_model
 from cpfls_cli.artifacts.trajectory import QuestionGroup, TrajectoryRecord
-from cpfls_cli.commands.trajectory import figure_paths
+from cpfls_cli.commands.trajectory import figure_paths, to_simulate
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.config.unknown import require_known
 from cpfls_cli.effects.effect import Effect
@@ -109,7 +109,7 @@ def run(job: Job, diagnosis: Path | None = None, plot: bool = False) -> Outcome:
     blocks = [*plan_blocks(planned, demand, None), *answer(source), *notes_blocks([*case.notes, *notes])]
     blocks += [Text(f"written beside it: {', '.join(map(str, (waypoints, *figures)))}")]
     files = {"waypoints": str(waypoints), "figures": [str(path) for path in figures]}
-    return Outcome(record.summary | files | {"duration_s": planned.duration}, tuple(blocks))
+    return Outcome(record.summary | files | {"duration_s": planned.duration}, tuple(blocks), next=(to_simulate(job),))
 
 
 def _effects(study: Study) -> list[Effect]:

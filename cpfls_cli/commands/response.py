@@ -10,9 +10,10 @@ import numpy as np
 from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
 from cpfls_cli.artifacts.output import refuse_own, write_text
 from cpfls_cli.artifacts.replay import VEHICLE, contradictions_of
-from cpfls_cli.artifacts.response import ResponseRecord
+from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, ResponseRecord
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.commands.compare import to_correct, to_fly
 from cpfls_cli.commands.replay import model_notes
 from cpfls_cli.config.unknown import require_known
 from cpfls_cli.flights.inputs import known_by, numbered_roles
@@ -25,7 +26,7 @@ from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.report.content import Text
-from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.report.outcome import Command, Outcome, nothing_written
 from cpfls_cli.response.flown import vehicle_responses
 
 _DIGITS = 9
@@ -60,7 +61,21 @@ def run(job: Job, flights: Sequence[Path], model: Path | None, table: Path | Non
     if table is not None:
         write_text(table, _csv(record))
         written = (Text(f"{table}: written, the curves as CSV"),)
-    return Outcome(record.summary, (*answer(source_of(job, record)), *written))
+    blocks = (*answer(source_of(job, record)), *written)
+    return Outcome(record.summary, blocks, next=(_next(job, record, flights, model),))
+
+
+def _next(job: Job, record: ResponseRecord, flights: Sequence[Path], model: Path | None) -> Command:
+    """Give the command that goes on: a flight that can be judged, what a model lacks, or the model handed over."""
+    words = [record.word(index) for index in range(len(record.name))]
+    if record.contradiction:
+        return to_correct(job)
+    if not record.has_instruments or set(words) <= {NOT_JUDGED}:
+        return to_fly(job)
+    if NOT_ACCEPTABLE not in words and model is not None:
+        return "cpfls", "export", model, "-o", job.beside(f"{model.stem}.c")
+    given = () if model is None else ("--model", model)
+    return "cpfls", "gap", job.config, *flights, *given, "-o", job.beside("gap")
 
 
 def _left_out(moved_by: Instruments, flights: Sequence[LoggedFlight]) -> Iterator[str]:

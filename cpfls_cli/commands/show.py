@@ -11,8 +11,10 @@ import numpy as np
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.store import Outline, findings_of, read_outline, read_record
 from cpfls_cli.pages.trust import trust_facts
-from cpfls_cli.report.content import Block, Facts, Table, Text
+from cpfls_cli.report.content import Block, Facts, Folded, Table, Text
 from cpfls_cli.report.outcome import Outcome
+
+_FINDINGS_SHOWN = 8
 
 
 def info(path: Path) -> Outcome:
@@ -29,7 +31,7 @@ def info(path: Path) -> Outcome:
         "datasets": datasets,
     }
     if artifact.spec.name != ModelRecord.FORMAT.name:
-        return Outcome(summary, description(artifact))
+        return Outcome(summary, description(artifact), next=(("cpfls", "check", path),))
     model = read_record(path, ModelRecord)
     gusts = model.vehicle.gusts
     told = model.provenance | ({} if gusts is None else {"gusts": gusts.summary})
@@ -44,7 +46,8 @@ def description(artifact: Outline, more: Sequence[tuple[str, str]] = ()) -> tupl
     rows = [_dataset_row(name, _describe_dataset(artifact, name)) for name in artifact.shapes]
     columns = ("Dataset", "Shape", "Unit", "What it holds")
     table = Table("datasets", "", columns, rows, frozenset(range(len(columns))), frozenset({3}))
-    return Text(f"{artifact.spec.name}: {artifact.spec.description}"), Facts([*origin, *more]), table
+    holds = Folded(f"what its {len(rows)} datasets hold", [table])
+    return Text(f"{artifact.spec.name}: {artifact.spec.description}"), Facts([*origin, *more]), holds
 
 
 def _describe_dataset(artifact: Outline, name: str) -> dict[str, Any]:
@@ -70,5 +73,8 @@ def check(path: Path) -> Outcome:
     """Check an artifact against its format; the exit code is 1 where it does not keep to it."""
     spec, findings = findings_of(path)
     summary = {"file": str(path), "format": spec.name, "good": not findings, "findings": findings}
-    sentences = [f"{path}: {finding}" for finding in findings] or [f"{path}: good ({spec.name})"]
-    return Outcome(summary, tuple(map(Text, sentences)), exit_code=int(bool(findings)))
+    said = [Text(f"{path}: {finding}") for finding in findings] or [Text(f"{path}: good ({spec.name})")]
+    rest = said[_FINDINGS_SHOWN:]
+    more = [Folded(f"{len(rest)} more findings", rest)] if rest else []
+    followed = () if findings else (("cpfls", "info", path),)
+    return Outcome(summary, (*said[:_FINDINGS_SHOWN], *more), int(bool(findings)), followed)

@@ -99,7 +99,8 @@ def _inverse(
         raise ComputationError("\n".join([*problems, f"{trajectory}: no flight was written; {remedy}"]))
     record = finish(job, FlightRecord.of_simulation({"time": time, **flight.signals}, flight.noise_std), inputs)
     warnings = (Text(problem, "warning") for problem in problems)
-    return Outcome(_summary(flight, record), (*answer(source_of(job, record)), *warnings))
+    to_reduce = ("cpfls", "reduce", job.config, job.output, "-o", job.beside("selection.h5"))
+    return Outcome(_summary(flight, record), (*answer(source_of(job, record)), *warnings), next=(to_reduce,))
 
 
 def _closed_loop(
@@ -117,6 +118,7 @@ def _closed_loop(
     return Outcome(
         _summary(flight, record) | {"tracking": errors, "effects": effects},
         (autopilot_text(**errors), *calm, *answer(source_of(job, record)), *clipped),
+        next=(("cpfls", "gap", job.config, job.output, "-o", job.beside("gap")),),
     )
 
 

@@ -34,7 +34,7 @@ def stopped(
     else:
         note = f"{output}: is complete; the interrupt came when there was nothing left to stop"
     code = 0 if signal is None else _FROM_SIGNAL + signal
-    return replace(outcome, blocks=(*outcome.blocks, Text(note, "warning")), exit_code=code)
+    return replace(outcome, blocks=(*outcome.blocks, Text(note, "warning", always=True)), exit_code=code)
 
 
 def without_model(reason: StopReason, signal: int | None) -> CpflsError | None:

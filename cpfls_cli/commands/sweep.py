@@ -45,4 +45,5 @@ def run(
     seconds = round(time.perf_counter() - clock, 3)
     summary = {"runs": len(runs), "runs_in_all": plan.runs, **record.summary, "seconds": seconds}
     blocks = (*(Text(sentence, "warning") for sentence in others), *answer(source_of(job, record)))
-    return stopped(Outcome(summary, blocks), reason, watch.signal, job.output)
+    to_report = ("cpfls", "report", job.config, job.output, "-o", job.beside("report.html"))
+    return stopped(Outcome(summary, blocks, next=(to_report,)), reason, watch.signal, job.output)

@@ -65,7 +65,9 @@ def run(job: Job, trajectory: Path, model: Path) -> Outcome:
     signals, noise = _logged(exact, job.study, rng)
     record = finish(job, FlightRecord.of_simulation(signals, noise, tracking=comparison), inputs)
     summary = {"samples": len(record.time), "noise": sorted(noise), **record.summary}
-    return Outcome(summary, (*trust_notes(identified, model), *answer(source_of(job, record), identified)))
+    blocks = (*trust_notes(identified, model), *answer(source_of(job, record), identified))
+    to_report = ("cpfls", "report", job.config, model, job.output, "-o", job.beside("report.html"))
+    return Outcome(summary, blocks, next=(to_report,))
 
 
 def _identified(path: Path, study: Study) -> IdentifiedRecord:

@@ -32,7 +32,7 @@ from cpfls_cli.pages.trajectory import (
     plan_blocks,
 )
 from cpfls_cli.report.content import Text
-from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.report.outcome import Command, Outcome, nothing_written
 from cpfls_cli.simulation.inverse import Flyability, flyability, single_axis_torque
 from cpfls_cli.simulation.room_left import RoomLeft, room_left
 from cpfls_cli.trajectory.consistency import check_waypoints
@@ -107,7 +107,12 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False, mission: Mi
     blocks += mission_blocks(texts, mission.forms, source.record)
     blocks += [Text(problem, "warning") for problem in (*problems, *guessed_words(job.study.vehicle))]
     summary = _summary(source.record, planned, demand, flight.excitation, figures)
-    return Outcome(summary | {"files": [str(path) for path in texts]}, tuple(blocks))
+    return Outcome(summary | {"files": [str(path) for path in texts]}, tuple(blocks), next=(to_simulate(job),))
+
+
+def to_simulate(job: Job) -> Command:
+    """Give the command that flies the path of a job."""
+    return "cpfls", "simulate", job.config, job.output, "-o", job.beside("flight.h5")
 
 
 def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:

@@ -111,16 +111,21 @@ def select_columns(columns: Mapping[str, Array], settings: ImportSettings) -> tu
 
 def _in_si(columns: Mapping[str, Array], signal: SignalMap) -> Array:
     values = np.column_stack([np.asarray(columns[name], dtype=float) for name in signal.columns])
-    sign = np.ones(len(signal.columns)) if signal.sign is None else np.array(signal.sign)
     values[~np.isfinite(values)] = np.nan
+    return to_si(as_mapped(values, signal), signal.unit)
+
+
+def as_mapped(values: Array, columns: ColumnMap) -> Array:
+    """Give columns of a log as a map makes them: shape (sample, column) to (sample, axis or rotor), in its unit."""
+    sign = np.ones(len(columns.columns)) if columns.sign is None else np.array(columns.sign)
     with np.errstate(over="ignore"):
         # What overflows is told as a value that no flight has.
-        values = sign * (signal.scale * values + signal.offset)
-    if signal.mixer is not None:
-        mixed = values @ np.array(signal.mixer).T
-        # A motor gives no more than all it has and no less than nothing, whatever the mixer adds up to.
-        values = np.clip(mixed, 0.0, 1.0) if signal.unit == "1" else mixed
-    return to_si(values, signal.unit)
+        scaled: Array = sign * (columns.scale * values + columns.offset)
+    if columns.mixer is None:
+        return scaled
+    mixed = scaled @ np.array(columns.mixer).T
+    # A motor gives no more than all it has and no less than nothing, whatever the mixer adds up to.
+    return np.clip(mixed, 0.0, 1.0) if columns.unit == "1" else np.asarray(mixed)
 
 
 def _require_present(columns: Mapping[str, Array], settings: ImportSettings) -> None:

@@ -4,11 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
-import numpy as np
-
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.agreement import handed
 from cpfls_cli.flightlog.airframe import MovedBy
+from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.flown import FlownPart
 from cpfls_cli.flightlog.log_table import LogTable
 from cpfls_cli.flightlog.nameless import OF_A_MATRIX
@@ -127,7 +126,7 @@ class Recognition:
     def rotors(self) -> int:
         """Number of rotors that the columns name; 0 where none do."""
         names: tuple[SignalName, ...] = ("rotor_speed", "rotor_command")
-        return max((len(guess.columns.columns) for name in names if (guess := self.signal(name))), default=0)
+        return max((len(guess.columns.names) for name in names if (guess := self.signal(name))), default=0)
 
 
 @dataclass
@@ -159,8 +158,8 @@ class Seen:
     def mapped(self, guess: Guess) -> Array:
         """Give the columns of a guess in the part that is flown, as they are mapped, in SI."""
         columns = guess.columns
-        values = columns.scale * self.log.on_grid(columns.columns, spikes=guess.signal not in ROTORS)[self.part]
-        return known_unit(columns.unit).factor * np.asarray(columns.sign or 1.0) * (values + columns.offset)
+        values = self.log.on_grid(columns.columns, spikes=guess.signal not in ROTORS)[self.part]
+        return known_unit(columns.unit).factor * as_mapped(values, columns)
 
     def tell(
         self,

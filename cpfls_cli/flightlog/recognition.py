@@ -11,6 +11,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.agreement import first_derivative, slow
 from cpfls_cli.flightlog.airframe import MovedBy, Parameters, airframe_from_motion
 from cpfls_cli.flightlog.attitude_columns import BODY_OF, doubt_reading, read_attitude
+from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.flown import FlownPart, find_flown
 from cpfls_cli.flightlog.log_table import LogTable, holding_values, make_grid, refuse_dead_rotors
 from cpfls_cli.flightlog.motion_columns import tell_acceleration, tell_body_rate, tell_places
@@ -18,7 +19,7 @@ from cpfls_cli.flightlog.nameless import nameless_signals
 from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals
 from cpfls_cli.flightlog.readings import Reading
 from cpfls_cli.flightlog.recognised import Load, Recognition, Rival, Seen, called
-from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_rotors
+from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_mixed, find_rotors
 from cpfls_cli.flightlog.setpoint_columns import tell_setpoints
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics
@@ -79,6 +80,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     refuse_dead_rotors(log, named, candidates)
     make_grid(log, candidates)
     rotors = find_rotors({name: _with_values(log, candidates.get(name, ())) for name in ROTORS}, parameters, system)
+    rotors = rotors if rotors.speed or rotors.command else find_mixed(log) or rotors
     level = _level(log, rotors)
     flown = _find_flown(log, candidates, level)
     if not flown.flies:
@@ -113,7 +115,7 @@ def _level(log: LogTable, rotors: RotorColumns) -> Array | None:
     if found is None:
         return None
     values = log.on_grid(found.columns.columns, spikes=False)
-    level = (found.columns.scale * values + found.columns.offset).mean(axis=1)
+    level = as_mapped(values, found.columns).mean(axis=1)
     largest = max(1.0, float(np.quantile(level, 0.98))) if rotors.command is None else 1.0
     return np.asarray(level / largest)
 

@@ -1,6 +1,6 @@
 """Which columns drive the rotors or say how fast they turn, in which unit, and which of them are connected."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.airframe import Parameters
+from cpfls_cli.flightlog.log_table import LogTable
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival, Sure
 from cpfls_cli.flightlog.settings import SignalMap
@@ -26,6 +27,13 @@ _SLOW_HZ = 25.0
 _USUAL_POLE_PAIRS = 7
 _RPM_FROM = 4000.0
 """Faster than rotors turn in rad/s; the smallest reach 3000."""
+
+_FEWEST_SAMPLES = 20
+"""For medians and rates."""
+
+_MIXED = ("controller.cmd_thrust", "controller.cmd_roll", "controller.cmd_pitch", "controller.cmd_yaw")
+_CRAZYFLIE_MIXER = ((1.0, -0.5, 0.5, 1.0), (1.0, -0.5, -0.5, -1.0), (1.0, 0.5, -0.5, 1.0), (1.0, 0.5, 0.5, -1.0))
+"""Of M1 to M4 the factors of these columns: power_distribution_quadrotor.c of the firmware."""
 
 _SAME = 0.02
 """Part of the largest one's spread below which an output is not connected to a motor."""
@@ -113,12 +121,7 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
                 f"{command.columns.columns[0]} and those beside it: {counts[1]} commands, {counts[0]} rotors"
             )
             command = None
-    warnings = [
-        f"the rotors are logged at {guess.rate_hz:.3g} Hz ({guess.columns.columns[0]}): too slow for motors that follow"
-        " within some 50 ms; log them at 100 Hz or more"
-        for guess in (speed, command)
-        if guess is not None and guess.rate_hz < _SLOW_HZ
-    ]
+    warnings = [warning for guess in (speed, command) if guess is not None for warning in _too_slow(guess)]
     shares = command is not None and command.columns.unit == "1"
     return RotorColumns(
         speed=speed,
@@ -127,6 +130,43 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
         left_out=tuple(left_out),
         warnings=tuple(warnings),
     )
+
+
+def find_mixed(log: LogTable) -> RotorColumns | None:
+    """Take what goes into the mixer of a Crazyflie for the commands of its motors; None where a log lacks it.
+
+    Parameters
+    ----------
+    log : LogTable
+        Without columns of rotors.
+    """
+    ending = _MIXED[0]
+    begin = next((name.removesuffix(ending) for name in log.names if name.endswith(ending)), None)
+    columns = tuple(f"{begin}{name}" for name in _MIXED)
+    if begin is None or not set(columns) <= {*log.names}:
+        return None
+    time, values = log.values(columns)
+    if len(time) < _FEWEST_SAMPLES or not np.ptp(values, axis=0).max() > 0:
+        return None
+    reason = (
+        "what goes into the mixer of a Crazyflie, 16 bits; the firmware makes each motor's command of it: thrust, half"
+        " of roll and pitch, and yaw, with the signs of its place"
+    )
+    mapped = SignalMap(columns=columns, unit="1", scale=1 / 65536, mixer=_CRAZYFLIE_MIXER)
+    guess = Guess(signal="rotor_command", columns=mapped, reason=reason, sure="named")
+    older = Rival("rotor_command_is: speed", "before 2022 the firmware handed to the motors what it had mixed")
+    said = "what a Crazyflie mixes are thrusts, before the battery is compensated"
+    command = RotorGuess(guess, 1 / float(np.median(np.diff(time))), "Crazyflie")
+    command_is = KeyChoice("rotor_command_is", "thrust", said, "named", (older,))
+    return RotorColumns(speed=None, command=command, command_is=command_is, warnings=tuple(_too_slow(command)))
+
+
+def _too_slow(guess: RotorGuess) -> Iterator[str]:
+    if guess.rate_hz < _SLOW_HZ:
+        yield (
+            f"the rotors are logged at {guess.rate_hz:.3g} Hz ({guess.columns.columns[0]}): too slow for motors that"
+            " follow within some 50 ms; log them at 100 Hz or more"
+        )
 
 
 def _is_electric(named: Named) -> bool:

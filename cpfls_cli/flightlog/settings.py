@@ -104,7 +104,7 @@ class ColumnMap(Settings):
     @property
     def names(self) -> tuple[str, ...]:
         """What the numbers of a sample are called: columns, or rotors of a mixer."""
-        return self.columns if self.mixer is None else tuple(f"rotor {1 + row}" for row in range(len(self.mixer)))
+        return self.columns if self.mixer is None else tuple(f"M{1 + row}" for row in range(len(self.mixer)))
 
 
 @dataclass(frozen=True, kw_only=True)

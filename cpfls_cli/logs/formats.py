@@ -22,6 +22,7 @@ _ENCRYPTED_MAGIC = b"ULogEnc"
 DATAFLASH_MAGIC = b"\xa3\x95\x80\x80"
 BLACKBOX_MAGIC = b"H Product:Blackbox flight data recorder"
 USD_MAGIC = b"\xbc"
+GZIP_MAGIC = b"\x1f\x8b"
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 _LONGEST_LINE = 16384
 _MOST_LISTED = 20
@@ -83,8 +84,6 @@ class LogFormat:
         What a file that begins in this way holds, in messages.
     magic : bytes
         First bytes of every such file; none for text, which begins with a line of column names.
-    named_freely : bool
-        Whether a file whose name says nothing is told by its first bytes.
     shared : bool
         Whether artifacts of this program end so too; ``is_log(path)`` of the reader tells them apart.
     reader : str
@@ -97,11 +96,15 @@ class LogFormat:
     name: str
     content: str
     magic: bytes = b""
-    named_freely: bool = False
     shared: bool = False
     reader: str
     packages: tuple[str, ...] = ()
     extra: str = ""
+
+    @property
+    def by_content(self) -> bool:
+        """Whether a file is told by its first bytes, whatever its name ends in; what a gzip holds they do not say."""
+        return bool(self.magic) and self.magic != GZIP_MAGIC
 
     def begins(self, line: bytes) -> bool:
         """Tell whether the first line of a file is that of a log in this format."""
@@ -111,17 +114,16 @@ class LogFormat:
 _PYARROW = {"packages": ("pyarrow", "pyarrow.parquet"), "extra": "parquet"}
 _PYULOG = {"packages": ("pyulog",), "extra": "ulog"}
 _ROSBAGS = {"packages": ("rosbags",), "extra": "rosbag"}
-_NAMED_FREELY = {"named_freely": True}
 _OURS_TOO = {"shared": True}
 _TABLE: tuple[tuple[str, str, str, bytes, str, dict[str, Any]], ...] = (
     (".csv", "CSV", "CSV", b"", "csv_log", {}),
-    (".csv.gz", "CSV", "gzip-compressed data", b"\x1f\x8b", "csv_log", {}),
+    (".csv.gz", "CSV", "gzip-compressed data", GZIP_MAGIC, "csv_log", {}),
     (".parquet", "Parquet", "Parquet", b"PAR1", "parquet_log", _PYARROW),
     (".ulg", "ULog", "ULog", ULOG_MAGIC, "ulog", _PYULOG),
     (".bin", "ArduPilot DataFlash", "a DataFlash log", DATAFLASH_MAGIC, "dataflash", {}),
-    (".bbl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, "blackbox", _NAMED_FREELY),
-    (".bfl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, "blackbox", _NAMED_FREELY),
-    ("", "Crazyflie uSD", "a log of a Crazyflie's uSD card", USD_MAGIC, "crazyflie_usd", _NAMED_FREELY),
+    (".bbl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, "blackbox", {}),
+    (".bfl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, "blackbox", {}),
+    ("", "Crazyflie uSD", "a log of a Crazyflie's uSD card", USD_MAGIC, "crazyflie_usd", {}),
     (".db3", "ROS 2 bag", "SQLite", b"SQLite format 3\x00", "rosbag", _ROSBAGS),
     (".mcap", "ROS 2 bag", "MCAP", b"\x89MCAP", "rosbag", _ROSBAGS),
     (".h5", "HDF5", "HDF5", HDF5_MAGIC, "matrices", _OURS_TOO),
@@ -165,8 +167,8 @@ def log_contents(path: Path, wanted: Collection[str] | None = None) -> LogConten
         raise InputError(f"{path}: is encrypted: decrypt it first, as PX4's Tools/decrypt_ulog.py does")
     if form is None:
         named = ", ".join(form.suffix for form in LOG_FORMATS if form.suffix)
-        free = " or ".join(dict.fromkeys(form.content for form in LOG_FORMATS if form.named_freely))
-        raise InputError(f"{path}: not a log: its name must end in one of {named}, or it must be {free}")
+        free = ", ".join(dict.fromkeys(form.name for form in LOG_FORMATS if form.by_content))
+        raise InputError(f"{path}: not a log: its name must end in one of {named}, or it must hold one of {free}")
     _refuse_other_content(path, form)
     _require_packages(path, form)
     contents: LogContents = import_module(form.reader).contents(path, wanted)
@@ -185,10 +187,11 @@ def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
 
 
 def _format_of(path: Path) -> LogFormat | None:
-    name = path.name.lower()
+    name, first = path.name.lower(), _first_line(path)
     named = next((form for form in LOG_FORMATS if form.suffix and name.endswith(form.suffix)), None)
-    free = (form for form in LOG_FORMATS if form.named_freely and form.begins(_first_line(path)))
-    return named or next(free, None)
+    if named is not None and named.magic and named.begins(first):
+        return named
+    return next((form for form in LOG_FORMATS if form.by_content and form.begins(first)), named)
 
 
 def _first_line(path: Path) -> bytes:

@@ -23,7 +23,7 @@ from cpfls_cli.pages.effects import (
     share_words,
     titles,
 )
-from cpfls_cli.pages.first_screen import first_screen, model_words, notes_on_flights
+from cpfls_cli.pages.first_screen import first_lines, first_screen, model_words, notes_on_flights
 from cpfls_cli.pages.gap import (
     AXES,
     BEFORE,
@@ -42,7 +42,7 @@ from cpfls_cli.pages.replay import beside_rivals, playback_figure
 from cpfls_cli.pages.sensors import sensor_warnings, sensors_answer, unseen_answer
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.canvas import GREY, in_columns, legend_over, plain_ticks, plot, stacked
-from cpfls_cli.report.content import Block, Heading, Plot, Text
+from cpfls_cli.report.content import Block, Folded, Heading, Plot, Text
 from cpfls_cli.report.numbers import sentence
 from cpfls_cli.words import joined
 
@@ -56,8 +56,9 @@ _BAND = 1.96
 def answer(diagnosis: Source[DiagnosisRecord]) -> Iterator[Block]:
     """Say what a model misses, how sure that is, what the flights cannot show, and what to distrust."""
     record = diagnosis.record
-    yield from first_screen(record, 1)
-    yield from _forces_decide(record)
+    yield from first_lines(record, 1)
+    decided = list(_forces_decide(record))
+    yield from [Folded("why the forces decide", decided)] if decided else []
     yield from unseen_answer(record.not_excited)
     yield from sensors_answer(record.audit)
     yield from sensor_warnings(record.audit)

@@ -11,13 +11,13 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.disagreement import DependenceGroup, DisagreementRecord, HeatMapGroup
 from cpfls_cli.gap.settings import CLEAR
-from cpfls_cli.pages.gap import channel_unit, channel_words
+from cpfls_cli.pages.gap import channel_name, channel_unit, channel_words
 from cpfls_cli.pages.repeats import NOT_SPLIT, again_blocks, again_box
 from cpfls_cli.pages.replay import playback_figure, playback_text
 from cpfls_cli.pages.sensors import contradicted, sensors_answer, settled_channels, unseen_answer
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import in_columns, line, plain_ticks, plot, stacked
-from cpfls_cli.report.content import Block, Box, Cell, Heading, Plot, Table, Text
+from cpfls_cli.report.content import Block, Box, Cell, Folded, Heading, Plot, Table, Text, in_short
 from cpfls_cli.report.numbers import number, plain, sentence, whole_percent
 from cpfls_cli.words import joined
 
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.collections import PatchCollection
     from matplotlib.figure import Figure
 
-_TITLE = "Where they disagree"
 _STRETCHES = 5
 _SIGNALS = 4
 _NAMED_SIGNALS = 2
@@ -55,11 +54,15 @@ _SIGNAL_UNITS = {
 def answer(disagreement: Source[DisagreementRecord]) -> Iterator[Block]:
     """Say where a model and flights disagree, what the flights cannot show, and what to distrust."""
     record = disagreement.record
-    yield from lead(disagreement)
+    *again, gap = lead(disagreement)
+    for box in again:
+        yield from in_short(box, 0, "what comes again, channel by channel")
+    yield gap
     yield from settled_channels(record.audit)
-    yield from where(disagreement)
-    yield from _not_split(record)
-    yield from playback_text(record.playback)
+    yield _axes_table(record, 1)
+    yield Folded("when the gap is largest, and what it follows", list(_when(record, 1)))
+    played = [*_not_split(record), *playback_text(record.playback)]
+    yield from [Folded("what comes again, and playback", played)] if played else []
     yield from unseen_answer(record.not_excited)
     yield from sensors_answer(record.audit)
     yield from (Text(warning, "warning") for warning in record.warning)
@@ -82,9 +85,12 @@ def _not_split(record: DisagreementRecord) -> Iterator[Text]:
 def where(disagreement: Source[DisagreementRecord]) -> Iterator[Block]:
     """Say on which axis, when and with which signals a model and flights disagree."""
     record = disagreement.record
-    yield Heading(_TITLE)
     yield _axes_table(record, 1)
-    yield from _stretches(record, 1)
+    yield from _when(record, 1)
+
+
+def _when(record: DisagreementRecord, index: int) -> Iterator[Block]:
+    yield from _stretches(record, index)
     yield from _follows(record)
 
 
@@ -146,20 +152,23 @@ def _axes_table(record: DisagreementRecord, index: int) -> Table:
         sizes = [number(float(values[channel_index]), 3) for values in (gap.rms, gap.floor, gap.floors)]
         above = Cell("yes", "warning") if gap.above_noise[channel_index] else Cell("no")
         share = whole_percent(float(gap.share[channel_index]))
-        rows.append([channel_words(channel), channel_unit(channel), *sizes, above, share])
+        rows.append([channel_name(channel), channel_unit(channel), *sizes, above, share])
     caption = (
         "Gap between what the measured motion takes and what the model provides, root mean square over "
-        f"{', '.join(record.flights.names())}. Floor: what noise alone would leave. Above noise: more than {CLEAR:g} "
-        "floors, because without a gap chance leaves up to that. Share: of the torque or force that moves the vehicle."
+        f"{', '.join(record.flights.names())}."
+    )
+    legend = (
+        f"Floor: what noise alone would leave. Above noise: more than {CLEAR:g} floors, because without a gap chance "
+        "leaves up to that. Share: of the torque or force that moves the vehicle."
     )
     header = ("Channel", "Unit", "Gap", "Noise floor", "In floors", "Above noise", "Share")
-    return Table(f"gap-by-axis-{index}", caption, header, rows, frozenset({0, 1, 5}))
+    return Table(f"gap-by-axis-{index}", caption, header, rows, frozenset({0, 1, 5}), legend=legend)
 
 
 def _stretches(record: DisagreementRecord, index: int) -> Iterator[Table]:
     flights = record.flights.names()
     rows = [
-        [str(rank), flights[flight], channel_words(channel), f"{start:.1f} … {end:.1f}", number(floors, 3)]
+        [str(rank), flights[flight], channel_name(channel), f"{start:.1f} … {end:.1f}", number(floors, 3)]
         for rank, (flight, start, end, channel, floors) in enumerate(record.stretch.first(_STRETCHES), start=1)
     ]
     caption = "The stretches in which the gap is largest, on the clock of each flight."

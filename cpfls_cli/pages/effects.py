@@ -155,6 +155,7 @@ def parameters_table(name: str, effects: NamedEffectsGroup) -> Table:
     for parameter, unit, *values in zip(numbers.name, numbers.unit, *columns, strict=True):
         kind, _, axis = parameter.rpartition("_")
         words = f"{_NUMBERS[kind]} {axis}" if kind in _NUMBERS else parameter.replace("_", " ")
+        words = f"{_SHORT[parameter]}, {words}" if kind == "inertia" else words
         is_relative = unit == "1"
         value, low, high = (100.0 * each if is_relative else each for each in values)
         rows.append([words, *measured(value, low, high), "%" if is_relative else unit_words(unit)])

@@ -12,15 +12,15 @@ from cpfls_cli.pages.effects import coefficients_table, effect_sentence, interva
 from cpfls_cli.pages.gap import gap_sizes_figure, gap_table
 from cpfls_cli.pages.replay import playback_figure, playback_text, playback_words
 from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.report.content import Block, Facts, Heading, Section, Table, Text
+from cpfls_cli.report.content import Block, Facts, Folded, Heading, Section, Table, Text
 from cpfls_cli.report.numbers import number, sentence
 from cpfls_cli.words import joined
 
 
 def details(extended: Source[ExtendedRecord]) -> Iterator[Block]:
     """Say what the gap of an extended model becomes, and about which axes it gets worse."""
-    yield _gap_table(extended, 1)
-    yield from playback_text(extended.record.playback)
+    rest: list[Block] = [_gap_table(extended, 1), *playback_text(extended.record.playback)]
+    yield Folded("the gap and the playback before and after", rest)
     yield from (Text(warning, "warning") for warning in warnings(extended.record))
 
 

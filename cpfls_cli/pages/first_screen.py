@@ -22,11 +22,11 @@ from cpfls_cli.pages.effects import (
     titles,
     wrong_numbers,
 )
-from cpfls_cli.pages.gap import channel_unit, channel_words
+from cpfls_cli.pages.gap import channel_name, channel_unit, channel_words
 from cpfls_cli.pages.repeats import NO_EFFECT, NOT_SPLIT, again_box
 from cpfls_cli.pages.replay import prediction_words, signal_scale
 from cpfls_cli.pages.sensors import contradicted
-from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Table, Text, Tone
+from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Table, Text, Tone, in_short
 from cpfls_cli.report.numbers import number, plain, sentence
 from cpfls_cli.words import joined
 
@@ -43,6 +43,7 @@ _TONES: dict[str, Tone] = {
     GapVerdict.CONTRADICTED: "warning",
     GapVerdict.FLIGHTS_DIFFER: "warning",
 }
+_EFFECTS_SHOWN = 2
 _ENERGY = {"feeds": ", feeds energy into the motion", "drains": ", drains energy from the motion"}
 _USE = "take the model with it, extended.h5, that `cpfls gap` and `cpfls extend` write"
 _GUSTS = "nothing on the model: what is left are gusts or noise; fly in still air, or more runs, to see what is smaller"
@@ -67,6 +68,18 @@ def first_screen(record: DiagnosisRecord, index: int) -> Iterator[Block]:
     yield _held_out_table(record, index)
     yield from (Text(sentence(remark), "note") for remark in record.remarks)
     yield Facts(list(_beside(record)))
+
+
+def first_lines(record: DiagnosisRecord, index: int) -> Iterator[Block]:
+    """Say the same with what a small screen has no room for folded away."""
+    if record.again_before is not None and not record.contradiction:
+        box = again_box(record.again_before, record.again_after, model_words(record))
+        yield from in_short(box, 0, "what comes again, channel by channel")
+    yield from in_short(verdict_box(record), _EFFECTS_SHOWN, "more effects")
+    yield Facts(list(_facts(record)))
+    remarks = [Text(sentence(remark), "note") for remark in record.remarks]
+    rest: list[Block] = [_held_out_table(record, index), *remarks, Facts(list(_beside(record)))]
+    yield Folded("held-out flights before and after, and what to know of the verdict", rest)
 
 
 def verdict_box(record: DiagnosisRecord) -> Box:
@@ -261,7 +274,7 @@ def _gap_row(record: DiagnosisRecord, channel: int) -> list[str | Cell]:
     before, after = (number(float(values[channel]), 2) for values in (gap.before_floors, gap.after_floors))
     grown = bool(gap.grown[channel])
     said = Cell(f"{before} → {after} floors{', worse' if grown else ''}", "warning" if grown else "plain")
-    return [f"gap, {channel_words(name)}", channel_unit(name), *sizes, said]
+    return [f"gap, {channel_name(name)}", channel_unit(name), *sizes, said]
 
 
 def _playback_rows(playback: PlaybackChangeGroup) -> Iterator[list[str | Cell]]:

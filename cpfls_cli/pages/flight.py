@@ -14,7 +14,7 @@ from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.pages.trajectory import attitude_figure, rotation_figure
 from cpfls_cli.report.canvas import line, plot, stacked, style_of
-from cpfls_cli.report.content import HASH_SHOWN, Block, Facts, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.content import HASH_SHOWN, Block, Facts, Folded, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, count, number, plain
 from cpfls_cli.units import SPEED_UNITS
 from cpfls_cli.words import joined
@@ -48,7 +48,8 @@ def answer(flight: Source[FlightRecord], index: int = 1) -> Iterator[Block]:
     if findings:
         rows = [[reason, count(times)] for reason, times in findings.items()]
         caption = f"What was found in the log of {flight.label}."
-        yield Table(f"quality-{index}", caption, ("What: what was done", "Count"), rows)
+        table = Table(f"quality-{index}", caption, ("What: what was done", "Count"), rows)
+        yield Folded("what was found in the log, and done about it", [table], shown=True)
     yield from _rotor_torque(flight)
     yield from _effects(flight)
     warnings = () if record.quality is None else record.quality.warning or ()

@@ -36,6 +36,7 @@ MEASURED: dict[str, Any] = {"color": "black", "linestyle": "-", "linewidth": 2.6
 BEFORE: dict[str, Any] = {**BASELINE, "linewidth": 1.4, "zorder": 3}
 AFTER: dict[str, Any] = {"color": style_of(1)["color"], "linestyle": "-", "linewidth": 1.2, "zorder": 2.5}
 
+_TURNS = {"x": "roll", "y": "pitch", "z": "yaw"}
 _MARKS = 12
 _ROOM = 3.0
 _LEAST = 0.1
@@ -47,6 +48,12 @@ _SHRUNK: dict[str, Any] = {"color": AFTER["color"], "marker": "o", "markersize":
 def channel_words(channel: str) -> str:
     """Say what a channel is."""
     return CHANNELS.get(channel, channel)
+
+
+def channel_name(channel: str) -> str:
+    """Name a channel in a table: `pitch torque`, `force z`."""
+    kind, _, axis = channel.partition(" ")
+    return f"{_TURNS[axis]} torque" if kind == "torque" else channel
 
 
 def channel_unit(channel: str) -> str:
@@ -62,8 +69,8 @@ def gap_table(name: str, gap: GapChangeGroup, caption: str) -> Table:
         sizes = [number(float(values[index]), 3) for values in (gap.before, gap.after, gap.floor)]
         before, after = (number(float(values[index]), 2) for values in (gap.before_floors, gap.after_floors))
         shrunk = Cell(after, "warning" if gap.grown[index] else "plain")
-        rows.append([channel_words(channel), channel_unit(channel), *sizes, before, shrunk])
-    header = ("Channel", "Unit", "Gap before", "Gap after", "Noise floor", "Before, in floors", "After, in floors")
+        rows.append([channel_name(channel), channel_unit(channel), *sizes, before, shrunk])
+    header = ("Channel", "Unit", "Gap before", "Gap after", "Noise floor", "Floors before", "Floors after")
     return Table(name, caption, header, rows, frozenset({0, 1}))
 
 

@@ -13,7 +13,7 @@ from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.report.canvas import legend_above, plain_ticks, plot, stacked, style_of
-from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.content import Block, Cell, Folded, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import ROUNDING, count, number, percent, r_squared, sentence
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ MODELS = {
 }
 """The judged models in words."""
 
+_PARTS_SHOWN = 3
 _SPEAKS = {1: "For it", -1: "Against it"}
 _SIGNS = {1: "for", -1: "against"}
 _SCORES = (
@@ -84,9 +85,25 @@ def grounds(record: IdentifiedRecord) -> Iterator[str]:
 
 def details(model: Source[IdentifiedRecord]) -> Iterator[Block]:
     """Say what was found, how good it is beside its baselines, and what to distrust."""
-    yield from solution(model)
-    yield scores_table(model, 1)
+    scores = scores_table(model, 1)
+    yield _short_scores(model.record.judged)
+    errors, shares = scores.part("errors", 0, 1, 2, 3, 4), scores.part("shares", 0, 1, 5, 6, 7)
+    rest: list[Block] = [*solution(model), Text(scores.explained), errors, shares]
+    yield Folded("how it was found, and all errors beside its baselines", rest)
     yield from (Text(finding, "warning") for finding in model.record.findings)
+
+
+def _short_scores(judged: JudgedGroup) -> Table:
+    """Show what a model explains of the torque of the first flights held out, beside the rigid body."""
+    parts = [part for part in judged.parts if part != TRAINING][:_PARTS_SHOWN] or list(judged.parts[:1])
+    rows: list[list[str | Cell]] = []
+    for part in parts:
+        for name in (name for name in (MODEL, RIGID_BODY) if name in judged.models):
+            judged_on, said, *_, roll, pitch, yaw = _row(judged, part, name)
+            rows.append([judged_on, said, roll, pitch, yaw])
+    header = ("Judged on", "Model", *_SCORES[-len(AXES) :])
+    caption = "Share of the variance of the body torque that is explained."
+    return Table("scores", caption, header, rows, frozenset({0, 1}))
 
 
 def worth(record: IdentifiedRecord) -> Iterator[str]:
@@ -136,13 +153,15 @@ def scores_table(model: Source[IdentifiedRecord], index: int) -> Table:
     """Show the errors of a model and its baselines on every part of the data."""
     caption = (
         f"{model.label} beside the rigid body with six inertia parameters, a constant inertia and no torque at all, "
-        "and where there is something to search for, the same structure without a search. MSE: mean over the axes. "
-        "Relative error: largest error over largest torque, worst axis. R²: share of the variance of the body torque "
-        "explained."
+        "and where there is something to search for, the same structure without a search."
+    )
+    legend = (
+        "MSE: mean over the axes. Relative error: largest error over largest torque, worst axis. R²: share of the "
+        "variance of the body torque explained."
     )
     judged = model.record.judged
     rows = [_row(judged, part, name) for part in judged.parts for name in judged.models]
-    return Table(f"headline-{index}", caption, _SCORES, rows, frozenset({0, 1}))
+    return Table(f"headline-{index}", caption, _SCORES, rows, frozenset({0, 1}), legend=legend)
 
 
 def _row(judged: JudgedGroup, part: str, name: str) -> list[str | Cell]:

@@ -18,7 +18,7 @@ from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.effects import effect_title, unit_words
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.pages.trust import trust_facts, trust_words
-from cpfls_cli.report.content import Block, Box, Facts, Heading, Section, Table, Text
+from cpfls_cli.report.content import Block, Box, Facts, Heading, Section, Table, Text, in_short
 from cpfls_cli.report.numbers import number, plain, whole_percent
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import joined
@@ -47,6 +47,9 @@ _PAGES = {"identified": "identification", "extended": "extended", "vehicle": "ve
 """Modules of `pages` by the kind of a model; one is loaded when a model of its kind is met."""
 
 
+_REASONS = 3
+
+
 def _kind_of(record: ModelRecord) -> _Kind:
     page = import_module(f"cpfls_cli.pages.{_PAGES[record.FORMAT.kind]}")
     return _Kind(page.title, page.grounds, page.details, page.worth)
@@ -54,7 +57,10 @@ def _kind_of(record: ModelRecord) -> _Kind:
 
 def answer(model: Source[Any]) -> Iterator[Block]:
     """Say how far to trust a model and why, what was found and how well it does, and what to distrust."""
-    yield trust_box(model)
+    box = trust_box(model)
+    # The reasons of a verdict are many.
+    judged = isinstance(model.record, IdentifiedRecord) and model.record.validated
+    yield from in_short(box, _REASONS, "every reason of the verdict") if judged else [box]
     yield from _kind_of(model.record).details(model)
 
 

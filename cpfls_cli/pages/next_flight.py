@@ -10,7 +10,7 @@ from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.trajectory import QuestionGroup
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.pages.effects import effect_title, unit_words
-from cpfls_cli.report.content import Block, Table, Text
+from cpfls_cli.report.content import Block, Folded, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, number, whole_percent
 from cpfls_cli.words import joined
 
@@ -53,6 +53,10 @@ def question_blocks(name: str, asked: QuestionGroup) -> Iterator[Block]:
             "warning",
         )
     yield _table(name, asked)
+    yield Folded("what each outcome will mean", list(_meaning(asked)), shown=True)
+
+
+def _meaning(asked: QuestionGroup) -> Iterator[Text]:
     yield from (Text(sentence) for sentence in dict.fromkeys(_outcomes(asked)))
     yield Text(
         "Fly it, then diagnose it together with the flights so far, the new one among those that train: cpfls gap "
@@ -85,13 +89,13 @@ def _table(name: str, asked: QuestionGroup) -> Table:
         ]
         for row in rows_of(asked)
     ]
-    caption = (
-        "How this flight, with those that are there, tells what is true: expected logarithm of the Bayes factor, and "
-        "the probability that the diagnosis names it. Beside it the same along the path that the autopilot of "
-        "simulation.closed_loop flies, of the median of random flights in the same room, and of the known flights "
-        "flown once more."
+    caption = "How this flight, with those that are there, tells what is true."
+    legend = (
+        "Expected logarithm of the Bayes factor, and the probability that the diagnosis names it. Beside it the same "
+        "along the path that the autopilot of simulation.closed_loop flies, of the median of random flights in the "
+        "same room, and of the known flights flown once more."
     )
-    return Table(name, caption, header, rows, frozenset({0, 1}))
+    return Table(name, caption, header, rows, frozenset({0, 1}), legend=legend)
 
 
 def _outcomes(asked: QuestionGroup) -> Iterator[str]:

@@ -14,15 +14,16 @@ from cpfls_cli.flightlog.airframe import Airframe, RotorPlace
 from cpfls_cli.flightlog.proposal import DECIDES_ROTORS, Proposal
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival
 from cpfls_cli.flightlog.settings import ColumnMap
-from cpfls_cli.report.content import Block, Cell, Table, Text
+from cpfls_cli.report.content import Block, Cell, Folded, Table, Text
 from cpfls_cli.report.numbers import number
+from cpfls_cli.words import joined
 
 _WIDTH = 110
 _SURE: Final = {"data": "the data", "named": "its name", "guess": "a guess"}
 NOT_KNOWN: Final = {"inertia": "null", "thrust": "null", "drag": "null"}
 """What stands for numbers that the identification of the vehicle finds."""
 
-_SPINS: Final = {1: "counter-clockwise", -1: "clockwise", 0: "turning an unknown way"}
+_SPINS: Final = {1: "ccw", -1: "cw", 0: "turning an unknown way"}
 _ORDER: Final = ("body_frame", "world_frame", "quaternion_order", "acceleration_frame", "rotor_command_is")
 _FASTEST_HZ, _RATE_HZ, _LOWPASS_HZ = 500.0, 250.0, 60.0
 
@@ -51,31 +52,83 @@ def asked_keys(proposal: Proposal, stated: Stated) -> tuple[str, ...]:
 
 def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
     """Say what every column is taken for and why, what was cut, what is asked, and what comes next."""
-    names = ", ".join(one.name for one in proposal.logs)
-    yield Text("; ".join([names, *proposal.facts]))
+    several = len(proposal.logs) > 1
+    names = f"{len(proposal.logs)} logs" if several else proposal.logs[0].name
+    topic = _topic(proposal)
+    yield Text("; ".join([names, *proposal.facts, *([f"columns of {topic}"] if topic else [])]))
+    short = [_short_row(guess, topic) for guess in proposal.signals]
+    yield Table("signals", "", ("Signal", "Columns", "Unit"), short, frozenset(range(3)))
+    if proposal.choices:
+        chosen = (f"{choice.key} {choice.value}{_guessed(choice)}" for choice in proposal.choices)
+        yield Text(", ".join(chosen))
+    yield Text(_rotors_in_words(proposal))
+    asked = asked_keys(proposal, stated)
+    if asked:
+        yield Text(f"to be filled in by hand, marked {ASK} in {output}: {_asked_words(asked)}", "warning", always=True)
+    why = [] if proposal.airframe is None else [Text(f"rotors: {proposal.airframe.reason}")]
+    yield Folded("the reason of each guess", [_reasons_table(proposal), *why])
+    yield from (Text(warning, "warning", always=True) for warning in proposal.warnings)
+    named = [(guess.signal, guess.rivals) for guess in proposal.signals]
+    for name, rivals in [*named, *((choice.key, choice.rivals) for choice in proposal.choices)]:
+        for rival in rivals:
+            yield Text(f"{name}: the data cannot rule out {rival.text}: {rival.reason}", "warning")
+    cut: list[Text] = []
+    for one in proposal.logs:
+        prefix = f"{one.name}: " if several else ""
+        reasons = one.recognition.flown.reasons or ("all of it is flight, nothing is cut",)
+        cut += [Text(f"{prefix}{reason}") for reason in reasons]
+        cut += [Text(f"{prefix}not mapped: {words}", "note") for words in one.recognition.left_out]
+    yield Folded("what is cut or not mapped", cut)
+
+
+def _topic(proposal: Proposal) -> str:
+    """Name the topic of all columns; empty where there are several."""
+    names = [column for guess in proposal.signals for column in guess.columns.columns]
+    topics = {name.partition(".")[0] for name in names if name.count(".") > 1}
+    return topics.pop() if len(topics) == 1 and all(name.count(".") > 1 for name in names) else ""
+
+
+def _short_row(guess: Guess, topic: str) -> list[str | Cell]:
+    columns = [name.removeprefix(f"{topic}.") for name in guess.columns.columns]
+    return [guess.signal, _in_braces(columns), f"{_unit(guess.columns)}{_guessed(guess)}"]
+
+
+def _guessed(entry: Guess | KeyChoice) -> str:
+    return " (a guess)" if entry.sure == "guess" else ""
+
+
+def _in_braces(names: Sequence[str]) -> str:
+    """List names with what they begin with written once, as a shell does."""
+    first, last = min(names), max(names)
+    begin = first[: next((place for place, letter in enumerate(first) if letter != last[place : place + 1]), None)]
+    if len(names) < 2 or not begin:
+        return ", ".join(names)
+    return f"{begin}{{{','.join(name.removeprefix(begin) for name in names)}}}"
+
+
+def _reasons_table(proposal: Proposal) -> Table:
     rows = [
         _row(guess.signal, ", ".join(guess.columns.columns), _unit(guess.columns), guess) for guess in proposal.signals
     ]
     rows += [_row(choice.key, choice.value, "", choice) for choice in proposal.choices]
     header = ("Signal or key", "Columns or value", "Unit", "Told by", "Why")
-    yield Table("signals", "What the log is taken for.", header, rows, frozenset(range(4)), frozenset({4}))
-    named = [(guess.signal, guess.rivals) for guess in proposal.signals]
-    for name, rivals in [*named, *((choice.key, choice.rivals) for choice in proposal.choices)]:
-        for rival in rivals:
-            yield Text(f"{name}: the data cannot rule out {rival.text}: {rival.reason}", "warning")
-    for one in proposal.logs:
-        prefix = f"{one.name}: " if len(proposal.logs) > 1 else ""
-        reasons = one.recognition.flown.reasons or ("all of it is flight, nothing is cut",)
-        yield from (Text(f"{prefix}{reason}") for reason in reasons)
-        yield from (Text(f"{prefix}not mapped: {words}", "note") for words in one.recognition.left_out)
-    yield Text(_rotors_in_words(proposal))
-    yield from (Text(warning, "warning") for warning in proposal.warnings)
-    asked = asked_keys(proposal, stated)
-    if asked:
-        yield Text(f"to be filled in by hand, marked {ASK} in {output}: {', '.join(asked)}", "warning")
-    yield Text(f"next: cpfls import {output} {proposal.logs[0].name} -o flight.h5")
-    if proposal.rotors:
-        yield Text(f"then: cpfls vehicle {output} flight.h5 -o vehicle.h5")
+    return Table("reasons", "", header, rows, frozenset(range(4)), frozenset({1, 4}))
+
+
+def _asked_words(keys: Sequence[str]) -> str:
+    """Name keys, those of each rotor once."""
+    others: list[str] = []
+    of_rotors: dict[str, list[str]] = {}
+    for key in keys:
+        _, *rest = key.split(".")
+        if len(rest) == 1:
+            others.append(key)
+        else:
+            of_rotors.setdefault(f"M{int(rest[1]) + 1}", []).append(rest[2])
+    by_keys: dict[tuple[str, ...], list[str]] = {}
+    for rotor, own in of_rotors.items():
+        by_keys.setdefault(tuple(own), []).append(rotor)
+    return ", ".join([*others, *(f"{joined(list(own))} of {joined(rotors)}" for own, rotors in by_keys.items())])
 
 
 def _row(name: str, value: str, unit: str, entry: Guess | KeyChoice) -> list[str | Cell]:
@@ -86,7 +139,8 @@ def _unit(columns: ColumnMap) -> str:
     scale = "" if columns.scale == 1.0 else f" x {number(columns.scale, 4)}"
     offset = "" if columns.offset == 0.0 else f" {'+' if columns.offset > 0 else '-'} {number(abs(columns.offset), 4)}"
     sign = "" if columns.sign is None else f", sign {' '.join('+' if s > 0 else '-' for s in columns.sign)}"
-    return f"{columns.unit}{scale}{offset}{sign}"
+    mixed = "" if columns.mixer is None else f", mixed for {len(columns.mixer)} rotors"
+    return f"{columns.unit}{scale}{offset}{sign}{mixed}"
 
 
 def _rotors_in_words(proposal: Proposal) -> str:
@@ -103,10 +157,10 @@ def _rotors_in_words(proposal: Proposal) -> str:
         )
         return f"{proposal.rotors} rotors; {unknown}"
     places = ", ".join(
-        f"{index} {rotor.name or 'at its place'} {_SPINS[rotor.spin]}".replace("  ", " ")
+        f"M{index} {rotor.name or 'at its place'} {_SPINS[rotor.spin]}"
         for index, rotor in enumerate(proposal.airframe.rotors, start=1)
     )
-    return f"rotors{', a guess' if proposal.airframe.is_guess else ''}: {places} ({proposal.airframe.reason})"
+    return f"rotors{', a guess' if proposal.airframe.is_guess else ''}: {places}"
 
 
 def summary(proposal: Proposal, stated: Stated, output: str) -> dict[str, Any]:
@@ -144,6 +198,7 @@ def _columns(columns: ColumnMap) -> dict[str, Any]:
         "sign": None if columns.sign is None else list(columns.sign),
         "scale": columns.scale,
         "offset": columns.offset,
+        **({} if columns.mixer is None else {"mixer": [list(row) for row in columns.mixer]}),
     }
 
 
@@ -325,6 +380,7 @@ def _entries(columns: ColumnMap) -> dict[str, Any]:
         entries["sign"] = [int(sign) for sign in columns.sign]
     entries |= {"scale": columns.scale} if columns.scale != 1.0 else {}
     entries |= {"offset": columns.offset} if columns.offset != 0.0 else {}
+    entries |= {"mixer": [list(row) for row in columns.mixer]} if columns.mixer is not None else {}
     return entries
 
 

@@ -15,7 +15,7 @@ from cpfls_cli.pages.gap import MEASURED
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, GREY, HELD, band, legend_above, legend_over, plain_ticks, plot, style_of
-from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text, in_short
 from cpfls_cli.report.numbers import number, plain, sentence
 from cpfls_cli.response.mismatch import ACCEPTABLE, COHERENT, GOOD, Deviation
 from cpfls_cli.words import joined
@@ -53,7 +53,8 @@ _UNEXCITED: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "zorder": 1.5}
 
 def answer(response: Source[ResponseRecord], index: int = 1) -> Iterator[Block]:
     """Say in which responses and at which frequencies a model is right, and how far off it is where it is not."""
-    yield response_box(response.record)
+    record = response.record
+    yield from in_short(response_box(record), len((record.contradiction or ())[1:]), "each response in words")
     yield from _grounds(response.record, index)
 
 
@@ -159,13 +160,13 @@ def _table(record: ResponseRecord, index: int) -> Table:
             ]
         )
     flown = joined(record.flown) if len(record.flown) <= _NAMED else f"{len(record.flown)} flights"
-    caption = (
-        f"Frequency responses of {flown} and of the model along the same flights. J adds up differences "
-        f"in decibels and degrees over the band of {_clear(record)} (Tischler and Remple): up to {GOOD:g} is good, up "
-        f"to {ACCEPTABLE:g} acceptable."
+    caption = f"Frequency responses of {flown} and of the model along the same flights."
+    legend = (
+        f"J adds up differences in decibels and degrees over the band of {_clear(record)} (Tischler and Remple): up to "
+        f"{GOOD:g} is good, up to {ACCEPTABLE:g} acceptable."
     )
     header = ("Response", "J", "The model", "Band, Hz", "Coherence", "Random error, %")
-    return Table(f"response-{index}", caption, header, rows, frozenset({0, 2}))
+    return Table(f"response-{index}", caption, header, rows, frozenset({0, 2}), legend=legend)
 
 
 def _clear(record: ResponseRecord) -> str:

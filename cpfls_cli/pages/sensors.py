@@ -9,7 +9,7 @@ from cpfls_cli.artifacts.audit import AuditGroup
 from cpfls_cli.artifacts.gap_flights import NotExcitedGroup
 from cpfls_cli.pages.effects import effect_title, measured, titles, unit_words
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.report.content import Block, Box, Heading, Section, Table, Text
+from cpfls_cli.report.content import Block, Box, Folded, Heading, Section, Table, Text
 from cpfls_cli.report.numbers import probability, sentence
 from cpfls_cli.words import joined
 
@@ -17,14 +17,16 @@ _SENSORS, _UNSEEN = "Sensors", "What these flights cannot show"
 
 
 def sensors_answer(audit: AuditGroup) -> Iterator[Block]:
-    """Say under a heading what the sensors say about each other; broken channels are left to `sensor_warnings`."""
-    yield Heading(_SENSORS)
-    yield from _faults(audit)
+    """Say what the sensors say about each other, faults first; broken channels are left to `sensor_warnings`."""
+    said = list(_faults(audit))
+    yield from (each for each in said if isinstance(each, Box))
+    rest = [each for each in said if not isinstance(each, Box)]
+    yield from [Folded("sensors", rest)] if rest else []
 
 
 def settled_channels(audit: AuditGroup) -> Iterator[Text]:
     """Say which channels contradict the others, and what is done about them."""
-    return (Text(repair, "warning") for repair in audit.settled)
+    return (Text(repair, "warning", always=True) for repair in audit.settled)
 
 
 def contradicted(first: str) -> str:
@@ -44,7 +46,7 @@ def _faults(audit: AuditGroup) -> Iterator[Block]:
 
 def sensor_warnings(audit: AuditGroup) -> Iterator[Text]:
     """Warn of channels that disagree or look broken."""
-    return (Text(warning, "warning") for warning in audit.warning)
+    return (Text(warning, "warning", always=True) for warning in audit.warning)
 
 
 def sensors_section(sources: Sources) -> Section | None:
@@ -91,8 +93,7 @@ def _numbers(audit: AuditGroup, name: str) -> Table:
 def unseen_answer(unseen: NotExcitedGroup) -> Iterator[Block]:
     """List the effects that could be there unseen, those of one reason together, and what would show them."""
     if unseen.name:
-        yield Heading(_UNSEEN)
-        yield _unseen_table("unseen", unseen, "")
+        yield Folded(f"{_UNSEEN[:1].lower()}{_UNSEEN[1:]}", [_unseen_table("unseen", unseen, "")])
 
 
 def unseen_section(sources: Sources) -> Section | None:
@@ -111,7 +112,7 @@ def unseen_section(sources: Sources) -> Section | None:
 
 def _unseen_table(name: str, unseen: NotExcitedGroup, caption: str) -> Table:
     header = ("Effects", "Identifiers", "Why, or what to fly")
-    return Table(name, caption, header, _rows(unseen), frozenset({0, 1, 2}), frozenset({0, 2}))
+    return Table(name, caption, header, _rows(unseen), frozenset({0, 1, 2}), frozenset({0, 1, 2}))
 
 
 def _rows(unseen: NotExcitedGroup) -> tuple[tuple[str, str, str], ...]:

@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.sweep import SettingRuns, SweepRecord, spread
 from cpfls_cli.pages.identification import SQUARED_TORQUE, TORQUE
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import plain_ticks, plot, style_of
-from cpfls_cli.report.content import Block, Plot, Section, Table, Text
+from cpfls_cli.report.content import Block, Folded, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import number, percent
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _DIGITS = 3
+_SETTINGS_SHOWN = 9
 _DEVIATION = "standard deviation of the"
 _DECADE = 10.0
 _TICKS = 4
@@ -46,23 +47,33 @@ _ROWS: tuple[tuple[str, Callable[[SettingRuns], str]], ...] = (
 def answer(sweep: Source[SweepRecord]) -> Iterator[Block]:
     """Say how many runs are finished, mean and spread of each setting, and what to distrust."""
     record = sweep.record
-    yield Text(f"{_finished(sweep)}, {len(record.settings)} settings; mean and standard deviation of the training part")
-    rows = [
-        [
-            setting.name,
-            *(str(value) for value in (setting.samples, *setting.size, setting.runs)),
-            *(_both(values) for values in (setting.mse[:, 0], setting.max_error[:, 0], setting.condition_number)),
-        ]
-        for setting in record.settings
-    ]
-    sizes = ("Setting", "Samples", "Population", "Generations", "Runs")
-    header = (*sizes, f"MSE, {SQUARED_TORQUE}", f"Largest error, {TORQUE}", "Condition number")
-    yield Table("settings", "", header, rows)
+    settings = f"{len(record.settings)} setting{'s' if len(record.settings) > 1 else ''}"
+    yield Text(f"{_finished(sweep)}, {settings}; mean and standard deviation of the training part")
+    yield _short_table("settings", record.settings[:_SETTINGS_SHOWN])
+    others = record.settings[_SETTINGS_SHOWN:]
+    if others:
+        yield Folded(f"{len(others)} more settings", [_short_table("more-settings", others)])
     if record.without_model:
         yield Text(
             f"{record.without_model} of {len(record.run)} runs found no finite model; all means leave them out",
             "warning",
         )
+
+
+def _short_table(name: str, settings: Sequence[SettingRuns]) -> Table:
+    rows = [
+        [
+            setting.name,
+            *(
+                shown(values)
+                for values in (setting.mse[:, 0], setting.max_error[:, 0], setting.condition_number)
+                for shown in (_mean, lambda each: "" if np.isnan(spread(each).variance) else _deviation(each))
+            ),
+        ]
+        for setting in settings
+    ]
+    header = ("Setting", f"MSE, {SQUARED_TORQUE}", "±", f"Largest error, {TORQUE}", "±", "Condition number", "±")
+    return Table(name, "", header, rows)
 
 
 def _finished(sweep: Source[SweepRecord]) -> str:
@@ -96,7 +107,7 @@ def _joined(first: Source[SweepRecord], second: Source[SweepRecord]) -> Source[S
 
 def _sweep(sweep: Source[SweepRecord], index: int) -> Iterator[Block]:
     # Table 5 holds more than the one that a terminal has room for.
-    yield from (block for block in answer(sweep) if not isinstance(block, Table))
+    yield from (block for block in answer(sweep) if not isinstance(block, Table | Folded))
     if not sweep.record.complete:
         yield Text(
             f"Unfinished: {_finished(sweep)} of {sweep.label}. The same command with --resume goes on.", "warning"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from cpfls_cli.artifacts.spec import Record
 from cpfls_cli.pages.prediction import trust_along
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_above, line, plot, stacked, style_of
-from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text, Tone
+from cpfls_cli.report.content import Block, Cell, Folded, Heading, Plot, Section, Table, Text, Tone
 from cpfls_cli.report.numbers import number, percent, plain
 
 if TYPE_CHECKING:
@@ -42,7 +43,9 @@ def answer(flight: Source[FlightRecord], model: Record | None = None, index: int
         f"{len(tracking.time)} samples, control rate {plain(tracking.control_rate)} Hz; attitude only, the vehicle is "
         "held at its centre of mass"
     )
-    yield _table(flight, index)
+    errors, others = _tables(flight, index)
+    yield errors
+    yield Folded("largest errors, and torques", [others], shown=True)
     yield from _beside(tracking, "rigid-body", "of the rigid body fitted to the same samples", "note")
     yield from _beside(tracking, "pd", "of PD alone", "warning")
     yield from trust_along(tracking.outside_count, tracking.not_positive_definite, samples, model)
@@ -59,7 +62,8 @@ def _comparison(flight: Source[FlightRecord]) -> TrackingGroup:
     return flight.record.tracking
 
 
-def _table(flight: Source[FlightRecord], index: int) -> Table:
+def _tables(flight: Source[FlightRecord], index: int) -> tuple[Table, Table]:
+    """Show the errors as root mean square, and apart the largest ones with the torques."""
     tracking = _comparison(flight)
     since = number(tracking.settled_from, 3)
     caption = f"Attitude errors of {flight.label} after {since} s, when an initial error has died down."
@@ -67,7 +71,9 @@ def _table(flight: Source[FlightRecord], index: int) -> Table:
         clipped = zip(tracking.controller, tracking.clipped, strict=True)
         shares = ", ".join(f"{_CONTROLLERS[name]} {percent(share)}" for name, share in clipped)
         caption += f" Commands clipped: {shares}."
-    return Table(f"tracking-{index}", caption, _HEADER, [_row(tracking, name) for name in tracking.controller])
+    whole = Table("", "", _HEADER, [_row(tracking, name) for name in tracking.controller])
+    errors = replace(whole.part(f"tracking-{index}", 0, 1, 2, 3), caption=caption)
+    return errors, whole.part(f"tracking-largest-{index}", 0, 4, 5, 6, 7)
 
 
 def _row(tracking: TrackingGroup, name: str) -> list[str | Cell]:

@@ -14,7 +14,7 @@ from cpfls_cli.artifacts.trajectory import DERIVATIVES, ExcitedGroup, LegGroup, 
 from cpfls_cli.pages.next_flight import question_blocks
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, legend_above, line, plot, stacked, style_of
-from cpfls_cli.report.content import Block, Plot, Table, Text
+from cpfls_cli.report.content import Block, Folded, Plot, Table, Text
 from cpfls_cli.report.numbers import number, plain
 from cpfls_cli.trajectory.legs import Leg
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory
@@ -48,9 +48,10 @@ def answer(trajectory: Source[TrajectoryRecord], index: int = 1) -> Iterator[Blo
         yield from _excited_blocks(record.excited)
     if record.run is not None:
         yield from _runs_blocks(record.run)
-    yield _peaks(f"peaks-{index}", trajectory)
+    peaks, alone = _peaks(f"peaks-{index}", trajectory), not (record.question or record.excited or record.run)
+    yield peaks if alone else Folded("largest derivatives", [peaks], shown=True)
     if record.leg is not None and any(record.leg.limited_by):
-        yield _moves(f"legs-{index}", trajectory.label, record.leg)
+        yield Folded("moves under limits", [_moves(f"legs-{index}", trajectory.label, record.leg)], shown=True)
 
 
 def _runs_blocks(runs: RunsGroup) -> Iterator[Block]:
@@ -61,11 +62,12 @@ def _runs_blocks(runs: RunsGroup) -> Iterator[Block]:
         f"{plain(between)} s between two to come back to the start and settle, {plain(runs.end[-1])} s "
         f"({runs.end[-1] / _MINUTE:.1f} min) in all. Runs begin at {_times(runs.begin)} s."
     )
-    yield Text(
+    why = Text(
         "What every run shows again was asked for by the path; what differs between them is gusts and noise. The other "
         "runs know nothing of the gusts of this one, so each is an instrument for the others: it tells the vehicle "
         "from the loop."
     )
+    yield Folded("why to repeat a path", [why], shown=True)
 
 
 def _times(begins: Array) -> str:
@@ -165,7 +167,7 @@ def violation_sentence(violation: RotorViolation, time: Array) -> str:
     """Say what a rotor was asked for that it cannot do."""
     start, end = time[violation.first], time[violation.last]
     return (
-        f"rotor {violation.rotor + 1}: {violation.kind} asked for at {_samples(violation.count)} from {start:.2f} s to "
+        f"M{violation.rotor + 1}: {violation.kind} asked for at {_samples(violation.count)} from {start:.2f} s to "
         f"{end:.2f} s (worst squared speed {violation.worst:.6g} rad^2/s^2)"
     )
 

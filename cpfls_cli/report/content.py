@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
 from cpfls_cli.arrays import Array
@@ -63,6 +63,8 @@ class Table:
         Columns that are aligned left; all others hold numbers.
     sentences : frozenset of int
         Columns of long text, which is broken into lines.
+    legend : str
+        What its columns mean: behind the caption on a page, on a terminal on request.
     """
 
     name: str
@@ -71,7 +73,22 @@ class Table:
     rows: Sequence[Sequence[str | Cell]]
     words: frozenset[int] = frozenset({0})
     sentences: frozenset[int] = frozenset()
+    legend: str = ""
     kind: ClassVar[str] = "table"
+
+    @property
+    def explained(self) -> str:
+        """The caption with the legend."""
+        return f"{self.caption} {self.legend}".strip()
+
+    def part(self, name: str, *columns: int) -> Table:
+        """Take some of its columns, without a caption."""
+        header, rows = ([self.header[each] for each in columns], [[row[each] for each in columns] for row in self.rows])
+        words, sentences = (
+            frozenset(new for new, old in enumerate(columns) if old in chosen)
+            for chosen in (self.words, self.sentences)
+        )
+        return Table(name, "", header, rows, words, sentences)
 
     @property
     def cells(self) -> list[list[Cell]]:
@@ -203,6 +220,13 @@ class Box:
 
 
 Block = Box | Text | Facts | Table | Plot | Listing | Folded | Heading
+
+
+def in_short(box: Box, sentences: int, rest: str) -> Iterator[Block]:
+    """Keep the first sentences of a box, and fold the others away in words that say what they are."""
+    yield replace(box, sentences=box.sentences[:sentences])
+    if len(box.sentences) > sentences:
+        yield Folded(rest, [Text(each) for each in box.sentences[sentences:]], shown=True)
 
 
 def unfolded(blocks: Iterable[Block]) -> Iterator[Block]:

@@ -56,7 +56,7 @@ def _table(table: Table) -> dict[str, Any]:
     return {
         "kind": table.kind,
         "name": table.name,
-        "caption": table.caption,
+        "caption": table.explained,
         "header": list(table.header),
         "rows": [[cell.text for cell in line] for line in cells],
         "marked": marked,

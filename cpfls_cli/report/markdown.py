@@ -50,7 +50,7 @@ def _block(block: Block) -> Iterator[str]:
 
 
 def _table(table: Table) -> Iterator[str]:
-    yield f'<a id="{table.name}"></a>{_plain(table.caption)}'
+    yield f'<a id="{table.name}"></a>{_plain(table.explained)}'
     rules = [":--" if column in table.words else "--:" for column in range(len(table.header))]
     rows = [[_marked(cell.text, cell.tone) for cell in row] for row in table.cells]
     yield "\n".join(f"| {' | '.join(row)} |" for row in [list(map(_plain, table.header)), rules, *rows])

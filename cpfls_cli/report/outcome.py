@@ -13,6 +13,9 @@ from cpfls_cli.report.content import Block, Text
 if TYPE_CHECKING:
     from cpfls_cli.artifacts.job import Job
 
+Command = Sequence[str | Path]
+"""Words of a command line."""
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -26,14 +29,14 @@ class Outcome:
         For people, on standard output; texts of tone ``warning`` go to standard error.
     exit_code : int
         Not 0 where the work was stopped.
-    next : tuple of sequences of str or Path
-        Commands to go on with, word by word, with the names of this run.
+    next : tuple of Command
+        To go on with, with the names of this run.
     """
 
     summary: Mapping[str, Any]
     blocks: tuple[Block, ...] = ()
     exit_code: int = 0
-    next: tuple[Sequence[str | Path], ...] = ()
+    next: tuple[Command, ...] = ()
 
 
 def nothing_written(job: Job) -> Outcome:

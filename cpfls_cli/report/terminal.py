@@ -52,7 +52,7 @@ def terminal_lines(
                     drawn.add_row(_rich(visible(term)), _rich(visible(value)))
                 yield from _printed(drawn, width, colour)
             case Table():
-                yield from _table(block, width, colour)
+                yield from _table(block, width, colour, whole=whole)
             case Listing():
                 yield from visible(block.text.rstrip()).split("\n")
             case Folded() if whole:
@@ -82,40 +82,70 @@ def _broken(text: str, width: int | None, indent: str = "") -> list[str]:
     )
 
 
-def _table(table: Table, width: int | None, colour: bool) -> Iterator[str]:
+def _table(table: Table, width: int | None, colour: bool, *, whole: bool) -> Iterator[str]:
     if table.caption:
-        yield from _broken(table.caption, width)
-    from rich.text import Text as RichText
-
-    lines = _printed(_drawn(table, width is None, colour), width, colour)
-    widest = max((RichText.from_ansi(line).cell_len for line in lines), default=0)
-    if width is not None and widest > width:
+        yield from _broken(table.explained if whole else table.caption, width)
+    lines = _printed(_drawn(table, colour, unbroken=width is None), width, colour)
+    if width is None and _widest(lines) > _WIDEST and table.sentences:
+        excess = _widest(lines) - _WIDEST
+        lines = _printed(_drawn(table, colour, unbroken=True, excess=excess), width, colour)
+    if width is not None and _widest(lines) > width:
         # No word is broken; what that takes beyond the width, other columns have to give.
-        lines = _printed(_drawn(table, False, colour), 2 * width - widest, colour)
-    if width is None and widest > _WIDEST and table.sentences:
-        lines = _printed(_drawn(table, True, colour, widest - _WIDEST), width, colour)
+        lines = _printed(_drawn(table, colour), 2 * width - _widest(lines), colour)
+    if width is not None and _widest(lines) > width:
+        lines = _printed(_drawn(table, colour, words=False), width, colour)
     yield from lines
 
 
-def _drawn(table: Table, whole: bool, colour: bool, excess: int = 0) -> RichTable:
-    """Lay out a table, its numbers and words on one line if `whole`; columns of sentences give what is in excess."""
+def _widest(lines: Iterable[str]) -> int:
+    from rich.text import Text as RichText
+
+    return max((RichText.from_ansi(line).cell_len for line in lines), default=0)
+
+
+def _drawn(table: Table, colour: bool, *, unbroken: bool = False, words: bool = True, excess: int = 0) -> RichTable:
+    """Lay out a table.
+
+    Parameters
+    ----------
+    unbroken : bool
+        Whether all but sentences stand on one line; numbers always do.
+    words : bool
+        Whether words stay whole.
+    excess : int
+        Columns by which it is too wide, which its sentences give.
+    """
     drawn = _grid(colour, header=any(table.header))
     cells = [[visible(cell.text) for cell in row] for row in table.cells]
     texts = [[visible(title), *(row[column] for row in cells)] for column, title in enumerate(table.header)]
-    long = {column: max(map(len, texts[column])) for column in table.sentences}
-    for column, (title, *_) in enumerate(texts):
-        word = max((len(word) for text in texts[column] for word in text.split()), default=0)
-        share = excess * long.get(column, 0) // max(sum(long.values()), 1)
+    long = _narrowed(texts, table.sentences, excess)
+    for column, (title, *entries) in enumerate(texts):
+        left = column in table.words or column in table.sentences
+        parts = [title, *entries] if left else [title]
+        least = max((len(word) for part in parts for word in part.split()), default=0)
+        least = least if left else max(least, *map(len, entries), 0)
         drawn.add_column(
             _rich(title),
-            justify="left" if column in table.words or column in table.sentences else "right",
-            no_wrap=whole and column not in long,
-            min_width=word,
-            max_width=max(long[column] - share, word) if excess and column in long else None,
+            justify="left" if left else "right",
+            no_wrap=unbroken and column not in long,
+            overflow="fold",
+            min_width=least if words or not left else None,
+            max_width=long.get(column) if excess else None,
         )
     for row in table.cells:
         drawn.add_row(*(_rich(visible(cell.text), _STYLES[cell.tone] if colour else "") for cell in row))
     return drawn
+
+
+def _narrowed(texts: Sequence[Sequence[str]], sentences: Iterable[int], excess: int) -> dict[int, int]:
+    """Give the widths of columns of sentences from which some is taken, always of the widest, down to its words."""
+    widths = {column: max(map(len, texts[column])) for column in sentences}
+    least = {column: max(len(word) for text in texts[column] for word in (text.split() or [""])) for column in widths}
+    for _ in range(excess):
+        wide = [column for column in widths if widths[column] > least[column]]
+        if wide:
+            widths[max(wide, key=widths.__getitem__)] -= 1
+    return widths
 
 
 def _rich(text: str, style: str = "") -> RichText:

@@ -37,9 +37,10 @@ def imported(cpfls, tmp_path):
         np.savetxt(log, rows, delimiter=",", header=",".join(names), comments="")
         mapped = ", ".join(SIGNALS[signal] for signal in signals)
         config.write_text(f"import: {{signals: {{{mapped}}}, torque_source: {source}}}\n{VEHICLE}")
-        result = cpfls("import", config, log, "-o", flight, "--force")
+        result = cpfls("import", config, log, "-o", flight, "--force", "-v")
         assert result.exit_code == 0, result.stderr
-        notes = [line.removeprefix("cpfls: note: ") for line in result.stderr.splitlines()]
+        begin = "cpfls: note: "
+        notes = [line.removeprefix(begin) for line in result.stderr.splitlines() if line.startswith(begin)]
         return result.stdout.splitlines(), notes, flight
 
     return call
@@ -111,9 +112,9 @@ def notes_of(cpfls, tmp_path):
         np.savetxt(log, table, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
         mapped = ", ".join(SIGNALS[signal] for signal in signals)
         config.write_text(f"import: {{signals: {{{mapped}}}, torque_source: rotor-command}}\n{VEHICLE}")
-        result = cpfls("import", config, log, "-o", flight, "--force", *words)
+        result = cpfls("import", config, log, "-o", flight, "--force", "-v", *words)
         assert result.exit_code == 0, result.stderr
-        return result.stderr.splitlines(), flight
+        return [line for line in result.stderr.splitlines() if line.startswith("cpfls: note: ")], flight
 
     return call
 

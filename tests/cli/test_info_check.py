@@ -37,7 +37,7 @@ def test_info_tells_origin_and_content(cpfls, pipeline, stage):
         for name, entry in summary["datasets"].items():
             assert entry["shape"] == list(file[name].shape)
             assert entry["units"] == file[name].attrs["units"]
-    lines = cpfls("info", path).stdout
+    lines = cpfls("info", path, "-v").stdout
     assert all(name in lines for name in summary["datasets"])
 
 

@@ -57,16 +57,18 @@ def test_the_gap_workflow_takes_it_as_well(log_study, tmp_path):
 
 @pytest.mark.usefixtures("fake_format")
 def test_messages_name_a_new_format(refuse, log_study, tmp_path):
-    csv, other = write(tmp_path / "log.csv"), tmp_path / "log.txt"
+    text, other = tmp_path / "log.fake", tmp_path / "log.txt"
     words = ("-o", tmp_path / "flight.h5")
-    assert refuse("import", log_study, csv, *words) == [
-        f"{csv}: seems to hold fakes, not what its name ends in; rename it to end in .fake"
+    text.write_text("t,roll\n0,1\n")
+    assert refuse("import", log_study, text, *words) == [
+        f"{text}: seems to hold CSV, not what its name ends in; rename it to end in .csv"
     ]
     assert refuse("import", log_study, other, *words) == [f"{other}: no such file"]
     other.write_text("t\n")
     assert refuse("import", log_study, other, *words) == [
         f"{other}: not a log: its name must end in one of .csv, .csv.gz, .parquet, .ulg, .bin, .bbl, .bfl, .db3, .mcap,"
-        " .h5, .hdf5, .mat, .fake, or it must be a blackbox log or a log of a Crazyflie's uSD card"
+        " .h5, .hdf5, .mat, .fake, or it must hold one of Parquet, ULog, ArduPilot DataFlash, Betaflight blackbox,"
+        " Crazyflie uSD, ROS 2 bag, HDF5, MATLAB, Fake"
     ]
     assert formats.suffixes_in_words().endswith(", .h5, .hdf5, .mat or .fake")
     assert formats.formats_in_words().endswith(", MATLAB, Fake")

@@ -152,7 +152,7 @@ def test_the_table_holds_what_json_tells(told, folder):
 
 
 def test_the_answer_begins_with_what_the_flights_tell(cpfls, folder, tmp_path):
-    result = cpfls("response", folder / "study.yaml", folder / "light.csv", "-o", tmp_path / "r.h5")
+    result = cpfls("response", folder / "study.yaml", folder / "light.csv", "-o", tmp_path / "r.h5", "-v")
     assert result.exit_code == 0
     first = " ".join(result.stdout.split())
     assert first.startswith("RESPONSE: The vehicle of the config: not judged: these flights show the loop")

@@ -117,7 +117,7 @@ def test_an_import_tells_in_json_and_in_lines_what_it_read_and_what_it_did_about
     assert (summary["lowpass_hz"], summary["spikes"], summary["suspected_spikes"]) == (None, {}, {"pitch": 1})
     assert {"samples_read", "missing", "saturated", "delay_s", "delay_r2", "signals"} <= set(summary)
     assert "1 suspected spike in column pitch" in result.stderr
-    repaired = cpfls("import", config, log, "-o", tmp_path / "f.h5", "--set", "import.spike_deviations=10")
+    repaired = cpfls("import", config, log, "-o", tmp_path / "f.h5", "--set", "import.spike_deviations=10", "-v")
     assert [line.rsplit(maxsplit=1) for line in repaired.stdout.splitlines()[-3:]] == [
         ["outside import.crop_s: rows dropped", "24"],
         ["gaps in the time stamps, up to 0.08 s: interpolated", "1"],

@@ -80,9 +80,9 @@ def _describe(vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
     other = {rotor: pair[1 - pair.index(rotor)] for pair in opposite_pairs(vehicle) for rotor in pair}
     if len(other) != len(loss):
         weak = loss.index(min(loss))
-        return f"Rotor {weak + 1} pulls least, {-100 * loss[weak]:.2g} % less than modelled." if any(loss) else ""
+        return f"M{weak + 1} pulls least, {-100 * loss[weak]:.2g} % less than modelled." if any(loss) else ""
     return " ".join(
-        f"Rotor {weak + 1} pulls {-100 * loss[weak]:.2g} % less than modelled, or rotor {other[weak] + 1} as much more."
+        f"M{weak + 1} pulls {-100 * loss[weak]:.2g} % less than modelled, or M{other[weak] + 1} as much more."
         for weak in range(len(loss))
         if loss[weak] < 0
     )

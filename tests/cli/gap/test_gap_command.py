@@ -23,7 +23,7 @@ def found(offset_answer):
 def again(cpfls, gap_config, shifted, tmp_path_factory):
     """The same again, for people."""
     folder = tmp_path_factory.mktemp("again") / "gap"
-    result = cpfls("gap", gap_config, *shifted, "-o", folder)
+    result = cpfls("gap", gap_config, *shifted, "-o", folder, "-v")
     assert result.exit_code == 0, result.stderr
     return SimpleNamespace(folder=folder, stdout=result.stdout)
 
@@ -125,7 +125,7 @@ def test_one_flight_is_split_in_time(cpfls, gap_config, shifted, tmp_path):
         assert file["signals/time"][1600] == pytest.approx(16.0)
 
 
-def test_people_read_the_verdict_first(again):
+def test_people_read_the_verdict_first(again, shifted):
     lines = again.stdout.splitlines()
     assert lines[0] == "NAMED: What the model misses is offset of the centre of mass."
     assert lines[1].startswith("  Offset of the centre of mass (com_offset): c_x = 0.0079")
@@ -135,11 +135,15 @@ def test_people_read_the_verdict_first(again):
         r"flight_3\.csv; also torque x\.",
         lines[3],
     )
-    rows = [line for line in lines[5:12] if line.startswith(("gap, ", "playback, "))]
-    assert re.match(r"gap, torque about x \(roll\) +N\sm +0\.\d+ +0\.0\d+ +0\.0\d+ +\d+ → [01]\.\d+ floors", rows[0])
+    rows = [line for line in lines[5:15] if line.startswith(("gap, ", "playback, "))]
+    assert re.match(r"gap, roll torque +N\sm +0\.\d+ +0\.0\d+ +0\.0\d+ +\d+ → [01]\.\d+ floors", rows[0])
     assert re.match(r"playback, body rate +rad/s +0\.\d+ +0\.0\d+ +0\.\d+ +better than “nothing moves”", rows[2])
     assert any(line.startswith("The gap in the torque about y (pitch) follows thrust") for line in lines)
-    assert lines[-1].endswith("extended.h5: the model with offset of the centre of mass.")
+    assert any(line.endswith("extended.h5: the model with offset of the centre of mass.") for line in lines)
+    folder, words = again.folder, lines[-1].split()
+    assert lines[-2] == "next:"
+    assert words[:2] == ["cpfls", "replay"]
+    assert words[3:5] == [str(folder / "extended.h5"), str(shifted[0])]
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -57,7 +57,7 @@ def found(cpfls, tmp_path_factory):
     study = folder / "study.yaml"
     study.write_text(yaml.safe_dump(config()))
     with undrawn():
-        result = cpfls("gap", study, *paths, "-o", folder / "gap")
+        result = cpfls("gap", study, *paths, "-o", folder / "gap", "-v")
     assert result.exit_code == 0, result.stderr
     summary = json.loads((folder / "gap" / "gap.json").read_text())
     return SimpleNamespace(folder=folder / "gap", stdout=result.stdout, summary=summary)

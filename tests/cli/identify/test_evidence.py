@@ -35,7 +35,7 @@ def validated(cpfls, study, pipeline, tmp_path_factory):
     """A model of a flight that is judged on its own rest, and what the command printed."""
     output = tmp_path_factory.mktemp("validated") / "model.h5"
     words = ("identify", study, pipeline.flight, "--set", "identification.training_share=0.6", "-o", output)
-    text, summary = cpfls(*words), cpfls(*words, "--force", "--json")
+    text, summary = cpfls(*words, "-v"), cpfls(*words, "--force", "--json")
     assert text.exit_code == summary.exit_code == 0, text.stderr
     return output, text.stdout, json.loads(summary.stdout)
 
@@ -66,7 +66,7 @@ def test_the_verdict_is_printed_with_its_reasons(validated):
     assert f"\n  {WORDS[verdict['label']]}.\n  Region: {verdict['region']}.\n" in text
     assert summary["trust"] == verdict["label"]
     for reason in verdict["reasons"]:
-        assert f"\n  {SIGNS[reason['speaks']]}: {sentence(reason['text'])}\n" in text
+        assert f"{SIGNS[reason['speaks']]}: {sentence(reason['text'])}" in map(str.strip, text.splitlines())
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -78,7 +78,9 @@ def test_the_report_shows_the_same_scores_and_the_same_verdict(validated, cpfls,
     blocks = {block.get("name", block["kind"]): block for section in sections for block in section["blocks"]}
     lines = [" ".join(line.split()) for line in text.splitlines()]
     for row in blocks["headline-1"]["rows"]:
-        assert " ".join(" ".join(row).split()) in lines
+        # A screen has no room for all columns beside each other.
+        for part in (row[:5], [*row[:2], *row[5:]]):
+            assert " ".join(" ".join(part).split()) in lines
     box = blocks["box"]
     assert f"{box['label']}: {box['title']}" in lines
     assert all(sentence in lines for sentence in box["sentences"])
@@ -142,7 +144,7 @@ def test_an_interrupt_while_evidence_is_gathered_leaves_the_whole_model(
             plain["vehicle/inertia_functions/coefficients"][()], whole["vehicle/inertia_functions/coefficients"][()]
         )
     monkeypatch.undo()
-    assert result.stderr.rstrip().endswith("the same command with --resume judges it")
+    assert "the same command with --resume judges it\n" in result.stderr
     assert cpfls(*words, "--resume").exit_code == 0
     assert output.read_bytes() == validated[0].read_bytes()
     assert [path.name for path in tmp_path.iterdir()] == ["model.h5"]

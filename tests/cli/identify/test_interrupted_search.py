@@ -172,9 +172,9 @@ def test_stalled_search_ends_converged(cpfls, words, tmp_path):
     summary = json.loads(result.stdout)
     assert (summary["stop_reason"], summary["complete"], summary["generations"] < 6) == ("converged", True, True)
     assert names(tmp_path) == ["model.h5"]
-    lines = cpfls(*words, "-o", tmp_path / "told.h5", *stall).stdout.splitlines()
+    lines = cpfls(*words, "-o", tmp_path / "told.h5", *stall, "-v").stdout.splitlines()
     assert (
         f"converged after generation {summary['generations']}: no objective improved enough "
         "(identification.stall_generations = 1)"
     ) in lines
-    assert "converged" not in cpfls(*words, "-o", tmp_path / "whole.h5").stdout
+    assert "converged" not in cpfls(*words, "-o", tmp_path / "whole.h5", "-v").stdout

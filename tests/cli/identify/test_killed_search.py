@@ -129,7 +129,7 @@ def test_first_signal_stops_the_search_and_a_second_one_the_program(program, who
     def signals(count):
         return at_call(3, engine, "reinsert", lambda: [os.kill(os.getpid(), number) for _ in range(count)])
 
-    once = program(tmp_path / "one.h5", patch=signals(1)).wait()
+    once = program(tmp_path / "one.h5", "-v", patch=signals(1)).wait()
     assert once.returncode == code, once.stderr
     assert "113 parameters from 60 samples" in once.stdout
     assert names(tmp_path) == ["one.h5", "one.h5.checkpoint"]

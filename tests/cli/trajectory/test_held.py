@@ -95,7 +95,7 @@ def test_no_autopilot_flies_a_held_vehicle(cpfls, refuse, tmp_path, study):
 def test_turns_that_no_rotor_gives_name_the_torque_to_limit(refuse, tmp_path, study):
     heavy = ("--set", "vehicle.inertia_kg_m2=[6, 6, 12]")
     messages = refuse("trajectory", study(), "-o", tmp_path / "t.h5", *heavy, code=1)
-    assert any("rotor 1: above the limit asked for" in message for message in messages)
+    assert any("M1: above the limit asked for" in message for message in messages)
     assert (
         "trajectory.rotation.torque_max_n_m (about one axis at a time the rotors give up to 36.4 36.5 5.4 N m)"
         in messages[-1]

@@ -61,7 +61,7 @@ def test_runs_flown_in_closed_loop_are_found_equal(cpfls, config, mission, tmp_p
 
 
 def test_a_repeated_path_says_how_long_it_takes_and_why(cpfls, config, tmp_path):
-    result = cpfls("trajectory", config, "--repeat", "3", "-o", tmp_path / "m.h5")
+    result = cpfls("trajectory", config, "--repeat", "3", "-o", tmp_path / "m.h5", "-v")
     assert result.exit_code == 0, result.output
     assert "The path is flown 3 times, each run the same from rest to rest: 54.86 s each" in result.stdout
     assert "each is an instrument for the others" in result.stdout

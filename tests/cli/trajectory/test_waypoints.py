@@ -49,7 +49,7 @@ def test_every_waypoint_is_reached_at_rest(cpfls, tmp_path, config, points):
 
 
 def test_limits_hold_and_are_named(cpfls, tmp_path, config, points):
-    result = cpfls("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", *LIMITED, *FREE)
+    result = cpfls("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", "-v", *LIMITED, *FREE)
     assert result.exit_code == 0, result.output
     assert re.search(r"^1 +9 +[\d.]+ +10 +.*pop", result.stdout, re.MULTILINE)
     with h5py.File(tmp_path / "t.h5") as file:
@@ -168,7 +168,7 @@ def test_more_than_the_rotors_give_is_refused_with_time_and_place(refuse, tmp_pa
     messages = refuse("trajectory", config, "-o", tmp_path / "t.h5", *weak, code=1)
     assert messages[0].startswith("thrust of up to 66.51")
     assert " N at 4.00 s, at x y z = " in messages[0]
-    assert "rotor 1: above the limit asked for at " in messages[1]
+    assert "M1: above the limit asked for at " in messages[1]
     assert messages[-1].endswith("set trajectory.infeasible: report")
 
 
@@ -238,7 +238,7 @@ def test_a_dry_run_finds_what_the_plan_would(refuse, tmp_path, config):
 
 def test_a_given_period_that_decides_alone_is_named(cpfls, tmp_path, config):
     loose = ("--set", "trajectory.limits.pop_m_s6=100", "--set", "trajectory.period_s=1")
-    result = cpfls("trajectory", config, "-o", tmp_path / "t.h5", *loose)
+    result = cpfls("trajectory", config, "-o", tmp_path / "t.h5", "-v", *loose)
     assert re.search(r"^1 +0 +16 +64 +period$", result.stdout, re.MULTILINE)
     assert "integral of |jerk| by move, m/s^2: 8, 8, 8" in result.stdout
 

@@ -18,10 +18,10 @@ def told(name, vehicle=None, **values):
 
 def test_weak_rotor_or_strong_opposite():
     said = told("rotor_mismatch", difference_1=(-0.05, 0.01), difference_2=(0.001, 0.01))
-    assert said == "Rotor 1 pulls 5 % less than modelled, or rotor 3 as much more."
+    assert said == "M1 pulls 5 % less than modelled, or M3 as much more."
     said = told("rotor_mismatch", difference_1=(0.05, 0.01), difference_2=(-0.12, 0.01))
-    assert "Rotor 3 pulls 5 % less than modelled, or rotor 1 as much more." in said
-    assert "Rotor 2 pulls 12 % less than modelled, or rotor 4 as much more." in said
+    assert "M3 pulls 5 % less than modelled, or M1 as much more." in said
+    assert "M2 pulls 12 % less than modelled, or M4 as much more." in said
 
 
 def test_nothing_sure_says_nothing_more():
@@ -33,7 +33,7 @@ def test_vehicle_without_opposite_pairs_names_the_weakest_rotor():
     angles = 2 * np.pi * np.arange(6) / 6
     hubs = [(0.3 * float(np.cos(a)), 0.3 * float(np.sin(a)), 0.0) for a in angles]
     vehicle = VehicleSettings(rotors=tuple(RotorSettings(position_m=h, spin=(-1) ** n) for n, h in enumerate(hubs)))
-    assert told("rotor_mismatch", vehicle, difference_1=(-0.1, 0.01)).startswith("Rotor 1 pulls least")
+    assert told("rotor_mismatch", vehicle, difference_1=(-0.1, 0.01)).startswith("M1 pulls least")
 
 
 @pytest.mark.parametrize(

@@ -155,25 +155,25 @@ def test_where_nothing_is_above_the_noise_nothing_is_located():
     assert facts["How sure"] == (
         "The largest gap is 1.4 noise floors; not ruled out, as listed below: 1 of the catalogue."
     )
-    assert [row for row in rows if row.startswith("gap")] == ["gap, force along y (left)"]
+    assert [row for row in rows if row.startswith("gap")] == ["gap, force y"]
     assert "Within the noise: torque x, torque y, torque z, force x, force z." in table.caption
     assert record.summary["where"] is None
 
 
 def test_the_gap_stands_before_and_after_beside_the_noise():
     _, _, rows, table, _ = screen(diagnosis())
-    assert rows["gap, torque about x (roll)"] == [
+    assert rows["gap, roll torque"] == [
         "N\N{NO-BREAK SPACE}m",
         "0.494",
         "0.0136",
         "0.0123",
         "40 → 1.1 floors",
     ]
-    assert "gap, torque about z (yaw)" not in rows
+    assert "gap, yaw torque" not in rows
     assert "Within the noise: torque z." in table.caption
     grew = {"gap/after_floors": np.array([60.0, 0.01, 0.9, 0.9, 0.8, 1.2])}
     _, _, rows, table, _ = screen(diagnosis(**grew))
-    assert rows["gap, torque about x (roll)"][-1] == "40 → 60 floors, worse"
+    assert rows["gap, roll torque"][-1] == "40 → 60 floors, worse"
     assert [cell.tone for cell in table.cells[0]][-1] == "warning"
 
 

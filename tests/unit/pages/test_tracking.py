@@ -8,7 +8,7 @@ from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.config.study import ReportSettings
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.tracking import tracking_section
-from cpfls_cli.report.content import Cell, Plot, Table, Text
+from cpfls_cli.report.content import Cell, Plot, Table, Text, unfolded
 from cpfls_cli.report.numbers import number
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -70,9 +70,9 @@ def test_the_model_is_praised_only_where_it_is_no_worse(model, tones):
 
 
 def test_the_table_holds_degrees_by_controller():
-    (table,) = (block for block in sections([0.5, 1.0, 8.0, 0.4]).blocks if isinstance(block, Table))
+    table, others = (block for block in unfolded(sections([0.5, 1.0, 8.0, 0.4]).blocks) if isinstance(block, Table))
     assert [row[0] for row in table.rows] == ["identified model", "rigid body", "PD alone", "exact vehicle"]
-    assert table.rows[2][1:7] == ["8.00"] * 6
+    assert table.rows[2][1:] == others.rows[2][1:4] == ["8.00"] * 3
     assert "clipped" not in table.caption
 
 

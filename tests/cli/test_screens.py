@@ -1,0 +1,151 @@
+"""What each command shows on a terminal of 80 columns and 24 lines, and how wide its tables are where there is none."""
+
+import shlex
+import shutil
+from types import SimpleNamespace
+from unittest.mock import patch
+
+import pytest
+import typer
+
+from cpfls_cli.cli import terminal
+from cpfls_cli.cli.app import app
+from cpfls_cli.report.content import Table, unfolded
+from cpfls_cli.report.terminal import terminal_lines
+from tests.builders.shifted_flights import CONFIG, OFFSET, flight_table, save
+from tests.builders.studies import VEHICLE
+from tests.builders.unknown_logs import flat_log, flight, write_csv
+
+COLUMNS, LINES, ANSWER, WIDEST = 80, 24, 15, 100
+WHOLE = ("config",)
+"""Prints a file, to be written into one."""
+
+
+def rows(text):
+    """Count lines as a terminal breaks them."""
+    return sum(max(1, -(-len(line) // COLUMNS)) for line in text.splitlines())
+
+
+@pytest.fixture(scope="session")
+def screens(cpfls, pipeline, study, tmp_path_factory):
+    """Run every command as on a terminal; give what it showed, and its outcome, by the name of the run."""
+    folder = tmp_path_factory.mktemp("screens")
+    shown = {}
+
+    def show(name, command, *words, output=None):
+        options = () if output is None else ("-o", output)
+        told = []
+
+        def tell(outcome, common):
+            told.append(outcome)
+            terminal.tell(outcome, common)
+
+        with (
+            patch("cpfls_cli.cli.app.tell", tell),
+            patch.object(terminal, "_columns", lambda: COLUMNS),
+            pytest.MonkeyPatch.context() as environment,
+        ):
+            environment.setenv("NO_COLOR", "1")
+            environment.chdir(folder)
+            result = cpfls(command, *words, *options)
+        assert told, result.output
+        shown[name] = SimpleNamespace(command=command, result=result, outcome=told[0])
+
+    for source in (study, *pipeline.paths.values()):
+        # Names as short as people's: a command is as long as the names in it.
+        shutil.copy(source, folder)
+    _of_torque(show)
+    _of_gaps(show, folder)
+    _of_logs(show, folder)
+    return shown
+
+
+def _of_torque(show):
+    quick = ("--set", "trajectory.sample_time_s=0.02")
+    show("trajectory", "trajectory", "tiny.yaml", output="path.h5")
+    excited = ("--hover", "20", "--excite", "roll,pitch", "--repeat", "2")
+    show("mission", "trajectory", "tiny.yaml", *excited, *quick, output="mission.h5")
+    show("simulate", "simulate", "tiny.yaml", "path.h5", output="other.h5")
+    show("tracking", "simulate", "tiny.yaml", "path.h5", "--model", "model.h5", output="tracked.h5")
+    show("reduce", "reduce", "tiny.yaml", "flight.h5", output="few.h5")
+    show("identify", "identify", "tiny.yaml", "flight.h5", "--validate", "other.h5", output="found.h5")
+    show("sweep", "sweep", "tiny.yaml", "flight.h5", "--set", "sweep.seeds=2", output="sweep.h5")
+    show("response", "response", "tiny.yaml", "flight.h5", output="response.h5")
+    show("predict", "predict", "tiny.yaml", "model.h5", "flight.h5", output="predicted.h5")
+    show("replay", "replay", "tiny.yaml", "model.h5", "flight.h5", output="replay.h5")
+    show("report", "report", "tiny.yaml", "model.h5", output="report.md")
+    show("export", "export", "model.h5", output="model.json")
+    for name in ("flight", "selection"):
+        show(f"info {name}", "info", f"{name}.h5")
+    show("check", "check", "model.h5")
+    show("effects", "effects")
+    for effect in ("payload", "flexible_mount", "linear_damping"):
+        show(f"effect {effect}", "effects", effect)
+
+
+def _of_gaps(show, folder):
+    config = folder / "gap.yaml"
+    config.write_text(CONFIG + VEHICLE)
+    flights = [save(folder / f"flight_{number}.csv", flight_table(number, OFFSET)) for number in (1, 2, 3)]
+    exact = save(folder / "exact.csv", flight_table(4))
+    show("compare", "compare", "gap.yaml", *(each.name for each in flights), output="disagreement.h5")
+    show("diagnose", "diagnose", "gap.yaml", "disagreement.h5", output="diagnosis.h5")
+    show("extend", "extend", "gap.yaml", "diagnosis.h5", output="extended.h5")
+    show("gap", "gap", "gap.yaml", *(each.name for each in flights), output="gap")
+    show("gap of nothing", "gap", "gap.yaml", exact.name, output="nothing")
+    show("info diagnosis", "info", "diagnosis.h5")
+    show("response of a model", "response", "gap.yaml", flights[0].name, "--model", "extended.h5", output="answer.h5")
+
+
+def _of_logs(show, folder):
+    logs = [write_csv(folder / f"log{number}.csv", flat_log(flight(seconds=20.0, seed=number))) for number in (1, 2, 3)]
+    names = [log.name for log in logs]
+    show("init", "init", *names, "--mass", "0.8", "--arm", "0.16", output="found.yaml")
+    show("init of one", "init", names[0], output="asked.yaml")
+    show("import", "import", "found.yaml", names[0], output="log1.h5")
+
+
+NAMES = (
+    *("trajectory", "mission", "simulate", "tracking", "reduce", "identify", "sweep", "response"),
+    *("info flight", "info selection", "info diagnosis", "check", "effects", "effect payload", "effect flexible_mount"),
+    *("effect linear_damping", "compare", "diagnose", "extend", "gap", "gap of nothing", "response of a model"),
+    *("init", "init of one", "import"),
+)
+"""Runs by name."""
+OF_MODELS = ("predict", "replay", "report", "export")
+"""Of these the words are held beside their flights."""
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_first_screen_holds_the_answer(screens, name):
+    result, outcome = screens[name].result, screens[name].outcome
+    assert rows(result.stdout) + rows(result.stderr) <= LINES, result.output
+    answer, *_ = result.stdout.partition("\nmore with -v: ")
+    assert rows(answer) <= ANSWER, result.stdout
+    assert max(map(len, result.stdout.splitlines())) <= COLUMNS or outcome.next
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_next_command_is_whole(screens, name):
+    result, outcome = screens[name].result, screens[name].outcome
+    printed = [line.strip() for line in result.stdout.partition("next:\n")[2].splitlines() if line.startswith("  ")]
+    assert [shlex.split(line) for line in printed] == [[str(word) for word in command] for command in outcome.next]
+    assert printed
+    assert all(line.startswith("cpfls ") and "CONFIG" not in line and "FLIGHT" not in line for line in printed)
+
+
+@pytest.mark.parametrize("name", [*NAMES, *OF_MODELS])
+def test_no_table_is_wider_than_people_read(screens, name):
+    tables = [block for block in unfolded(screens[name].outcome.blocks) if isinstance(block, Table)]
+    lines = [line for table in tables for line in terminal_lines([_without_caption(table)])]
+    assert max(map(len, lines), default=0) <= WIDEST
+
+
+def _without_caption(table):
+    return Table(table.name, "", table.header, table.rows, table.words, table.sentences)
+
+
+def test_every_command_is_shown(screens):
+    commands = set(typer.main.get_command(app).commands)
+    assert {each.command for each in screens.values()} >= commands - {*WHOLE, "vehicle", "verify-export"}
+    assert set(screens) == {*NAMES, *OF_MODELS}
