@@ -282,8 +282,8 @@ class Evaluated:
 
     def parameters(self, flight: PlaybackFlight, samples: IntArray, terms: Array) -> Parameters:
         """Differentiate the weights over these steps, and the inertia, by each number."""
-        entries, weights, of_response = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((0, terms.shape[1]))], {}
-        first = [0]
+        entries, weights, first = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((0, terms.shape[1]))], [0]
+        of_response: dict[str, slice] = {}
         for number, derivative in zip(self.at.free.numbers, self.derivatives, strict=True):
             own = (self.at.table if derivative is None else derivative)[:, self.used.active]
             # The first term of the rotors is constant, so the response in time leaves it.

@@ -517,6 +517,17 @@ class Parameters(NamedTuple):
     moves: BoolArray
 
 
+NO_PARAMETERS = Parameters(
+    row=np.zeros(0, dtype=np.int64),
+    term=np.zeros(0, dtype=np.int64),
+    first=np.zeros(1, dtype=np.int64),
+    value=np.zeros((0, 0)),
+    inertia=np.zeros((0, 3, 3)),
+    moves=np.zeros(0, dtype=np.bool_),
+)
+"""For sums of the loss alone."""
+
+
 class Loss(NamedTuple):
     """How errors are weighed: ``sum over signals of weight delta^2 (sqrt(1 + |e|^2 / delta^2) - 1)``.
 
