@@ -72,7 +72,7 @@ def learned(
     for name in ("greedy", "everything") if baselines else ():
         judged = getattr(choice, name)
         clock = perf_counter()
-        fitted, _ = fitted_to_all(judged.structure, vehicle, training, used, judged.fits[0])
+        fitted, _ = fitted_to_all(judged.structure, vehicle, training, used, judged.fit)
         print(f"  {name} fitted to all in {perf_counter() - clock:.1f} s")
         models[f"{name}, {judged.numbers} numbers"] = fitted.model
     return models

@@ -165,14 +165,14 @@ class VehicleCheckpointRecord(Record):
     )
 
     structure: StructuresKeptGroup = group()
-    loss: Array = dataset("of the fit without each part of the flights", "structure", "part")
+    loss: Array = dataset("of the fit to all parts of the flights, and without each of them", "structure", "fit")
     values: Array = dataset("numbers of all fits, one fit after another", "fitted", units="SI")
-    hessian: Array = dataset("their curvatures by rows, one fit after another", "curvature")
+    hessian: Array = dataset("curvatures of the fits to all parts by rows, one fit after another", "curvature")
 
     @classmethod
     def of(cls, judged: Sequence[Judged]) -> Self:
         """Arrange the structures that were judged, at least one."""
-        fits = [fitted for each in judged for fitted in each.fits]
+        fits = [(each.fit, *each.without) for each in judged]
         return cls(
             structure=columns_of(
                 StructuresKeptGroup,
@@ -180,7 +180,7 @@ class VehicleCheckpointRecord(Record):
                 blocks=tuple(" ".join(each.structure.blocks) for each in judged),
                 rules=np.array([each.structure.rules for each in judged], dtype=np.int64),
             ),
-            loss=np.array([[fitted.loss for fitted in each.fits] for each in judged]),
-            values=np.concatenate([fitted.values for fitted in fits]),
-            hessian=np.concatenate([fitted.hessian.ravel() for fitted in fits]),
+            loss=np.array([[fitted.loss for fitted in own] for own in fits]),
+            values=np.concatenate([fitted.values for own in fits for fitted in own]),
+            hessian=np.concatenate([each.fit.hessian.ravel() for each in judged]),
         )

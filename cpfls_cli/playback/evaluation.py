@@ -282,22 +282,26 @@ class Evaluated:
 
     def parameters(self, flight: PlaybackFlight, samples: IntArray, terms: Array) -> Parameters:
         """Differentiate the weights over these steps, and the inertia, by each number."""
-        entries, values, first = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((len(samples), 0))], [0]
+        entries, weights, first = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((0, terms.shape[1]))], [0]
+        of_response: dict[str, slice] = {}
         for number, derivative in zip(self.at.free.numbers, self.derivatives, strict=True):
-            of_response = derivative is None
-            source = self.rotor_terms(flight, samples, number.name) if of_response else terms
-            weights = (self.at.table if derivative is None else derivative)[:, self.used.active]
+            own = (self.at.table if derivative is None else derivative)[:, self.used.active]
             # The first term of the rotors is constant, so the response in time leaves it.
-            places = np.argwhere(np.any(weights[:, :, 1 if of_response else 0 :], axis=2))
+            places = np.argwhere(np.any(own[:, :, 0 if derivative is not None else 1 :], axis=2))
             entries.append(places)
-            values.append(source @ weights[places[:, 0], places[:, 1]].T)
+            weights.append(own[places[:, 0], places[:, 1]])
             first.append(first[-1] + len(places))
-        joined = np.concatenate(entries)
+            if derivative is None:
+                of_response[number.name] = slice(*first[-2:])
+        joined, by_entry = np.concatenate(entries), np.concatenate(weights)
+        values = terms @ by_entry.T
+        for name, part in of_response.items():
+            values[:, part] = self.rotor_terms(flight, samples, name) @ by_entry[part].T
         return Parameters(
             np.ascontiguousarray(joined[:, 0]),
             np.ascontiguousarray(joined[:, 1]),
             np.array(first, dtype=np.int64),
-            np.ascontiguousarray(np.hstack(values)),
+            values,
             self.inertia_derivatives,
             np.asarray(np.any(self.inertia_derivatives, axis=(1, 2))),
         )

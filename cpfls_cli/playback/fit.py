@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -16,7 +18,7 @@ from cpfls_cli.gauss_newton import minimised
 from cpfls_cli.playback.evaluation import Evaluated
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers
-from cpfls_cli.playback.kernels import Loss, MeasuredMotion, errors_of_runs, sensitivities
+from cpfls_cli.playback.kernels import NO_PARAMETERS, Loss, MeasuredMotion, errors_of_runs, sensitivities
 from cpfls_cli.playback.model import VehicleModel
 
 _SIGNAL_WEIGHTS = (0.0, 0.3, 0.5, 1.0)
@@ -141,7 +143,7 @@ def loss_of(flight: PlaybackFlight, scale: Array) -> Loss:
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedNumbers:
     """Numbers fitted to windows.
 
     Attributes
@@ -149,25 +151,48 @@ class Fitted:
     values : array, shape (number,)
     loss : float
         Mean over windows, without the prior; about 1.1 for rates that stay.
-    hessian : array, shape (number, number)
-        Gauss-Newton, of the mean loss with the prior, in scales of the numbers.
     """
 
     free: JointNumbers
     values: Array
     loss: float
-    hessian: Array
 
     @property
     def model(self) -> VehicleModel:
         """Model of the vehicle of the config."""
         return self.free.at(self.values).model
 
+
+@dataclass(frozen=True)
+class Fitted(FittedNumbers):
+    """Numbers fitted to windows, and how well these tell them.
+
+    Attributes
+    ----------
+    hessian : array, shape (number, number)
+        Gauss-Newton, of the mean loss with the prior, in scales of the numbers.
+    """
+
+    hessian: Array
+
     @property
     def condition_number(self) -> float:
         """Of the numbers in their scales, prior included."""
         eigenvalues = np.linalg.eigvalsh(self.hessian) if len(self.hessian) else np.ones(1)
         return float(eigenvalues[-1] / max(eigenvalues[0], np.finfo(float).tiny))
+
+
+class Believed(NamedTuple):
+    """What is believed of numbers before the flights: that they are at their starts, so far away in their scales.
+
+    Attributes
+    ----------
+    start, scale, spread : array, shape (number,)
+    """
+
+    start: Array
+    scale: Array
+    spread: Array
 
 
 @dataclass(frozen=True)
@@ -178,27 +203,44 @@ class FitPoint:
     ----------
     loss : float
         The objective without what was believed before.
+    derivatives : callable
+        Gives gradient and Hessian of the loss by the numbers. They cost ten times the loss, and a step that fails, or
+        is the last one, needs none.
     """
 
     values: Array
     loss: float
-    objective: float
-    gradient: Array
-    hessian: Array
+    derivatives: Callable[[], tuple[Array, Array]]
+    believed: Believed
 
-    @classmethod
-    def of(
-        cls, values: Array, loss: float, gradient: Array, hessian: Array, scale: Array, start: Array, spread: Array
-    ) -> FitPoint:
-        """Add what was believed before the flights: numbers at their starts, so far from them in their scales."""
-        away, belief = (values - start) / scale, _PRIOR / spread**2
-        return cls(
-            values,
-            loss,
-            loss + 0.5 * float(belief @ away**2),
-            gradient * scale + belief * away,
-            hessian * scale[:, None] * scale + np.diag(belief),
-        )
+    @cached_property
+    def objective(self) -> float:
+        """Loss, and what was believed before."""
+        return self.loss + 0.5 * float(self._belief @ self._away**2)
+
+    @property
+    def gradient(self) -> Array:
+        """Of the objective, in scales of the numbers."""
+        return self._in_scales[0]
+
+    @property
+    def hessian(self) -> Array:
+        """Of the objective, in scales of the numbers."""
+        return self._in_scales[1]
+
+    @property
+    def _belief(self) -> Array:
+        return np.asarray(_PRIOR / self.believed.spread**2)
+
+    @property
+    def _away(self) -> Array:
+        return (self.values - self.believed.start) / self.believed.scale
+
+    @cached_property
+    def _in_scales(self) -> tuple[Array, Array]:
+        gradient, hessian = self.derivatives()
+        scale, belief = self.believed.scale, self._belief
+        return gradient * scale + belief * self._away, hessian * scale[:, None] * scale + np.diag(belief)
 
 
 def fit(
@@ -225,47 +267,114 @@ def fit(
     Ljung, System Identification, section 10.2; Jategaonkar, Flight Vehicle System Identification, chapter 4 (output
     error); Bock 1983 (multiple shooting: each window starts from what was measured).
     """
-    low, high = free.lows, free.highs
-    point = _evaluated(free, windows, np.clip(free.values(known), low, high))
-    if not np.isfinite(point.objective):
+    return fit_parts(free, [windows], known, steps, tolerance)[0]
+
+
+def fit_parts(
+    free: JointNumbers, parts: Sequence[Sequence[FitWindows]], known: Mapping[str, float], steps: int, tolerance: float
+) -> tuple[Fitted, tuple[FittedNumbers, ...]]:
+    """Fit numbers to all parts of the windows, and from there, by one step, without each.
+
+    Without a part the derivatives at the fit to all are known: they are those of all less those of the part. Each step
+    has to lower the loss without the part. Parameters are those of `fit`; a single part cannot be left out.
+    """
+    windows = [window for part in parts for window in part]
+    place = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    bounds = free.lows, free.highs
+
+    def best(kept: BoolArray, point: FitPoint, steps: int) -> FitPoint:
+        own = [window for window, keep in zip(windows, kept, strict=True) if keep]
+
+        def evaluated(values: Array) -> FitPoint:
+            return _Sums(free, own, values).mean()
+
+        return minimised(evaluated, point, free.scales, bounds, steps, tolerance)
+
+    start = _Sums(free, windows, np.clip(free.values(known), *bounds)).mean()
+    if not np.isfinite(start.objective):
         raise ComputationError("the prediction error is not finite at the stated numbers; look at the units of the log")
-    point = minimised(partial(_evaluated, free, windows), point, free.scales, (low, high), steps, tolerance)
-    return Fitted(free, point.values, point.loss, point.hessian)
+    sums = _Sums(free, windows, best(place >= 0, start, steps).values)
+    whole = sums.mean()
+    # The derivatives along all windows are taken here, before threads ask for parts of them.
+    hessian = whole.hessian
+
+    def without(part: int) -> FittedNumbers:
+        kept = place != part
+        point = best(kept, sums.mean(kept), 1)
+        return FittedNumbers(free, point.values, point.loss)
+
+    with ThreadPoolExecutor(2) as threads:
+        found = tuple(threads.map(without, range(len(parts) if len(parts) > 1 else 0)))
+    return Fitted(free, whole.values, whole.loss, hessian), found
 
 
-class _Evaluations:
-    """Numbers at values, evaluated once for each vehicle that flew."""
+@dataclass(frozen=True)
+class _Sums:
+    """Numbers at values, and what they come to along each of several windows."""
 
-    def __init__(self, free: JointNumbers, values: Array) -> None:
-        self.free, self.values = free, values
-        self._known: dict[str, tuple[Evaluated, IntArray]] = {}
+    free: JointNumbers
+    windows: Sequence[FitWindows]
+    values: Array
 
-    def of(self, flight: PlaybackFlight) -> tuple[Evaluated, IntArray]:
-        """Give the evaluation for a flight, and where its numbers stand among all."""
-        if flight.group not in self._known:
-            own, places = self.free.of_flight(flight)
-            self._known[flight.group] = Evaluated.of(own, self.values[places]), places
-        return self._known[flight.group]
+    @cached_property
+    def _of_groups(self) -> dict[str, tuple[Evaluated, IntArray]]:
+        """Evaluate the numbers once for each vehicle that flew, and say where they stand among all."""
+        found = {}
+        for window in self.windows:
+            if window.flight.group not in found:
+                own, places = self.free.of_flight(window.flight)
+                found[window.flight.group] = Evaluated.of(own, self.values[places]), places
+        return found
 
-    def sums(self, window: FitWindows, group: IntArray) -> tuple[float, Array, Array]:
-        """Sum loss, gradient and Hessian over windows of a flight; see `window_sums`."""
-        evaluated, places = self.of(window.flight)
-        loss, own_gradient, own_hessian = window_sums(evaluated, window, group)
-        count = len(self.values)
-        gradient, hessian = np.zeros((len(own_gradient), count)), np.zeros((len(own_gradient), count, count))
-        gradient[:, places] = own_gradient
-        hessian[:, places[:, None], places] = own_hessian
-        return loss, gradient, hessian
+    @cached_property
+    def losses(self) -> Array:
+        """Sums of the loss, shape (windows,)."""
+        return np.array([window_loss(self._of_groups[each.flight.group][0], each) for each in self.windows])
+
+    def derivatives(self, groups: Sequence[IntArray]) -> list[tuple[Array, Array]]:
+        """Sum gradient and Hessian by all numbers along each, shapes (group, number) and (group, number, number)."""
+
+        def of(window: FitWindows, group: IntArray) -> tuple[Array, Array]:
+            evaluated, places = self._of_groups[window.flight.group]
+            own_gradient, own_hessian = window_sums(evaluated, window, group)[1:]
+            count = len(self.values)
+            gradient, hessian = np.zeros((len(own_gradient), count)), np.zeros((len(own_gradient), count, count))
+            gradient[:, places] = own_gradient
+            hessian[:, places[:, None], places] = own_hessian
+            return gradient, hessian
+
+        with ThreadPoolExecutor(2) as threads:
+            return list(threads.map(of, self.windows, groups))
+
+    @cached_property
+    def _by_window(self) -> tuple[Array, Array]:
+        none = [np.zeros(len(window.starts), dtype=np.int64) for window in self.windows]
+        gradient, hessian = zip(*self.derivatives(none), strict=True)
+        return np.concatenate(gradient), np.concatenate(hessian)
+
+    def mean(self, kept: BoolArray | slice = slice(None)) -> FitPoint:
+        """Take the means over the runs of some of the windows."""
+        count = np.array([len(window.starts) for window in self.windows])[kept].sum()
+
+        def derivatives() -> tuple[Array, Array]:
+            gradient, hessian = (each[kept].sum(axis=0) / count for each in self._by_window)
+            return gradient, hessian
+
+        believed = Believed(self.free.starts, self.free.scales, self.free.spreads)
+        return FitPoint(self.values, float(self.losses[kept].sum() / count), derivatives, believed)
 
 
-def _evaluated(free: JointNumbers, windows: Sequence[FitWindows], values: Array) -> FitPoint:
-    evaluations = _Evaluations(free, values)
-    total, gradient, hessian = 0.0, np.zeros(len(values)), np.zeros((len(values), len(values)))
-    for window in windows:
-        loss, by_group, curvature = evaluations.sums(window, np.zeros(len(window.starts), dtype=np.int64))
-        total, gradient, hessian = total + loss, gradient + by_group[0], hessian + curvature[0]
-    count = sum(len(window.starts) for window in windows)
-    return FitPoint.of(values, total / count, gradient / count, hessian / count, free.scales, free.starts, free.spreads)
+def window_loss(evaluated: Evaluated, window: FitWindows) -> float:
+    """Sum the loss over the windows of a flight."""
+    flight = window.flight
+    group, none = np.zeros(len(window.starts), dtype=np.int64), np.zeros((1, 0))
+    weights = evaluated.weights(evaluated.rotor_terms(flight, window.samples))
+    body, used, places, moves = evaluated.body, evaluated.used, window.places, flight.translates
+    return float(
+        sensitivities(
+            window.motion, body, used, weights, NO_PARAMETERS, window.loss, places, moves, group, none, none[:, None]
+        )
+    )
 
 
 def window_sums(evaluated: Evaluated, window: FitWindows, group: IntArray) -> tuple[float, Array, Array]:
@@ -340,13 +449,11 @@ def uncertainty(fitted: Fitted, windows: Sequence[FitWindows]) -> Uncertainty:
     ----------
     Bell and McCaffrey 2002; MacKinnon, Nielsen and Webb 2023 (jackknife by cluster); Ljung, section 9.4.
     """
-    free = fitted.free
-    evaluations, scale = _Evaluations(free, fitted.values), free.scales
+    free, scale = fitted.free, fitted.free.scales
     count = sum(len(window.starts) for window in windows)
-    sums = []
-    for window in windows:
-        blocks = max(2, round(BLOCKS * len(window.starts) / count))
-        sums.append(evaluations.sums(window, contiguous(len(window.starts), blocks))[1:])
+    blocks = [max(2, round(BLOCKS * len(window.starts) / count)) for window in windows]
+    groups = [contiguous(len(window.starts), own) for window, own in zip(windows, blocks, strict=True)]
+    sums = _Sums(free, windows, fitted.values).derivatives(groups)
     gradient, hessian = (np.concatenate(each) for each in zip(*sums, strict=True))
     # The prior stays in the difference, so that it can be inverted whatever a block takes with it.
     without = fitted.hessian * count - hessian * scale[:, None] * scale
@@ -357,10 +464,11 @@ def uncertainty(fitted: Fitted, windows: Sequence[FitWindows]) -> Uncertainty:
     return Uncertainty(covariance, len(gradient), np.asarray(conditional > _INFORMED * belief))
 
 
-def window_errors(fitted: Fitted, window: FitWindows) -> Array:
+def window_errors(fitted: FittedNumbers, window: FitWindows) -> Array:
     """Weigh the errors of each window as the fit does, shape (window,): about 1.1 for rates that stay."""
     flight = window.flight
-    evaluated, _ = _Evaluations(fitted.free, fitted.values).of(flight)
+    own, places = fitted.free.of_flight(flight)
+    evaluated = Evaluated.of(own, fitted.values[places])
     errors = np.empty((len(window.starts), window.horizon, 4, 3))
     errors_of_runs(
         window.motion,

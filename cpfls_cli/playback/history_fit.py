@@ -18,7 +18,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.gauss_newton import minimised
 from cpfls_cli.playback.evaluation import Evaluated
-from cpfls_cli.playback.fit import FitPoint, Fitted, FitWindows, weighed, windows_of
+from cpfls_cli.playback.fit import Believed, FitPoint, Fitted, FittedNumbers, FitWindows, weighed, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.history import Observer, missed_wrench, past_of
 from cpfls_cli.playback.kernels import MeasuredMotion, Parameters, errors_of_runs, sensitivities
@@ -66,8 +66,8 @@ def find_history(
 
     def errors(part: int) -> list[Array]:
         training = [windows for other, kept in enumerate(parts) if other != part for windows in kept]
-        observer = fit_observer(chosen.fits[part], training, settings.history_s)
-        return [errors_with_past(chosen.fits[part], observer, windows) for windows in parts[part]]
+        observer = fit_observer(chosen.without[part], training, settings.history_s)
+        return [errors_with_past(chosen.without[part], observer, windows) for windows in parts[part]]
 
     with ThreadPoolExecutor(2) as threads:
         found = block_errors([each for kept in threads.map(errors, range(len(parts))) for each in kept])
@@ -78,7 +78,7 @@ def find_history(
     return fit_observer(fitted, windows, settings.history_s)
 
 
-def fit_observer(fitted: Fitted, windows: Sequence[FitWindows], past_s: float) -> Observer:
+def fit_observer(fitted: FittedNumbers, windows: Sequence[FitWindows], past_s: float) -> Observer:
     """Minimise the prediction error of a forecast by the numbers of its observer, over windows between given ones.
 
     A forecast was fitted to the given ones, and misses less of them than of others: little would be left to observe.
@@ -101,7 +101,7 @@ def fit_observer(fitted: Fitted, windows: Sequence[FitWindows], past_s: float) -
     return _observer(found.values, past_s)
 
 
-def errors_with_past(fitted: Fitted, observer: Observer, windows: FitWindows) -> Array:
+def errors_with_past(fitted: FittedNumbers, observer: Observer, windows: FitWindows) -> Array:
     """Weigh the errors of windows as the fit does; see `window_errors`."""
     at, found = _evaluated(fitted), []
     for each in _chunks([windows]):
@@ -132,7 +132,7 @@ def _chunks(windows: Sequence[FitWindows]) -> Iterator[FitWindows]:
             yield FitWindows(window.flight, window.starts[first : first + _CHUNK], window.loss)
 
 
-def _evaluated(fitted: Fitted) -> Evaluated:
+def _evaluated(fitted: FittedNumbers) -> Evaluated:
     """Evaluate a forecast with the constant among its terms: that is what pushes."""
     at = Evaluated.of(fitted.free.base, fitted.values[: len(fitted.free.base.numbers)])
     active = np.union1d([0], at.used.active).astype(np.int64)
@@ -207,10 +207,8 @@ def _point(at: Evaluated, begun: Sequence[_Begun], past_s: float, values: Array)
         )
     total, lower = sum(len(each.window.starts) for each in begun), hessian[0]
     curvature = np.tril(lower) + np.tril(lower, -1).T
-    spread = np.full(count, _SPREAD)
-    return FitPoint.of(
-        values, loss / total, gradient[0] / total, curvature / total, np.ones(count), _FIRST.ravel(), spread
-    )
+    believed = Believed(_FIRST.ravel(), np.ones(count), np.full(count, _SPREAD))
+    return FitPoint(values, loss / total, lambda: (gradient[0] / total, curvature / total), believed)
 
 
 def _pushing(value: Array) -> Parameters:

@@ -517,6 +517,17 @@ class Parameters(NamedTuple):
     moves: BoolArray
 
 
+NO_PARAMETERS = Parameters(
+    row=np.zeros(0, dtype=np.int64),
+    term=np.zeros(0, dtype=np.int64),
+    first=np.zeros(1, dtype=np.int64),
+    value=np.zeros((0, 0)),
+    inertia=np.zeros((0, 3, 3)),
+    moves=np.zeros(0, dtype=np.bool_),
+)
+"""For sums of the loss alone."""
+
+
 class Loss(NamedTuple):
     """How errors are weighed: ``sum over signals of weight delta^2 (sqrt(1 + |e|^2 / delta^2) - 1)``.
 
@@ -530,18 +541,17 @@ class Loss(NamedTuple):
     delta: Array
 
 
-class _Tangent(NamedTuple):
-    """Derivatives of a state by each parameter, shape (3, parameter); the rotation's as a vector in the body frame."""
-
-    position: Array
-    velocity: Array
-    rotation: Array
-    rate: Array
+_VELOCITY, _ROTATION, _RATE = 3, 6, 9
+"""First rows of a tangent, shape (12, parameter): derivatives of a state by each parameter, position, velocity,
+rotation as a vector in the body frame, and rate."""
 
 
-@part
-def _new_tangent(count: int) -> _Tangent:
-    return _Tangent(np.zeros((3, count)), np.zeros((3, count)), np.zeros((3, count)), np.zeros((3, count)))
+class _Columns(NamedTuple):
+    """Work space of a linearisation, a column for each parameter: of the air velocity, the wrench and its slopes."""
+
+    air: Array
+    wrench: Array
+    by_motion: Array
 
 
 @_inlined
@@ -559,47 +569,10 @@ def _by_motion(used: Terms, weights: Array, slope: Array, out: Array) -> None:
 
 
 @_inlined
-def _cross(first: Array, second: Array, out: Array) -> None:
-    """Write cross products of a vector with each column, or of each column of a matrix with a vector's."""
-    for c in range(out.shape[1]):
-        out[0, c] = first[1] * second[2, c] - first[2] * second[1, c]
-        out[1, c] = first[2] * second[0, c] - first[0] * second[2, c]
-        out[2, c] = first[0] * second[1, c] - first[1] * second[0, c]
-
-
-@_inlined
-def _times(matrix: Array, vectors: Array, out: Array) -> None:
-    """Multiply a small matrix with columns; the loop over columns is the inner one, so that it runs in registers."""
-    for i in range(matrix.shape[0]):
-        for c in range(vectors.shape[1]):
-            out[i, c] = matrix[i, 0] * vectors[0, c]
-        for k in range(1, matrix.shape[1]):
-            factor = matrix[i, k]
-            for c in range(vectors.shape[1]):
-                out[i, c] += factor * vectors[k, c]
-
-
-class _Columns(NamedTuple):
-    """Work space of a linearisation, a column for each parameter."""
-
-    motion: Array
-    wrench: Array
-    first: Array
-    second: Array
-    by_motion: Array
-
-
-@part
-def _new_columns(count: int) -> _Columns:
-    return _Columns(
-        np.zeros((6, count)), np.zeros((6, count)), np.zeros((3, count)), np.zeros((3, count)), np.zeros((6, 6))
-    )
-
-
-@_inlined
 def _own_change(parameters: Parameters, sample: int, rate: Array, at: _Space, wrench: Array) -> None:
-    """Add the derivatives of the wrench by the parameters, less those of ``I omega'`` by the inertia."""
+    """Write the derivatives of the wrench by the parameters, less those of ``I omega'`` by the inertia."""
     turned, pushed = np.empty(3), np.empty(3)
+    _clear(wrench, 0)
     for c in range(len(parameters.moves)):
         for e in range(parameters.first[c], parameters.first[c + 1]):
             wrench[parameters.row[e], c] += parameters.value[sample, e] * at.active[parameters.term[e]]
@@ -608,9 +581,16 @@ def _own_change(parameters: Parameters, sample: int, rate: Array, at: _Space, wr
             for i in range(3):
                 turned[i] = change[i, 0] * rate[0] + change[i, 1] * rate[1] + change[i, 2] * rate[2]
                 pushed[i] = change[i, 0] * at.out[3] + change[i, 1] * at.out[4] + change[i, 2] * at.out[5]
-            wrench[0, c] -= pushed[0] + rate[1] * turned[2] - rate[2] * turned[1]
-            wrench[1, c] -= pushed[1] + rate[2] * turned[0] - rate[0] * turned[2]
-            wrench[2, c] -= pushed[2] + rate[0] * turned[1] - rate[1] * turned[0]
+            for i in range(3):
+                j, k = (i + 1) % 3, (i + 2) % 3
+                wrench[i, c] -= pushed[i] + rate[j] * turned[k] - rate[k] * turned[j]
+
+
+@_inlined
+def _weigh_rows(first: float, second: float, third: float, rows: Array, begin: int, out: Array) -> None:
+    """Write the weighted sum of three rows."""
+    for c in range(len(out)):
+        out[c] = first * rows[begin, c] + second * rows[begin + 1, c] + third * rows[begin + 2, c]
 
 
 @_inlined
@@ -621,7 +601,7 @@ def _linearise(
     parameters: Parameters,
     sample: int,
     state: _State,
-    tangent: _Tangent,
+    tangent: Array,
     at: _Space,
     work: _Columns,
     out: Array,
@@ -629,82 +609,97 @@ def _linearise(
     """Write derivatives of the accelerations (world, body frame) by each parameter, shape (6, parameter).
 
     ``R' dv + v_b x dphi`` and ``d omega`` move the wrench; then ``m dv' = R (dF - F x dphi)`` and
-    ``I d omega' = dM - d omega x I omega - omega x I d omega``.
+    ``I d omega' = dM - d omega x I omega - omega x I d omega``. The gyroscopic torque is a slope by the rate as well.
     """
-    rate, air = state.rate, at.value[1:4]
-    _by_motion(used, weights, at.slope, work.by_motion)
-    _times(state.rotation.T, tangent.velocity, work.motion[:3])
-    _cross(air, tangent.rotation, work.first)
+    rotation, rate, air, slope, wrench = state.rotation, state.rate, at.motion, work.by_motion, work.wrench
+    _by_motion(used, weights, at.slope, slope)
+    _own_change(parameters, sample, rate, at, wrench)
     for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        for m in range(3):
+            slope[i, 3 + m] -= rate[j] * body.inertia[k, m] - rate[k] * body.inertia[j, m]
+            # Of the momentum I omega, whose cross product with d omega is added.
+            slope[i, 3 + j] -= body.inertia[k, m] * rate[m]
+            slope[i, 3 + k] += body.inertia[j, m] * rate[m]
+    # What does not hang on the column is read before each loop over columns, so that the loop runs in registers.
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        r0, r1, r2, a0, a1 = rotation[0, i], rotation[1, i], rotation[2, i], air[j], air[k]
         for c in range(out.shape[1]):
-            work.motion[i, c] += work.first[i, c]
-            work.motion[3 + i, c] = tangent.rate[i, c]
-    _times(work.by_motion, work.motion, work.wrench)
-    _own_change(parameters, sample, rate, at, work.wrench)
-    _cross(at.out[6:9], tangent.rotation, work.first)
-    for i in range(3):
+            turned = a0 * tangent[_ROTATION + k, c] - a1 * tangent[_ROTATION + j, c]
+            work.air[i, c] = turned + r0 * tangent[3, c] + r1 * tangent[4, c] + r2 * tangent[5, c]
+    for k in range(6):
+        s0, s1, s2, s3, s4, s5 = slope[k, 0], slope[k, 1], slope[k, 2], slope[k, 3], slope[k, 4], slope[k, 5]
         for c in range(out.shape[1]):
-            work.first[i, c] = (work.wrench[3 + i, c] - work.first[i, c]) / body.mass
-    _times(state.rotation, work.first, out[:3])
-    _turning_change(body, rate, tangent.rate, work)
-    _times(body.inverse, work.wrench[:3], out[3:])
-
-
-@_inlined
-def _turning_change(body: Body, rate: Array, change: Array, work: _Columns) -> None:
-    """Take the derivatives of ``omega x I omega`` off those of the torque."""
-    momentum = np.empty(3)
+            moved = s0 * work.air[0, c] + s1 * work.air[1, c] + s2 * work.air[2, c]
+            turned = s3 * tangent[9, c] + s4 * tangent[10, c] + s5 * tangent[11, c]
+            wrench[k, c] += moved + turned
     for i in range(3):
-        momentum[i] = body.inertia[i, 0] * rate[0] + body.inertia[i, 1] * rate[1] + body.inertia[i, 2] * rate[2]
-    _times(body.inertia, change, work.first)
-    _cross(rate, work.first, work.second)
-    _cross(momentum, change, work.first)
+        j, k = (i + 1) % 3, (i + 2) % 3
+        f0, f1 = at.out[6 + j], at.out[6 + k]
+        for c in range(out.shape[1]):
+            wrench[3 + i, c] -= f0 * tangent[_ROTATION + k, c] - f1 * tangent[_ROTATION + j, c]
     for i in range(3):
-        for c in range(change.shape[1]):
-            work.wrench[i, c] += work.first[i, c] - work.second[i, c]
+        _weigh_rows(
+            rotation[i, 0] / body.mass, rotation[i, 1] / body.mass, rotation[i, 2] / body.mass, wrench, 3, out[i]
+        )
+        _weigh_rows(body.inverse[i, 0], body.inverse[i, 1], body.inverse[i, 2], wrench, 0, out[3 + i])
 
 
 @_inlined
-def _move_rotation(turn: Array, right: Array, h: float, rotation: Array, rate: Array, out: Array) -> None:
-    """Write derivatives of a rotation after a turn: ``turn' rotation + h right rate``; `out` may be `rotation`."""
-    for c in range(rotation.shape[1]):
-        p0, p1, p2 = rotation[0, c], rotation[1, c], rotation[2, c]
-        for i in range(3):
-            moved = turn[0, i] * p0 + turn[1, i] * p1 + turn[2, i] * p2
-            out[i, c] = moved + h * (right[i, 0] * rate[0, c] + right[i, 1] * rate[1, c] + right[i, 2] * rate[2, c])
+def _move_row(begin: Array, change: Array, h: float, out: Array) -> None:
+    for c in range(len(out)):
+        out[c] = begin[c] + h * change[c]
 
 
 @_inlined
-def _tangent_to_middle(tangent: _Tangent, middle: _Tangent, change: Array, h: float, moves: bool, at: _Space) -> None:
+def _tangent_moved(
+    begin: Array, rate: Array, change: Array, h: float, moves: bool, turn: Array, right: Array, out: Array
+) -> None:
+    """Take a step of the derivatives of a state: ``turn' rotation + h right rate``, and by the accelerations' change.
+
+    Parameters
+    ----------
+    begin : array, shape (12, parameter)
+        At its begin.
+    rate : array, shape (12, parameter)
+        That the body turns and moves with.
+    out : array, shape (12, parameter)
+        Not `begin`.
+    """
     for i in range(3):
-        for c in range(change.shape[1]):
-            middle.velocity[i, c] = tangent.velocity[i, c] + (0.5 * h * change[i, c] if moves else 0.0)
-            middle.rate[i, c] = tangent.rate[i, c] + 0.5 * h * change[3 + i, c]
-    _move_rotation(at.half, at.half_right, 0.5 * h, tangent.rotation, tangent.rate, middle.rotation)
+        t0, t1, t2 = turn[0, i], turn[1, i], turn[2, i]
+        r0, r1, r2 = h * right[i, 0], h * right[i, 1], h * right[i, 2]
+        for c in range(out.shape[1]):
+            turned = t0 * begin[6, c] + t1 * begin[7, c] + t2 * begin[8, c]
+            out[_ROTATION + i, c] = turned + r0 * rate[9, c] + r1 * rate[10, c] + r2 * rate[11, c]
+        _move_row(begin[_RATE + i], change[3 + i], h, out[_RATE + i])
+        _move_row(begin[i], rate[_VELOCITY + i], h if moves else 0.0, out[i])
+        _move_row(begin[_VELOCITY + i], change[i], h if moves else 0.0, out[_VELOCITY + i])
+
+
+_ROWS = 9
+"""Of a Jacobian at a time: those of a step, but for position, which is not weighed."""
 
 
 @_inlined
-def _tangent_to_end(tangent: _Tangent, middle: _Tangent, change: Array, h: float, moves: bool, at: _Space) -> None:
-    _move_rotation(at.turn, at.right, h, tangent.rotation, middle.rate, tangent.rotation)
-    for i in range(3):
-        for c in range(change.shape[1]):
-            tangent.rate[i, c] += h * change[3 + i, c]
-            if moves:
-                tangent.position[i, c] += h * middle.velocity[i, c]
-                tangent.velocity[i, c] += h * change[i, c]
+def _add_squares(rows: Array, filled: int, hessian: Array) -> None:
+    """Add products of columns, of some rows and of zeros behind them, to the lower triangle."""
+    for first in range(0, filled, _ROWS):
+        for c in range(len(hessian)):
+            for k in range(c + 1):
+                product = 0.0
+                for r in range(_ROWS):
+                    product += rows[first + r, c] * rows[first + r, k]
+                hessian[c, k] += product
 
 
 @_inlined
-def _add(error: Array, rows: Array, weight: float, delta: float, gradient: Array, hessian: Array) -> float:
-    """Add one error to gradient and Hessian; give its loss."""
-    root = np.sqrt(1.0 + (error[0] ** 2 + error[1] ** 2 + error[2] ** 2) / (delta * delta))
-    share = weight / root
-    for c in range(len(gradient)):
-        r0, r1, r2 = share * rows[0, c], share * rows[1, c], share * rows[2, c]
-        gradient[c] += r0 * error[0] + r1 * error[1] + r2 * error[2]
-        for k in range(c + 1):
-            hessian[c, k] += r0 * rows[0, k] + r1 * rows[1, k] + r2 * rows[2, k]
-    return float(weight * delta * delta * (root - 1.0))
+def _clear(matrix: Array, first: int) -> None:
+    """Set rows from one on to 0."""
+    for i in range(first, matrix.shape[0]):
+        for c in range(matrix.shape[1]):
+            matrix[i, c] = 0.0
 
 
 @compiled
@@ -724,12 +719,15 @@ def sensitivities(
     """Sum the loss of free runs, its gradient and its Gauss-Newton Hessian by the parameters.
 
     The gradient is exact: the derivative of a rotation's error vector differs from that of the rotation only across
-    the vector, and the loss depends on its length alone.
+    the vector, and the loss depends on its length alone. The rows of a run's Jacobian are collected, and multiplied
+    with each other at its end.
 
     Parameters
     ----------
     motion, body, used, weights, starts, translates
         See `errors_of_runs`.
+    parameters : Parameters
+        Without any, the loss alone is summed, to the same digits.
     group : array of int, shape (run,)
         Which sum a run is added to.
     gradient : array, shape (group, parameter)
@@ -737,43 +735,51 @@ def sensitivities(
     hessian : array, shape (group, parameter, parameter)
         Added to, the lower triangle.
     """
-    h = motion.period
-    state, middle, at = _new_state(), _new_state(), _new_space(used, True)
-    count = len(parameters.inertia)
-    tangent, half, change = _new_tangent(count), _new_tangent(count), np.empty((6, count))
-    work = _new_columns(count)
-    error = np.empty((4, 3))
+    h, count, horizon = motion.period, len(parameters.moves), len(loss.weight)
+    state, middle, at = _new_state(), _new_state(), _new_space(used, count > 0)
+    tangent, half, moved = np.zeros((12, count)), np.zeros((12, count)), np.zeros((12, count))
+    work = _Columns(np.zeros((3, count)), np.zeros((6, count)), np.zeros((6, 6)))
+    change, error, rows = np.zeros((6, count)), np.zeros((4, 3)), np.zeros((12 * horizon + _ROWS, count))
     total = 0.0
     for n in range(len(starts)):
         _start(motion, starts[n], state)
-        for own in tangent:
-            own[:] = 0.0
-        for step in range(len(loss.weight)):
+        _clear(tangent, 0)
+        filled = 0
+        for step in range(horizon):
             sample = starts[n] + step
-            here, moved = state, tangent
+            here, of_here, turn, right, ahead, elapsed = state, tangent, at.half, at.half_right, half, 0.5 * h
             for in_middle in (False, True):
                 _evaluate(body, used, weights[sample], here, at)
-                _linearise(body, used, weights[sample], parameters, sample, here, moved, at, work, change)
+                if count:
+                    _linearise(body, used, weights[sample], parameters, sample, here, of_here, at, work, change)
                 if in_middle:
                     _to_end(state, middle, h, translates, at)
-                    _tangent_to_end(tangent, half, change, h, translates, at)
                 else:
                     _to_middle(state, middle, h, translates, at)
-                    _tangent_to_middle(tangent, half, change, h, translates, at)
-                    here, moved = middle, half
+                if count:
+                    _tangent_moved(tangent, of_here, change, elapsed, translates, turn, right, ahead)
+                here, of_here, turn, right, ahead, elapsed = middle, half, at.turn, at.right, moved, h
+            tangent, moved = moved, tangent
             if _lost(state):
                 # A run that leaves every flight behind: as bad as the largest error, and of no direction.
-                total += np.sum(loss.weight[step:] * loss.delta[step:]) * FASTEST
+                for later in range(step, horizon):
+                    for signal in range(4):
+                        total += loss.weight[later, signal] * loss.delta[later, signal] * FASTEST
                 break
             _write_errors(motion, sample + 1, state, error)
             for signal in range(4):
-                if loss.weight[step, signal] > 0.0:
-                    total += _add(
-                        error[signal],
-                        tangent[signal],
-                        loss.weight[step, signal],
-                        loss.delta[step, signal],
-                        gradient[group[n]],
-                        hessian[group[n]],
-                    )
+                weight, delta = loss.weight[step, signal], loss.delta[step, signal]
+                if weight > 0.0:
+                    size = error[signal, 0] ** 2 + error[signal, 1] ** 2 + error[signal, 2] ** 2
+                    root = np.sqrt(1.0 + size / (delta * delta))
+                    total += weight * delta * delta * (root - 1.0)
+                    share = np.sqrt(weight / root)
+                    for i in range(3):
+                        for c in range(count):
+                            row = share * tangent[3 * signal + i, c]
+                            rows[filled, c] = row
+                            gradient[group[n], c] += share * error[signal, i] * row
+                        filled += 1
+        _clear(rows, filled)
+        _add_squares(rows, filled, hessian[group[n]])
     return total

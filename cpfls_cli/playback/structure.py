@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -18,7 +17,16 @@ from cpfls_cli.evolution.archive import Evaluation
 from cpfls_cli.evolution.engine import evolve
 from cpfls_cli.evolution.ranking import comparable
 from cpfls_cli.evolution.settings import EvolutionSettings
-from cpfls_cli.playback.fit import Fitted, FitWindows, fit, stays_error, window_errors, windows_of
+from cpfls_cli.playback.fit import (
+    Fitted,
+    FittedNumbers,
+    FitWindows,
+    fit,
+    fit_parts,
+    stays_error,
+    window_errors,
+    windows_of,
+)
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import Group, JointNumbers
 from cpfls_cli.playback.kernels import Airflow
@@ -91,8 +99,10 @@ class Judged:
     by_block : array, shape (block,)
         The same by flight, or by pieces of few flights; equal for all structures.
     condition_number : float
-        The largest of its fits.
-    fits : tuple of Fitted
+        Of the fit to all parts.
+    fit : Fitted
+        To all parts.
+    without : tuple of FittedNumbers
         One a part that was kept aside.
     """
 
@@ -101,7 +111,8 @@ class Judged:
     by_block: Array
     numbers: int
     condition_number: float
-    fits: tuple[Fitted, ...]
+    fit: Fitted
+    without: tuple[FittedNumbers, ...]
 
     def worse_than(self, other: Judged) -> tuple[float, float]:
         """Compare on the same blocks: mean difference, and its standard error."""
@@ -146,15 +157,23 @@ class SearchStoppedError(Exception):
 
 
 class Solution(NamedTuple):
-    """What a fit came to: `Fitted` without the numbers, which follows from structure and vehicle."""
+    """What the fits of a structure came to: to all parts first, then without each.
 
-    values: Array
-    loss: float
+    Attributes
+    ----------
+    values : tuple of array, shape (number,)
+    losses : tuple of float
+    hessian : array, shape (number, number)
+        Of the first.
+    """
+
+    values: tuple[Array, ...]
+    losses: tuple[float, ...]
     hessian: Array
 
 
-Kept = Mapping[Structure, Sequence[Solution]]
-"""Structures that a stopped search has judged, with a fit for each part of the flights."""
+Kept = Mapping[Structure, Solution]
+"""Structures that a stopped search has judged."""
 
 
 @dataclass
@@ -183,24 +202,19 @@ class _Bench:
         """Fit and judge a structure; fitted to another vehicle first, where one is given."""
         if structure not in self.known:
             kept = self.kept.get(structure)
-            self.known[structure] = self._judged(structure, self._fits(structure, first) if kept is None else kept)
+            fits = self._fits(structure, first) if kept is None else _rebuilt(structure.free(self.vehicle), kept)
+            self.known[structure] = self._judged(structure, *fits)
             if kept is None:
                 self.progress(tuple(self.known.values()), max(self.expected, len(self.known)))
         return self.known[structure]
 
-    def _fits(self, structure: Structure, first: VehicleSettings | None) -> list[Solution]:
-        near = self._nearest(structure)
-
-        def fitted(part: int) -> Solution:
-            known = self._known(structure, part, near)
-            if first is not None:
-                free = structure.free(first)
-                known |= free.named(self._fit(free, part, known).values)
-            found = self._fit(structure.free(self.vehicle), part, known)
-            return Solution(found.values, found.loss, found.hessian)
-
-        with ThreadPoolExecutor(2) as threads:
-            return list(threads.map(fitted, range(len(self.parts))))
+    def _fits(self, structure: Structure, first: VehicleSettings | None) -> tuple[Fitted, tuple[FittedNumbers, ...]]:
+        known = self._known(structure)
+        if first is not None:
+            free = structure.free(first)
+            windows = [each for part in self.parts for each in part]
+            known |= free.named(fit(free, windows, known, _SEARCH_STEPS, _SEARCH_TOLERANCE).values)
+        return fit_parts(structure.free(self.vehicle), self.parts, known, _SEARCH_STEPS, _SEARCH_TOLERANCE)
 
     def _nearest(self, structure: Structure) -> Judged | None:
         """Find the known structure that differs in the fewest blocks; the better one of two."""
@@ -214,28 +228,28 @@ class _Bench:
         known = ascending(self.known.values(), lambda each: each.error)
         return min(known, key=away, default=None)
 
-    def _known(self, structure: Structure, part: int, near: Judged | None) -> dict[str, float]:
+    def _known(self, structure: Structure) -> dict[str, float]:
         """Give the values that a fit starts from."""
+        near = self._nearest(structure)
         if near is None:
             return {}
-        known = near.fits[part].free.named(near.fits[part].values)
+        known = near.fit.free.named(near.fit.values)
         if near.structure.rules != structure.rules:
             known = {name: value for name, value in known.items() if name.split(".")[0] not in LEARNED}
         return known
 
-    def _fit(self, free: JointNumbers, part: int, known: Mapping[str, float]) -> Fitted:
-        training = [windows for other, kept in enumerate(self.parts) if other != part for windows in kept]
-        return fit(free, training, known, _SEARCH_STEPS, _SEARCH_TOLERANCE)
-
-    def _judged(self, structure: Structure, solutions: Sequence[Solution]) -> Judged:
-        free = structure.free(self.vehicle)
-        fits = tuple(Fitted(free, *solution) for solution in solutions)
+    def _judged(self, structure: Structure, whole: Fitted, without: tuple[FittedNumbers, ...]) -> Judged:
         errors = [
-            window_errors(fitted, windows) for fitted, kept in zip(fits, self.parts, strict=True) for windows in kept
+            window_errors(fitted, windows) for fitted, kept in zip(without, self.parts, strict=True) for windows in kept
         ]
         by_block, joined = block_errors(errors), np.concatenate(errors)
-        condition = max(fitted.condition_number for fitted in fits)
-        return Judged(structure, float(joined.mean()), by_block, len(fits[0].values), condition, fits)
+        condition = whole.condition_number
+        return Judged(structure, float(joined.mean()), by_block, len(whole.values), condition, whole, without)
+
+
+def _rebuilt(free: JointNumbers, kept: Solution) -> tuple[Fitted, tuple[FittedNumbers, ...]]:
+    whole, *without = (FittedNumbers(free, *each) for each in zip(kept.values, kept.losses, strict=True))
+    return Fitted(free, whole.values, whole.loss, kept.hessian), tuple(without)
 
 
 def block_errors(errors: Sequence[Array]) -> Array:
@@ -371,13 +385,12 @@ def _greedy(bench: _Bench, blocks: tuple[str, ...], start: Judged) -> Iterator[J
 def _shrinking(everything: Judged) -> Iterator[Structure]:
     """Take out the block that the loss near the fit of all blocks misses least, one after another.
 
-    Without the numbers b the loss rises by ``1/2 b' ((H^-1)_bb)^-1 b``, the other numbers fitted again; H is the mean
-    of all parts.
+    Without the numbers b the loss rises by ``1/2 b' ((H^-1)_bb)^-1 b``, the other numbers fitted again.
     """
-    structure, fits = everything.structure, everything.fits
-    free, hessian = fits[0].free, np.mean([fitted.hessian for fitted in fits], axis=0)
-    scale, absent = free.scales, np.array([number.absent for number in free.numbers])
-    away = np.mean([(fitted.values - absent) / scale for fitted in fits], axis=0)
+    structure, fitted = everything.structure, everything.fit
+    free, hessian = fitted.free, fitted.hessian
+    absent = np.array([number.absent for number in free.numbers])
+    away = (fitted.values - absent) / free.scales
     inverse = np.linalg.inv(hessian)
     place = {block: [i for i, n in enumerate(free.numbers) if n.block == block] for block in structure.blocks}
 

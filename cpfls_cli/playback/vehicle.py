@@ -163,7 +163,7 @@ def find_vehicle(
     chosen = choice.chosen
     flown = {flight.group for flight in flights}
     groups = tuple(Group(group.name, group.differs or OF_A_WEIGHT) for group in settings.groups if group.name in flown)
-    fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fits[0], groups)
+    fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fit, groups)
     loop, given = loop_bounds(fitted.model, own), instruments(own)
     constants = find_constants(begun, own, given, settings.leave_out)
     # Where instruments find the same body the fit is the vehicle's, and takes more from the flights.

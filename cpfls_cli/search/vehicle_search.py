@@ -46,15 +46,15 @@ class VehicleCheckpoint(KeptFile):
 def kept_of(record: VehicleCheckpointRecord) -> Kept:
     """Rebuild what the search left, equal to what was stored down to the last bit."""
     structure = record.structure
-    counts = np.repeat(structure.numbers, record.loss.shape[1])
-    values = iter(np.split(record.values, np.cumsum(counts)[:-1]))
-    hessians = iter(np.split(record.hessian, np.cumsum(counts**2)[:-1]))
-    rows = zip(structure.blocks, structure.rules.tolist(), record.loss.tolist(), strict=True)
+    numbers = np.cumsum(structure.numbers)[:-1]
+    hessians = np.split(record.hessian, np.cumsum(structure.numbers**2)[:-1])
+    values = np.split(record.values, numbers * record.loss.shape[1])
+    rows = zip(structure.blocks, structure.rules.tolist(), record.loss.tolist(), values, hessians, strict=True)
     return {
-        Structure(tuple(blocks.split()), Rules(*rules)): [
-            Solution(numbers := next(values), loss, next(hessians).reshape(2 * (len(numbers),))) for loss in losses
-        ]
-        for blocks, rules, losses in rows
+        Structure(tuple(blocks.split()), Rules(*rules)): Solution(
+            tuple(own.reshape(len(losses), -1)), tuple(losses), hessian.reshape(2 * (len(own) // len(losses),))
+        )
+        for blocks, rules, losses, own, hessian in rows
     }
 
 

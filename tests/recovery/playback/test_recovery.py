@@ -96,7 +96,7 @@ def test_a_force_without_a_name_is_learned_and_what_has_a_name_is_not():
     true = {*TRUE_BLOCKS, "remainder_force"} - {"rotor_drag"}
     found, settings = chosen(STATED, flights, (*true, "remainder"), search_windows=60, folds=2, horizon_s=0.3)
     assert set(found.structure.blocks) == true
-    final, _ = fitted_to_all(found.structure, STATED, flights, settings, found.fits[0])
+    final, _ = fitted_to_all(found.structure, STATED, flights, settings, found.fit)
     learned, flew = (pushes(model) for model in (final.model, pushed()))
     assert np.abs(learned - flew).max() < 0.1 * np.abs(flew).max()
 
@@ -113,7 +113,7 @@ def test_the_drag_of_another_simulator_is_found():
     flights, hidden = [rotorpy_flight("drag")], ROTORPY_HIDDEN["drag"]
     candidates = (*(effect.name for effect in hidden), "com_offset")
     found, settings = chosen(ROTORPY, flights, candidates, search_windows=20, folds=2)
-    final, _ = fitted_to_all(found.structure, ROTORPY, flights, settings, found.fits[0])
+    final, _ = fitted_to_all(found.structure, ROTORPY, flights, settings, found.fit)
     free = final.free
     assert {effect.name for effect in hidden} <= set(free.base.blocks)
     known = {effect.name: effect.coefficients for effect in hidden}

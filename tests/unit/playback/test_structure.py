@@ -98,7 +98,7 @@ class Bench:
     def judge(self, tried):
         error, count = self.errors["".join(tried.blocks)], len(tried.blocks)
         by_block = error + 0.002 * (-1) ** count * np.array([-1.0, 1.0])
-        return self.known.setdefault(tried, structure.Judged(tried, error, by_block, count, 1.0, ()))
+        return self.known.setdefault(tried, structure.Judged(tried, error, by_block, count, 1.0, None, ()))
 
 
 def test_blocks_that_gain_only_beside_others_are_added():
