@@ -124,6 +124,15 @@ def worth(record: IdentifiedRecord) -> Iterator[str]:
     yield "Rotors, mass and all forces are those of the config."
 
 
+def cautions(record: IdentifiedRecord) -> Iterator[str]:
+    """Say what speaks against an identified model, wherever it is taken."""
+    words = trust_words(record.trust)
+    if record.verdict is None or record.verdict.label is None:
+        yield "has no verdict and no bands; `cpfls identify` with identification.validation.enabled adds them"
+    elif words.tone == "warning":
+        yield ": ".join([f"its verdict is: {words.short}", *(reason for reason, _ in record.verdict.reasons[:1])])
+
+
 def solution(model: Source[IdentifiedRecord]) -> Iterator[Text]:
     """Say how many parameters were found from how much, how the search ended, and the rigid body beside them."""
     record = model.record
