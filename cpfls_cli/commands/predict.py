@@ -41,6 +41,7 @@ from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles
 from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_balance
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.identification.data import TorqueSource
+from cpfls_cli.pages.identification import unjudged
 from cpfls_cli.pages.prediction import answer
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.trust import NOT_SEEN, seen_words
@@ -81,7 +82,7 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
     draws = _draws(identified.uncertainty)
     finish_parts(job, _along(functions, draws, flown, torque, findings, job.progress), len(flown), inputs)
     others = (*model_of_another(model, job.study), *other_vehicles([flight], job.study))
-    notes = (Text(note, "warning") for note in others)
+    notes = (*unjudged(identified, model), *(Text(note, "warning") for note in others))
     return Outcome(findings.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(findings, identified)))
 
 

@@ -103,6 +103,11 @@ def _guesses(vehicle: dict[str, Any], rotors: list[dict[str, Any]]) -> dict[Unkn
     }
 
 
+def needs_numbers(vehicle: VehicleSettings, command: str) -> bool:
+    """Tell whether a command would take for facts what a config leaves open, of a vehicle without a model."""
+    return bool(vehicle.unknown) and command not in _TAKEN - {"replay", "simulate", "compare", "response"}
+
+
 def require_known(study: Study, command: str, *, whole: bool = True, accept: bool = False) -> tuple[str, ...]:
     """Refuse a vehicle with unknown numbers for a command that would take their guesses for facts.
 

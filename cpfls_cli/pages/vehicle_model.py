@@ -42,7 +42,6 @@ from cpfls_cli.pages.replay import (
     lost_words,
     playback_words,
 )
-from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.pages.trust import model_words
 from cpfls_cli.playback.table import wrench_of
@@ -152,7 +151,7 @@ def _headline(record: VehicleRecord) -> str:
 
 def _against(record: VehicleRecord) -> Iterator[str]:
     if record.contradiction:
-        yield from (contradicted(each) for each in record.contradiction)
+        yield from playback_words(Trust.DO_NOT_USE, None, record.contradiction)
         return
     if record.trust == Trust.LOOP or (record.loop.shown and record.instruments is None):
         yield loop_words(record)
@@ -172,7 +171,8 @@ def _against(record: VehicleRecord) -> Iterator[str]:
 
 def _grounds_of_forecast(record: VehicleRecord) -> Iterator[str]:
     """Say what its forecast is good for, which model makes it, what it is beside, and how it was chosen."""
-    yield from playback_words(record.forecast_verdict, record.held_out, record.contradiction)
+    if not record.contradiction:
+        yield from playback_words(record.forecast_verdict, record.held_out, None)
     if record.instruments is None and record.responses is not None:
         yield from response_words(record.responses)
     if record.forecast is not None:

@@ -25,7 +25,6 @@ from cpfls_cli.pages.vehicle_model import (
     remainder_curves,
     title,
     warnings,
-    worth,
 )
 from cpfls_cli.report.content import Plot, Table, Text, unfolded
 from cpfls_cli.validation.trust import Trust, capped
@@ -119,7 +118,7 @@ def test_flights_that_show_the_loop_are_said_first_and_leave_no_good_word():
     assert misled.held_out is None
     assert misled.verdict == Trust.LOOP
     assert not any("show the loop" in line for line in warnings(misled))
-    first, said, *_ = worth(misled)
+    first, said, *_ = cautions(misled)
     assert first == (
         "FORECAST NOT JUDGED; VEHICLE NOT JUDGED: THE FLIGHTS SHOW THE LOOP: not judged as a forecast; its constants "
         "are those of vehicle and autopilot together; 2 of 2 numbers are not determined."
