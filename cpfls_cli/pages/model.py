@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.model import EffectsGroup, InertiaFunctionsGroup, ModelRecord, ResponseGroup, RotorsGroup
 from cpfls_cli.artifacts.rebuilt import model_effects
 from cpfls_cli.effects.registry import CATALOGUE
