@@ -31,7 +31,7 @@ from cpfls_cli.cli.path_options import (
     WaypointsOption,
 )
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
-from cpfls_cli.errors import CpflsError
+from cpfls_cli.errors import ComputationError
 from cpfls_cli.logs.formats import formats_in_words, suffixes_in_words
 from cpfls_cli.report.forms import Form
 from cpfls_cli.version import __version__
@@ -664,10 +664,10 @@ def _run_without_config(title: str, output: Path, common: Common, call: Callable
 
 @contextmanager
 def _noted(job: Job) -> Iterator[None]:
-    """Say beside an error what speaks against the model and the numbers that it came about with."""
+    """Say beside what cannot be computed what speaks against the model and the numbers that it came about with."""
     try:
         yield
-    except CpflsError as error:
+    except ComputationError as error:
         for caution in list(job.cautions)[:1]:
             error.add_note(caution)
         raise

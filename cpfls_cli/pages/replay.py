@@ -35,7 +35,7 @@ from cpfls_cli.report.canvas import (
     stacked,
     style_of,
 )
-from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import number, sentence, whole_percent
 from cpfls_cli.rounding import less, tied
 from cpfls_cli.validation.trust import Trust
@@ -85,7 +85,7 @@ def _grounds(record: ReplayRecord, index: int) -> Iterator[Block]:
 
 
 def _worst(record: ReplayRecord, index: int) -> Iterator[Block]:
-    yield _worst_table(record, index)
+    yield Folded("Where it is farthest off", [_worst_table(record, index)], shown=True)
     yield from (Text(words, "warning") for words in (*_diverged(record), *record.warning))
 
 

@@ -165,8 +165,6 @@ def _against(record: VehicleRecord) -> Iterator[str]:
     open_ = [name_of(name) for name in record.untold if name not in told]
     if open_ and record.trust != Trust.LOOP:
         yield f"Not determined, for the flights say too little of it: {joined(open_)}."
-    if not record.complete:
-        yield "The search was stopped before its end; other structures may be better."
 
 
 def _grounds_of_forecast(record: VehicleRecord) -> Iterator[str]:
@@ -332,6 +330,8 @@ def warnings(record: VehicleRecord) -> list[str]:
         )
     if _guessed(record) and record.held_out is not None:
         said.append("the stated vehicle has guesses where the config leaves constants open")
+    if not record.complete:
+        said.append("the search was stopped before its end; other structures may be better")
     return said
 
 
