@@ -668,7 +668,7 @@ def _noted(job: Job) -> Iterator[None]:
     try:
         yield
     except ComputationError as error:
-        for caution in list(job.cautions)[:1]:
+        for caution in list(job.cautions)[: bool(job.study.vehicle.unknown)]:
             error.add_note(caution)
         raise
 

@@ -40,11 +40,11 @@ class Outcome:
 
 
 def cautioned(outcome: Outcome, job: Job) -> Outcome:
-    """Say what speaks against the models and numbers that an answer rests on, before all else that warns."""
+    """Say what speaks against the models and numbers that an answer rests on."""
     if not job.cautions:
         return outcome
     said = list(job.cautions)
-    blocks = (*caution_texts(said), *outcome.blocks)
+    blocks = (*outcome.blocks, *caution_texts(said))
     return replace(outcome, summary={**outcome.summary, "cautions": said}, blocks=blocks)
 
 

@@ -201,9 +201,9 @@ def test_an_interrupt_keeps_what_was_found(cpfls, config, flights, tmp_path, int
     result = cpfls("vehicle", config, flights[0], "-o", tmp_path / "v.h5", "--json")
     assert result.exit_code == 130
     assert names(tmp_path) == ["v.h5", "v.h5.checkpoint"]
-    assert result.stderr.splitlines()[-1] == (
+    assert (
         f"cpfls: note: {tmp_path / 'v.h5'}: is incomplete, because the search was interrupted; {RESUME}"
-    )
+    ) in result.stderr.splitlines()
     assert cpfls("check", tmp_path / "v.h5.checkpoint").exit_code == 0
     told = json.loads(result.stdout)
     assert (told["complete"], told["evaluated"]) == (False, 4)
