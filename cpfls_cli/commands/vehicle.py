@@ -110,7 +110,7 @@ def _next(
     job: Job, record: VehicleRecord, flights: Sequence[Path], held_out: Sequence[Path]
 ) -> tuple[Sequence[str | Path], ...]:
     """Give the commands that show what was found, and that judge it, plan what would tell more, or hand it over."""
-    config, name = job.inputs[0], job.output.stem
+    config, name = job.config, job.output.stem
     page = ("cpfls", "report", config, job.output, "-o", job.output.with_suffix(".html"))
     if not record.complete:
         return (page,)
