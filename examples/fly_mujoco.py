@@ -1,6 +1,8 @@
 """Fly an exported vehicle in MuJoCo by a controller that knows the stated one, and log it: see docs/simulators.md.
 
 python examples/fly_mujoco.py UAV.xml STUDY.yaml LOG.h5
+
+In the place of a study that leaves numbers open, name the vehicle.h5 that `cpfls vehicle` found.
 """
 
 import sys
@@ -12,6 +14,12 @@ import yaml
 
 BEGIN_S, END_S, EVERY = 5.0, 45.0, 10
 STIFF, DAMPED = np.array([60.0, 60.0, 1.5]), np.array([14.0, 14.0, 2.0])
+ROTOR = {
+    "position_m": "position",
+    "spin": "spin",
+    "thrust_factor_n_s2": "thrust_factor",
+    "drag_factor_n_m_s2": "drag_factor",
+}
 NOISE = {"attitude": 0.003, "rate": 0.005, "position": 0.02, "velocity": 0.05, "speed": 1.0}
 
 
@@ -70,9 +78,25 @@ def fly(model, controller):
     return np.array(rows)
 
 
-def main(uav, study, log):
+def known(study):
+    """Read the numbers of a vehicle: of a study, or as `cpfls vehicle` found them."""
+    if h5py.is_hdf5(study):
+        with h5py.File(study) as file:
+            found = {key: file[f"vehicle/rotor/{name}"][()].tolist() for key, name in ROTOR.items()}
+            rotors = [dict(zip(found, each, strict=True)) for each in zip(*found.values(), strict=True)]
+            inertia, mass = file["vehicle/inertia"][()].tolist(), float(file["vehicle/mass"][()])
+            return {"mass_kg": mass, "inertia_kg_m2": inertia, "rotors": rotors}
     with open(study, encoding="utf-8") as stream:
         vehicle = yaml.safe_load(stream)["vehicle"]
+    if None in (vehicle["inertia_kg_m2"] or [None]) or any(
+        None in [r[key] for key in ROTOR] for r in vehicle["rotors"]
+    ):
+        sys.exit(f"{study}: leaves numbers of the vehicle open; name the vehicle.h5 that `cpfls vehicle` found instead")
+    return vehicle
+
+
+def main(uav, study, log):
+    vehicle = known(study)
     rows = fly(mujoco.MjModel.from_xml_path(uav), Controller(vehicle))
     noise = np.repeat([0.0, *NOISE.values()], [1, 3, 3, 3, 3, rows.shape[1] - 13])
     rows += noise * np.random.default_rng(1).standard_normal(rows.shape)

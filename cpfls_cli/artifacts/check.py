@@ -281,7 +281,8 @@ def _read_header(file: h5py.File) -> Header:
     config = bytes(file[CONFIG][()]).decode()
     if text_sha256(config) != file.attrs["config_sha256"]:
         raise ValueError(f"/{CONFIG} was changed after the file was written (config_sha256 differs)")
-    return Header(str(file.attrs["cpfls_version"]), int(file.attrs["seed"]), config, inputs)
+    cautions = tuple(str(file.attrs.get("cautions", "")).splitlines())
+    return Header(str(file.attrs["cpfls_version"]), int(file.attrs["seed"]), config, inputs, cautions)
 
 
 def require_all(path: Path, stored: Stored) -> None:

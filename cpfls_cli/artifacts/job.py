@@ -7,13 +7,14 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Literal, Protocol, TypeVar
 
 from cpfls_cli.artifacts.output import check_output
 from cpfls_cli.artifacts.spec import Header, InputFile, Record
-from cpfls_cli.artifacts.store import file_sha256, format_name, write_parts, write_record
+from cpfls_cli.artifacts.store import file_sha256, format_name, read_header, write_parts, write_record
 from cpfls_cli.config.study import Study, resolved_yaml
-from cpfls_cli.errors import InputError
+from cpfls_cli.config.unknown import require_known
+from cpfls_cli.errors import InputError, visible
 from cpfls_cli.version import __version__
 
 R = TypeVar("R", bound=Record)
@@ -53,6 +54,11 @@ class Job:
         The config, and every input that was taken so far: no output may replace them.
     config : Path
         File of the study, as the commands that go on name it.
+    open_numbers : {"refused", "guessed", "found"}
+        What a command does that needs numbers which the config leaves open: it refuses, takes the guesses that stand
+        for them, or has those of a vehicle that was found in their place.
+    cautions : dict of str to None
+        What speaks against the models and numbers that it rests on, in order: the output carries it.
     """
 
     study: Study
@@ -64,10 +70,19 @@ class Job:
     deferred_interrupts: Callable[[], AbstractContextManager[Interrupted]] = _uninterrupted
     inputs: list[Path] = field(default_factory=list)
     config: Path = Path("CONFIG")
+    open_numbers: Literal["refused", "guessed", "found"] = "refused"
+    cautions: dict[str, None] = field(default_factory=dict)
 
     def beside(self, name: str) -> Path:
         """Name a file in the folder of the output."""
         return self.output.with_name(name)
+
+
+def require_numbers(job: Job, command: str, *, whole: bool = True) -> None:
+    """Refuse numbers that the config leaves open, as `require_known`; or say how far its output hangs on guesses."""
+    if job.open_numbers != "found":
+        said = require_known(job.study, command, whole=whole, accept=job.open_numbers == "guessed")
+        job.cautions.update(dict.fromkeys(said))
 
 
 def begin(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
@@ -89,6 +104,9 @@ def take_inputs(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
         _check_input(path)
         job.reads(path)
         job.inputs.append(path)
+    for path in inputs.values():
+        # What an input rests on, the output rests on.
+        job.cautions.update(dict.fromkeys(read_header(path).cautions if format_name(path) else ()))
     return {role: input_file(path) for role, path in inputs.items()}
 
 
@@ -103,20 +121,20 @@ def _check_input(path: Path) -> None:
 
 def finish(job: Job, record: R, inputs: Mapping[str, InputFile]) -> R:
     """Write the record of a job, and give it back with the header that says where it comes from."""
-    whole = record.with_header(header_of(job.study, inputs))
+    whole = record.with_header(header_of(job.study, inputs, job.cautions))
     write_record(job.output, whole)
     return whole
 
 
 def finish_parts(job: Job, parts: Iterable[Record], samples: int, inputs: Mapping[str, InputFile]) -> None:
     """Write the record of a job of which no more than a part is in memory, as `write_parts`."""
-    header = header_of(job.study, inputs)
+    header = header_of(job.study, inputs, job.cautions)
     write_parts(job.output, (part.with_header(header) for part in parts), samples)
 
 
-def header_of(study: Study, inputs: Mapping[str, InputFile]) -> Header:
+def header_of(study: Study, inputs: Mapping[str, InputFile], cautions: Iterable[str] = ()) -> Header:
     """Tell where an artifact comes from."""
-    return Header(__version__, study.seed, resolved_yaml(study), inputs)
+    return Header(__version__, study.seed, resolved_yaml(study), inputs, tuple(map(visible, cautions)))
 
 
 def input_file(path: Path) -> InputFile:

@@ -333,6 +333,11 @@ class ModelRecord(Record):
         return Trust.NOT_JUDGED
 
     @property
+    def judged_as(self) -> dict[str, str]:
+        """How far to trust it, by what it is judged as; the word of the last is that of whoever takes it elsewhere."""
+        return {"": self.trust}
+
+    @property
     def stopped(self) -> str:
         """Why the search for it ended before its end; empty where it did not."""
         return ""

@@ -29,6 +29,7 @@ FOUND_AS = {
 }
 """Numbers of a fit, by the keys under which people look for them."""
 
+_REMAINDER = "remainder"
 _NAMES = {
     THRUST: "thrust factor",
     DRAG: "drag factor",
@@ -38,14 +39,29 @@ _NAMES = {
     **dict(zip(CENTRE, ("centre of mass along x", "along y"), strict=True)),
 }
 
+_FOUND_NAMES = {found: _NAMES[key] for key, found in FOUND_AS.items()}
+
 OF_TURNING = frozenset(FOUND_AS[key] for key in (DRAG, *INERTIA))
 """Numbers of a fit that are known only as far as the torques are that turn the vehicle."""
 
 _UNITS = {THRUST: "N s^2", DRAG: "N m s^2", LAG: "s", DELAY: "s", **dict.fromkeys(CENTRE, "m")}
+ON_BOUND = "on a bound of what is tried"
+
 STATED = (THRUST, DRAG, *INERTIA)
 """What a config states, where it states anything."""
 
-_GUESSES = {"thrust_factor": (THRUST,), "drag_factor": (DRAG,), "inertia": INERTIA[:3]}
+GUESSES = {"thrust_factor": (THRUST,), "drag_factor": (DRAG,), "inertia": INERTIA[:3]}
+
+
+def name_of(found: str) -> str:
+    """Say what people call a number of a fit."""
+    block, _, number = found.partition(".")
+    return _FOUND_NAMES.get(found, f"{block.replace('_', ' ')} {number}".strip())
+
+
+def is_learned(found: str) -> bool:
+    """Tell whether a number of a fit belongs to a remainder: to that of the torque, or of the force."""
+    return found.startswith(_REMAINDER)
 
 
 class Parameter(NamedTuple):
@@ -82,6 +98,17 @@ class Parameter(NamedTuple):
         return _NAMES[self.key]
 
     @property
+    def told(self) -> str:
+        """Whether the flights tell it, in a word."""
+        if self.determined:
+            return "yes"
+        if self.value is None:
+            return "a guess"
+        if self.low is None:
+            return "as stated" if self.stated is not None else "not needed"
+        return "on a bound" if self.reason == ON_BOUND else "no"
+
+    @property
     def needed(self) -> bool:
         """Whether it is anything but a zero that nobody asked for."""
         return self.value != 0 or self.low is not None or self.stated is not None
@@ -90,7 +117,7 @@ class Parameter(NamedTuple):
 def parameters_of(record: VehicleRecord) -> Iterator[Parameter]:
     """List the constants of a vehicle that was found, known or not."""
     found = {row["name"]: row for row in rows_of(record.found)}
-    guesses = {key for name in record.guess or () for key in _GUESSES[name]}
+    guesses = {key for name in record.guess or () for key in GUESSES[name]}
     for key, name in FOUND_AS.items():
         unit = _UNITS.get(key, "kg m^2")
         if name in found:
@@ -111,7 +138,7 @@ def _reason(record: VehicleRecord, row: dict[str, Any]) -> str:
     """Say why a number is not determined; empty where it is."""
     name = row["name"]
     if row["at_bound"]:
-        return "on a bound of what is tried"
+        return ON_BOUND
     others = [
         each["second"] if each["first"] == name else each["first"]
         for each in rows_of(record.trade)
@@ -135,10 +162,12 @@ def too_heavy(record: VehicleRecord) -> str:
     limits = beyond_any_body(vehicle.mass, vehicle.rotor.position, moments)
     if not limits:
         return ""
-    told = " and ".join(f"{name} {moments[name]:.3g} where {limit:.3g} can be" for name, limit in limits.items())
+    told = " and ".join(
+        f"{name_of(name)} {moments[name]:.3g} where {limit:.3g} can be" for name, limit in limits.items()
+    )
     return (
-        f"too heavy for {vehicle.mass:.3g} kg between these rotors ({told}, kg m^2): part of the torque that the log "
-        "states turns nothing, as noise of the speeds or in answer to gusts; numbers that predict, not the body's"
+        f"too heavy for {vehicle.mass:.3g} kg between these rotors ({told}, kg m^2): numbers that predict, not the "
+        "body's"
     )
 
 

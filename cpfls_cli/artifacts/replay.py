@@ -29,6 +29,9 @@ USUAL = "usual"
 CONTROL_HORIZON = 0.1
 """Horizon in s to which a controller of the attitude relies on its model."""
 
+CONTROL_BAND = (0.04, 0.25)
+"""Horizons in s at which a controller of the attitude corrects what its model got wrong."""
+
 _DRAWN_RUNS = 12
 _MODEL = 0
 
@@ -234,20 +237,47 @@ def better_to(errors: ErrorsByHorizon, signal: str) -> float:
     return float(errors.horizon_s[better[-1]]) if len(better) else 0.0
 
 
+def lost_to(errors: ErrorsByHorizon, row: int = _MODEL) -> dict[str, tuple[str, float, float]]:
+    """Find where a prediction of rates or attitude loses to what knows no model at horizons where control lives.
+
+    Returns
+    -------
+    dict of str to (str, float, float)
+        By signal: the rival that it loses to first, and from which horizon to which, s.
+    """
+    horizon, (low, high) = errors.horizon_s, CONTROL_BAND
+    # A rounding error is no horizon apart.
+    inside = ~less(horizon, low) & ~less(high, horizon) if not less(horizon[-1], low) else np.ones(len(horizon), bool)
+    lost: dict[str, tuple[str, float, float]] = {}
+    for signal in ("body_rate", "attitude"):
+        group = errors.errors[signal]
+        if group is None:
+            continue
+        rivals = group.mae[1:3]
+        where = np.flatnonzero(inside & less(rivals.min(axis=0), group.mae[row]))
+        if len(where):
+            rival = errors.prediction[1 + int(rivals[:, where[0]].argmin())]
+            lost[signal] = (rival, float(horizon[where[0]]), float(horizon[where[-1]]))
+    return lost
+
+
 def trust_by_playback(held_out: PlaybackGroup | None) -> Trust:
     """Judge a model by its playback along flights that it was not found in.
 
     Good for simulation where errors of rates, attitude, velocity and position, as far as the flights know them, add
     up to less over the horizon than those of what knows no model; for control where those of the rates do, over
-    0.1 s at least.
+    0.1 s at least. Nothing is good for either that loses in rates or attitude where control lives.
     """
     if held_out is None:
         return Trust.NOT_JUDGED
     last, known = float(held_out.horizon_s[-1]), held_out.errors
     reached = {signal: better_to(held_out, signal) for signal, group in known.items() if group is not None}
-    if known["velocity"] is not None and all(horizon >= last for horizon in reached.values()):
-        return Trust.SIMULATION
-    return Trust.CONTROL if reached["body_rate"] >= min(CONTROL_HORIZON, last) else Trust.DO_NOT_USE
+    if reached["body_rate"] < min(CONTROL_HORIZON, last):
+        return Trust.DO_NOT_USE
+    if lost_to(held_out):
+        return Trust.NOT_CONTROL
+    simulates = known["velocity"] is not None and all(horizon >= last for horizon in reached.values())
+    return Trust.SIMULATION if simulates else Trust.CONTROL
 
 
 def contradictions_of(flights: Sequence[LoggedFlight]) -> tuple[str, ...] | None:

@@ -215,12 +215,15 @@ class Header:
         The resolved study as YAML.
     inputs : mapping of str to InputFile
         By role.
+    cautions : tuple of str
+        What speaks against the models that it rests on, and numbers that are guesses.
     """
 
     version: str
     seed: int
     config: str
     inputs: Mapping[str, InputFile] = field(default_factory=dict)
+    cautions: tuple[str, ...] = ()
 
 
 @record

@@ -317,6 +317,8 @@ def _write_header(file: h5py.File, artifact: Artifact) -> None:
     file.attrs["cpfls_version"] = header.version
     file.attrs["seed"] = header.seed
     file.attrs["config_sha256"] = text_sha256(header.config)
+    if header.cautions:
+        file.attrs["cautions"] = "\n".join(header.cautions)
     file.create_dataset(CONFIG, data=np.bytes_(header.config.encode()))
     for role, source in sorted(header.inputs.items()):
         group = file.create_group(f"{INPUTS}/{role}")

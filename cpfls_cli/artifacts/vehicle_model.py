@@ -12,11 +12,11 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.disturbance import DisturbanceGroup
 from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
-from cpfls_cli.artifacts.parameters import parameters_of
+from cpfls_cli.artifacts.parameters import DRAG, FOUND_AS, GUESSES, INERTIA, is_learned, parameters_of
 from cpfls_cli.artifacts.replay import HeldOutGroup, trust_by_playback
 from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, response_word
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, group_of, record, rows_of
-from cpfls_cli.inertia import EXPLAINED, INERTIA_PARAMETERS
+from cpfls_cli.inertia import EXPLAINED
 from cpfls_cli.response.mismatch import ROTATION, THRUST
 from cpfls_cli.validation.trust import Trust, capped
 
@@ -338,8 +338,13 @@ class VehicleRecord(ModelRecord):
 
     @property
     def trust(self) -> str:
-        """What playback on flights held out says of it."""
+        """What it is as the vehicle: whoever takes it elsewhere takes its constants."""
         return self.verdict
+
+    @property
+    def judged_as(self) -> dict[str, str]:
+        """How far to trust it as a forecast along logged rotor speeds, and as the vehicle."""
+        return {"forecast": self.forecast_verdict, "vehicle": self.verdict}
 
     @property
     def stopped(self) -> str:
@@ -350,30 +355,60 @@ class VehicleRecord(ModelRecord):
     def verdict(self) -> Trust:
         """How far to trust its constants, where the flights neither contradict themselves nor show the loop.
 
-        Where instruments tell them, by what they explain of the motion that comes again; else by playback. No word is
-        good where the frequency response about roll or pitch is off.
+        Where instruments tell them, by what they explain of the motion that comes again; else by playback, as far as
+        they are told at all. No word is good where the frequency response about roll or pitch is off.
         """
         against = self.contradiction or ()
         off = self.responses is not None and self.responses.off
+        told = self.tells_turning and not set(FOUND_AS.values()) & set(self.on_bound)
         if self.instruments is None:
-            return capped(self.forecast_verdict, against, loop=self.loop.shown, lacks=off)
+            told = told and self.tells_yaw
+            return capped(self.forecast_verdict, against, loop=self.loop.shown, lacks=off, told=told)
         lacks = off or self.instruments.lacks
         seen = lacks or (self.responses is not None and self.responses.judged)
-        if not (seen and self.tells_turning):
-            return capped(Trust.NOT_JUDGED, against)
-        return capped(Trust.SIMULATION, against, lacks=lacks)
+        word = Trust.SIMULATION if seen else Trust.NOT_JUDGED
+        return capped(word, against, lacks=lacks, told=told)
 
     @property
     def tells_turning(self) -> bool:
-        """Whether the moments of inertia about roll and pitch are determined, or known, and on no bound."""
-        numbers = dict(zip(self.found.name, zip(self.found.determined, self.found.at_bound, strict=True), strict=True))
-        moments = [numbers.get(f"inertia.{name}", (True, False)) for name in INERTIA_PARAMETERS[:2]]
-        return all(determined and not at_bound for determined, at_bound in moments)
+        """Whether the moments of inertia about roll and pitch are told, or known, and on no bound."""
+        return not {FOUND_AS[key] for key in INERTIA[:2]} & set(self.untold)
+
+    @property
+    def tells_yaw(self) -> bool:
+        """Whether the moment of inertia about yaw is told, or its ratio to the drag factor."""
+        drag, moment = FOUND_AS[DRAG], FOUND_AS[INERTIA[2]]
+        ratios = {frozenset(pair) for pair in zip(self.trade.first, self.trade.second, strict=True)}
+        return moment not in self.untold or frozenset((drag, moment)) in ratios
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Numbers of the fit that mean something by themselves, those of a learned remainder left out."""
+        return tuple(name for name in self.found.name if not is_learned(name))
+
+    @property
+    def on_bound(self) -> tuple[str, ...]:
+        """Numbers that lie on a bound of what is tried, and are not just zero."""
+        return tuple(
+            row["name"] for row in rows_of(self.found) if row["at_bound"] and row["value"] and row["name"] in self.named
+        )
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """Numbers that the flights do not tell: not determined, on a bound, or guesses still."""
+        open_ = {row["name"] for row in rows_of(self.found) if not row["determined"]} | set(self.on_bound)
+        guessed = (FOUND_AS[key] for name in self.guess or () for key in GUESSES[name])
+        return (*(name for name in self.named if name in open_), *(key for key in guessed if key not in self.named))
 
     @property
     def forecast_verdict(self) -> Trust:
         """What playback on flights held out says of it as a forecast along logged rotor speeds."""
-        return trust_by_playback(self.held_out)
+        return capped(trust_by_playback(self.held_out), self.contradiction or ())
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers were looked for, guesses among them."""
+        return len({*self.named, *self.untold})
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -385,6 +420,7 @@ class VehicleRecord(ModelRecord):
             "not_held": [],
             "verdict": self.verdict,
             "forecast_verdict": self.forecast_verdict,
+            "not_determined": list(self.untold),
             **self.provenance,
             "parameters": {row.pop("key"): row for row in (each._asdict() for each in parameters_of(self))},
             "numbers": numbers,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from enum import StrEnum
 from importlib import import_module
@@ -31,12 +31,13 @@ from cpfls_cli.cli.path_options import (
     WaypointsOption,
 )
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
+from cpfls_cli.errors import ComputationError
 from cpfls_cli.logs.formats import formats_in_words, suffixes_in_words
 from cpfls_cli.report.forms import Form
 from cpfls_cli.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from cpfls_cli.artifacts.job import Job
     from cpfls_cli.config.study import Study
@@ -80,7 +81,7 @@ ModelOption = Annotated[
     typer.Option(
         "--model",
         metavar="MODEL",
-        help="Made by `cpfls identify` (`compare` takes one of `extend` or `vehicle` too); without, the vehicle of the "
+        help="Made by `cpfls identify` or `vehicle` (`compare` takes one of `extend` too); without, the vehicle of the "
         "config.",
     ),
 ]
@@ -639,13 +640,19 @@ def _of(title: str) -> Any:
 def _run(title: str, config: Path, output: Path, common: Common, call: Callable[[Any, Job], Outcome]) -> None:
     """Load the study, run one command, given as its module, with a progress bar, and print what it says."""
     with messages_for_errors():
-        from cpfls_cli.config.unknown import require_known
-
         narration = _narration(title, common)
         study = common.study(config, sweep=title == "sweep")
-        require_known(study, title)
         narration.reads(config)
-        _run_with(study, title, [config], output, common, narration, call)
+
+        def with_numbers(command: Any, job: Job) -> Outcome:
+            from cpfls_cli.artifacts.job import require_numbers
+
+            if common.numbers is not None:
+                job = import_module("cpfls_cli.commands.numbers").with_numbers_of(job, common.numbers)
+            require_numbers(job, title)
+            return call(command, job)
+
+        _run_with(study, title, [config], output, common, narration, with_numbers)
 
 
 def _run_without_config(title: str, output: Path, common: Common, call: Callable[[Any, Job], Outcome]) -> None:
@@ -653,6 +660,17 @@ def _run_without_config(title: str, output: Path, common: Common, call: Callable
     from cpfls_cli.config.load import validate
 
     _run_with(validate({}, "default"), title, [], output, common, _narration(title, common), call)
+
+
+@contextmanager
+def _noted(job: Job) -> Iterator[None]:
+    """Say beside what cannot be computed what speaks against the model and the numbers that it came about with."""
+    try:
+        yield
+    except ComputationError as error:
+        for caution in list(job.cautions)[: bool(job.study.vehicle.unknown)]:
+            error.add_note(caution)
+        raise
 
 
 def _narration(title: str, common: Common) -> Narration:
@@ -670,12 +688,23 @@ def _run_with(
 ) -> None:
     from cpfls_cli.artifacts.job import Job
     from cpfls_cli.artifacts.output import locked
+    from cpfls_cli.report.outcome import cautioned
 
     with progress_bar(title, common) as progress:
-        job = Job(study, output, common.force, common.dry_run, progress, narration.reads, deferred_interrupts, inputs)
+        job = Job(
+            study,
+            output,
+            common.force,
+            common.dry_run,
+            progress,
+            narration.reads,
+            deferred_interrupts,
+            inputs,
+            "guessed" if common.accept_guesses else "refused",
+        )
         job = replace(job, config=inputs[0]) if inputs else job
-        with nullcontext() if common.dry_run else locked(output, title):
-            outcome = call(_of(title), job)
+        with nullcontext() if common.dry_run else locked(output, title), _noted(job):
+            outcome = cautioned(call(_of(title), job), job)
     if not common.dry_run:
         narration.wrote(output)
     tell(outcome, common)

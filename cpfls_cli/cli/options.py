@@ -48,6 +48,23 @@ class Common:
         bool, typer.Option("--dry-run", help="Check config, inputs and output; compute and write nothing.")
     ] = False
 
+    accept_guesses: Annotated[
+        bool,
+        typer.Option(
+            "--accept-guesses",
+            help="Take guesses from mass and arms for what the config leaves open; the answer says how far it hangs on "
+            "them.",
+        ),
+    ] = False
+    numbers: Annotated[
+        Path | None,
+        typer.Option(
+            "--model",
+            metavar="VEHICLE",
+            help="Take what the config leaves open from this vehicle of `cpfls vehicle`.",
+        ),
+    ] = None
+
     def study(self, config: Path, *, sweep: bool = False) -> Study:
         """Load a study with the overrides given on the command line; check its sweep where one is to be run."""
         from cpfls_cli.config.load import load_study
@@ -105,14 +122,16 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
         for name, parameter in inspect.signature(command).parameters.items()
         if name != "common"
     ]
+    left_out = _left_out(command.__name__.rstrip("_"), hints)
     shared = [
         inspect.Parameter(f.name, inspect.Parameter.KEYWORD_ONLY, default=f.default, annotation=common_hints[f.name])
         for f in fields(Common)
+        if f.name not in left_out
     ]
 
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> None:
-        common = Common(**{f.name: kwargs.pop(f.name) for f in fields(Common)})
+        common = Common(**{f.name: kwargs.pop(f.name) for f in fields(Common) if f.name not in left_out})
         if "config" not in hints:
             _refuse_overrides(common)
         _check_order(command.__name__.rstrip("_"), {name: kwargs[name] for name in arguments}, kwargs.get("output"))
@@ -123,6 +142,19 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
     wrapped.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     wrapped.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return wrapped
+
+
+_OF_NUMBERS = ("accept_guesses", "numbers")
+_WITHOUT_VEHICLE = ("vehicle", "report", "config")
+"""Commands that read a config and do with guesses, or need no vehicle."""
+
+
+def _left_out(command: str, hints: Mapping[str, Any]) -> tuple[str, ...]:
+    """List the options on numbers of the vehicle that a command has no use for, or has as an option of its own."""
+    if "config" not in hints or command in _WITHOUT_VEHICLE:
+        return _OF_NUMBERS
+    own = "model" in hints and not any(isinstance(each, ArgumentInfo) for each in get_args(hints["model"]))
+    return ("numbers",) if own else ()
 
 
 def _refuse_overrides(common: Common) -> None:

@@ -12,8 +12,8 @@ from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study, generator
-from cpfls_cli.config.unknown import require_known
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
@@ -34,7 +34,7 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     roles = numbered_roles("flight", flights)
     inputs = begin(job, roles | ({} if model is None else {"model": model}))
     check_ignored(job.study)
-    require_known(job.study, "compare", whole=model is not None and holds(model, VehicleRecord))
+    job = with_numbers(job, "compare", model, whole=model is not None and holds(model, VehicleRecord))
     read, learned = read_flights(flights, job.study), learned_by(model)
     base = VehicleModel(vehicle=job.study.vehicle) if model is None else read_model(model, job.study)
     given = replace(read, recordings=tuple(of_vehicle(read.recordings, base)))

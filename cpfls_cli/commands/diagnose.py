@@ -23,6 +23,7 @@ from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.gap.before_after import before_after
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.naming.results import Diagnosis, GapVerdict
+from cpfls_cli.gap.whole_vehicle import known_already
 from cpfls_cli.pages.diagnosis import answer
 from cpfls_cli.pages.effects import closest_sentence
 from cpfls_cli.pages.first_screen import next_steps, notes_on_flights, verdict_box
@@ -114,12 +115,12 @@ def diagnosed(
     base: VehicleModel,
     progress: Callable[[float, str], None],
 ) -> tuple[Diagnosis, DiagnosisRecord]:
-    """Diagnose flights."""
-    model = base.fuzzy
+    """Diagnose flights; of a base with effects of its own, those that come on top."""
+    model, settings = base.fuzzy, replace(study.gap, ignore=(*study.gap.ignore, *known_already(base)))
     rng = generator(study, "diagnose")
-    result = diagnose(split.training, split.held_out, study.gap, rng, model=model, progress=progress)
+    result = diagnose(split.training, split.held_out, settings, rng, model=model, progress=progress)
     extended = result.model(model)
-    change = before_after(split.training, split.held_out, result.held_out, extended, study.gap)
+    change = before_after(split.training, split.held_out, result.held_out, extended, settings, base)
     flights = (split.training, split.held_out, split.sentence)
     record = DiagnosisRecord.of(result, change, extended, *flights, warnings, base)
     return result.diagnosis, record

@@ -21,7 +21,7 @@ from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.gap.before_after import errors_by_horizon, left_out, played_pairs
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
-from cpfls_cli.gap.whole_vehicle import require_body, whole_vehicle
+from cpfls_cli.gap.whole_vehicle import beside_rotors, has_effects, on_top_of, require_body, whole_vehicle
 from cpfls_cli.pages.extended import warnings
 from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.source import source_of
@@ -40,7 +40,9 @@ def run(job: Job, diagnosis: Path, model: Path | None) -> Outcome:
     named_effects(diagnosed)
     if job.dry_run:
         return nothing_written(job)
-    training, held = (diagnosed.flights.recordings(job.study, role) for role in (TRAINING, HELD_OUT))
+    training, held = (
+        beside_rotors(diagnosed.flights.recordings(job.study, role), base) for role in (TRAINING, HELD_OUT)
+    )
     record = extended(job.study, training, held, diagnosed, base)
     own = None if model is None else learned_by(model)
     record = finish_extended(job, record, diagnosed, inputs, own)
@@ -90,9 +92,10 @@ def extended(
 ) -> ExtendedRecord:
     """Put the effects that a diagnosis names into a model; refused where the held-out gap does not shrink."""
     extension = extend(training, held, named_effects(diagnosis), audit(diagnosis.audit), study.gap, base.fuzzy)
-    whole, given = (whole_vehicle(each, study.vehicle) for each in (extension.model, plain(base.fuzzy)))
-    require_body(extension.model, study.vehicle)
+    stated = base.vehicle if has_effects(base) else study.vehicle
+    whole, given = (on_top_of(base, whole_vehicle(each, stated)) for each in (extension.model, plain(base.fuzzy)))
+    require_body(extension.model, stated)
     played = played_pairs(held, whole, given)
     playback = PlaybackChangeGroup.of_pairs(played, errors_by_horizon(played, study.gap.horizon_s))
     missing = left_out(whole, whole.beside_table, held)
-    return ExtendedRecord.of(extension, study.vehicle, whole, playback, missing)
+    return ExtendedRecord.of(extension, stated, whole, playback, missing)

@@ -25,11 +25,13 @@ from cpfls_cli.commands.diagnose import (
     whole_summary,
 )
 from cpfls_cli.commands.extend import extended, finish_extended
+from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import learned_by, read_base
 from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, split_flights
 from cpfls_cli.gap.naming.results import Diagnosis
+from cpfls_cli.gap.whole_vehicle import beside_rotors, has_effects, of_vehicle
 from cpfls_cli.pages.disagreement import where
 from cpfls_cli.pages.extended import model_with, warnings
 from cpfls_cli.pages.first_screen import notes_on_flights
@@ -73,6 +75,7 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path
 
     The search adds one effect after another until nothing more can be named, so once through is all the way.
     """
+    job = with_numbers(job, "gap", model)
     given = _begin(job, flights, held_out, model)
     if job.dry_run:
         line = Text(f"{job.output}: would be filled; the config and all inputs are good")
@@ -108,9 +111,10 @@ def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: P
     check_ignored(job.study)
     # All flights are read together, so that one battery is full in all of them.
     read = read_flights([*flights, *held_out], job.study)
-    given, held = read.recordings[: len(flights)], read.recordings[len(flights) :]
-    split = split_flights(given, held, job.study.gap)
     base = read_base(model, job.study)
+    flown = tuple(of_vehicle(read.recordings, base)) if has_effects(base) else read.recordings
+    balanced, given = beside_rotors(read.recordings, base), flown[: len(flights)]
+    split = split_flights(balanced[: len(flights)], balanced[len(flights) :], job.study.gap)
     learned, judged = learned_by(model), known_by(numbered_roles("flight", flights), inputs)
     whole = with_seen(Recordings(given, read.warnings), model, learned, judged)
     return _Given(whole, split, base, learned, inputs)

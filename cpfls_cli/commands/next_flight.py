@@ -15,9 +15,9 @@ from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
 from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.rebuilt import audit, vehicle_model
 from cpfls_cli.artifacts.trajectory import QuestionGroup, TrajectoryRecord
+from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.commands.trajectory import figure_paths, to_simulate
 from cpfls_cli.config.study import Study, generator, settings_of
-from cpfls_cli.config.unknown import require_known
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.registry import effect as find
@@ -81,7 +81,7 @@ class Case:
 def run(job: Job, diagnosis: Path | None = None, plot: bool = False) -> Outcome:
     """Plan the flight that tells most, and write it with waypoints for an autopilot."""
     study = job.study
-    require_known(study, "trajectory", whole=False)
+    with_numbers(job, "trajectory", None)
     inputs = begin(job, {"diagnosis": diagnosis} if diagnosis else {})
     waypoints = job.output.with_name(f"{job.output.stem}-waypoints.csv")
     figures = figure_paths(job, figure_names(held=False) if plot else ())

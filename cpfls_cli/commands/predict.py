@@ -19,8 +19,8 @@ from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.spec import PART
 from cpfls_cli.artifacts.store import count_rows, holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study
-from cpfls_cli.config.unknown import require_known
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
@@ -41,7 +41,7 @@ from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles
 from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_balance
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.identification.data import TorqueSource
-from cpfls_cli.pages.model import trust_notes
+from cpfls_cli.pages.identification import unjudged
 from cpfls_cli.pages.prediction import answer
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.trust import NOT_SEEN, seen_words
@@ -58,7 +58,7 @@ _Predicted = Callable[[FlightStretch], PredictionRecord]
 def run(job: Job, model: Path, flight: Path) -> Outcome:
     """Predict along a flight and write it."""
     inputs = begin(job, {"model": model, "flight": flight})
-    require_known(job.study, "predict", whole=holds(model, VehicleRecord))
+    job = with_numbers(job, "predict", model, whole=holds(model, VehicleRecord))
     record = read_record(model, ModelRecord)
     identified = record if isinstance(record, IdentifiedRecord) else None
     findings, wrong = Findings(), contradictions(check_file(flight, job.study, driven=identified is None))
@@ -72,8 +72,7 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
             return nothing_written(job)
         finish_parts(job, _by_stretches(predicted, stretches, findings, job.progress), len(stretches), inputs)
         about = (Text(f"{stretches.name}: {warning}", "warning") for warning in stretches.warnings)
-        notes = (*trust_notes(record, model), *about)
-        return Outcome(findings.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(findings)))
+        return Outcome(findings.summary | {"contradictions": list(wrong)}, (*said, *about, *answer(findings)))
     functions = rebuilt(model, identified).fuzzy
     assert isinstance(functions, InertiaFunctions), "what is identified"
     torque = count_rows(flight, FlightRecord.spec(), FlightRecord.path("torque")) is not None
@@ -83,7 +82,7 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
     draws = _draws(identified.uncertainty)
     finish_parts(job, _along(functions, draws, flown, torque, findings, job.progress), len(flown), inputs)
     others = (*model_of_another(model, job.study), *other_vehicles([flight], job.study))
-    notes = (*trust_notes(identified, model), *(Text(note, "warning") for note in others))
+    notes = (*unjudged(identified, model), *(Text(note, "warning") for note in others))
     return Outcome(findings.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(findings, identified)))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.replay import ReplayRecord
-from cpfls_cli.config.unknown import require_known
+from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import holds_forecast, is_vehicle, learned_by, read_model, read_observer
@@ -31,10 +31,10 @@ _FORECAST = "{}: its forecast along logged rotor speeds is played, loop and all;
 
 def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) -> Outcome:
     """Play a model back along flights and write its errors by horizon."""
-    require_known(job.study, "replay", whole=not is_vehicle(model))
     of_model = {} if is_vehicle(model) else {"model": model}
     roles = numbered_roles("flight", flights)
     inputs = begin(job, of_model | roles)
+    job = with_numbers(job, "replay", model, whole=not is_vehicle(model))
     to_play = read_model(model, job.study, forecast=True)
     observer = read_observer(model, options.history_s) if options.history_s > 0 else None
     given = flights_to_play(flights, job.study, options.hold)

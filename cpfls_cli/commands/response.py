@@ -14,8 +14,8 @@ from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, ResponseRec
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.compare import to_correct, to_fly
+from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.commands.replay import model_notes
-from cpfls_cli.config.unknown import require_known
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import learned_by, read_model
 from cpfls_cli.flights.playback import flights_to_play
@@ -36,7 +36,7 @@ def run(job: Job, flights: Sequence[Path], model: Path | None, table: Path | Non
     """Estimate frequency responses and write them."""
     roles = numbered_roles("flight", flights)
     inputs = begin(job, ({} if model is None else {"model": model}) | roles)
-    require_known(job.study, "response", whole=model is not None and holds(model, VehicleRecord))
+    job = with_numbers(job, "response", model, whole=model is not None and holds(model, VehicleRecord))
     if table is not None:
         refuse_own(table, job.output)
         check_outputs(job, table)

@@ -28,6 +28,7 @@ def info(path: Path) -> Outcome:
         "cpfls_version": header.version,
         "seed": header.seed,
         "inputs": {role: vars(source) for role, source in header.inputs.items()},
+        "cautions": list(header.cautions),
         "datasets": datasets,
     }
     if artifact.spec.name != ModelRecord.FORMAT.name:
@@ -46,6 +47,7 @@ def description(artifact: Outline, more: Sequence[tuple[str, str]] = ()) -> tupl
     rows = [_dataset_row(name, _describe_dataset(artifact, name)) for name in artifact.shapes]
     columns = ("Dataset", "Shape", "Unit", "What it holds")
     table = Table("datasets", "", columns, rows, frozenset(range(len(columns))), frozenset({3}))
+    origin += [("caution", each) for each in header.cautions]
     holds = Folded(f"what its {len(rows)} datasets hold", [table])
     return Text(f"{artifact.spec.name}: {artifact.spec.description}"), Facts([*origin, *more]), holds
 

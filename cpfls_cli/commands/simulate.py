@@ -18,6 +18,7 @@ from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands import tracking
+from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError
@@ -43,6 +44,7 @@ def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None 
     if model is not None and mode is None:
         whole = holds(model, VehicleRecord)
         job = replace(job, study=_with_mode(job.study, "closed-loop" if whole else "computed-torque"))
+    job = with_numbers(job, "simulate", model)
     if job.study.simulation.mode == "computed-torque":
         if model is None:
             raise InputError("simulation.mode = computed-torque: controls the attitude with a model; add --model MODEL")

@@ -33,7 +33,7 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.models import rebuilt
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.pages.model import trust_notes
+from cpfls_cli.pages.identification import unjudged
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.tracking import answer
 from cpfls_cli.report.outcome import Outcome, nothing_written
@@ -65,7 +65,7 @@ def run(job: Job, trajectory: Path, model: Path) -> Outcome:
     signals, noise = _logged(exact, job.study, rng)
     record = finish(job, FlightRecord.of_simulation(signals, noise, tracking=comparison), inputs)
     summary = {"samples": len(record.time), "noise": sorted(noise), **record.summary}
-    blocks = (*trust_notes(identified, model), *answer(source_of(job, record), identified))
+    blocks = (*unjudged(identified, model), *answer(source_of(job, record), identified))
     to_report = ("cpfls", "report", job.config, model, job.output, "-o", job.beside("report.html"))
     return Outcome(summary, blocks, next=(to_report,))
 

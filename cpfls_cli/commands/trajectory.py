@@ -15,8 +15,8 @@ from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
 from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.trajectory import ExcitedGroup, TrajectoryRecord
 from cpfls_cli.commands.mission import Mission, mission_paths, mission_texts, write_mission
+from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study, generator, settings_of
-from cpfls_cli.config.unknown import require_known
 from cpfls_cli.errors import ComputationError, ConfigError, InputError, SettingError
 from cpfls_cli.excitation.optimise import Excitation, optimised_rotation
 from cpfls_cli.logs.csv_log import read_csv, row_lines
@@ -81,7 +81,7 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False, mission: Mi
     mission = mission or Mission()
     inputs = begin(job, {"waypoints": waypoints} if waypoints else {})
     settings = _settings(job.study, waypoints)
-    require_known(job.study, "trajectory", whole=not settings.held)
+    job = with_numbers(job, "trajectory", None, whole=not settings.held)
     figures = figure_paths(job, figure_names(held=settings.held) if plot else ())
     check_outputs(job, *figures, *mission_paths(job, mission))
     # To optimise takes long; what else can go wrong shows only when it is planned.
@@ -105,7 +105,8 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False, mission: Mi
     blocks = [*plan_blocks(planned, demand, flight.excitation), *answer(source)]
     blocks += [Text(f"drawn: {', '.join(map(str, figures))}")] if figures else []
     blocks += mission_blocks(texts, mission.forms, source.record)
-    blocks += [Text(problem, "warning") for problem in (*problems, *guessed_words(job.study.vehicle))]
+    guessed = guessed_words(job.study.vehicle) if job.open_numbers == "refused" else ()
+    blocks += [Text(problem, "warning") for problem in (*problems, *guessed)]
     summary = _summary(source.record, planned, demand, flight.excitation, figures)
     return Outcome(summary | {"files": [str(path) for path in texts]}, tuple(blocks), next=(to_simulate(job),))
 

@@ -22,6 +22,7 @@ from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.playback import flights_to_play, played
 from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.pages.model import answer
+from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.parameters import MASS, blocks_of
@@ -34,6 +35,7 @@ from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.response.flown import VehicleResponse, vehicle_responses
 from cpfls_cli.search.resumable import Watch
 from cpfls_cli.search.vehicle_search import VehicleCheckpoint, begin_vehicle_search
+from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import did_you_mean, joined
 
 _KEPT_EVERY = 10
@@ -98,8 +100,28 @@ def run(
         # Of a search that goes on, the numbers are not those that are found; nothing is then in the way of --resume.
         written = _write_config(config, record)
         checkpoint.remove()
-    outcome = Outcome(record.summary, (*answer(source_of(job, record)), *written))
+    outcome = Outcome(
+        record.summary, (*answer(source_of(job, record)), *written), next=_next(job, record, flights, held_out)
+    )
     return stopped(outcome, "generations" if record.complete else "interrupted", signal, job.output)
+
+
+def _next(
+    job: Job, record: VehicleRecord, flights: Sequence[Path], held_out: Sequence[Path]
+) -> tuple[Sequence[str | Path], ...]:
+    """Give the commands that show what was found, and that judge it, plan what would tell more, or hand it over."""
+    config, name = job.config, job.output.stem
+    page = ("cpfls", "report", config, job.output, "-o", job.output.with_suffix(".html"))
+    if not record.complete:
+        return (page,)
+    if record.trust in (Trust.LOOP, Trust.NOT_DETERMINED, Trust.LACKING):
+        mission = job.output.with_name(f"{name}-mission.h5")
+        words = [config if word == "CONFIG" else word for word in WHAT_TO_FLY.split()[:-1]]
+        return page, (*words, mission)
+    if not held_out and len(flights) > 1:
+        judged = job.output.with_name(f"{name}-judged.h5")
+        return page, ("cpfls", "vehicle", config, *flights[:-1], "--held-out", flights[-1], "-o", judged)
+    return page, ("cpfls", "export", job.output, "-o", job.output.with_suffix(".c"))
 
 
 def _write_config(config: ConfigCopy | None, record: VehicleRecord) -> tuple[Text, ...]:

@@ -21,7 +21,7 @@ from cpfls_cli.export.holding import Missing, Off, sized
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.flights.models import rebuilt
 from cpfls_cli.pages.export import identified_evidence, identified_warnings
-from cpfls_cli.pages.model import worth_in_words
+from cpfls_cli.pages.model import against, worth_in_words
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.validation.trust import Trust
 
@@ -59,6 +59,7 @@ def bare_sheet(record: ModelRecord, model: VehicleModel) -> Sheet:
         "",
         verdict=None if record.trust == Trust.NOT_JUDGED else str(record.trust),
         stopped=record.stopped or None,
+        cautions=() if isinstance(record, IdentifiedRecord) else (*record.origin.cautions, *against(record)),
         evidence=identified_evidence(record) if isinstance(record, IdentifiedRecord) else {},
     )
 

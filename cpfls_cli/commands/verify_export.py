@@ -18,7 +18,7 @@ from cpfls_cli.playback.flight import playback_flight
 from cpfls_cli.playback.player import made_ready
 from cpfls_cli.playback.rotors import Hold
 from cpfls_cli.report.content import Text
-from cpfls_cli.report.outcome import Outcome
+from cpfls_cli.report.outcome import Outcome, caution_texts
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,5 @@ def run(model: Path, flight: Path, options: Options, *, force: bool, dry_run: bo
     repaired = playback_flight(logged.name, [read.repaired(part) for part in logged.parts], logged.hold)
     verification = verified(options.form, made, repaired, (along, player), horizon, options.windows)
     blocks = verification_answer(options.form, made.told, logged, verification)
-    return Outcome(
-        verification_summary(options.form, made.missing, verification), tuple(blocks), int(not verification.agrees)
-    )
+    summary = verification_summary(options.form, made.missing, verification) | {"cautions": list(sheet.cautions)}
+    return Outcome(summary, (*caution_texts(sheet.cautions), *blocks), int(not verification.agrees))

@@ -28,12 +28,20 @@ _DRAG_LEVER = 0.1
 _HOVER = 0.55
 """Rotor speed in hover, share of the largest: a vehicle lifts about three times its weight."""
 
+_OFF: Final[dict[Unknown, str]] = {
+    "thrust_factor": "0.5 to 2",
+    "drag_factor": "0.2 to 3",
+    "inertia": "0.8 to 4",
+}
+"""How many times a guess real vehicles have: by the ranges above, and hover at 0.4 to 0.8 of the largest speed."""
+
 _TAKEN = frozenset({"import", "vehicle", "replay", "response", "report", "export", "predict", "compare", "trajectory"})
+_TAKEN |= {"simulate", "gap"}
 """Commands that work with guesses; a report and an export are of a model, which has its own numbers.
 
-`predict`, `replay`, `response` and `compare` do with that of a whole vehicle, and ask `require_known` where theirs is
-another; `trajectory` where torque or effects choose the path. Else guesses only serve to check what it asks of the
-rotors.
+`predict`, `replay`, `response`, `compare`, `simulate` and `gap` do with those of a whole vehicle, and ask
+`require_known` where theirs is another; `trajectory` where torque or effects choose the path. Else guesses only serve
+to check what it asks of the rotors.
 """
 
 
@@ -95,26 +103,36 @@ def _guesses(vehicle: dict[str, Any], rotors: list[dict[str, Any]]) -> dict[Unkn
     }
 
 
-def require_known(study: Study, command: str, *, whole: bool = True) -> None:
+def needs_numbers(vehicle: VehicleSettings, command: str) -> bool:
+    """Tell whether a command would take for facts what a config leaves open, of a vehicle without a model."""
+    return bool(vehicle.unknown) and command not in _TAKEN - {"replay", "simulate", "compare", "response"}
+
+
+def require_known(study: Study, command: str, *, whole: bool = True, accept: bool = False) -> tuple[str, ...]:
     """Refuse a vehicle with unknown numbers for a command that would take their guesses for facts.
 
-    `whole` is False for a command whose model, known by now, is none of a whole vehicle with numbers of its own.
+    `whole` is False for a command whose model, known by now, is none of a whole vehicle with numbers of its own. With
+    `accept` the guesses are taken, and what is given says how far what follows hangs on them.
     """
     unknown = study.vehicle.unknown
     torque = study.import_.torque_source
     of_rotors = command == "import" and torque in ("rotor-speed", "rotor-command")
     if not unknown or (command in _TAKEN and whole and not of_rotors):
-        return
+        return ()
+    if accept:
+        off = ", ".join(f"{name.replace('_', ' ')} {_OFF[name]}" for name in unknown)
+        return (
+            f"guesses from mass and arms stand for what the config leaves open (--accept-guesses); of a guess real "
+            f"vehicles have times: {off}; torques, rates and gains that follow are off by as much",
+        )
     keys = ", ".join(f"vehicle.{'' if name == 'inertia' else 'rotors.'}{KEYS[name]}" for name in unknown)
+    ways = "--model VEHICLE.h5 takes the numbers that `cpfls vehicle` found, --accept-guesses those from mass and arms"
     if of_rotors:
         raise ConfigError(
             f"import.torque_source = {torque}: needs {keys}, not known in this config; set it to null: `cpfls vehicle` "
-            "needs no torque"
+            f"needs no torque; {ways}"
         )
-    raise ConfigError(
-        f"{keys}: not known in this config, and `cpfls {command}` needs what is null there; `cpfls vehicle` finds it "
-        "in flights and writes it (--write-config), or state it"
-    )
+    raise ConfigError(f"{keys}: not known in this config, and `cpfls {command}` needs what is null there; {ways}")
 
 
 def _inertia(mass: float, positions: Sequence[Sequence[float]]) -> tuple[float, float, float]:

@@ -58,6 +58,8 @@ class Signals:
         Height of the ground in the world frame.
     wind : array, shape (3,), m/s, world frame, or None
         None for still air.
+    beside : array, shape (time, 6), N m and N, body frame, or None
+        Torque and force of a known model beyond the squares of its rotor speeds.
     setpoints : mapping of str to array, shape (time, column)
         What was asked of the autopilot and of its loops, where it is known at all samples: ``position`` and
         ``velocity`` in the world frame, m and m/s; ``attitude`` as roll, pitch, yaw, rad; ``body_rate``, rad/s, body
@@ -81,6 +83,7 @@ class Signals:
     voltage: Array | None = None
     ground_height_m: float = 0.0
     wind: Array | None = None
+    beside: Array | None = None
     setpoints: Mapping[str, Array] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -154,12 +157,12 @@ class Signals:
 
     @cached_property
     def wrench(self) -> Array:
-        """Torque and force of the rotors, shape (time, 6), N m and N, body frame; unknown parts are 0."""
-        wrench = np.zeros((len(self), 6))
+        """Torque and force of the rotors, and of what is known beside them, shape (time, 6); unknown parts are 0."""
+        wrench = np.zeros((len(self), 6)) if self.beside is None else self.beside.copy()
         if self.torque is not None:
-            wrench[:, :3] = self.torque
+            wrench[:, :3] += self.torque
         if self.thrust is not None:
-            wrench[:, 5] = self.thrust
+            wrench[:, 5] += self.thrust
         return wrench
 
     @cached_property

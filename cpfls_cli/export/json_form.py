@@ -109,6 +109,7 @@ def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
         "complete": sheet.complete,
         "stop_reason": sheet.stopped,
         "verdict": None if sheet.verdict is None else {"label": sheet.verdict},
+        "cautions": list(sheet.cautions),
         "findings": [],
         "worth": [*sheet.worth, *told],
         "conventions": _CONVENTIONS if found is None else _CONVENTIONS | _ON_ATTITUDE,

@@ -95,7 +95,9 @@ class Sheet:
     floor : tuple of float, length 6, N m and N
         Noise floors of the flights that it was made with; NaN where unknown.
     warnings : tuple of str
-        What speaks against using it.
+        What speaks against using it, of an identified model, on the screen alone.
+    cautions : tuple of str
+        What speaks against using it, at the top of every file.
     """
 
     name: str
@@ -111,6 +113,7 @@ class Sheet:
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
     floor: tuple[float, ...] = (np.nan,) * 6
     warnings: tuple[str, ...] = ()
+    cautions: tuple[str, ...] = ()
 
     @property
     def identified(self) -> InertiaFunctions | None:
@@ -184,7 +187,7 @@ class Sheet:
     @property
     def told(self) -> list[str]:
         """What must not be overlooked, what the model is and what it is worth."""
-        return [*self._marks(), *self._structure(), *self.worth]
+        return [*self._marks(), *self.cautions, *self._structure(), *self.worth]
 
     def _marks(self) -> Iterator[str]:
         if self.stopped is not None:

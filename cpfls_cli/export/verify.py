@@ -14,7 +14,9 @@ from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import Held
 from cpfls_cli.export.registry import TARGETS, Exported
 from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.player import Player, free_runs, in_the_air
+from cpfls_cli.rounding import less
 
 AGREES = 1e-6
 """Largest distance in SI at which the equations of a target are those that were exported."""
@@ -32,12 +34,15 @@ class Verification:
     errors : array, shape (3, 4)
         Mean norms at the end of the horizon, SI, of position, velocity, attitude and body rate: of the playback of the
         model and of the target, each less what was measured, and of the target less the playback.
+    still : array, shape (4,)
+        Mean norms at the end of the horizon of a state that stays as it was, less what was measured.
     step, equations, missing : array, shape (4,)
         Largest norm over all windows and horizons of what the target's step leaves; of what is left between the target
         and what was exported where steps have no length; and of what the target does not hold.
     """
 
     errors: Array
+    still: Array
     step: Array
     equations: Array
     missing: Array
@@ -48,6 +53,11 @@ class Verification:
     def agrees(self) -> bool:
         """Whether the target flies what was exported."""
         return bool(np.all(self.equations < AGREES))
+
+    @property
+    def beats(self) -> tuple[bool, ...]:
+        """Whether the target ends nearer to what was measured than a state that stays, of each that moves at all."""
+        return tuple(bool(less(own, still)) for own, still in zip(self.errors[1], self.still, strict=True) if still)
 
 
 def verified(
@@ -77,18 +87,24 @@ def verified(
         finer = 1 if np.isinf(target.step_s) else ceil(flight.motion.period / target.step_s - 1e-9)
         flown, limit = _limit(form, exported.text, course, finer)
         fine = _fine(held, course)
-    if not flight.translates:
-        for errors in (replayed, same, flown, limit, fine):
-            errors[:, :, :3] = 0.0
+    for errors in (replayed, same, flown, limit, fine):
+        errors[:, :, ~flight.shown] = 0.0
     ends = [errors[:, -1] for errors in (replayed, flown, flown - replayed)]
     return Verification(
         np.array([np.linalg.norm(end, axis=2).mean(axis=0) for end in ends]),
+        np.linalg.norm(_still(course)[:, -1], axis=2).mean(axis=0) * flight.shown,
         _largest(flown - limit),
         _largest(limit - fine),
         _largest(same - replayed),
         len(starts),
         horizon * flight.motion.period,
     )
+
+
+def _still(course: Course) -> Array:
+    """Compare states that stay as they were with what was measured, shape (run, horizon, 4, 3)."""
+    begin = (values[course.starts] for values in course.flight.motion[:4])
+    return course.errors(State(*(np.repeat(values[:, None], course.horizon, axis=1) for values in begin)))
 
 
 def _require(flight: PlaybackFlight, held: Held) -> None:

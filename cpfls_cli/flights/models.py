@@ -13,6 +13,7 @@ from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study
+from cpfls_cli.config.unknown import KEYS
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.playback.history import Observer
@@ -29,6 +30,20 @@ def read_model(path: Path, study: Study, *, forecast: bool = False) -> VehicleMo
     record = read_of_vehicle(path, ModelRecord, study)
     apart = record.forecast if forecast and isinstance(record, VehicleRecord) else None
     return rebuilt(path, record if apart is None else replace(record, vehicle=apart))
+
+
+def with_found_numbers(study: Study, path: Path) -> Study:
+    """Put the numbers of a vehicle that was found in the place of those that a config leaves open.
+
+    They stay among its unknown ones: a flight of the config is one of this vehicle, whatever stands for them.
+    """
+    found = read_of_vehicle(path, VehicleRecord, study).vehicle.vehicle()
+    vehicle = study.vehicle
+    keys = [KEYS[name] for name in vehicle.unknown if name != "inertia"]
+    pairs = zip(vehicle.rotors, found.rotors, strict=True)
+    rotors = tuple(replace(own, **{key: getattr(other, key) for key in keys}) for own, other in pairs)
+    inertia = found.inertia_kg_m2 if "inertia" in vehicle.unknown else vehicle.inertia_kg_m2
+    return study.model_copy(update={"vehicle": replace(vehicle, rotors=rotors, inertia_kg_m2=inertia)})
 
 
 def read_observer(path: Path, past_s: float) -> Observer:
@@ -56,10 +71,12 @@ def learned_by(path: Path | None) -> tuple[LearnedFlight, ...]:
 
 
 def read_base(path: Path | None, study: Study) -> VehicleModel:
-    """Read what effects are sought for: an identified model, or the rigid body of the vehicle where there is none."""
+    """Read what effects are sought for: a vehicle that was found, an identified model, or else the rigid body."""
     rigid = VehicleModel(vehicle=study.vehicle)
     if path is None:
         return rigid
+    if holds(path, VehicleRecord):
+        return read_model(path, study)
     return replace(rigid, fuzzy=rebuilt(path, read_of_vehicle(path, IdentifiedRecord, study)).fuzzy)
 
 

@@ -20,7 +20,8 @@ R = TypeVar("R", bound=Record)
 
 def require_same_vehicle(path: Path, given: VehicleSettings, wanted: VehicleSettings) -> None:
     """Refuse a file that was made with another vehicle than that of the config."""
-    different = _different(given, wanted)
+    # What the config left open is open still, whatever stands for it now.
+    different = _different(_with_what_was_open(given, wanted) if given.unknown == wanted.unknown else given, wanted)
     if different:
         raise InputError(
             f"{path}: was made with another vehicle; not the same: {different}; use the config of that vehicle, or "

@@ -16,7 +16,7 @@ from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
 from cpfls_cli.gap.residual.views import GapStretch, Whiteness, stretches, whiteness
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.gap.whole_vehicle import whole_vehicle
+from cpfls_cli.gap.whole_vehicle import on_top_of, whole_vehicle
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import Runs, apart, free_runs, made_ready
@@ -236,6 +236,7 @@ def before_after(
     unseen: HeldOut,
     model: ExtendedModel,
     settings: GapSettings,
+    base: VehicleModel | None = None,
 ) -> BeforeAfter:
     """Compare a model with effects with the model as given on held-out flights.
 
@@ -245,6 +246,8 @@ def before_after(
         Flights that the effects were found in, and that they are judged on.
     unseen : HeldOut
         Their residuals.
+    base : VehicleModel or None
+        A vehicle with effects of its own that the model comes on top of; of that as given, the base of `model` is part.
     """
     windows = common_windows(held, settings)
     centres = [windows.centres(recording.signals.time) for recording in held]
@@ -252,6 +255,8 @@ def before_after(
     stride = -(-len(windows.weight) // windows.hop)
     stated = held[0].signals.vehicle
     with_effects, given = (whole_vehicle(each, stated) for each in (model, plain(model.base)))
+    if base is not None:
+        with_effects, given = on_top_of(base, with_effects), on_top_of(base, given)
     played = played_pairs(held, with_effects, given)
     in_floors = unseen.before * unseen.known / unseen.floor
     found = stretches(in_floors, np.concatenate(centres), index, level=0.0)

@@ -152,6 +152,51 @@ def of_vehicle(recordings: Sequence[Recording], model: VehicleModel) -> list[Rec
     return [_of_vehicle(recording, model) for recording in recordings]
 
 
+def has_effects(model: VehicleModel) -> bool:
+    """Tell a vehicle that was found from what a search begins with: a rigid body, or an inertia over attitude."""
+    return not model.is_rigid_body and model.fuzzy is None
+
+
+def beside_rotors(recordings: Sequence[Recording], model: VehicleModel) -> list[Recording]:
+    """Give flights the vehicle of a model, and take all that it does beyond squared rotor speeds as known.
+
+    Raises
+    ------
+    InputError
+        If a flight lacks a signal that the model needs.
+    """
+    if not has_effects(model):
+        return list(recordings)
+    given = []
+    for recording in of_vehicle(recordings, model):
+        signals = recording.signals
+        beside = model.wrench_along(model.acting(signals)) - signals.wrench
+        given.append(replace(recording, signals=replace(signals, beside=beside)))
+    return given
+
+
+def on_top_of(base: VehicleModel, found: VehicleModel) -> VehicleModel:
+    """Add what a balance has found beside a model to it."""
+    if not has_effects(base):
+        return found
+    known = {effect.name: effect for effect in base.effects}
+    added = [effect for effect in found.effects if effect.name not in known]
+    both = [
+        effect._replace(coefficients=known[effect.name].coefficients + effect.coefficients)
+        for effect in found.effects
+        if effect.name in known
+    ]
+    changed = {effect.name: effect for effect in both}
+    kept = tuple(changed.get(effect.name, effect) for effect in base.effects)
+    return replace(base, vehicle=found.vehicle, effects=(*kept, *added), repairs=found.repairs)
+
+
+def known_already(model: VehicleModel) -> tuple[str, ...]:
+    """Name the effects that a model has: a search beside it does not look for them again."""
+    late = [known.name for known, _ in late_effects(model.response)]
+    return (*(effect.name for effect in model.effects if effect.known.kind != "parameter"), *late)
+
+
 def _of_vehicle(recording: Recording, model: VehicleModel) -> Recording:
     missing = tuple(sorted(model.needs - recording.signals.available))
     if missing:

@@ -326,10 +326,11 @@ class Model:
         from tempfile import TemporaryDirectory
 
         from cpfls_cli.artifacts.store import read_any
+        from cpfls_cli.report.outcome import cautioned
 
         with TemporaryDirectory(prefix="cpfls-") as folder:
             job = self._job(Path(folder, "artifact.h5"), force=False)
-            _warn(command(job), 4)
+            _warn(cautioned(command(job), job), 4)
             return Artifact(read_any(job.output))
 
     def _job(self, output: Path, force: bool) -> Job:

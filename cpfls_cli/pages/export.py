@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.export.holding import Missing
 from cpfls_cli.export.registry import TARGETS
 from cpfls_cli.export.verify import AGREES, Verification
 from cpfls_cli.playback.flight import LoggedFlight
-from cpfls_cli.report.content import Block, Table, Text
+from cpfls_cli.report.content import Block, Box, Folded, Table, Text
 from cpfls_cli.report.numbers import number
+from cpfls_cli.words import joined
 
 _SCORE_UNITS = {"mse": "(N m)^2", "max_error": "N m", "relative_error": "1", "r2": "1", "vaf": "1", "r2_body": "1"}
 _SIGNALS = (
@@ -77,28 +79,44 @@ def identified_warnings(model: IdentifiedRecord, path: object) -> Iterator[str]:
 
 
 def verification_answer(form: str, told: Sequence[str], flight: LoggedFlight, found: Verification) -> Iterator[Block]:
-    """Say how far the flown export is from its model, what makes the difference, and what the target does not hold."""
+    """Say whether the flown export beats a state that stays, how far it is from its model, and what it lacks."""
     title, step = TARGETS[form].title, TARGETS[form]
     runs = f"{found.windows} runs of {found.horizon_s:.3g} s along {flight.name}"
-    verdict = "flies what was exported" if found.agrees else "DOES NOT FLY what was exported"
-    yield Text(
-        f"{title} {verdict}: {runs}, from measured states along {flight.actuation}; largest difference "
-        f"{found.equations.max():.2g} SI{', steps of no length' if step.levels else ''} (bound {AGREES:g}).",
-        "good" if found.agrees else "warning",
+    flies = "flies what was exported" if found.agrees else "DOES NOT FLY what was exported"
+    moving = [name for (name, *_), still in zip(_SIGNALS, found.still, strict=True) if still]
+    lost = [name for name, beats in zip(moving, found.beats, strict=True) if not beats]
+    beside = f"loses to “nothing moves” in {joined(lost)}" if lost else f"beats “nothing moves” in {joined(moving)}"
+    good = found.agrees and not lost
+    yield Box(
+        "BETTER THAN NOTHING MOVES" if not lost else "NO BETTER THAN NOTHING MOVES",
+        f"{title} {flies}, and {beside}: {runs}, from measured states along {flight.actuation}.",
+        [
+            f"Its equations are those that were exported within {found.equations.max():.2g} SI"
+            f"{', steps of no length' if step.levels else ''} (bound {AGREES:g})."
+        ],
+        "good" if good else "warning",
     )
-    rows = [
-        ("playback of the model less measured, mean at the end", found.errors[0]),
-        (f"{title} less measured, mean at the end", found.errors[1]),
-        (f"{title} less playback, mean at the end", found.errors[2]),
-        ("of it: not held by the target, largest", found.missing),
-        ("of it: step of the target, largest", found.step),
-        ("of it: equations, largest", found.equations),
-    ]
-    header = ("", *(f"{name}, {unit}" for name, unit, _ in _SIGNALS))
     scale = np.array([factor for _, _, factor in _SIGNALS])
-    shown = [[name, *(number(value, 3) for value in values * scale)] for name, values in rows]
-    yield Table("verification", "", header, shown)
-    yield from map(Text, told)
+
+    def table(name: str, caption: str, rows: Sequence[tuple[str, Array]]) -> Table:
+        header = ("", *(f"{signal}, {unit}" for signal, unit, _ in _SIGNALS))
+        shown = [[row, *(number(value, 3) for value in values * scale)] for row, values in rows]
+        return Table(name, caption, header, shown)
+
+    measured = (
+        (title, found.errors[1]),
+        ("playback of the model", found.errors[0]),
+        ("nothing moves", found.still),
+    )
+    yield table("verification", "Off what was measured at the end of a run, mean.", measured)
+    apart = (
+        ("in all, mean", found.errors[2]),
+        ("not held by the target, largest", found.missing),
+        ("step of the target, largest", found.step),
+        ("equations, largest", found.equations),
+    )
+    between = table("verification-apart", f"Between {title} and playback at the end of a run.", apart)
+    yield Folded(f"What {title} does not hold, and how far that is", [between, *map(Text, told)])
     yield from (Text(warning, "warning") for warning in flight.warnings)
 
 
@@ -112,10 +130,12 @@ def verification_summary(form: str, missing: Sequence[Missing], found: Verificat
     return {
         "format": form,
         "agrees": found.agrees,
+        "beats_nothing_moves": not found.beats or all(found.beats),
         "windows": found.windows,
         "horizon_s": found.horizon_s,
         "playback_error": by_signal(found.errors[0]),
         "target_error": by_signal(found.errors[1]),
+        "nothing_moves_error": by_signal(found.still),
         "difference": by_signal(found.errors[2]),
         "largest": {
             "not_held": by_signal(found.missing),

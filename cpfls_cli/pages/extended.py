@@ -12,6 +12,7 @@ from cpfls_cli.pages.effects import coefficients_table, effect_sentence, interva
 from cpfls_cli.pages.gap import gap_sizes_figure, gap_table
 from cpfls_cli.pages.replay import playback_figure, playback_text, playback_words
 from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.report.content import Block, Facts, Folded, Heading, Section, Table, Text
 from cpfls_cli.report.numbers import number, sentence
 from cpfls_cli.words import joined
@@ -43,13 +44,20 @@ def _shrunk(record: ExtendedRecord) -> str:
 
 def worth(record: ExtendedRecord) -> Iterator[str]:
     """Say what a model that is used elsewhere is worth, and what has to be repaired in the signals that it is given."""
-    yield next(playback_words(record.trust, record.playback, record.audit.contradiction))
+    if trust_words(record.trust).tone != "warning":
+        yield next(playback_words(record.trust, record.playback, record.audit.contradiction))
     yield _shrunk(record)
-    yield from (sentence(warning) for warning in warnings(record))
     yield from (
         f"Not in the model, to be repaired in the signals that it is given: {fault}"
         for fault in (*record.audit.settled, *record.audit.faults)
     )
+
+
+def cautions(record: ExtendedRecord) -> Iterator[str]:
+    """Say what speaks against an extended model, wherever it is taken."""
+    if trust_words(record.trust).tone == "warning":
+        yield from playback_words(record.trust, record.playback, record.audit.contradiction)
+    yield from map(sentence, warnings(record))
 
 
 def model_with(label: str, record: ExtendedRecord) -> str:

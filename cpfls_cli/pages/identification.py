@@ -15,6 +15,7 @@ from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.report.canvas import legend_above, plain_ticks, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Cell, Folded, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import ROUNDING, count, number, percent, r_squared, sentence
+from cpfls_cli.validation.trust import Trust
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -122,6 +123,22 @@ def worth(record: IdentifiedRecord) -> Iterator[str]:
     for finding in record.findings:
         yield f"Finding: {finding}"
     yield "Rotors, mass and all forces are those of the config."
+
+
+def cautions(record: IdentifiedRecord) -> Iterator[str]:
+    """Say what speaks against an identified model, wherever it is taken."""
+    words = trust_words(record.trust)
+    if record.verdict is not None and words.tone == "warning":
+        yield ": ".join([f"its verdict is: {words.short}", *(reason for reason, _ in record.verdict.reasons[:1])])
+
+
+def unjudged(record: IdentifiedRecord, path: object) -> Iterator[Text]:
+    """Say of an identified model that nothing says how far to trust it."""
+    if record.trust == Trust.NOT_JUDGED:
+        yield Text(
+            f"{path}: has no verdict and no bands; `cpfls identify` with identification.validation.enabled adds them",
+            "warning",
+        )
 
 
 def solution(model: Source[IdentifiedRecord]) -> Iterator[Text]:

@@ -17,10 +17,9 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.effects import effect_title, unit_words
 from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.pages.trust import trust_facts, trust_words
-from cpfls_cli.report.content import Block, Box, Facts, Heading, Section, Table, Text, in_short
+from cpfls_cli.pages.trust import model_words, trust_facts
+from cpfls_cli.report.content import Block, Box, Facts, Heading, Section, Table, in_short
 from cpfls_cli.report.numbers import number, plain, whole_percent
-from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import joined
 
 
@@ -33,14 +32,15 @@ class _Kind(NamedTuple):
         Of a record: what the model is, and the sentences behind the word of trust.
     details : callable
         Of a source: what stands below the box.
-    worth : callable
-        Of a record: what it is worth that is used elsewhere.
+    worth, cautions : callable
+        Of a record: what it is worth that is used elsewhere, and what speaks against that.
     """
 
     title: Callable[[Any], str]
     grounds: Callable[[Any], Iterator[str]]
     details: Callable[[Source[Any]], Iterator[Block]]
     worth: Callable[[Any], Iterator[str]]
+    cautions: Callable[[Any], Iterator[str]]
 
 
 _PAGES = {"identified": "identification", "extended": "extended", "vehicle": "vehicle_model"}
@@ -52,7 +52,7 @@ _REASONS = 3
 
 def _kind_of(record: ModelRecord) -> _Kind:
     page = import_module(f"cpfls_cli.pages.{_PAGES[record.FORMAT.kind]}")
-    return _Kind(page.title, page.grounds, page.details, page.worth)
+    return _Kind(page.title, page.grounds, page.details, page.worth, page.cautions)
 
 
 def answer(model: Source[Any]) -> Iterator[Block]:
@@ -67,31 +67,28 @@ def answer(model: Source[Any]) -> Iterator[Block]:
 def trust_box(model: Source[Any]) -> Box:
     """Say how far to trust a model, and why."""
     record = model.record
-    kind, words = _kind_of(record), trust_words(record.trust)
+    kind, words = _kind_of(record), model_words(record)
     return Box(words.short.upper(), f"{model.label}: {kind.title(record)}", list(kind.grounds(record)), words.tone)
 
 
-def trust_notes(record: ModelRecord, path: object) -> Iterator[Text]:
-    """Say what speaks against the use of a model: its search was stopped, it was judged unfit, or could not be judged.
+def cautions_of(record: ModelRecord, path: object) -> tuple[str, ...]:
+    """Say what speaks against the use of a model, wherever it is used; what it rests on itself included.
 
     Parameters
     ----------
-    path : Path
+    path : Path or str
         As the model is called in the sentences.
     """
+    said = [] if record.header is None else list(record.header.cautions)
     if record.stopped:
         again = f"`cpfls {record.FORMAT.made_by} --resume` goes on"
-        yield Text(f"{path}: is incomplete: its search was stopped; {again}", "warning")
-    if record.trust in (Trust.DO_NOT_USE, Trust.LOOP):
-        verdict = record.verdict if isinstance(record, IdentifiedRecord) else None
-        why = next(_kind_of(record).grounds(record))
-        said = why if verdict is None else f"its verdict is: do not use; {verdict.reasons[0][0]}"
-        yield Text(f"{path}: {said}", "warning")
-    elif record.trust == Trust.NOT_JUDGED and isinstance(record, IdentifiedRecord):
-        yield Text(
-            f"{path}: has no verdict and no bands; `cpfls identify` with identification.validation.enabled adds them",
-            "warning",
-        )
+        said.append(f"{path}: is incomplete: its search was stopped; {again}")
+    return (*said, *(f"{path}: {each}" for each in against(record)))
+
+
+def against(record: ModelRecord) -> Iterator[str]:
+    """Say what speaks against a model itself."""
+    return _kind_of(record).cautions(record)
 
 
 def worth_in_words(record: ModelRecord) -> Iterator[str]:

@@ -9,7 +9,7 @@ from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
-from cpfls_cli.pages.comparison import comparison_section
+from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
 from cpfls_cli.pages.diagnosis import diagnosis_blocks
 from cpfls_cli.pages.disagreement import disagreement_blocks
 from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
@@ -62,6 +62,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | None]] = (
     model_section,
     _of_each("diagnosis", "Before and after", DiagnosisRecord, diagnosis_blocks),
     extension_section,
+    compared_vehicles_section,
     found_vehicle_section,
     _of_each("disagreement", "Where they disagree", DisagreementRecord, disagreement_blocks),
     sensors_section,

@@ -20,6 +20,7 @@ from cpfls_cli.artifacts.spec import InputFile, Record
 from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.config.unknown import needs_numbers
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.content import HASH_SHOWN, Block, Listing, Section, Table, Text
 
@@ -169,6 +170,8 @@ def _lines(source: Source, paths: dict[str, str]) -> Iterator[str]:
     for role in command.options:
         for file in _files(inputs, role, paths):
             words += [f"--{role}", file]
+    # What its config leaves open stands there as it was taken.
+    words += ["--accept-guesses"] if needs_numbers(source.vehicle, command.name) and "model" not in inputs else []
     yield " ".join([*words, *_asked(source.record), "-o", output])
 
 

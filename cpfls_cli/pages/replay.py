@@ -17,6 +17,7 @@ from cpfls_cli.artifacts.replay import (
     ReplayRecord,
     SignalErrorGroup,
     better_to,
+    lost_to,
 )
 from cpfls_cli.pages.gap import AXES, MEASURED, keep_in_view
 from cpfls_cli.pages.sensors import contradicted
@@ -34,7 +35,7 @@ from cpfls_cli.report.canvas import (
     stacked,
     style_of,
 )
-from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import number, sentence, whole_percent
 from cpfls_cli.rounding import less, tied
 from cpfls_cli.validation.trust import Trust
@@ -84,7 +85,7 @@ def _grounds(record: ReplayRecord, index: int) -> Iterator[Block]:
 
 
 def _worst(record: ReplayRecord, index: int) -> Iterator[Block]:
-    yield _worst_table(record, index)
+    yield Folded("Where it is farthest off", [_worst_table(record, index)], shown=True)
     yield from (Text(words, "warning") for words in (*_diverged(record), *record.warning))
 
 
@@ -153,8 +154,22 @@ def playback_words(trust: str, held: PlaybackGroup | None, contradictions: Seque
     elif trust == Trust.CONTROL:
         reached = better_to(held, "body_rate")
         yield f"Good for control of the attitude: it predicts body rates to {number(reached, 2)} s{_region(held)}."
+    elif trust == Trust.NOT_CONTROL:
+        yield f"Not for control: it {lost_words(held)}, where a controller corrects what its model got wrong."
     else:
         yield "Do not use it: held out, its errors of the body rate add up to more than those of what knows no model."
+
+
+def lost_words(held: ErrorsByHorizon) -> str:
+    """Say where in rates or attitude a model loses to what knows no model, of horizons where control lives."""
+    return joined(
+        f"loses in {_SIGNALS[signal][0]} to “{_WORDS[rival]}” {_between(low, high)}"
+        for signal, (rival, low, high) in lost_to(held).items()
+    )
+
+
+def _between(low: float, high: float) -> str:
+    return f"from {low:.2g} to {_seconds(high)}" if low < high else f"at {_seconds(high)}"
 
 
 def _region(held: PlaybackGroup) -> str:

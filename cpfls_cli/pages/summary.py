@@ -9,7 +9,7 @@ from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
 from cpfls_cli.pages.diagnosis import gap_blocks
 from cpfls_cli.pages.identification import scores_table, solution, verdict_line
-from cpfls_cli.pages.model import trust_box
+from cpfls_cli.pages.model import cautions_of, trust_box
 from cpfls_cli.pages.provenance import missing
 from cpfls_cli.pages.replay import told_at, verdict_box
 from cpfls_cli.pages.response import response_box
@@ -21,7 +21,8 @@ from cpfls_cli.report.numbers import ROUNDING, percent, plain, sentence
 
 def summary_section(sources: Sources) -> Section:
     """Say in plain words what ran on what and how it ended."""
-    blocks: list[Block] = [verdict_line(model) for model in sources.models]
+    blocks: list[Block] = list(_cautions(sources))
+    blocks += [verdict_line(model) for model in sources.models]
     blocks += [Text(note, "note") for note in sources.settings.notes]
     blocks += gap_blocks(sources)
     blocks += [trust_box(vehicle) for vehicle in sources.vehicles]
@@ -38,6 +39,13 @@ def summary_section(sources: Sources) -> Section:
     if len(sources.models) < 2:
         blocks += _missing(sources)
     return Section("summary", "Summary", blocks)
+
+
+def _cautions(sources: Sources) -> Iterator[Text]:
+    """Say what speaks against models that the artifacts rest on, each once; those on the page say it themselves."""
+    shown = {each for source in sources.vehicles for each in cautions_of(source.record, source.label)}
+    given = dict.fromkeys(caution for source in sources.all for caution in source.header.cautions)
+    yield from (Text(caution, "warning") for caution in given if caution not in shown)
 
 
 def models_section(sources: Sources) -> Section | None:

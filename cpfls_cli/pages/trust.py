@@ -30,12 +30,16 @@ _WORDS: dict[str, Words] = {
     Trust.LACKING: Words(
         "constants of the vehicle, which lacks an effect", "Constants of the vehicle, but it lacks an effect", "note"
     ),
+    Trust.NOT_CONTROL: Words("not for control", "Predicts, but is not for control", "warning"),
+    Trust.NOT_DETERMINED: Words("constants not determined", "Its constants are not determined", "warning"),
     Trust.LOOP: Words(
         "not judged: the flights show the loop", "Not judged: these flights show the loop, not the vehicle", "warning"
     ),
     Trust.RIGID_BODY: Words("no better than a rigid body", "Not better than the rigid body", "warning"),
     Trust.DO_NOT_USE: Words("do not use", "Do not use it", "warning"),
 }
+
+_TONES: tuple[Tone, ...] = ("plain", "good", "note", "warning")
 
 KnownBy = Iterable[tuple[str, Collection[str]]]
 """Flights by file name, each with the hashes of its file and of its log."""
@@ -48,9 +52,23 @@ def trust_words(trust: str) -> Words:
     return _WORDS.get(trust, Words(trust, trust, "note"))
 
 
+def model_words(model: ModelRecord) -> Words:
+    """Put how far to trust a model; of one that is judged as a forecast and as the vehicle both, in the worse tone."""
+    words = [trust_words(word) for word in dict.fromkeys(model.judged_as.values())]
+    if len(words) == 1:
+        return words[0]
+    said = [(name, trust_words(word)) for name, word in model.judged_as.items()]
+    tone = max((each.tone for _, each in said), key=_TONES.index)
+    return Words(
+        "; ".join(f"{name} {each.short}" for name, each in said),
+        "; ".join(f"{name}: {each.sentence[:1].lower()}{each.sentence[1:]}" for name, each in said),
+        tone,
+    )
+
+
 def trust_facts(model: ModelRecord) -> list[tuple[str, str]]:
     """Say in a word how far to trust a model, and which flights it learned from."""
-    return [("How far to trust it", trust_words(model.trust).sentence), ("Learned from", learned_words(model))]
+    return [("How far to trust it", model_words(model).sentence), ("Learned from", learned_words(model))]
 
 
 def learned_words(model: ModelRecord) -> str:

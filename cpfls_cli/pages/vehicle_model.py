@@ -19,11 +19,14 @@ from cpfls_cli.artifacts.parameters import (
     OF_TURNING,
     THRUST,
     Parameter,
+    is_learned,
+    name_of,
     parameters_of,
     too_heavy,
     vehicle_section,
 )
 from cpfls_cli.artifacts.rebuilt import vehicle_model
+from cpfls_cli.artifacts.replay import better_to
 from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, ResponsesGroup, VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
@@ -31,11 +34,19 @@ from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.disturbance import gust_blocks
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
-from cpfls_cli.pages.replay import beside_past, beside_rivals, errors_table, horizon_figure, playback_words
+from cpfls_cli.pages.replay import (
+    beside_past,
+    beside_rivals,
+    errors_table,
+    horizon_figure,
+    lost_words,
+    playback_words,
+)
 from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.trust import model_words
 from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, style_of
-from cpfls_cli.report.content import Block, Cell, Facts, Heading, Listing, Plot, Section, Table, Text
+from cpfls_cli.report.content import Block, Cell, Facts, Folded, Heading, Listing, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, number, percent, whole_percent
 from cpfls_cli.response.mismatch import ACCEPTABLE
 from cpfls_cli.validation.trust import Trust
@@ -83,19 +94,89 @@ _FAR = 3.0
 
 
 def title(record: VehicleRecord) -> str:
-    """Say what a vehicle found in flights is."""
-    return f"a vehicle with {len(record.found.name)} numbers found in its flights."
+    """Say in one sentence how far it predicts, whose its constants are, and how many numbers are not told."""
+    said = [_as_forecast(record), _as_vehicle(record)]
+    if record.untold:
+        said.append(f"{len(record.untold)} of {record.numbers} numbers are not determined")
+    return f"{'; '.join(part for part in said if part)}."
+
+
+def _as_forecast(record: VehicleRecord) -> str:
+    held, word = record.held_out, record.forecast_verdict
+    if record.contradiction:
+        return "its flights contradict themselves"
+    if held is None:
+        return "not judged as a forecast"
+    if word is Trust.DO_NOT_USE:
+        return "predicts no better than what knows no model"
+    signals = {"rates": "body_rate"} if word is Trust.CONTROL else {"rates": "body_rate", "motion": "velocity"}
+    far = min(reached for name in signals.values() if np.isfinite(reached := better_to(held, name)))
+    what = "motion" if word is Trust.SIMULATION else "body rates"
+    against = f", but {lost_words(held)}" if word is Trust.NOT_CONTROL else ""
+    return f"predicts {what} {number(far, 2)} s ahead{against}"
+
+
+def _as_vehicle(record: VehicleRecord) -> str:
+    if record.contradiction:
+        return ""
+    if record.trust == Trust.LOOP:
+        return "its constants are those of vehicle and autopilot together"
+    if record.trust == Trust.LACKING:
+        return "beside its constants an effect is missing"
+    if record.trust == Trust.NOT_DETERMINED and too_heavy(record):
+        return "inertia and drag factor are not the body's"
+    constants = [name_of(name) for name in record.untold if name in FOUND_AS.values()]
+    if constants:
+        return f"{joined(constants)} {'is' if len(constants) == 1 else 'are'} not the vehicle's own"
+    return "its constants are told"
 
 
 def grounds(record: VehicleRecord) -> Iterator[str]:
-    """Say what a vehicle is good for, and how well it predicts what it was not fitted to."""
-    yield from _judged_words(record)
+    """Say what its constants rest on, and what speaks against them."""
+    if record.instruments is not None and not record.contradiction:
+        yield from instrument_words(record, record.instruments)
+    yield from _against(record)
+
+
+def cautions(record: VehicleRecord) -> Iterator[str]:
+    """Say what speaks against a vehicle that was found, wherever it is taken."""
+    if model_words(record).tone == "warning":
+        yield _headline(record)
+    yield from _against(record)
+
+
+def _headline(record: VehicleRecord) -> str:
+    return f"{model_words(record).short.upper()}: {title(record)}"
+
+
+def _against(record: VehicleRecord) -> Iterator[str]:
+    if record.contradiction:
+        yield from playback_words(Trust.DO_NOT_USE, None, record.contradiction)
+        return
+    if record.trust == Trust.LOOP or (record.loop.shown and record.instruments is None):
+        yield loop_words(record)
+    heavy = too_heavy(record)
+    if heavy:
+        yield f"Inertia and drag factor: {heavy}."
+    bound = [name_of(name) for name in record.on_bound]
+    if bound:
+        yield f"{joined(bound)}: on a bound of what is tried, so the flights ask for more; no number of the vehicle."
+    told = {*record.on_bound, *(OF_TURNING if heavy else ())}
+    open_ = [name_of(name) for name in record.untold if name not in told]
+    if open_ and record.trust != Trust.LOOP:
+        yield f"Not determined, for the flights say too little of it: {joined(open_)}."
+
+
+def _grounds_of_forecast(record: VehicleRecord) -> Iterator[str]:
+    """Say what its forecast is good for, which model makes it, what it is beside, and how it was chosen."""
+    if not record.contradiction:
+        yield from playback_words(record.forecast_verdict, record.held_out, None)
     if record.instruments is None and record.responses is not None:
         yield from response_words(record.responses)
     if record.forecast is not None:
         yield (
-            "Beside these constants the file holds a forecast along logged rotor speeds, loop and all, which `cpfls "
-            "replay` plays: good for forecasts of such flights, and no vehicle. What follows is said of it."
+            "Beside its constants the file holds a forecast along logged rotor speeds, loop and all, which `cpfls "
+            "replay` plays: good for forecasts of such flights, and no vehicle. Errors are its."
         )
     if record.held_out is not None:
         yield from beside_rivals(record.held_out)
@@ -113,17 +194,30 @@ def grounds(record: VehicleRecord) -> Iterator[str]:
     yield f"It holds {joined(blocks)}." if blocks else f"It holds nothing but {alone}."
 
 
-def details(vehicle: Source[VehicleRecord]) -> Iterator[Block]:
-    """Say how well a vehicle predicts what it was not fitted to, its numbers, and what to be careful with."""
+def details(vehicle: Source[VehicleRecord], index: int = 1) -> Iterator[Block]:
+    """Say its constants first, then how well it predicts, its other numbers, and what to be careful with."""
     record = vehicle.record
+    yield _constants_table([each for each in parameters_of(record) if each.needed], index)
+    yield Folded("Errors of the forecast, by horizon", list(_forecast_blocks(record, index)), shown=True)
+    yield Folded("Other numbers, and what would tell them", list(_number_blocks(vehicle, index)), shown=True)
+    careful = [Text(each, "warning") for each in warnings(record)]
+    yield from [Folded("What to be careful with", careful, shown=True)] if careful else []
+    text = to_yaml({"vehicle": vehicle_section(record)})
+    yield Folded("The section vehicle to paste", [Listing("With what was found", text, shown=True)])
+
+
+def _forecast_blocks(record: VehicleRecord, index: int) -> Iterator[Block]:
+    yield from map(Text, _grounds_of_forecast(record))
     if record.held_out is not None:
-        yield errors_table(record.held_out, 1)
-    yield from _differences_table(record, 1)
-    yield from _constants(record, 1)
-    yield from _numbers_table(vehicle, 1)
-    yield from gust_blocks(record, 1)
-    yield _section_to_paste(record)
-    yield from (Text(warning, "warning") for warning in warnings(record))
+        yield errors_table(record.held_out, index)
+
+
+def _number_blocks(vehicle: Source[VehicleRecord], index: int) -> Iterator[Block]:
+    record = vehicle.record
+    yield from _differences_table(record, index)
+    yield from _about_constants(record)
+    yield from _numbers_table(vehicle, index)
+    yield from gust_blocks(record, index)
 
 
 def _guessed(record: VehicleRecord) -> bool:
@@ -132,21 +226,16 @@ def _guessed(record: VehicleRecord) -> bool:
 
 
 def worth(record: VehicleRecord) -> Iterator[str]:
-    """Say what a vehicle that is used elsewhere is worth, and how far off it is itself."""
-    yield next(_judged_words(record))
+    """Say what a vehicle that is used elsewhere is worth, beside what speaks against it, and how far off it is."""
+    if model_words(record).tone != "warning":
+        yield _headline(record)
+    if record.instruments is not None and not record.contradiction:
+        yield next(instrument_words(record, record.instruments))
     held = record.held_out
     if held is not None:
         last = {name: group.mae[0, -1] for name, group in held.errors.items() if group is not None}
         ends = joined(f"{number(last[name] * scale, 3)} {unit}" for name, unit, scale in _ENDS if name in last)
         yield f"Held out, it ends {ends} off what was measured after {held.horizon_s[-1]:.3g} s, mean."
-
-
-def _judged_words(record: VehicleRecord) -> Iterator[str]:
-    if record.instruments is not None and not record.contradiction:
-        return instrument_words(record, record.instruments)
-    if record.trust == Trust.LOOP:
-        return iter([loop_words(record)])
-    return playback_words(record.trust, record.held_out, record.contradiction)
 
 
 def instrument_words(record: VehicleRecord, given: InstrumentsGroup) -> Iterator[str]:
@@ -176,9 +265,6 @@ def instrument_words(record: VehicleRecord, given: InstrumentsGroup) -> Iterator
             "The flights do not show the frequency responses of roll and pitch clearly enough to judge the model by "
             f"them: fly with faster turns, as {WHAT_TO_FLY} plans them."
         )
-    held = [row["name"] for row in rows_of(record.found) if row["at_bound"] and row["value"] != 0]
-    if held:
-        yield f"{joined(held)}: on a bound of what is tried, so these are not the vehicle's own numbers yet."
 
 
 def response_words(given: ResponsesGroup) -> Iterator[str]:
@@ -217,41 +303,26 @@ def loop_words(record: VehicleRecord) -> str:
     )
     return (
         f"These flights show the loop, not the vehicle: torque explains {shares}. An autopilot that answers gusts, or "
-        f"an effect that is missing here, makes a body look heavier or lighter than it is: {times} what was found. "
-        "What follows is a forecast of vehicle and autopilot together. Fly in still air, with faster and larger turns "
-        "of roll and pitch, until torque explains 90 %, and the same several times: "
-        f"{WHAT_TO_FLY}"
+        f"an effect that is missing here, makes a body look heavier or lighter than it is: {times} what was found. Fly "
+        f"in still air, larger and faster turns, the same several times: {WHAT_TO_FLY}"
     )
 
 
 def warnings(record: VehicleRecord) -> list[str]:
-    """Warn of numbers that the flights do not tell, and of what is known about the flights."""
-    found = record.found
+    """Warn of numbers that mean something only together, or are no property of a part, and of the flights."""
     said = list(record.warning)
-    named = [row for row in rows_of(found) if not _is_learned(row["name"])]
-    bound = [row["name"] for row in named if row["at_bound"] and row["value"] != 0]
-    none = [row["name"] for row in named if row["at_bound"] and row["value"] == 0]
-    heavy = too_heavy(record)
-    told = OF_TURNING if heavy else ()
-    misled = record.loop.shown and record.instruments is None
-    open_ = [row["name"] for row in named if not row["determined"] and row["name"] not in told and not misled]
-    if bound:
-        said.append(f"{joined(bound)}: on a bound of what is tried, so the flights ask for more; not a physical number")
+    none = [name_of(row["name"]) for row in rows_of(record.found) if row["at_bound"] and row["value"] == 0]
     if none:
         said.append(f"{joined(none)}: 0, the least that it can be; the flights show none of it")
-    if open_:
-        said.append(f"{joined(open_)}: not determined, the flights say too little of it")
-    if misled and record.trust != Trust.LOOP:
-        said.append(loop_words(record))
-    if heavy:
-        said.append(f"inertia and drag factor: {heavy}")
     # Numbers of the remainder have no meaning of their own, together or apart.
-    trades = [row for row in rows_of(record.trade) if not (_is_learned(row["first"]) and _is_learned(row["second"]))]
+    trades = [row for row in rows_of(record.trade) if not (is_learned(row["first"]) and is_learned(row["second"]))]
     if trades:
-        pairs = "; ".join(f"{row['first']} and {row['second']} ({row['correlation']:.3f})" for row in trades)
+        pairs = "; ".join(
+            f"{name_of(row['first'])} and {name_of(row['second'])} ({row['correlation']:.3f})" for row in trades
+        )
         said.append(f"numbers that trade against each other and mean something only together (correlation): {pairs}")
-    stated = [row for row in rows_of(found) if np.isfinite(row["stated"]) and row["stated"] > 0]
-    far = [row["name"] for row in stated if not 1 / _FAR < row["value"] / row["stated"] < _FAR]
+    stated = [row for row in rows_of(record.found) if np.isfinite(row["stated"]) and row["stated"] > 0]
+    far = [name_of(row["name"]) for row in stated if not 1 / _FAR < row["value"] / row["stated"] < _FAR]
     if far:
         said.append(
             f"{joined(far)}: more than {_FAR:g} times off what is stated; an effective number that predicts, not a "
@@ -264,26 +335,21 @@ def warnings(record: VehicleRecord) -> list[str]:
     return said
 
 
-def _is_learned(name: str) -> bool:
-    """Tell whether a number belongs to a remainder: to that of the torque, or of the force."""
-    return name.startswith(_REMAINDER)
-
-
 def _numbers_table(found: Source[VehicleRecord], index: int) -> Iterator[Table]:
     """Show what was found beside the constants, if anything was."""
     numbers, constants = rows_of(found.record.found), FOUND_AS.values()
     rows = [
         [
-            row["name"],
+            name_of(row["name"]),
             row["unit"],
             Cell(number(row["value"]), "warning" if row["at_bound"] or not row["determined"] else "plain"),
             number(row["low"], 3),
             number(row["high"], 3),
         ]
         for row in numbers
-        if row["name"] not in constants and not _is_learned(row["name"])
+        if row["name"] not in constants and not is_learned(row["name"])
     ]
-    learned = sum(_is_learned(row["name"]) for row in numbers)
+    learned = sum(is_learned(row["name"]) for row in numbers)
     more = f" {learned} more make the learned remainder; they stand in /found of the file." if learned else ""
     caption = f"Other numbers of the vehicle with 95 % intervals from blocks of the flights.{more}"
     header = ("Number", "Unit", "Value", "From", "To")
@@ -291,14 +357,15 @@ def _numbers_table(found: Source[VehicleRecord], index: int) -> Iterator[Table]:
         yield Table(f"vehicle-numbers-{index}", caption, header, rows, frozenset({0, 1}))
 
 
-def _constants(record: VehicleRecord, index: int) -> Iterator[Block]:
-    """Show the constants of a vehicle, say what scale they have and what would tell the open ones."""
+def _about_constants(record: VehicleRecord) -> Iterator[Block]:
+    """Say what scale the constants of a vehicle have, and what would tell the open ones."""
     listed = list(parameters_of(record))
-    yield _constants_table([each for each in listed if each.needed], index)
     yield Text(" ".join(_scale(record, {each.key: each for each in listed})))
     idle = [each.name for each in listed if not each.needed]
     if idle:
         yield Text(f"Left at 0, since no lower error comes with it: {joined(idle)}.")
+    for reason, same in groupby(filter(_wanting, listed), key=lambda each: each.reason):
+        yield Text(f"{joined(each.name for each in same)}: {reason}.")
     for flight, wanting in groupby(filter(_wanting, listed), key=lambda each: _FLIGHTS[each.key]):
         yield Text(f"To know {joined(each.name for each in wanting)}: {flight}.", "warning")
 
@@ -320,26 +387,21 @@ def _wanting(parameter: Parameter) -> bool:
     return parameter.value is None or (parameter.low is not None and not parameter.determined)
 
 
-def _section_to_paste(record: VehicleRecord) -> Listing:
-    """Write the section of the config with what was found."""
-    text = to_yaml({"vehicle": vehicle_section(record)})
-    return Listing("The section vehicle with what was found, ready to paste", text)
-
-
 def _constants_table(listed: list[Parameter], index: int) -> Table:
+    stated = any(each.stated is not None for each in listed)
     rows: list[list[str | Cell]] = [
         [
-            each.name,
-            each.unit,
+            f"{each.name}, {each.unit}",
             Cell(_or_unknown(each.value, 4), "warning" if _wanting(each) else "plain"),
-            *(_or_unknown(value, 3) for value in (each.low, each.high, each.stated)),
-            each.reason,
+            *(_or_unknown(value, 3) for value in (each.low, each.high)),
+            *([_or_unknown(each.stated, 3)] if stated else []),
+            each.told,
         ]
         for each in listed
     ]
-    caption = "Constants of the vehicle with 95 % intervals; stated: in the config."
-    header = ("Constant", "Unit", "Value", "From", "To", "Stated", "Why")
-    return Table(f"vehicle-constants-{index}", caption, header, rows, frozenset({0, 1, 6}), frozenset({6}))
+    caption = f"Constants with 95 % intervals{'; stated: in the config' if stated else ''}."
+    header = ("Constant", "Value", "From", "To", *(["Stated"] if stated else []), "Told")
+    return Table(f"vehicle-constants-{index}", caption, header, rows, frozenset({0, len(header) - 1}))
 
 
 def _or_unknown(value: float | None, digits: int) -> str:
@@ -384,15 +446,9 @@ def _section(found: Source[VehicleRecord], index: int) -> Iterator[Block]:
             ("Of the force", _share_in_words(record.share.name, record.share.force)),
         ]
     )
+    yield from details(found, index)
     if record.held_out is not None:
-        yield errors_table(record.held_out, index)
         yield horizon_figure(f"vehicle-errors-{index}", record.held_out)
-    yield from _differences_table(record, index)
-    yield from _constants(record, index)
-    yield from _numbers_table(found, index)
-    yield from gust_blocks(record, index)
-    yield _section_to_paste(record)
-    yield from (Text(warning, "warning") for warning in warnings(record))
     yield _structures_table(record, index)
     yield _structures_figure(record, index)
     yield _shares_table(record, index)

@@ -93,5 +93,6 @@ def _origin(origin: Origin) -> dict[str, Any]:
         "sha256": origin.sha256,
         "config_sha256": origin.config_sha256,
         "inputs": {role: asdict(file) for role, file in header.inputs.items()},
+        "cautions": list(header.cautions),
         "config": header.config,
     }

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +37,20 @@ class Outcome:
     blocks: tuple[Block, ...] = ()
     exit_code: int = 0
     next: tuple[Command, ...] = ()
+
+
+def cautioned(outcome: Outcome, job: Job) -> Outcome:
+    """Say what speaks against the models and numbers that an answer rests on."""
+    if not job.cautions:
+        return outcome
+    said = list(job.cautions)
+    blocks = (*outcome.blocks, *caution_texts(said))
+    return replace(outcome, summary={**outcome.summary, "cautions": said}, blocks=blocks)
+
+
+def caution_texts(cautions: Iterable[str]) -> Iterator[Text]:
+    """Write what speaks against a model: the first is seen however many notes there are."""
+    return (Text(each, "warning", always=index == 0) for index, each in enumerate(cautions))
 
 
 def nothing_written(job: Job) -> Outcome:

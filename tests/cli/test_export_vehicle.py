@@ -63,12 +63,15 @@ def test_a_vehicle_is_exported(cpfls, vehicle, tmp_path, form):
 
 def test_what_is_said_of_it(cpfls, vehicle, tmp_path):
     result = cpfls("export", vehicle, "-o", tmp_path / "quad.py")
-    written, about, effects, learned, judged, whole_of_it = result.stdout.splitlines()
+    written, caution, about, effects, learned, judged, whole_of_it = result.stdout.splitlines()
+    assert caution.startswith("linear damping d_x: on a bound of what is tried")
     assert written.startswith(f"{tmp_path / 'quad.py'}: written (")
     assert about.startswith("Vehicle: 0.9 kg, 4 rotors; delay 0.013 s, lag 0.035 s, slow actuation -0.4 (roll, pitch)")
     assert effects == "Effects: linear rotational damping, quadratic rotational damping."
     assert learned == "Learned, without a name: torque x, torque z, force z over the direction of the airflow."
-    assert judged == "No flight was held out, so what it is good for is open; --held-out FLIGHT says it."
+    assert judged == (
+        "NOT JUDGED: not judged as a forecast; its constants are told; 1 of 2 numbers are not determined."
+    )
     assert whole_of_it == "Python holds all of it."
     assert effects in (tmp_path / "quad.py").read_text()
 

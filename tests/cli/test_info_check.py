@@ -69,7 +69,13 @@ def test_files_describe_themselves_and_hold_nothing_that_the_format_does_not_nam
     with h5py.File(pipeline.paths[stage]) as file:
         config = bytes(file["config"][()])
         assert file.attrs["config_sha256"] == hashlib.sha256(config).hexdigest()
-        assert set(file.attrs) - {"kind"} == {"format", "schema_version", "cpfls_version", "seed", "config_sha256"}
+        assert set(file.attrs) - {"kind", "cautions"} == {
+            "format",
+            "schema_version",
+            "cpfls_version",
+            "seed",
+            "config_sha256",
+        }
         found = {}
         file.visititems(lambda name, item: found.update({name: item}) if isinstance(item, h5py.Dataset) else None)
         del found["config"]

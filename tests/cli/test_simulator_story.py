@@ -2,7 +2,6 @@
 
 import json
 import runpy
-from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -23,9 +22,9 @@ def test_a_flight_in_mujoco_comes_back(cpfls, tmp_path):
     pytest.importorskip("mujoco", reason="needs the package mujoco, of the extra simulators")
     study = load_study(CONFIG)
     offset = ModelEffect("com_offset", {}, np.array([0.01, -0.006]))
-    record = record_of(VehicleModel(vehicle=study.vehicle, effects=(offset,)), (), resolved_yaml(study))
+    record = record_of(VehicleModel(vehicle=study.vehicle, effects=(offset,)), resolved_yaml(study))
     model, uav, log, flight = (tmp_path / name for name in ("model.h5", "uav.xml", "log.h5", "flight.h5"))
-    write_record(model, replace(record, commanded=False))
+    write_record(model, record)
     assert cpfls("export", model, "-o", uav).exit_code == 0
     script = runpy.run_path(str(ROOT / "examples" / "fly_mujoco.py"))
     script["main"].__globals__.update(BEGIN_S=2.0, END_S=4.0)

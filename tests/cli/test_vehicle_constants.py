@@ -75,7 +75,7 @@ def test_what_is_null_is_a_guess_that_is_named(unknown):
 def test_other_commands_refuse_a_guess(refuse, unknown, flights, folder, command):
     (message,) = refuse(command, unknown, flights["flight"], "-o", folder / "x.h5")
     assert "vehicle.inertia_kg_m2" in message
-    assert "`cpfls vehicle` finds it" in message
+    assert "--model VEHICLE.h5 takes the numbers that `cpfls vehicle` found, --accept-guesses those" in message
 
 
 def test_a_torque_of_unknown_rotors_is_refused(refuse, folder):

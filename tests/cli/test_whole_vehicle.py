@@ -358,7 +358,9 @@ def test_an_exported_vehicle_is_flown_back(cpfls, refuse, vehicle, flight, noisy
     assert found["largest"]["not_held"]["body_rate"] > 0.01
     assert 0.001 < found["playback_error"]["body_rate"] < found["target_error"]["body_rate"]
     words = ("verify-export", vehicle, flight, "--format", "sdf", "--windows", "2", "--horizon", "0.05")
-    assert "Gazebo's motor model flies what was exported: 2 runs of 0.05 s along flight.h5" in cpfls(*words).stdout
+    said = cpfls(*words).stdout
+    assert "Gazebo's motor model flies what was exported, and " in said
+    assert ": 2 runs of 0.05 s along flight.h5" in said
     monkeypatch.setattr(verify_export, "verified", None)
     checked = cpfls(*words, "--dry-run")
     assert (checked.exit_code, checked.stdout.count("would be flown along")) == (0, 1)

@@ -13,7 +13,7 @@ from cpfls_cli.config.study import resolved
 from cpfls_cli.pages import diagnosis, disagreement, model
 from cpfls_cli.pages.source import Source
 from cpfls_cli.regressor.structure import model_structure
-from cpfls_cli.report.content import Table, Text
+from cpfls_cli.report.content import Table, Text, unfolded
 from cpfls_cli.report.outcome import as_json
 from tests.builders import gap_artifacts, vehicle_models
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
@@ -95,7 +95,7 @@ def test_the_report_says_what_the_command_says(told, answered, name):
     # Whether a model has seen the flight stands in the model.
     beside = [told["model"].source] if name == "prediction" else []
     for form, text in in_all_forms(source, blocks, beside).items():
-        warned = [block.text for block in blocks if isinstance(block, Text) and block.tone == "warning"]
+        warned = [block.text for block in unfolded(blocks) if isinstance(block, Text) and block.tone == "warning"]
         assert [p for p in said if words(p) not in words(text) and (form != "terminal" or p not in warned)] == [], form
         assert [number for number in numbers if number not in text] == [], form
 

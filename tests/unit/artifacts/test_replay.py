@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.replay import SignalErrorGroup, better_to
+from cpfls_cli.artifacts.replay import SignalErrorGroup, better_to, lost_to, trust_by_playback
+from cpfls_cli.validation.trust import Trust
 
 HORIZON = np.array([0.1, 0.2, 0.3, 0.4])
 NOTHING, STAYS, STATED = [1.0, 2.0, 3.0, 4.0], [2.0, 2.0, 2.0, 2.0], [9.0] * 4
@@ -27,3 +28,55 @@ def test_sums_up_to_a_horizon_are_compared(model, horizon):
     errors = SimpleNamespace(horizon_s=HORIZON, errors={"body_rate": group, "velocity": None})
     assert better_to(errors, "body_rate") == horizon
     assert np.isnan(better_to(errors, "velocity"))
+
+
+def held_out(rate, attitude=None, velocity=None):
+    """Errors from 0.02 to 0.5 s; both rivals grow from 0 to 1."""
+    horizon = np.linspace(0.02, 0.5, 25)
+
+    def group(model):
+        rows = [np.broadcast_to(model, horizon.shape), 2 * horizon, 2 * horizon, horizon]
+        return SignalErrorGroup(mae=np.array(rows), rms=np.zeros((4, 25, 3)))
+
+    known = {"body_rate": rate, "attitude": attitude, "velocity": velocity, "position": None}
+    errors = {name: None if model is None else group(model(horizon)) for name, model in known.items()}
+    return SimpleNamespace(
+        horizon_s=horizon, errors=errors, prediction=("model", "nothing-moves", "rate-stays", "stated")
+    )
+
+
+def good(horizon):
+    return horizon
+
+
+def slow(horizon):
+    """Better than its rivals over half a second, and worse from 0.04 to 0.1 s."""
+    return np.where((horizon > 0.03) & (horizon < 0.11), 2.5 * horizon, 0.5 * horizon)
+
+
+def late(horizon):
+    return np.where(horizon > 0.3, 2.01 * horizon, horizon)
+
+
+@pytest.mark.parametrize(
+    ("given", "trust"),
+    [
+        ((good, good, good), Trust.SIMULATION),
+        ((good, good), Trust.CONTROL),
+        # A loss beyond what a controller corrects is none.
+        ((good, late, good), Trust.SIMULATION),
+        ((slow, good, good), Trust.NOT_CONTROL),
+        ((good, slow, good), Trust.NOT_CONTROL),
+        # What nobody controls by.
+        ((good, good, slow), Trust.SIMULATION),
+        ((lambda horizon: 3 * horizon, good, good), Trust.DO_NOT_USE),
+    ],
+)
+def test_nothing_is_good_for_control_that_loses_where_control_lives(given, trust):
+    assert trust_by_playback(held_out(*given)) == trust
+
+
+def test_a_loss_is_named_with_its_rival_and_horizons():
+    lost = lost_to(held_out(slow, good))
+    assert list(lost) == ["body_rate"]
+    assert lost["body_rate"] == ("nothing-moves", pytest.approx(0.04), pytest.approx(0.1))

@@ -9,7 +9,7 @@ from cpfls_cli.artifacts.disturbance import DisturbanceGroup
 from cpfls_cli.pages.disturbance import gust_blocks
 from cpfls_cli.pages.model import answer
 from cpfls_cli.playback.disturbance import FoundGusts
-from cpfls_cli.report.content import Table, Text
+from cpfls_cli.report.content import Table, Text, unfolded
 from tests.builders.forms import source_of_record
 from tests.builders.vehicle_models import QUAD, record_of, whole
 
@@ -40,7 +40,9 @@ def test_sizes_are_told_as_accelerations_with_how_long_they_last():
     assert "Gusts about yaw are not known" in words
     assert "--gusts" in words
     (table,) = [
-        block for block in answer(source_of_record(record())) if getattr(block, "name", "") == "vehicle-gusts-1"
+        block
+        for block in unfolded(answer(source_of_record(record())))
+        if getattr(block, "name", "") == "vehicle-gusts-1"
     ]
     assert isinstance(table, Table)
     assert len(table.cells) == 6

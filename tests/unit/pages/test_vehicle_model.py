@@ -18,8 +18,15 @@ from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.pages.source import Sources
-from cpfls_cli.pages.vehicle_model import found_vehicle_section, grounds, remainder_curves, warnings, worth
-from cpfls_cli.report.content import Plot, Table
+from cpfls_cli.pages.vehicle_model import (
+    cautions,
+    found_vehicle_section,
+    grounds,
+    remainder_curves,
+    title,
+    warnings,
+)
+from cpfls_cli.report.content import Plot, Table, Text, unfolded
 from cpfls_cli.validation.trust import Trust, capped
 from tests.builders.forms import source_of_record
 from tests.builders.vehicle_models import record_of, remainder, whole
@@ -43,15 +50,15 @@ def found(model):
 
 
 def test_numbers_without_a_meaning_of_their_own_are_counted_and_not_listed():
-    tables = [block for block in answer(source_of_record(found(whole()))) if isinstance(block, Table)]
+    tables = [block for block in unfolded(answer(source_of_record(found(whole())))) if isinstance(block, Table)]
     (table,) = [table for table in tables if table.name.startswith("vehicle-numbers")]
-    assert [row[0].text for row in table.cells] == ["rotor_drag.k_d"]
+    assert [row[0].text for row in table.cells] == ["rotor drag k_d"]
     assert "3 more make the learned remainder" in table.caption
 
 
 def test_they_are_warned_of_only_where_they_stand_for_a_number_with_a_name():
     said = " ".join(warnings(found(whole())))
-    assert "only together (correlation): rotor_drag.k_d and remainder_force.3_0_0 (-0.970)" in said
+    assert "only together (correlation): rotor drag k_d and remainder force 3_0_0 (-0.970)" in said
     assert "remainder_force.3_0_1" not in said
     assert "not determined" not in said
 
@@ -87,7 +94,9 @@ def test_an_inertia_that_no_body_has_is_no_constant_however_narrow_its_interval(
     (row,) = [each for each in parameters_of(record) if each.key == "inertia_kg_m2.0"]
     assert row.determined is not told
     assert ("too heavy for 0.9 kg between these rotors" in row.reason) is told
-    assert any("inertia.Ixx 0.03 where" in line for line in warnings(record)) is told
+    assert any("Ixx 0.03 where" in line for line in cautions(record)) is told
+    assert record.verdict == (Trust.NOT_DETERMINED if told else Trust.NOT_JUDGED)
+    assert ("inertia and drag factor are not the body's" in title(record)) is told
     # What was stated stays where the flights do not tell better.
     assert vehicle_section(record)["inertia_kg_m2"][0] == pytest.approx(0.004 if told else record.vehicle.inertia[0])
 
@@ -109,7 +118,11 @@ def test_flights_that_show_the_loop_are_said_first_and_leave_no_good_word():
     assert misled.held_out is None
     assert misled.verdict == Trust.LOOP
     assert not any("show the loop" in line for line in warnings(misled))
-    said = next(worth(misled))
+    first, said, *_ = cautions(misled)
+    assert first == (
+        "FORECAST NOT JUDGED; VEHICLE NOT JUDGED: THE FLIGHTS SHOW THE LOOP: not judged as a forecast; its constants "
+        "are those of vehicle and autopilot together; 2 of 2 numbers are not determined."
+    )
     assert "torque explains 45 % of the roll acceleration and 47 % of the pitch acceleration" in said
     assert "Ixx 0.21 to 2.6 times and Iyy 0.23 to 2.4 times what was found" in said
     assert said.endswith(f": {WHAT_TO_FLY}")
@@ -150,12 +163,13 @@ def test_constants_that_repeats_tell_are_judged_by_what_comes_again_and_not_by_a
     assert record.held_out is None
     assert record.forecast_verdict == Trust.NOT_JUDGED
     assert record.verdict == Trust.SIMULATION
-    first, cost, second, *_ = grounds(record)
+    first, cost, *_ = grounds(record)
     assert "3 runs that repeat each other (correlation 0.90 to 0.97)" in first
     assert "From 1.0 to 6.0 Hz they explain 98 % (± 1 %) of the roll" in first
     assert cost.startswith("Cost J of its frequency responses, 100 at most is acceptable: roll 12")
-    assert "`cpfls replay` plays" in second
-    assert not any("loop, not the vehicle" in line for line in warnings(record))
+    said = [block.text for block in unfolded(answer(source_of_record(record))) if isinstance(block, Text)]
+    assert any("`cpfls replay` plays" in line for line in said)
+    assert not any("loop, not the vehicle" in line for line in said)
 
 
 def test_a_response_that_is_off_is_none_of_the_vehicle_and_one_that_is_not_seen_judges_nothing():
@@ -173,8 +187,8 @@ def test_a_response_that_is_off_is_none_of_the_vehicle_and_one_that_is_not_seen_
     [
         ({"total": np.array([0.98, 0.7, 0.98])}, {}, Trust.LACKING),
         ({"used": np.array([True, False])}, {}, Trust.LACKING),
-        ({}, {"determined": np.array([False, True])}, Trust.NOT_JUDGED),
-        ({}, {"at_bound": np.array([True, False])}, Trust.NOT_JUDGED),
+        ({}, {"determined": np.array([False, True])}, Trust.NOT_DETERMINED),
+        ({}, {"at_bound": np.array([True, False])}, Trust.NOT_DETERMINED),
     ],
 )
 def test_constants_that_lack_something_are_not_good(given, found, trust):
@@ -184,4 +198,4 @@ def test_constants_that_lack_something_are_not_good(given, found, trust):
     assert replace(record, contradiction=("rates are mirrored",)).verdict == Trust.DO_NOT_USE
     said = " ".join(grounds(record))
     assert ("Below 2.0 Hz they explain less" in said) == ("used" in given)
-    assert ("They do not tell the moments of inertia" in said) == (trust == Trust.NOT_JUDGED)
+    assert ("They do not tell the moments of inertia" in said) == (trust == Trust.NOT_DETERMINED)

@@ -1,0 +1,216 @@
+"""A vehicle whose flights do not tell it: what its config leaves open, every command takes or refuses by name."""
+
+import json
+import runpy
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from cpfls_cli.artifacts.store import read_any, write_record
+from cpfls_cli.config.load import load_study
+from cpfls_cli.config.study import resolved_yaml
+from cpfls_cli.export.registry import FORMS
+from cpfls_cli.playback.model import VehicleModel
+from tests.builders.command_line import undrawn
+from tests.builders.vehicle_models import record_of
+from tests.builders.vehicle_search import CONFIG
+
+ROOT = Path(__file__).parents[2]
+HEADLINE = (
+    "FORECAST NOT JUDGED; VEHICLE NOT JUDGED: THE FLIGHTS SHOW THE LOOP: not judged as a forecast; its constants are "
+    "those of vehicle and autopilot together; 1 of 2 numbers are not determined."
+)
+HEAVY = "too heavy for 0.8 kg between these rotors (Ixx 0.05 where"
+ROTATION = ("--set", "trajectory.path=full-rotation")
+TRUE = (0.05, 0.0044, 0.0075)
+GUESSED = "guesses from mass and arms stand for what the config leaves open (--accept-guesses)"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("difficult")
+
+
+@pytest.fixture(scope="module")
+def config(folder):
+    """What `vehicle --write-config` leaves open."""
+    data, path = yaml.safe_load(CONFIG), folder / "found.yaml"
+    data["vehicle"]["inertia_kg_m2"] = [None, None, None]
+    for rotor in data["vehicle"]["rotors"]:
+        rotor |= {"thrust_factor_n_s2": None, "drag_factor_n_m_s2": None}
+    path.write_text(yaml.safe_dump(data, sort_keys=False))
+    return path
+
+
+@pytest.fixture(scope="module")
+def vehicle(config, folder):
+    """A vehicle whose flights show the loop, with an inertia that no body of its mass has."""
+    study, path = load_study(config), folder / "vehicle.h5"
+    record = record_of(VehicleModel(vehicle=replace(study.vehicle, inertia_kg_m2=TRUE)), resolved_yaml(study))
+    numbers = replace(record.found, value=np.array([TRUE[0], 0.0]), determined=np.array([False, True]))
+    write_record(path, replace(record, found=numbers, loop=replace(record.loop, shown=True)))
+    return path
+
+
+@pytest.fixture(scope="module")
+def flight(cpfls, config, folder):
+    plan, path = folder / "path.h5", folder / "flight.h5"
+    words = ("--set", "trajectory.path=straight", "--set", "trajectory.direction=[-0.3, 1.0, 0.4]")
+    for result in (
+        cpfls("trajectory", config, "-o", plan, *words),
+        cpfls("simulate", config, plan, "-o", path, "--accept-guesses"),
+    ):
+        assert result.exit_code == 0, result.stderr
+    record = read_any(path)
+    assert record.origin.cautions[0].startswith(GUESSED)
+    # As if it was measured: what its path was flown by is none of what follows.
+    write_record(path, record.with_header(replace(record.origin, cautions=())))
+    return path
+
+
+@pytest.fixture
+def command(config, flight, folder, tmp_path):
+    """The words of a command by its name."""
+
+    def words(name):
+        given = {
+            "simulate": ("simulate", config, folder / "path.h5"),
+            "replay": ("replay", config, "vehicle", flight, "--every", "50"),
+            "trajectory": ("trajectory", config, *ROTATION, "--set", "trajectory.infeasible=report"),
+            "gap": ("gap", config, flight, "--held-out", flight, "--dry-run"),
+            "compare": ("compare", config, flight, "--dry-run"),
+            "response": ("response", config, flight, "--dry-run"),
+            "identify": ("identify", config, flight, "--dry-run"),
+        }
+        return (*given[name], "-o", tmp_path / "out")
+
+    return words
+
+
+def test_an_error_says_what_it_came_about_with(cpfls, config, vehicle, tmp_path):
+    result = cpfls("trajectory", config, *ROTATION, "--model", vehicle, "-o", tmp_path / "path.h5")
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert result.stderr.splitlines()[-1] == f"cpfls: note: vehicle.h5: {HEADLINE}"
+
+
+COMMANDS = ("simulate", "replay", "trajectory", "gap", "compare", "response", "identify")
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_refusal_names_both_ways_and_each_of_them_works(cpfls, refuse, command, vehicle, name):
+    (line,) = refuse(*command(name))
+    assert "vehicle.inertia_kg_m2" in line
+    assert "--model VEHICLE.h5 takes the numbers that `cpfls vehicle` found" in line
+    assert "--accept-guesses" in line
+    guessed = cpfls(*command(name), "--accept-guesses", "--json")
+    assert guessed.exit_code == 0, guessed.stderr
+    (said,) = json.loads(guessed.stdout)["cautions"]
+    assert said.startswith(GUESSED)
+    assert "inertia 0.8 to 4" in said
+    found = cpfls(*command(name), "--model", vehicle, "--json", "--force")
+    assert found.exit_code == 0, found.stderr
+    first, *others = json.loads(found.stdout)["cautions"]
+    assert first == f"vehicle.h5: {HEADLINE}"
+    assert any(HEAVY in each for each in others)
+    assert not any(each.startswith(GUESSED) for each in others)
+
+
+def test_no_word_is_good_above_a_number_that_is_not_known(vehicle):
+    summary = read_any(vehicle).summary
+    assert (summary["verdict"], summary["forecast_verdict"]) == ("shows-the-loop", "not-judged")
+    assert summary["not_determined"] == ["inertia.Ixx"]
+
+
+def test_found_numbers_stand_in_for_open_ones(cpfls, command, vehicle, tmp_path):
+    assert cpfls(*command("replay"), "--model", vehicle).exit_code == 0
+    stored = yaml.safe_load(read_any(tmp_path / "out").origin.config)["vehicle"]
+    assert stored["inertia_kg_m2"] == pytest.approx(TRUE)
+
+
+def test_only_a_vehicle_that_was_found_has_numbers_to_take(refuse, command, flight):
+    (line,) = refuse(*command("replay"), "--model", flight)
+    assert line == f"--model {flight}: is no vehicle that `cpfls vehicle` found"
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_every_export_says_it_at_its_top(cpfls, vehicle, tmp_path, form):
+    output = tmp_path / f"uav_model{FORMS[form].ending}"
+    result = cpfls("export", vehicle, "-o", output, "--format", form, "--json")
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["cautions"][0] == HEADLINE
+    shown = cpfls("export", vehicle, "-o", output, "--format", form, "--force").stdout
+    for path in [output, *output.parent.glob("*.h")]:
+        text = path.read_text()
+        if form == "json":
+            document = json.loads(text)
+            assert (document["cautions"][0], HEAVY in document["cautions"][2]) == (HEADLINE, True)
+            continue
+        begin = " ".join(text[:2000].replace("#", " ").replace("*", " ").split())
+        for words in (HEADLINE, HEAVY):
+            assert words in begin
+            assert words in " ".join(shown.split())
+
+
+def test_a_file_made_with_it_carries_it_on(cpfls, config, flight, vehicle, tmp_path):
+    compared = tmp_path / "compared.h5"
+    made = cpfls("compare", config, flight, "--model", vehicle, "-o", compared)
+    assert made.exit_code == 0, made.stderr
+    assert f"cpfls: note: vehicle.h5: {HEADLINE}" in made.stderr.splitlines()
+    header = read_any(compared).origin
+    assert header.cautions[0] == f"vehicle.h5: {HEADLINE}"
+    told = json.loads(cpfls("info", compared, "--json").stdout)
+    assert told["cautions"] == list(header.cautions)
+    assert HEADLINE in " ".join(cpfls("info", compared).stdout.split())
+    with undrawn():
+        assert cpfls("report", config, compared, "-o", tmp_path / "page.md").exit_code == 0
+    summary = (tmp_path / "page.md").read_text().split("## ")[1]
+    assert summary.count(HEADLINE) == 1
+
+
+def test_a_verified_export_is_held_against_nothing_moves(cpfls, vehicle, flight):
+    result = cpfls("verify-export", vehicle, flight, "--format", "sdf", "--windows", "2", "--json")
+    told = json.loads(result.stdout)
+    assert told["nothing_moves_error"]["body_rate"] > 0
+    # A body ten times as heavy to turn stays where it is.
+    assert told["beats_nothing_moves"] is all(
+        told["target_error"][name] < still for name, still in told["nothing_moves_error"].items()
+    )
+    said = cpfls("verify-export", vehicle, flight, "--format", "sdf", "--windows", "2")
+    good = told["beats_nothing_moves"]
+    assert said.stdout.startswith("BETTER THAN NOTHING MOVES: " if good else "NO BETTER THAN NOTHING MOVES: ")
+    assert HEADLINE in said.stderr
+
+
+def test_two_vehicles_stand_side_by_side(cpfls, config, vehicle, tmp_path):
+    record, other = read_any(vehicle), tmp_path / "other.h5"
+    numbers = replace(
+        record.found,
+        value=np.array([0.0052, 0.0]),
+        low=np.array([0.005, 0.0]),
+        high=np.array([0.0054, 0.0]),
+        determined=np.array([True, True]),
+    )
+    write_record(other, replace(record, found=numbers, loop=replace(record.loop, shown=False)))
+    with undrawn():
+        assert cpfls("report", config, vehicle, other, "-o", tmp_path / "page.json").exit_code == 0
+    page = json.loads((tmp_path / "page.json").read_text())
+    (section,) = [each for each in page["sections"] if each["name"] == "vehicles"]
+    (table,) = [block for block in section["blocks"] if block["kind"] == "table"]
+    (row,) = [row for row in table["rows"] if "Ixx, kg m^2" in str(row)]
+    assert "0.005200, 0.00500 to 0.00540" in str(row)
+    assert "beyond both intervals" in str(row)
+    (mass,) = [row for row in table["rows"] if "Iyy, kg m^2" in str(row)]
+    assert "beyond both intervals" not in str(mass)
+
+
+def test_the_example_in_mujoco_says_what_to_give_it(config, vehicle):
+    pytest.importorskip("mujoco", reason="needs the package mujoco, of the extra simulators")
+    known = runpy.run_path(str(ROOT / "examples" / "fly_mujoco.py"))["known"]
+    with pytest.raises(SystemExit, match=r"leaves numbers of the vehicle open; name the vehicle\.h5"):
+        known(str(config))
+    found = known(str(vehicle))
+    assert found["inertia_kg_m2"][:3] == list(TRUE)
+    assert [rotor["spin"] for rotor in found["rotors"]] == [1, -1, 1, -1]
