@@ -700,7 +700,7 @@ def _run_with(
             narration.reads,
             deferred_interrupts,
             inputs,
-            "guessed" if common.accept_guesses else "refused",
+            open_numbers="guessed" if common.accept_guesses else "refused",
         )
         job = replace(job, config=inputs[0]) if inputs else job
         with nullcontext() if common.dry_run else locked(output, title), _noted(job):
