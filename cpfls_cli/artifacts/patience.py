@@ -43,14 +43,16 @@ while True:
     *lines, rest = (rest + chunk.translate(None, STOPS)).split(b"\\n")
     for line in lines:
         seconds, _, name = line.decode("utf-8", "surrogateescape").partition(" ")
-        wait, path, why = float(seconds) or None, name, f"HDF5 does not come to an end with it within {seconds} s"
+        wait, path, why = float(seconds) or None, name, f"damaged: HDF5 does not come to an end with it within {seconds} s"
     if stopped and wait:
-        wait, why = 1.0, "interrupted while HDF5 does not come to an end with it"
-os.write(2, f"cpfls: error: {path}: damaged: {why}\\n".encode("utf-8", "surrogateescape"))
+        wait, why = GRACE, "interrupted while HDF5 was reading it"
+os.write(2, f"cpfls: error: {path}: {why}\\n".encode("utf-8", "surrogateescape"))
 os.kill(int(sys.argv[1]), getattr(signal, "SIGKILL", signal.SIGTERM))
 os._exit(0)
 """
 _STOPS = bytes([signal.SIGINT, signal.SIGTERM])
+_GRACE_S = 3.0
+"""After a signal, in which a sound file is read to the end of one dataset and the program ends by itself."""
 _GOES_ON = b"0 \n"
 
 
@@ -91,7 +93,7 @@ class _Watch:
             import subprocess
 
             self.wanted = False
-            code = _WATCH.replace("STOPS", repr(_STOPS))
+            code = _WATCH.replace("STOPS", repr(_STOPS)).replace("GRACE", repr(_GRACE_S))
             with suppress(OSError, ValueError):
                 self._process = subprocess.Popen(
                     [sys.executable, "-I", "-S", "-c", code, str(os.getpid())],

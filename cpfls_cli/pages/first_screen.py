@@ -45,7 +45,7 @@ _TONES: dict[str, Tone] = {
 }
 _EFFECTS_SHOWN = 2
 _ENERGY = {"feeds": ", feeds energy into the motion", "drains": ", drains energy from the motion"}
-_USE = "take the model with it, extended.h5, that `cpfls gap` and `cpfls extend` write"
+_USE = "take the model with it, extended.h5"
 _GUSTS = "nothing on the model: what is left are gusts or noise; fly in still air, or more runs, to see what is smaller"
 _PLAN = "`cpfls trajectory CONFIG --for diagnosis.h5 -o path.h5` plans such a flight"
 _NEXT: dict[str, str] = {
@@ -61,25 +61,44 @@ _NEXT: dict[str, str] = {
 
 def first_screen(record: DiagnosisRecord, index: int) -> Iterator[Block]:
     """Say what a diagnosis found, how sure that is, where, what it becomes on held-out flights, and what to do next."""
-    if record.again_before is not None and not record.contradiction:
-        yield again_box(record.again_before, record.again_after, model_words(record))
     yield verdict_box(record)
     yield Facts(list(_facts(record)))
     yield _held_out_table(record, index)
+    yield from _again(record)
     yield from (Text(sentence(remark), "note") for remark in record.remarks)
     yield Facts(list(_beside(record)))
 
 
 def first_lines(record: DiagnosisRecord, index: int) -> Iterator[Block]:
     """Say the same with what a small screen has no room for folded away."""
-    if record.again_before is not None and not record.contradiction:
-        box = again_box(record.again_before, record.again_after, model_words(record))
-        yield from in_short(box, 0, "what comes again, channel by channel")
     yield from in_short(verdict_box(record), _EFFECTS_SHOWN, "more effects")
-    yield Facts(list(_facts(record)))
+    yield Facts([*_shrunk(record), *_facts(record)])
+    for box in _again(record):
+        yield from in_short(box, 0, "what comes again, channel by channel")
     remarks = [Text(sentence(remark), "note") for remark in record.remarks]
     rest: list[Block] = [_held_out_table(record, index), *remarks, Facts(list(_beside(record)))]
     yield Folded("held-out flights before and after, and what to know of the verdict", rest)
+
+
+def _again(record: DiagnosisRecord) -> Iterator[Box]:
+    """Say what of the gap comes again, where flights repeat a path."""
+    if record.again_before is not None and not record.contradiction:
+        yield again_box(record.again_before, record.again_after, model_words(record))
+
+
+def _shrunk(record: DiagnosisRecord) -> Iterator[tuple[str, str]]:
+    """Say in a line what becomes of the held-out gap, in noise floors; of what has none there is nothing to say."""
+    gap = record.gap
+    changes = [f"{channel_name(gap.channel[channel])} {_floors(record, channel)}" for channel in gap.loud[0]]
+    if changes:
+        yield "Gap", sentence(f"held out, in noise floors: {', '.join(changes)}")
+
+
+def _floors(record: DiagnosisRecord, channel: int) -> str:
+    before, after = (
+        number(float(values[channel]), 2) for values in (record.gap.before_floors, record.gap.after_floors)
+    )
+    return f"{before} → {after}"
 
 
 def verdict_box(record: DiagnosisRecord) -> Box:
@@ -271,9 +290,8 @@ def _gap_row(record: DiagnosisRecord, channel: int) -> list[str | Cell]:
     gap = record.gap
     name = gap.channel[channel]
     sizes = [number(float(values[channel]), 3) for values in (gap.before, gap.after, gap.floor)]
-    before, after = (number(float(values[channel]), 2) for values in (gap.before_floors, gap.after_floors))
     grown = bool(gap.grown[channel])
-    said = Cell(f"{before} → {after} floors{', worse' if grown else ''}", "warning" if grown else "plain")
+    said = Cell(f"{_floors(record, channel)} floors{', worse' if grown else ''}", "warning" if grown else "plain")
     return [f"gap, {channel_name(name)}", channel_unit(name), *sizes, said]
 
 

@@ -59,4 +59,4 @@ def test_a_signal_ends_it_too(looping, number):
         process.send_signal(number)
         _, said = process.communicate(timeout=60)
     assert process.returncode == -signal.SIGKILL
-    assert said == f"cpfls: error: {looping}: damaged: interrupted while HDF5 does not come to an end with it\n"
+    assert said == f"cpfls: error: {looping}: interrupted while HDF5 was reading it\n"

@@ -63,7 +63,7 @@ def test_json_has_every_promised_key(found):
     assert promised <= set(found.summary)
     assert {"headline", "where", "playback", "next", "contradictions", "warnings"} <= set(found.summary)
     assert found.summary["headline"] == "What the model misses is offset of the centre of mass."
-    assert found.summary["next"] == ["Take the model with it, extended.h5, that `cpfls gap` and `cpfls extend` write."]
+    assert found.summary["next"] == ["Take the model with it, extended.h5."]
     assert found.summary["where"]["channels"] == ["torque y", "torque x"]
     assert {"parameters", "split", "extended", "disagreement"} <= set(found.summary)
     assert set(found.summary["effects"][0]) == {

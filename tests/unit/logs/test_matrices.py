@@ -68,6 +68,12 @@ def test_columns_of_matlab_are_paths(tmp_path, version):
     assert listed(log_contents(tmp_path / "log.mat")) == expected
 
 
+def test_matlab_is_read_whatever_its_name_ends_in(tmp_path):
+    scipy.io.savemat(tmp_path / "log.mat", {"t": TIME[:, None]})
+    (tmp_path / "log.mat").rename(tmp_path / "log.h5")
+    assert listed(log_contents(tmp_path / "log.h5")) == {"t": TIME.tolist()}
+
+
 def test_matlab_of_version_7_3_is_hdf5_behind_a_line_of_text(tmp_path):
     path = tmp_path / "log.mat"
     hdf5(path, userblock_size=512)
@@ -89,10 +95,10 @@ def test_matlab_of_version_7_3_is_hdf5_behind_a_line_of_text(tmp_path):
         (
             "log.h5",
             b"MATLAB 5.0 MAT-file".ljust(126),
-            "seems to hold MATLAB, not what its name ends in; rename it to end in .mat",
+            "cannot be read as MATLAB: ",
         ),
     ],
-    ids=["empty", "broken", "cut", "other"],
+    ids=["empty", "broken", "cut", "under another ending"],
 )
 def test_what_cannot_be_read(tmp_path, name, content, message):
     (tmp_path / name).write_bytes(content)

@@ -9,7 +9,7 @@ from cpfls_cli.report.content import Box, Facts, Table, Text
 from tests.builders import gap_artifacts as made
 
 RIVALS = [("torque_bias", "com_offset", 0.98, "change the thrust", "")]
-USE = "Take the model with it, extended.h5, that `cpfls gap` and `cpfls extend` write"
+USE = "Take the model with it, extended.h5"
 WRONG = "the inertia about z would have to be 29 times that of the config"
 
 

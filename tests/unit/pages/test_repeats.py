@@ -83,11 +83,11 @@ def test_what_effects_leave_is_told(after, words):
     assert f"50 % comes again from 0.25 to 1.5 Hz, of which {left} is left" in box.sentences[1]
 
 
-def test_the_split_leads_the_answer():
+def test_the_split_stands_behind_a_verdict_and_before_a_gap():
     groups = {"again_before": made.comes_again(PITCH), "again_after": made.comes_again(NOTHING)}
     record = replace(DiagnosisRecord.of_data(*_parts(made.diagnosis())), **groups)
     first, second = (block for block in answer(source_of_record(record)) if isinstance(block, Box))
-    assert [first.label, second.label] == ["REPEATS", "NAMED"]
+    assert [first.label, second.label] == ["NAMED", "REPEATS"]
     assert record.summary["comes_again"]["before"]["channels"]["torque y"]["comes_again"][3:5] == [True, True]
     compared = replace(DisagreementRecord.of_data(*_parts(made.disagreement())), again=groups["again_before"])
     boxes = [block.label for block in answer_of_disagreement(source_of_record(compared)) if isinstance(block, Box)]
