@@ -43,7 +43,8 @@ while True:
     *lines, rest = (rest + chunk.translate(None, STOPS)).split(b"\\n")
     for line in lines:
         seconds, _, name = line.decode("utf-8", "surrogateescape").partition(" ")
-        wait, path, why = float(seconds) or None, name, f"damaged: HDF5 does not come to an end with it within {seconds} s"
+        wait, path = float(seconds) or None, name
+        why = f"damaged: HDF5 does not come to an end with it within {seconds} s"
     if stopped and wait:
         wait, why = GRACE, "interrupted while HDF5 was reading it"
 os.write(2, f"cpfls: error: {path}: {why}\\n".encode("utf-8", "surrogateescape"))

@@ -189,7 +189,7 @@ def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
 def _format_of(path: Path) -> LogFormat | None:
     name, first = path.name.lower(), _first_line(path)
     named = next((form for form in LOG_FORMATS if form.suffix and name.endswith(form.suffix)), None)
-    if named is not None and named.magic and named.begins(first):
+    if named is not None and named.begins(first):
         return named
     return next((form for form in LOG_FORMATS if form.by_content and form.begins(first)), named)
 

@@ -72,7 +72,7 @@ def first_screen(record: DiagnosisRecord, index: int) -> Iterator[Block]:
 def first_lines(record: DiagnosisRecord, index: int) -> Iterator[Block]:
     """Say the same with what a small screen has no room for folded away."""
     yield from in_short(verdict_box(record), _EFFECTS_SHOWN, "more effects")
-    yield Facts([*_shrunk(record), *_facts(record)])
+    yield Facts(list(_facts(record)))
     for box in _again(record):
         yield from in_short(box, 0, "what comes again, channel by channel")
     remarks = [Text(sentence(remark), "note") for remark in record.remarks]
@@ -162,6 +162,7 @@ def model_words(record: DiagnosisRecord) -> str:
 
 
 def _facts(record: DiagnosisRecord) -> Iterator[tuple[str, str]]:
+    yield from _shrunk(record)
     sure = [sentence(each) for each in (*_taken_off(record), *_rivals(record), *record.contradiction[1:])]
     if sure:
         yield "How sure", " ".join(sure)

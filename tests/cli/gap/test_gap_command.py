@@ -129,13 +129,16 @@ def test_people_read_the_verdict_first(again, shifted):
     lines = again.stdout.splitlines()
     assert lines[0] == "NAMED: What the model misses is offset of the centre of mass."
     assert lines[1].startswith("  Offset of the centre of mass (com_offset): c_x = 0.0079")
-    assert [line.split("  ")[0] for line in lines[2:5]] == ["How sure", "Where", "Next"]
+    assert [line.split("  ")[0] for line in lines[2:6]] == ["Gap", "How sure", "Where", "Next"]
+    assert re.fullmatch(
+        r"Gap +Held out, in noise floors: roll torque \d+ → [01]\.\d+, pitch torque \d+ → [01]\.\d+\.", lines[2]
+    )
     assert re.fullmatch(
         r"Where +Torque about y \(pitch\), above the noise 100 % of the time, most from [\d.]+ to [\d.]+ s of "
         r"flight_3\.csv; also torque x\.",
-        lines[3],
+        lines[4],
     )
-    rows = [line for line in lines[5:15] if line.startswith(("gap, ", "playback, "))]
+    rows = [line for line in lines[6:16] if line.startswith(("gap, ", "playback, "))]
     assert re.match(r"gap, roll torque +N\sm +0\.\d+ +0\.0\d+ +0\.0\d+ +\d+ → [01]\.\d+ floors", rows[0])
     assert re.match(r"playback, body rate +rad/s +0\.\d+ +0\.0\d+ +0\.\d+ +better than “nothing moves”", rows[2])
     assert any(line.startswith("The gap in the torque about y (pitch) follows thrust") for line in lines)
