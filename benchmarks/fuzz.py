@@ -3,9 +3,10 @@
     python -m benchmarks.fuzz --each 10000 --kills 100 --processes 2
 
 A case is met well where a command does its work, or ends with one message, exit code 1 or 2, and all files as they
-were. What is accepted has to pass `cpfls check`. A process of its own runs the cases: one that turns for ever is ended
-after a minute and counted. A killed command is run again, with --resume where it left something to resume, and has to
-end in the bytes of one that nobody disturbed, with nothing left beside it.
+were, without orders to the terminal and in 2 GB of memory. What is accepted has to pass `cpfls check`. A process of its
+own, which cannot take more than 6 GB, runs the cases: one that turns for ever is ended after a minute and counted,
+unless the command itself says that HDF5 does not come to an end. A killed command is run again, with --resume where it
+left something to resume, and has to end in the bytes of one that nobody disturbed, with nothing left beside it.
 """
 
 from __future__ import annotations
@@ -32,12 +33,16 @@ from benchmarks.shared.measure import pin_threads, table
 
 pin_threads()
 
+from cpfls_cli.artifacts import patience
+from cpfls_cli.logs import matrices
 from tests.builders.command_line import run
 from tests.builders.hostile_files import FAULTS, KINDS, Good, tried
 from tests.builders.studies import TINY, VEHICLE, stages
 from tests.builders.vehicle_search import CONFIG, TRIED, left_out
 
 PATIENCE_S = 60.0
+LIMIT_BYTES = 6 << 30
+TOLD, NO_END = "case ", "HDF5 does not come to an end"
 PREPARING_S = 600.0
 LONGER = ("--set", "identification.population=40", "--set", "identification.generations=6")
 VEHICLE_STUDY = {"search_windows": 20, "folds": 2, "generations": 0, "population": 2, "leave_out": left_out(TRIED)}
@@ -82,7 +87,7 @@ def counted(kind: str, cases: int, seed: int) -> Counter[str]:
 def told(kind: str, first: int, cases: int, seed: int) -> Iterator[tuple[int, str, str]]:
     words = [sys.executable, "-m", "benchmarks.fuzz", "--seed", str(seed), "--cases", kind, str(first), str(cases)]
     lines: Queue[str | None] = Queue()
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
 
         def read() -> None:
             for line in process.stdout or ():
@@ -90,31 +95,40 @@ def told(kind: str, first: int, cases: int, seed: int) -> Iterator[tuple[int, st
             lines.put(None)
 
         Thread(target=read, daemon=True).start()
-        number, fault, patience = first - 1, "", PREPARING_S
+        number, fault, longest_s, said = first - 1, "", PREPARING_S, ""
         while number + 1 < cases:
             try:
-                line = lines.get(timeout=patience)
+                line = lines.get(timeout=longest_s)
             except Empty:
                 fault = "hang"
                 break
-            patience = PATIENCE_S
             if line is None:
-                fault = "traceback"
+                fault = "" if NO_END in said else "traceback"
                 break
-            number, *found = json.loads(line)
+            if not line.startswith(TOLD):
+                said = line
+                continue
+            longest_s, said = PATIENCE_S, ""
+            number, *found = json.loads(line.removeprefix(TOLD))
             yield number, *found
         process.kill()
-    if fault:
-        yield number + 1, fault, f"the process ended with {process.returncode}"
+    if number + 1 < cases:
+        yield number + 1, fault, f"the process ended with {process.returncode}: {said}"
 
 
 def run_cases(kind: str, first: int, cases: int, seed: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         good = Good.made(Path(folder))
-        print(json.dumps([first - 1, "", ""]), flush=True)
+        if os.name == "posix":
+            import resource
+
+            resource.setrlimit(resource.RLIMIT_DATA, (LIMIT_BYTES, LIMIT_BYTES))
+        patience.longest_read_s = matrices.longest_read_s = lambda _: PATIENCE_S / 4
+        patience.end_what_hangs()
+        print(TOLD + json.dumps([first - 1, "", ""]), flush=True)
         for number in range(first, cases):
             fault, what = tried(good.case(kind, [seed, number])) or ("", "")
-            print(json.dumps([number, fault, what]), flush=True)
+            print(TOLD + json.dumps([number, fault, what]), flush=True)
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,8 @@ _SEAL = b"cpfls sha256 "
 _SEAL_BYTES = len(_SEAL) + 64 + 1
 _BLOCK = 1 << 20
 _LEAST_S, _BYTES_PER_SECOND = 60.0, 5e6
+_PLAIN, _TIMES = 1 << 27, 200
+"""Bytes of numbers that a log may hold whatever its size, and in sizes of it beyond: signals hardly compress."""
 
 
 class Content(NamedTuple):
@@ -44,6 +46,11 @@ def is_hdf5(path: Path) -> bool:
 def longest_read_s(size: int) -> float:
     """Say how long to read a file of so many bytes may take, s, before it is taken to have no end."""
     return _LEAST_S + size / _BYTES_PER_SECOND
+
+
+def most_held(size: int) -> int:
+    """Say how many bytes of numbers, of eight each, a log of so many bytes may hold before it is taken for no log."""
+    return max(_PLAIN, _TIMES * size)
 
 
 def is_sealed(path: Path) -> bool:

@@ -107,7 +107,7 @@ def _turning(speed: Array) -> BoolArray:
 
 
 class MeantUnit(NamedTuple):
-    """The unit that speeds of rotors are surely in, and how many times the weight these lift in it and as declared."""
+    """The unit that speeds of rotors are likely in, and how many times the weight these lift in it and as declared."""
 
     unit: str
     lifts: float
@@ -146,7 +146,9 @@ def meant_unit(vehicle: VehicleSettings, speed: Array, attitude: Array | None, d
         return None
     read = {unit: lifts * (factor / _SPEEDS[declared]) ** 2 for unit, factor in _SPEEDS.items()}
     fitting = [unit for unit, own in read.items() if usual[0] < own < usual[1]]
-    return MeantUnit(fitting[0], read[fitting[0]], lifts) if len(fitting) == 1 else None
+    # Of several, where the thrust factor is a guess, the one that is the most usual.
+    unit = min(fitting, key=lambda unit: abs(np.log(read[unit] ** 2 / (usual[0] * usual[1]))), default=None)
+    return None if unit is None else MeantUnit(unit, read[unit], lifts)
 
 
 def thrust_beside_weight(parts: Sequence[Signals]) -> Finding | None:

@@ -99,10 +99,11 @@ def select_columns(columns: Mapping[str, Array], settings: ImportSettings) -> tu
     _require_present(columns, settings)
     stamps = columns[str(settings.time_column)]
     time: Array = to_si(np.asarray(stamps, dtype=float), settings.time_unit)
+    for name, signal in settings.signals.items():
+        unlike = next((size for column in signal.columns if (size := len(columns[column])) != len(time)), None)
+        if unlike is not None:
+            raise InputError(f"import.signals.{name}.columns: {unlike} values for {len(time)} time stamps")
     signals: dict[str, Array] = {name: _in_si(columns, signal) for name, signal in settings.signals.items()}
-    for name, values in signals.items():
-        if len(values) != len(time):
-            raise InputError(f"import.signals.{name}.columns: {len(values)} values for {len(time)} time stamps")
     finite = time[np.isfinite(time)]
     if len(finite) < 2:
         raise InputError(f"import.time_column: {settings.time_column!r} holds fewer than two time stamps")

@@ -71,8 +71,9 @@ def _flight(content: bytes) -> tuple[dict[str, str], IntArray, int]:
     return header, rows, broken
 
 
-def _integers(header: Mapping[str, str], key: str, otherwise: str = "") -> list[int]:
-    return [int(word) for word in header.get(key, otherwise).split(",")]
+def _integers(header: Mapping[str, str], key: str, otherwise: str | None = None) -> list[int]:
+    text = header[key] if otherwise is None else header.get(key, otherwise)
+    return [int(word) for word in text.split(",")]
 
 
 def _fields(header: Mapping[str, str]) -> Fields:
@@ -82,7 +83,7 @@ def _fields(header: Mapping[str, str]) -> Fields:
     width = max(len(header.get(f"Field {kind} name", "").split(",")) for kind in KINDS)
     fields = Fields(np.zeros(len(KINDS), dtype=np.int64), *np.zeros((3, len(KINDS), width), dtype=np.int64))
     for number, kind in enumerate(KINDS):
-        if f"Field {kind} encoding" not in header:
+        if kind != "I" and f"Field {kind} encoding" not in header:
             continue
         named = "I" if kind == "P" else kind
         count = fields.counts[number] = len(header[f"Field {named} name"].split(","))

@@ -4,6 +4,7 @@ import csv
 import gzip
 import io
 import zlib
+from array import array
 from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
+from cpfls_cli.files import most_held
 from cpfls_cli.logs.formats import LogContents, some
 
 _LONGEST_LINE = 1 << 20
@@ -41,19 +43,21 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
         if repeated:
             raise InputError(f"{path}: column '{repeated[0]}' stands twice")
         kept = [index for index, name in enumerate(names) if name in wanted]
-        rows = []
+        # Lists of numbers would take ten times as much.
+        numbers, count = array("d"), 0
         for number, row in enumerate(lines, start=2):
             if not row:
                 continue
             if len(row) != len(names):
                 raise InputError(f"{path}:{number}: {len(row)} fields, but {len(names)} column names")
             try:
-                rows.append(_plain_numbers([row[index] for index in kept]))
+                numbers.extend(_plain_numbers([row[index] for index in kept]))
             except ValueError:
-                rows.append([_number(row[index], path, number, names[index]) for index in kept])
-    if not rows:
+                numbers.extend([_number(row[index], path, number, names[index]) for index in kept])
+            count += 1
+    if not count:
         raise InputError(f"{path}: holds column names but no samples")
-    values = np.array(rows, dtype=float).reshape(len(rows), len(kept))
+    values = np.array(numbers).reshape(count, len(kept))
     columns: dict[str, Array] = {name: np.empty(0) for name in names}
     return columns | {names[index]: values[:, position] for position, index in enumerate(kept)}
 
@@ -62,6 +66,8 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
 def _rows(path: Path) -> Iterator[tuple[list[str], Iterator[list[str]]]]:
     """Open a CSV: its column names, and its rows."""
     try:
+        if path.suffix == ".gz":
+            _refuse_inflated(path)
         with _open(path) as stream:
             first = stream.readline(_LONGEST_LINE)
             if len(first) == _LONGEST_LINE:
@@ -76,6 +82,17 @@ def _rows(path: Path) -> Iterator[tuple[list[str], Iterator[list[str]]]]:
         raise InputError(f"{path}: cannot be read: {error}") from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: not a CSV file: {error}") from None
+
+
+def _refuse_inflated(path: Path) -> None:
+    """Refuse a compressed log of more text than its numbers may make up."""
+    # A number and what parts it from the next take two letters at least, and eight bytes.
+    most, held = most_held(path.stat().st_size) // 4, 0
+    with gzip.open(path) as raw:
+        while part := raw.read(_LONGEST_LINE):
+            held += len(part)
+            if held > most:
+                raise InputError(f"{path}: holds more than {most / 1e6:.3g} MB of text: damaged, or no log")
 
 
 @contextmanager

@@ -4,6 +4,7 @@ import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -75,9 +76,9 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         if each in fields and unit != _INSTANCE
     }
     parameters: dict[str, float | str] = {}
-    for row in tables.get("PARM", ()):
+    for name, value in _rows(tables, "PARM", Name="S", Value="fiu"):
         # As the log begins.
-        parameters.setdefault(_text(row["Name"]), float(row["Value"]))
+        parameters.setdefault(_text(name), float(value))
     broken = (f"{lost} bytes are no messages: the file is broken in places; what could be read of it is used",)
     return LogContents(topics, units, parameters, _system(tables), broken if lost else ())
 
@@ -138,12 +139,10 @@ def _topics(kind: _Kind, samples: np.ndarray, units: Mapping[str, str]) -> Itera
 
 def _stated_units(tables: Mapping[str, np.ndarray], kinds: Mapping[int, _Kind]) -> dict[str, dict[str, str]]:
     """Look up the units that the log states, by kind and field, of fields that need no further factor to be in them."""
-    try:
-        labels = {chr(int(row["Id"]) % 256): _text(row["Label"]) for row in tables["UNIT"]}
-        stated = {int(row["FmtType"]): (_text(row["UnitIds"]), _text(row["MultIds"])) for row in tables["FMTU"]}
-    except (KeyError, ValueError):
-        # Logs of before 3.6 state none.
-        return {}
+    # Logs of before 3.6 state none.
+    labels = {chr(int(letter) % 256): _text(label) for letter, label in _rows(tables, "UNIT", Id="iu", Label="S")}
+    described = _rows(tables, "FMTU", FmtType="iu", UnitIds="S", MultIds="S")
+    stated = {int(number): (_text(units), _text(factors)) for number, units, factors in described}
     labels = {letter: _UNITS.get(label, label) for letter, label in labels.items()} | {_INSTANCE: _INSTANCE}
     return {
         kind.name: {
@@ -157,12 +156,21 @@ def _stated_units(tables: Mapping[str, np.ndarray], kinds: Mapping[int, _Kind]) 
 
 
 def _system(tables: Mapping[str, np.ndarray]) -> str:
-    for row in tables.get("MSG", ()):
-        program = re.match(r"(?:APM:)?(\w+) V(\d[\w.]*)", _text(row["Message"]))
+    for (said,) in _rows(tables, "MSG", Message="S"):
+        program = re.match(r"(?:APM:)?(\w+) V(\d[\w.]*)", _text(said))
         if program:
             name = program[1] if program[1].startswith("Ardu") else f"Ardu{program[1]}"
             return f"{name} {program[2]}"
     return ""
+
+
+def _rows(tables: Mapping[str, np.ndarray], name: str, **kinds: str) -> Iterator[tuple[Any, ...]]:
+    """Give some fields of each message of a kind; none where a damaged log describes them as something else."""
+    table = tables.get(name)
+    if table is not None and all(
+        field in (table.dtype.names or ()) and table.dtype[field].kind in kind for field, kind in kinds.items()
+    ):
+        yield from zip(*(table[field] for field in kinds), strict=True)
 
 
 def _text(field_of: bytes) -> str:

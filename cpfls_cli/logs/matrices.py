@@ -6,6 +6,7 @@ import sys
 import zlib
 from collections.abc import Collection, Iterable, Iterator
 from functools import lru_cache
+from math import prod
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -15,7 +16,7 @@ import scipy.io
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.files import FileState, is_sealed, longest_read_s, state_of
+from cpfls_cli.files import FileState, is_sealed, longest_read_s, most_held, state_of
 from cpfls_cli.logs.formats import LogContents
 from cpfls_cli.units import known_unit
 
@@ -27,7 +28,8 @@ states = 0
 
 def count(name, own):
     global states
-    states += own.nbytes if isinstance(own, h5py.Dataset) else 0
+    # Of one byte each or of eight, they are read as numbers of eight.
+    states += max(own.nbytes, 8 * (own.size or 0)) if isinstance(own, h5py.Dataset) else 0
 
 def read(name, own):
     if isinstance(own, h5py.Dataset) and own.dtype.kind in "iufb" and own.ndim and own.size:
@@ -44,8 +46,6 @@ with h5py.File(sys.argv[1], "r") as file:
         sys.exit(3)
     file.visititems(read)
 """
-_PLAIN, _TIMES = 1 << 29, 200
-"""Bytes that a log may hold whatever its size, and in sizes of the file beyond: signals of sensors hardly compress."""
 _COMPRESSED, _INFLATED = 15, 3
 """Kind of a variable of a .mat that is compressed; what the probe of a file ends with that states too much."""
 _TIME_UNITS = ("s", "ms", "us", "ns")
@@ -98,7 +98,7 @@ def _probed(state: FileState) -> _Probed:
     limit = longest_read_s(state.size)
     try:
         done = subprocess.run(
-            [sys.executable, "-c", _PROBE, state.path, str(_most(state.size))],
+            [sys.executable, "-c", _PROBE, state.path, str(most_held(state.size))],
             capture_output=True,
             timeout=limit,
             check=False,
@@ -152,14 +152,12 @@ def _of_mat(path: Path) -> Iterator[tuple[str, Any]]:
     yield from within("", {name: value for name, value in variables.items() if not name.startswith("__")})
 
 
-def _most(size: int) -> int:
-    """Give how many bytes a log of a file of so many may hold."""
-    return max(_PLAIN, _TIMES * size)
-
-
 def _refuse_inflated(path: Path) -> None:
     """Refuse a .mat whose compressed variables hold more than memory may, out of proportion to the file."""
-    size, total = path.stat().st_size, 0
+    size = path.stat().st_size
+    # What is stored in a byte each is read as numbers of eight.
+    _require_held(path, sum(8 * prod(shape) for _, shape, _ in scipy.io.whosmat(str(path))), size)
+    total = 0
     with path.open("rb") as stream:
         head = stream.read(128)
         if head[126:] not in (b"IM", b"MI"):
@@ -173,11 +171,15 @@ def _refuse_inflated(path: Path) -> None:
             part, left = zlib.decompressobj(), stream.read(min(length, size))
             while left:
                 total += len(part.decompress(left, 1 << 20))
-                if total > _most(size):
-                    raise InputError(
-                        f"{path}: holds more than {total / 1e9:.2g} GB in {size / 1e6:.2g} MB: damaged, or no log"
-                    )
+                _require_held(path, total, size)
                 left = part.unconsumed_tail
+
+
+def _require_held(path: Path, total: int, size: int) -> None:
+    if total > most_held(size):
+        raise InputError(
+            f"{path}: holds more than {total / 1e9:.2g} GB of numbers in {size / 1e6:.2g} MB: damaged, or no log"
+        )
 
 
 def _named(arrays: Iterable[tuple[str, Any]], wanted: Collection[str] | None) -> Iterator[tuple[str, Array]]:

@@ -12,6 +12,7 @@ from pyarrow import parquet
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
+from cpfls_cli.files import most_held
 from cpfls_cli.logs.formats import LogContents, some
 
 _PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
@@ -29,6 +30,11 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
             repeated = sorted(name for name, count in Counter(kept).items() if count > 1)
             if repeated:
                 raise InputError(f"{path}: column '{repeated[0]}' stands twice")
+            held = 8 * file.metadata.num_rows * len(kept)
+            if held > most_held(path.stat().st_size):
+                raise InputError(
+                    f"{path}: states {held / 1e9:.3g} GB of numbers, far more than a file of its size holds"
+                )
             table = file.read(columns=kept)
     # A column's name may be no text.
     except (OSError, pyarrow.ArrowException, UnicodeDecodeError) as error:

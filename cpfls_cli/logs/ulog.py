@@ -1,11 +1,12 @@
 """Reader of ULog, as PX4 writes it: topics, each with stamps in microseconds."""
 
 import io
+import re
 import struct
 from collections.abc import Collection
 from contextlib import redirect_stdout
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import pyulog
 
@@ -16,6 +17,8 @@ from cpfls_cli.logs.formats import ULOG_MAGIC, LogContents
 from cpfls_cli.logs.records import numbers, seconds
 
 _PER_SECOND = 10**6
+_HEADER_BYTES, _LONGEST_MESSAGE = 16, 65535
+_FIELD = re.compile(r"([^;\s\[]+)(?:\[(\d+)\])? [^;]*")
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
@@ -43,6 +46,7 @@ def _parsed(path: Path) -> Any:
         with path.open("rb") as stream, redirect_stdout(io.StringIO()):
             if stream.read(len(ULOG_MAGIC)) != ULOG_MAGIC:
                 raise InputError(f"{path}: not a ULog file: it does not begin as one")
+            _refuse_endless(path, stream)
             stream.seek(0)
             return pyulog.ULog(stream)
     except OSError as error:
@@ -51,6 +55,32 @@ def _parsed(path: Path) -> Any:
         raise InputError(f"{path}: a broken ULog file: a message of it contains itself") from None
     except (pyulog.core.ULogException, struct.error, ValueError, KeyError, IndexError, TypeError) as error:
         raise InputError(f"{path}: a broken ULog file: {error}") from None
+
+
+def _refuse_endless(path: Path, stream: BinaryIO) -> None:
+    """Refuse a file whose messages hold each other, or arrays, beyond what a message may take: the reader lists all."""
+    described: dict[str, list[tuple[str, int]]] = {}
+    stream.seek(_HEADER_BYTES)
+    while len(head := stream.read(3)) == 3:
+        size, kind = struct.unpack("<Hc", head)
+        content = stream.read(size)
+        if kind == b"A":
+            break
+        if kind == b"F":
+            name, _, own = content.decode("latin-1").partition(":")
+            described[name] = [(part[1], int(part[2] or 1)) for part in _FIELD.finditer(own)]
+    sizes: dict[str, int] = {}
+
+    def size_of(name: str) -> int:
+        if name not in sizes:
+            sizes[name] = sum(count * size_of(kind) for kind, count in described[name]) if name in described else 1
+        return sizes[name]
+
+    for name in described:
+        if size_of(name) > _LONGEST_MESSAGE:
+            raise InputError(
+                f"{path}: a broken ULog file: its message '{name}' would take more than {_LONGEST_MESSAGE} bytes"
+            )
 
 
 def _system(log: Any) -> str:

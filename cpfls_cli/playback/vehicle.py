@@ -207,7 +207,7 @@ def carrying_weight(
     """Replace the guess of the thrust factor by what carries the weight; a guessed drag factor scales with it.
 
     Where runs do not move, for want of velocity, the thrust factor follows from the accelerometer, and is then found;
-    without one either nothing tells thrust from weight, and the guess stays.
+    without one either, or where it feels no lift, nothing tells thrust from weight, and the guess stays.
 
     Parameters
     ----------
@@ -225,13 +225,13 @@ def carrying_weight(
     """
     if "thrust_factor" not in vehicle.unknown:
         return vehicle, ()
+    squares = np.concatenate([(flight.speed**2).sum(axis=1) for flight in flights])
+    if not squares.any():
+        return vehicle, ()
     moves = all(flight.translates for flight in flights)
     sensed = None if moves else _sensed_thrust_factor(vehicle, flights)
-    if sensed is None:
-        squares = np.concatenate([(flight.speed**2).sum(axis=1) for flight in flights])
-        thrust = vehicle.mass_kg * vehicle.gravity_m_s2 / float(np.mean(squares))
-    else:
-        thrust = sensed.value
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    thrust = weight / float(np.mean(squares)) if sensed is None else sensed.value
     factor = thrust / float(np.mean([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors]))
     rotors = tuple(
         replace(
@@ -257,9 +257,15 @@ def _sensed_thrust_factor(vehicle: VehicleSettings, flights: Sequence[PlaybackFl
         products += [part.sum() for part in np.array_split(lift * force, count)]
         squares += [part.sum() for part in np.array_split(lift**2, count)]
     above, below = np.array(products), np.array(squares)
+    left = below.sum() - below
+    if not (left > 0).all():
+        return None
     value = float(above.sum() / below.sum())
-    without = (above.sum() - above) / (below.sum() - below)
-    low, high = _interval(value, float(half_width(jackknife_error(without), len(products))), positive=True)
+    half = float(half_width(jackknife_error((above.sum() - above) / left), len(products)))
+    # An accelerometer that is upside down, or noise, feels no lift.
+    if value <= half:
+        return None
+    low, high = _interval(value, half, positive=True)
     return FoundNumber("thrust_factor", "N s^2", value, low, high, np.nan, high < KNOWN * low, False)
 
 

@@ -5,9 +5,14 @@
 
 from __future__ import annotations
 
+import json
 import struct
+import sys
+import tempfile
 import traceback
+import zlib
 from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 
 import h5py
@@ -15,12 +20,17 @@ import numpy as np
 import pyarrow
 from pyarrow import parquet
 
-from tests.builders import ulogs
+from cpfls_cli.errors import visible
+from tests.builders import blackbox_logs, ulogs
 from tests.builders.artifacts import seal
 from tests.builders.command_line import invoked, run
+from tests.builders.dataflash_logs import dataflash
 from tests.builders.studies import TINY, VEHICLE, stages
+from tests.builders.usd_logs import usd
 
-FAULTS = ("traceback", "hang", "wrong exit code", "file left", "accepted nonsense")
+FAULTS = ("traceback", "hang", "wrong exit code", "file left", "accepted nonsense", "terminal orders", "memory")
+MOST_BYTES = 2 << 30
+"""Of memory that a command may take for a small file."""
 SCALARS = (
     *("", "~", "true", "-1", "0", "1e308", "-1e308", "1e-320", ".nan", ".inf", "-.inf", "1" + 40 * "0", "0x10", "'1'"),
     *("[]", "{}", "[1, 2]", "{a: 1}", "text", "&a [1]", "*a", "!!int ''", "!!float x", "!!binary aGk=", "<<", "ASK"),
@@ -48,6 +58,8 @@ FIELDS = (
     ),
     *("1,5", "0x1", "\x00", "\ud7ff", "1;2", " 1 ", "--1", "1e", "+", "1" * 400, "TRUE", "12:30:01", '"1\n2"'),
 )
+NAMES = ("\x1b[2J", "\x1b]0;x\x07", "\x9b31m", "\u202e", "a\rb", "a\nb", 5000 * "a", "", "-o", "{x}", "$\\frac{$")
+PLACES = (0.0, 0.0, 0.3, -0.3, 1e-9, 1e3)
 COLUMNS = ("t", "roll", "pitch", "yaw", "mx", "my", "mz")
 LOG_STUDY = """\
 import:
@@ -106,7 +118,10 @@ def tried(case):
     folder = case.path.parent
     before = set(folder.iterdir())
     for words in case.commands:
+        taken = most_taken()
         result = invoked(*words)
+        if most_taken() > max(MOST_BYTES, taken):
+            return "memory", f"{words[0]}: {most_taken() / 1e9:.2g} GB: {result.output[-300:]}"
         if result.exception is not None and not isinstance(result.exception, SystemExit):
             last = "".join(traceback.format_exception(result.exception)[-3:])
             return "traceback", f"{words[0]}: {last}"
@@ -115,6 +130,8 @@ def tried(case):
         is_finding = words[0] == "check" and result.exit_code == 1 and result.stdout
         if result.exit_code not in (0, 1, 2) or (not is_finding and fails != bool(said)):
             return "wrong exit code", f"{words[0]}: {result.exit_code}: {result.output[-300:]}"
+        if visible(result.output) != result.output:
+            return "terminal orders", f"{words[0]}: {result.output[-300:]!r}"
         if not fails and case.must_fail:
             return "accepted nonsense", f"{words[0]}: took {case.path.name}"
         written = set(folder.iterdir()) - before
@@ -126,6 +143,15 @@ def tried(case):
                 return "accepted nonsense", f"{words[0]}: {checked.output[-300:]}"
             path.unlink()
     return None
+
+
+def most_taken():
+    """Give the most memory, bytes, that this process or one that it waited for has ever held; 0 where not known."""
+    if sys.platform != "linux":
+        return 0
+    import resource
+
+    return 1024 * max(resource.getrusage(whose).ru_maxrss for whose in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
 
 
 def yaml_case(rng, good):
@@ -228,6 +254,13 @@ def bytes_case(rng, good):
     return Case(path, _readers(stage, path, good), must_fail=damaged != content)
 
 
+def sealed_case(rng, good):
+    """Damage an artifact and seal it again, so that the damage is read."""
+    case = bytes_case(rng, good)
+    seal(case.path)
+    return Case(case.path, case.commands)
+
+
 def _bytes_changed(rng, content):
     changed = bytearray(content)
     for _ in range(rng.integers(1, 4)):
@@ -328,6 +361,179 @@ def ulog_case(rng, good):
     return _imported(path, good, ULOG_STUDY, rng)
 
 
+def nested_case(rng, good):
+    """Describe topics of a ULog by each other: within themselves, by the thousand, without an end."""
+    names = [f"m{number}" for number in range(int(rng.integers(1, 6)))]
+    kinds = [*names, *names, "float", "char", "uint8_t", "none"]
+    counts = ("", "", "[3]", "[1000]", "[100000000]", "[-1]", "[x]")
+    formats = {
+        name: "uint64_t timestamp;"
+        + ";".join(f"{rng.choice(kinds)}{rng.choice(counts)} f{number}" for number in range(rng.integers(1, 4)))
+        for name in names
+    }
+    sent = [(20_000 * number, int(rng.integers(0, len(names))), rng.random(12)) for number in range(60)]
+    path = good.folder / "hostile.ulg"
+    path.write_bytes(ulogs.ulog(sent, formats))
+    return _imported(path, good, ULOG_STUDY, rng)
+
+
+def names_case(rng, good):
+    """Give a config keys that nobody knows, and a config, a log, its columns and an export names that no one has."""
+    name = str(rng.choice(NAMES))
+    place = name if len(name) < 100 else "hostile"
+    ending = str(rng.choice([".csv", ".h5", ".parquet", ".ulg"]))
+    config, path = good.folder / f"{place}.yaml", good.folder / f"{place}{ending}"
+    quoted = json.dumps(name)
+    keys = (
+        f"{quoted}: 1",
+        f"report: {{title: {quoted}, {quoted}: 1}}",
+        f"import: {{time_column: {quoted}, torque_source: null, signals: {{attitude: {{columns: [{quoted}, a, b], unit:"
+        f" rad}}}}}}",
+        f"import: {{time_column: t, signals: {{{quoted}: {{columns: [{quoted}], unit: {quoted}}}}}}}",
+        f"seed: {quoted}",
+    )
+    text = good.study.read_text() if rng.random() < 0.5 else VEHICLE
+    config.write_text(f"{rng.choice(keys)}\n{text}")
+    columns = dict(zip((name, "a", "b", f"{name}x"), _rows(rng).T, strict=False))
+    if ending == ".csv":
+        rows = [",".join(columns), *(",".join(map(str, row)) for row in zip(*columns.values(), strict=True))]
+        path.write_text("\n".join(rows))
+    elif ending == ".parquet":
+        parquet.write_table(pyarrow.table(columns), path)
+    elif ending == ".h5":
+        with h5py.File(path, "w") as file:
+            for own, values in columns.items():
+                file[own.replace("\0", "") or "t"] = values
+    else:
+        fields = {f"{name}": f"uint64_t timestamp;float {name}"}
+        path.write_bytes(ulogs.ulog([(20_000 * row, 0, [0.1]) for row in range(60)], fields, {"sys_name": name}))
+    exported = ("export", good.artifacts["model"], "-o", good.folder / "out.json", "--name", name)
+    imported = ("import", config, path, "-o", good.folder / "out.h5")
+    return Case(path, (("config", config), imported, ("init", path, "-o", good.folder / "out.yaml"), exported))
+
+
+def rotors_case(rng, good):
+    """Put rotors in one place, in a line, or where none can be."""
+    places = [[float(rng.choice(PLACES)) for _ in range(3)] for _ in range(2)]
+    rotors = [
+        {
+            "position_m": places[int(rng.integers(0, 2))] if rng.random() < 0.8 else rng.normal(size=3).tolist(),
+            "spin": int(rng.choice([-1, 1])),
+            "thrust_factor_n_s2": float(rng.choice([1e-5, 1e-5, 1e-5, 0.0, 1e-30])),
+            "drag_factor_n_m_s2": 2e-7,
+        }
+        for _ in range(rng.choice([1, 4, 4, 4, 6]))
+    ]
+    count = len(rotors)
+    config, path = good.folder / "log-study.yaml", good.folder / "hostile.csv"
+    speeds = [f"r{number}" for number in range(count)]
+    mapped = {"attitude": (["roll", "pitch", "yaw"], "rad"), "rotor_speed": (speeds, "rad/s")}
+    signals = {name: {"columns": columns, "unit": unit} for name, (columns, unit) in mapped.items()}
+    study = {
+        "import": {"time_column": "t", "torque_source": None, "signals": signals},
+        "vehicle": {
+            "mass_kg": 1.0,
+            "inertia_kg_m2": [0.01, 0.01, 0.02],
+            "rotor_speed_max_rad_s": 1000.0,
+            "rotors": rotors,
+        },
+    }
+    config.write_text(json.dumps(study))
+    time = 0.02 * np.arange(400)
+    table = np.column_stack([time, 0.2 * np.sin(np.outer(time, [2, 3, 4])), rng.uniform(400, 500, (400, count))])
+    np.savetxt(path, table, "%.6g", ",", header=",".join(["t", "roll", "pitch", "yaw", *speeds]), comments="")
+    simulated = ("simulate", config, good.artifacts["trajectory"], "-o", good.folder / "out.h5")
+    return Case(path, (("config", config), simulated, ("compare", config, path, "-o", good.folder / "out.h5")))
+
+
+def bomb_case(rng, good):
+    """Let a small log declare, or compress, more than it can mean."""
+    count = int(2 ** rng.uniform(16, 29))
+    write, ending = BOMBS[int(rng.integers(0, len(BOMBS)))]
+    path = good.folder / f"hostile{ending}"
+    write(path, count, rng)
+    return _imported(path, good, LOG_STUDY, rng)
+
+
+def _declared(path, count, rng):
+    kind = str(rng.choice(["u1", "i2", "f4", "f8"]))
+    with h5py.File(path, "w") as file:
+        for name in COLUMNS[: int(rng.integers(1, 8))]:
+            own = file.create_dataset(name, (int(count * 4 ** rng.integers(0, 3)),), kind, chunks=(1 << 16,))
+            own[:100] = np.arange(100)
+
+
+def _inflated_matrix(path, count, rng):
+    # A matrix of doubles, stored in a byte each, as MATLAB stores whole numbers.
+    flags = struct.pack("<IIII", 6, 8, 6, 0)
+    shape = struct.pack("<IIii", 5, 8, *((count, 1) if rng.random() < 0.8 else rng.integers(-1, 1 << 31, 2)))
+    inside = flags + shape + struct.pack("<HH4s", 1, 1, b"t") + struct.pack("<II", 2, count)
+    packed = _packed(zlib.compressobj(1), struct.pack("<II", 14, len(inside) + count) + inside, bytes(1 << 20), count)
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H2s", 0x100, b"IM")
+    path.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
+
+
+def _inflated_text(path, count, rng):
+    head = ",".join(COLUMNS).encode() + b"\n"
+    begin, part = [(b"", b"a" * 1024), (b"", b",a" * 512), (head, b"0," * 512), (head, b"1,0,0,0,0,0,0\n" * 64)][
+        int(rng.integers(0, 4))
+    ]
+    packing = zlib.compressobj(1, zlib.DEFLATED, zlib.MAX_WBITS | 16)
+    path.write_bytes(_packed(packing, begin, part * 1024, count))
+
+
+def _packed(packing, begin, part, count):
+    parts = [packing.compress(begin), *(packing.compress(part) for _ in range(count // len(part)))]
+    return b"".join([*parts, packing.compress(part[: count % len(part)]), packing.flush()])
+
+
+BOMBS = ((_declared, ".h5"), (_inflated_matrix, ".mat"), (_inflated_text, ".csv.gz"))
+
+
+def damaged_case(rng, good, *, kind):
+    """Damage a good log of a binary format."""
+    ending, study = DAMAGED[kind]
+    path = good.folder / f"hostile{ending}"
+    path.write_bytes(_bytes_changed(rng, _good_log(kind)))
+    return _imported(path, good, study, rng)
+
+
+@cache
+def _good_log(kind):
+    rows = _rows(np.random.default_rng(1))
+    if kind == "DataFlash":
+        sent = [("FLT", (int(1e6 * abs(row[0])), *row[1:])) for row in rows]
+        return dataflash({"FLT": ("Qffffff", "TimeUS,R,P,Y,X,V,W")}, sent, {"MOT_PWM_MAX": 2000.0}, ("on",), {})
+    if kind == "uSD":
+        events = {"fixed": {f"log.{name}": "f" for name in COLUMNS[1:]}}
+        return usd(events, [("fixed", int(1e6 * abs(row[0])), row[1:]) for row in rows])
+    if kind == "Betaflight":
+        return blackbox_logs.header() + b"".join(blackbox_logs.frames(blackbox_logs.flight()))
+    # The builder of bags needs a package that is left out at times.
+    from tests.builders.ros_bags import BEGIN_NS, imu, write_bag
+
+    stamps = [BEGIN_NS + 20_000_000 * number for number in range(60)]
+    with tempfile.TemporaryDirectory() as folder:
+        sent = [("/imu", stamp, imu(stamp, (0.1, 0.2, 0.3), (0.0, 0.1, 9.8))) for stamp in stamps]
+        return write_bag(Path(folder) / "bag", ".mcap", sent).read_bytes()
+
+
+def _mapped(time, signal, columns, unit):
+    mapped = {"time_column": time, "torque_source": None, "signals": {signal: {"columns": columns, "unit": unit}}}
+    return f"import: {json.dumps(mapped)}\n"
+
+
+DAMAGED = {
+    "MCAP": (
+        ".mcap",
+        _mapped("/imu.timestamp", "body_rate", [f"/imu.angular_velocity.{axis}" for axis in "xyz"], "rad/s"),
+    ),
+    "Betaflight": (".bbl", _mapped("time", "attitude", [f"axisI[{axis}]" for axis in range(3)], "deg")),
+    "DataFlash": (".bin", _mapped("FLT.timestamp", "attitude", ["FLT.R", "FLT.P", "FLT.Y"], "rad")),
+    "uSD": ("", _mapped("fixed.timestamp", "attitude", [f"fixed.log.{name}" for name in COLUMNS[1:4]], "rad")),
+}
+
+
 def _rows(rng):
     time = 0.02 * np.arange(60.0)
     angles = [0.2 * np.sin((2 + axis) * time) for axis in range(3)]
@@ -351,4 +557,10 @@ KINDS = {
     "CSV": csv_case,
     "Parquet": parquet_case,
     "ULog": ulog_case,
+    "names": names_case,
+    "rotors": rotors_case,
+    "ULog nested": nested_case,
+    "bombs": bomb_case,
+    **{kind: partial(damaged_case, kind=kind) for kind in DAMAGED},
+    "sealed": sealed_case,
 }

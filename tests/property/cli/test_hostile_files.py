@@ -5,10 +5,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tests.builders.command_line import undrawn
-from tests.builders.hostile_files import KINDS, Good, tried
+from tests.builders.hostile_files import DAMAGED, KINDS, Good, tried
 
 # `make fuzz` tries ten thousand of each, with all figures drawn.
 EXAMPLES = {"YAML": 30, "HDF5 structure": 20, "HDF5 bytes": 25, "CSV": 40, "Parquet": 40, "ULog": 40}
+EXAMPLES |= {"names": 30, "rotors": 20, "ULog nested": 30, "bombs": 5, **dict.fromkeys(DAMAGED, 25)}
 
 
 @pytest.fixture(scope="module")
@@ -16,7 +17,8 @@ def good(tmp_path_factory):
     return Good.made(tmp_path_factory.mktemp("good"))
 
 
-@pytest.mark.parametrize("kind", KINDS)
+# What is damaged and sealed again may keep HDF5 busy for ever, which only a process of its own survives.
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "sealed"])
 def test_no_file_hurts(good, kind):
     @settings(
         max_examples=EXAMPLES[kind],

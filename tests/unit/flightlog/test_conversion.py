@@ -168,3 +168,11 @@ def test_what_goes_into_a_mixer_becomes_the_share_of_each_rotor():
     flight = import_log({"t": 0.01 * np.arange(30), "T": 100 * thrust, "l": 100 * roll}, settings)
     expected = [[0.5, 0.5, 0.25], [0.7, 1.0, 0.45], [0.3, 0.0, 0.05]] * 10
     np.testing.assert_allclose(flight.rotor_command, expected, atol=1e-12)
+
+
+def test_columns_of_other_lengths_than_the_stamps_are_told():
+    log = columns(np.zeros((50, 3)))
+    log["pitch"] = np.zeros(100)
+    settings = ImportSettings(signals={"attitude": SignalMap(columns=NAMES, unit="rad")}, torque_source=None)
+    with pytest.raises(InputError, match=r"import\.signals\.attitude\.columns: 100 values for 50 time stamps"):
+        import_log(log, settings)

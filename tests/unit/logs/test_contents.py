@@ -1,10 +1,14 @@
 """What a log holds, read without a config."""
 
+import gzip
+
+import h5py
 import numpy as np
 import pyarrow
 import pytest
 from pyarrow import parquet
 
+from cpfls_cli import files
 from cpfls_cli.errors import InputError
 from cpfls_cli.logs.formats import log_contents
 from tests.builders import ulogs
@@ -59,3 +63,41 @@ def test_a_ulog_holds_topics_and_what_px4_knows_of_the_vehicle(tmp_path):
     }
     assert contents.parameters == {"CA_ROTOR_COUNT": 4.0, "MPC_THR_HOVER": 0.5}
     assert contents.system == "PX4 1.14.0"
+
+
+@pytest.mark.parametrize(
+    "formats",
+    [
+        {"a": "uint64_t timestamp;float[100000000] x"},
+        {"a": "uint64_t timestamp;b[1000] x", "b": "c[1000] x", "c": "float[1000] x"},
+    ],
+    ids=["array", "nested"],
+)
+def test_a_message_of_a_ulog_that_is_longer_than_any_is_refused_before_it_is_listed(tmp_path, formats):
+    path = tmp_path / "log.ulg"
+    path.write_bytes(ulogs.ulog([(0, 0, [1.0])], formats))
+    with pytest.raises(InputError, match=r"log\.ulg: a broken ULog file: its message 'a' would take more than 65535"):
+        log_contents(path)
+
+
+def test_a_message_of_a_ulog_within_itself_is_refused(tmp_path):
+    path = tmp_path / "log.ulg"
+    path.write_bytes(ulogs.ulog([(0, 0, [1.0])], {"a": "uint64_t timestamp;a x"}))
+    with pytest.raises(InputError, match=r"log\.ulg: a broken ULog file: a message of it contains itself"):
+        log_contents(path)
+
+
+def test_what_a_small_file_cannot_hold_is_refused_before_it_is_read(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "_PLAIN", 1 << 16)
+    text, table, bytes_of_eight = tmp_path / "log.csv.gz", tmp_path / "log.parquet", tmp_path / "log.h5"
+    text.write_bytes(gzip.compress(b"t,roll\n" + b"1,0\n" * (1 << 20)))
+    with pytest.raises(InputError, match=r"log\.csv\.gz: holds more than .* MB of text: damaged, or no log"):
+        log_contents(text)
+    parquet.write_table(pyarrow.table({"t": np.zeros(1 << 22)}), table)
+    with pytest.raises(InputError, match=r"log\.parquet: states 0\.0336 GB of numbers, far more"):
+        log_contents(table)
+    # A byte each in the file, eight in memory.
+    with h5py.File(bytes_of_eight, "w") as file:
+        file.create_dataset("t", (1 << 18,), "u1", chunks=(1 << 12,))
+    with pytest.raises(InputError, match=r"log\.h5: states 0\.0021 GB of numbers"):
+        log_contents(bytes_of_eight)

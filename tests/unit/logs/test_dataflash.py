@@ -112,6 +112,14 @@ def test_what_is_no_log(read, content, message):
     assert str(caught.value).endswith(f"log.bin: {message}")
 
 
+def test_kinds_of_other_fields_than_usual_tell_nothing_of_the_vehicle(read):
+    kinds = {"MSG": ("QZ", "TimeUS,Mess"), "PARM": ("QNZ", "TimeUS,Name,Value"), "UNIT": ("Qbf", "TimeUS,Id,Label")}
+    rows = [("MSG", (1, b"ArduCopter V4.5.7")), ("PARM", (1, b"A", b"x")), ("UNIT", (1, 100, 1.0)), *ROWS]
+    contents = read(dataflash(KINDS | kinds, rows))
+    assert (contents.system, contents.parameters, contents.units) == ("", {}, {})
+    assert "IMU" in contents.topics
+
+
 def test_kinds_that_contradict_themselves_are_left_out(read):
     kinds = KINDS | {
         "BAD1": ("Qf", "TimeUS,A,B"),

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import scipy.io
 
+from cpfls_cli import files
 from cpfls_cli.errors import InputError
 from cpfls_cli.logs import matrices
 from cpfls_cli.logs.formats import log_contents
@@ -133,11 +134,11 @@ def test_an_artifact_of_this_program_is_no_log(tmp_path):
 
 
 def test_a_file_that_states_more_than_memory_may_hold_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(matrices, "_PLAIN", 1 << 20)
+    monkeypatch.setattr(files, "_PLAIN", 1 << 20)
     with h5py.File(tmp_path / "log.h5", "w") as file:
         file.create_dataset("t", (10**9,), "f8", chunks=(1 << 16,))
     scipy.io.savemat(tmp_path / "log.mat", {"t": np.zeros(3 << 20)}, do_compression=True)
     with pytest.raises(InputError, match=r"log\.h5: states 8 GB of numbers, far more"):
         log_contents(tmp_path / "log.h5")
-    with pytest.raises(InputError, match=r"log\.mat: holds more than .* GB in .* MB: damaged, or no log"):
+    with pytest.raises(InputError, match=r"log\.mat: holds more than .* GB of numbers in .* MB: damaged, or no log"):
         log_contents(tmp_path / "log.mat")

@@ -9,7 +9,7 @@ from cpfls_cli.config.load import validate
 from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.vehicle import FoundNumber, beside_loop, bodily, find_vehicle
+from cpfls_cli.playback.vehicle import FoundNumber, beside_loop, bodily, carrying_weight, find_vehicle
 from tests.builders.playback_flights import MIDDLING, STATED, TRUE_BLOCKS, flown, truth
 
 TRUE = truth()
@@ -86,6 +86,39 @@ def test_without_velocity_and_accelerometer_the_thrust_factor_stays_open():
     vehicle, by_name = found(without_velocity(flown(TRUE, noise=MIDDLING, seed=2, hold="linear"), accelerometer=False))
     assert vehicle.guessed == ("thrust_factor",)
     assert "thrust_factor" not in by_name
+
+
+def noise_alone(force, lift):
+    """What gives a thrust factor of next to nothing, with an interval of more than any number on either side."""
+    drawn = np.random.default_rng(3).normal(0.0, 3.0, force.shape)
+    return drawn - (lift @ drawn) / lift.sum() + 1e-9
+
+
+@pytest.mark.parametrize(
+    "sensed",
+    [noise_alone, lambda force, _: -force, lambda force, _: 0.0 * force],
+    ids=["noise", "upside down", "dead"],
+)
+def test_an_accelerometer_that_feels_no_lift_leaves_the_thrust_factor_open(sensed):
+    flights = [
+        replace(flight, specific_force=sensed(flight.specific_force, (flight.speed**2).sum(axis=1)))
+        for flight in without_velocity(flown(TRUE, noise=MIDDLING, seed=2, hold="linear"), accelerometer=True)
+    ]
+    vehicle, told = carrying_weight(OPEN, flights)
+    assert told == ()
+    squares = np.concatenate([(flight.speed**2).sum(axis=1) for flight in flights])
+    for rotor in vehicle.rotors:
+        weight = STATED.mass_kg * STATED.gravity_m_s2
+        assert rotor.thrust_factor_n_s2 * squares.mean() == pytest.approx(weight)
+
+
+def test_rotors_that_stand_or_turn_for_a_moment_tell_no_thrust():
+    flights = without_velocity(flown(TRUE, noise=MIDDLING, seed=2, hold="linear"), accelerometer=True)
+    assert carrying_weight(OPEN, [replace(flight, speed=0.0 * flight.speed) for flight in flights]) == (OPEN, ())
+    brief = [replace(flight, speed=0.0 * flight.speed) for flight in flights]
+    brief[0].speed[:3] = flights[0].speed[:3]
+    _, told = carrying_weight(OPEN, brief)
+    assert told == ()
 
 
 @pytest.mark.parametrize(("heavier", "known"), [(1.0, True), (8.0, False)])
