@@ -86,7 +86,7 @@ def write(tmp_path):
 def flown(cpfls, config, write, tmp_path):
     def call(content, *words):
         flight = tmp_path / "flight.h5"
-        result = cpfls("import", config, write(content), "-o", flight, "--json", *words)
+        result = cpfls("import", config, write(content), "-o", flight, "--json", "-v", *words)
         assert result.exit_code == 0, result.stderr
         with h5py.File(flight) as file:
             signals = {name: file[name][()] for name in ("time", "attitude", "body_rate", "body_torque")}
@@ -321,7 +321,7 @@ VERSIONS = {
 @pytest.mark.parametrize("version", VERSIONS)
 def test_one_example_takes_logs_of_all_versions(cpfls, write, tmp_path, version):
     flight = tmp_path / "flight.h5"
-    words = ["--set", "import.delay_s=0", "--set", "import.lowpass_hz=null"]
+    words = ["-v", "--set", "import.delay_s=0", "--set", "import.lowpass_hz=null"]
     result = cpfls("import", EXAMPLE, write(of_version(version)), "-o", flight, *words)
     assert result.exit_code == 0, result.stderr
     told = " ".join(result.stderr.split())
