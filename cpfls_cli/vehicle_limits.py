@@ -319,10 +319,10 @@ def _look(limit: Limit) -> str:
 
 
 def _in_another_unit(figures: Figures, name: str, unit: str, broken: Sequence[Limit]) -> Beyond:
-    concerned = next((limit for limit in broken if name in limit.of), broken[0])
+    concerned = next((f"{_told(limit, figures)}: " for limit in broken if name in limit.of), "with the others right, ")
     quantity, value = _QUANTITIES[name], figures[name]
     meant = f"{value * quantity.units[unit]:.4g} {quantity.unit}? {value:.4g} is {quantity.words} in {unit}"
-    return Beyond(name, f"{_told(concerned, figures)}: {meant}")
+    return Beyond(name, f"{concerned}{meant}")
 
 
 def _in_words(figures: Figures, units: Mapping[str, str]) -> str:

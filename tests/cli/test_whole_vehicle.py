@@ -382,11 +382,11 @@ def test_gusts_of_a_model_are_played_where_they_are_asked_for(cpfls, config, pat
         assert result.exit_code == 0, result.stderr
         return (folder / name).read_bytes(), read_record(folder / name, FlightRecord).body_rate, result.stdout
 
-    once, shaken, said = flown("gusts.h5", "--gusts")
-    again, _, _ = flown("gusts-again.h5", "--gusts")
-    other, _, _ = flown("gusts-other.h5", "--gusts", "--set", "seed=2")
-    _, still, calm = flown("no-gusts.h5")
-    _, before, nothing = flown("no-gusts-known.h5", model=vehicle)
+    once, shaken, said = flown("shaken.h5", "--gusts")
+    again, _, _ = flown("again.h5", "--gusts")
+    other, _, _ = flown("other-shaken.h5", "--gusts", "--set", "seed=2")
+    _, still, calm = flown("calm.h5")
+    _, before, nothing = flown("calm-known.h5", model=vehicle)
     assert once == again != other
     np.testing.assert_array_equal(still, before)
     assert np.abs(shaken - still).max() > 0.1
