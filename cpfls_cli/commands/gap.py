@@ -29,7 +29,7 @@ from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import learned_by, read_base
-from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, split_flights
+from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, refuse_seen, split_flights
 from cpfls_cli.gap.naming.results import Diagnosis
 from cpfls_cli.gap.whole_vehicle import beside_rotors, has_effects, of_vehicle
 from cpfls_cli.pages.disagreement import where
@@ -108,6 +108,7 @@ def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: P
     check_folder(job.output, job.force, FILES)
     for name in FILES:
         refuse_inputs(job.output / name, job.inputs)
+    refuse_seen(*([inputs[each] for each in inputs if each.startswith(role)] for role in ("flight", "held-out")))
     check_ignored(job.study)
     # All flights are read together, so that one battery is full in all of them.
     read = read_flights([*flights, *held_out], job.study)
