@@ -94,6 +94,7 @@ def run(
             parts,
             _responses(vehicle, training),
             commanded=commanded,
+            shares=any(flight.shares for flight in training),
         )
         record = finish(job, found_vehicle, inputs)
     written: tuple[Text, ...] = ()
