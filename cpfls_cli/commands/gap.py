@@ -108,7 +108,6 @@ def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: P
     check_folder(job.output, job.force, FILES)
     for name in FILES:
         refuse_inputs(job.output / name, job.inputs)
-    refuse_seen(*([inputs[each] for each in inputs if each.startswith(role)] for role in ("flight", "held-out")))
     check_ignored(job.study)
     # All flights are read together, so that one battery is full in all of them.
     read = read_flights([*flights, *held_out], job.study)
@@ -116,6 +115,9 @@ def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: P
     flown = tuple(of_vehicle(read.recordings, base)) if has_effects(base) else read.recordings
     balanced, given = beside_rotors(read.recordings, base), flown[: len(flights)]
     split = split_flights(balanced[: len(flights)], balanced[len(flights) :], job.study.gap)
+    # Those held out are behind those learned from, whoever chose them.
+    files = [inputs[role] for role in roles]
+    refuse_seen(files[: len(split.training)], files[len(split.training) :])
     learned, judged = learned_by(model), known_by(numbered_roles("flight", flights), inputs)
     whole = with_seen(Recordings(given, read.warnings), model, learned, judged)
     return _Given(whole, split, base, learned, inputs)
