@@ -21,6 +21,9 @@ then, less than a fifth of the usual gain margin of 6 dB."""
 KNOWN = 2.0
 """Ratio of the ends of an interval from which on a moment of inertia, or what is positive like it, is not known."""
 
+MEASURED = 1.1
+"""What a largest moment may have over the sum of the others: moments are measured, not exact."""
+
 VISIBLE = np.log(1.05)
 """Logarithm of a ratio of moments of inertia that matters."""
 
@@ -70,6 +73,13 @@ def beyond_any_body(mass: float, hubs: Array, moments: Mapping[str, float]) -> d
     largest = mass * _WIDER**2 * (squares.sum(axis=1, keepdims=True) - squares).max(axis=0)
     limits = dict(zip((f"inertia.{name}" for name in INERTIA_PARAMETERS), largest.tolist(), strict=False))
     return {name: limit for name, limit in limits.items() if moments.get(name, 0.0) > limit}
+
+
+def more_than_others(moments: Sequence[float] | Array) -> tuple[str, ...]:
+    """Name the moments of inertia, of three, that are more than the other two together, which no body has."""
+    whole = sum(moments[:3])
+    named = zip(INERTIA_PARAMETERS, moments, strict=False)
+    return tuple(name for name, moment in list(named)[:3] if moment > MEASURED * (whole - moment))
 
 
 def symmetric_columns(vectors: Array) -> Array:

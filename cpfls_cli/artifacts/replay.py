@@ -261,12 +261,20 @@ def lost_to(errors: ErrorsByHorizon, row: int = _MODEL) -> dict[str, tuple[str, 
     return lost
 
 
+def behind_both(errors: ErrorsByHorizon) -> tuple[str, ...]:
+    """List what of velocity and position a model predicts worse, over all horizons, than each that knows no model."""
+    groups = {signal: errors.errors[signal] for signal in ("velocity", "position")}
+    totals = {signal: group.total for signal, group in groups.items() if group is not None}
+    return tuple(signal for signal, total in totals.items() if less(total[1:3].max(), total[_MODEL]))
+
+
 def trust_by_playback(held_out: PlaybackGroup | None) -> Trust:
     """Judge a model by its playback along flights that it was not found in.
 
     Good for simulation where errors of rates, attitude, velocity and position, as far as the flights know them, add
     up to less over the horizon than those of what knows no model; for control where those of the rates do, over
-    0.1 s at least. Nothing is good for either that loses in rates or attitude where control lives.
+    0.1 s at least. Nothing is good for either that loses in rates or attitude where control lives, or whose velocity
+    or position is worse than both of what knows no model: mere decay of the rates predicts rates as well.
     """
     if held_out is None:
         return Trust.NOT_JUDGED
@@ -274,7 +282,7 @@ def trust_by_playback(held_out: PlaybackGroup | None) -> Trust:
     reached = {signal: better_to(held_out, signal) for signal, group in known.items() if group is not None}
     if reached["body_rate"] < min(CONTROL_HORIZON, last):
         return Trust.DO_NOT_USE
-    if lost_to(held_out):
+    if lost_to(held_out) or behind_both(held_out):
         return Trust.NOT_CONTROL
     simulates = known["velocity"] is not None and all(horizon >= last for horizon in reached.values())
     return Trust.SIMULATION if simulates else Trust.CONTROL

@@ -16,9 +16,9 @@ from cpfls_cli.artifacts.parameters import DRAG, FOUND_AS, GUESSES, INERTIA, is_
 from cpfls_cli.artifacts.replay import HeldOutGroup, trust_by_playback
 from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, response_word
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, group_of, record, rows_of
-from cpfls_cli.inertia import EXPLAINED
+from cpfls_cli.inertia import EXPLAINED, beyond_any_body, more_than_others
 from cpfls_cli.response.mismatch import ROTATION, THRUST
-from cpfls_cli.validation.trust import Trust, capped
+from cpfls_cli.validation.trust import GOOD, Trust, capped
 
 if TYPE_CHECKING:
     # Reading a record does not need the compiled loops that play a vehicle back.
@@ -289,6 +289,11 @@ class VehicleRecord(ModelRecord):
     guess: tuple[str, ...] | None = dataset(
         "numbers of /vehicle that are guesses still: no flight tells them", "guess", default=None
     )
+    full_speed: float | None = dataset(
+        "largest speed of a rotor, assumed, where commands are shares of it; thrust and drag factor go with it",
+        units="rad/s",
+        default=None,
+    )
     difference: DifferencesGroup | None = group(default=None)
     contradiction: tuple[str, ...] | None = dataset(
         "what of the flights contradicts itself or the vehicle", "contradiction", default=None
@@ -306,6 +311,7 @@ class VehicleRecord(ModelRecord):
         responses: Sequence[VehicleResponse] = (),
         *,
         commanded: bool,
+        shares: bool = False,
     ) -> Self:
         """Arrange a vehicle that was found, and how well it predicts flights that it was not found in."""
         return cls(
@@ -331,6 +337,7 @@ class VehicleRecord(ModelRecord):
             blocks=found.blocks,
             warning=tuple(warnings),
             guess=found.guessed or None,
+            full_speed=found.model.vehicle.rotor_speed_max_rad_s if shares else None,
             difference=columns_of(DifferencesGroup, found.differences) if found.differences else None,
             contradiction=None if contradictions is None else tuple(contradictions),
             disturbance=None if found.gusts is None else DisturbanceGroup.of(found.gusts),
@@ -360,10 +367,10 @@ class VehicleRecord(ModelRecord):
         """
         against = self.contradiction or ()
         off = self.responses is not None and self.responses.off
-        told = self.tells_turning and not set(FOUND_AS.values()) & set(self.on_bound)
+        told = self.tells_turning and not self.unreal and not set(FOUND_AS.values()) & set(self.on_bound)
         if self.instruments is None:
             told = told and self.tells_yaw
-            return capped(self.forecast_verdict, against, loop=self.loop.shown, lacks=off, told=told)
+            return capped(self._by_playback, against, loop=self.loop.shown, lacks=off, told=told)
         lacks = off or self.instruments.lacks
         seen = lacks or (self.responses is not None and self.responses.judged)
         word = Trust.SIMULATION if seen else Trust.NOT_JUDGED
@@ -401,9 +408,27 @@ class VehicleRecord(ModelRecord):
         return (*(name for name in self.named if name in open_), *(key for key in guessed if key not in self.named))
 
     @property
-    def forecast_verdict(self) -> Trust:
-        """What playback on flights held out says of it as a forecast along logged rotor speeds."""
+    def unreal(self) -> tuple[str, ...]:
+        """Moments of inertia about roll and pitch that were found and are on a bound, or those of no body."""
+        played = self.forecast or self.vehicle
+        moments = {FOUND_AS[key]: float(value) for key, value in zip(INERTIA[:3], played.inertia, strict=False)}
+        wrong = {*self.on_bound, *beyond_any_body(played.mass, played.rotor.position, moments)}
+        wrong |= {f"inertia.{name}" for name in more_than_others(list(moments.values()))}
+        return tuple(name for name in list(moments)[:2] if name in wrong and name in self.named)
+
+    @property
+    def _by_playback(self) -> Trust:
         return capped(trust_by_playback(self.held_out), self.contradiction or ())
+
+    @property
+    def forecast_verdict(self) -> Trust:
+        """What playback on flights held out says of it as a forecast along logged rotor speeds.
+
+        No word is good where the body that turns in it is none, or its frequency response about roll or pitch is off:
+        what merely stops turning predicts rates as well for a while.
+        """
+        doubted = bool(self.unreal) or (self.responses is not None and self.responses.off)
+        return Trust.NOT_CONTROL if doubted and self._by_playback in GOOD else self._by_playback
 
     @property
     def numbers(self) -> int:
@@ -421,6 +446,7 @@ class VehicleRecord(ModelRecord):
             "verdict": self.verdict,
             "forecast_verdict": self.forecast_verdict,
             "not_determined": list(self.untold),
+            "full_speed_rad_s": self.full_speed,
             **self.provenance,
             "parameters": {row.pop("key"): row for row in (each._asdict() for each in parameters_of(self))},
             "numbers": numbers,

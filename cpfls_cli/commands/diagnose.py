@@ -18,7 +18,7 @@ from cpfls_cli.commands.compare import check_ignored, progress_of, to_correct, t
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import numbered_roles
-from cpfls_cli.flights.recordings import FlightSplit, read_flights, seen_twice, split_flights
+from cpfls_cli.flights.recordings import FlightSplit, read_flights, refuse_seen, seen_twice, split_flights
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.gap.before_after import before_after
 from cpfls_cli.gap.diagnose import diagnose
@@ -44,6 +44,8 @@ def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
             f"{disagreement}: was made with a model that has effects already; `cpfls diagnose` names what a base model "
             "misses, so compare without --model, or with an identified model"
         )
+    learned = [file for role, file in compared.origin.inputs.items() if role.startswith("flight")]
+    refuse_seen(learned, (inputs[role] for role in numbered_roles("held-out", held_out)))
     held = read_flights(held_out, job.study)
     split = split_flights(compared.flights.recordings(job.study), held.recordings, job.study.gap)
     if job.dry_run:
@@ -101,7 +103,7 @@ def seen_notes(record: DiagnosisRecord) -> Iterator[Text]:
     """Warn of flights that stand for two, and of those held out that the effects or their model were found in."""
     inputs = record.origin.inputs
     held_out = [file for role, file in inputs.items() if role.startswith("held-out")]
-    twice = seen_twice([file for role, file in inputs.items() if role.startswith("flight")], held_out)
+    twice = seen_twice(file for role, file in inputs.items() if role.startswith("flight"))
     model = inputs["disagreement"].name
     hashes = [(file.name, (file.sha256,)) for file in held_out]
     seen = seen_warnings(f"the model of {model}", record.model_learned_from, hashes)

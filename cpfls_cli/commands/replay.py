@@ -49,7 +49,7 @@ def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) 
         return nothing_written(job)
     errors = replay(pairs, horizon, options.every, lambda done: job.progress(done, 1))
     warnings = [
-        *seen_twice((inputs[role] for role in roles), ()),
+        *seen_twice(inputs[role] for role in roles),
         *seen_warnings(model.name, learned_by(model), known_by(roles, inputs)),
         *(warning for flight in given for warning in flight.warnings),
         *([_FORECAST.format(model.name)] if holds_forecast(model) else []),

@@ -48,7 +48,7 @@ def run(job: Job, flights: Sequence[Path], model: Path | None, table: Path | Non
     moved_by = instruments([flight.playback for flight in given])
     responses = vehicle_responses(judged, given, moved_by.beside)
     warnings = [
-        *seen_twice((inputs[role] for role in roles), ()),
+        *seen_twice(inputs[role] for role in roles),
         *seen_warnings(name, learned_by(model), known_by(roles, inputs)),
         *(warning for flight in given for warning in flight.warnings),
         *model_notes(name, judged, given),

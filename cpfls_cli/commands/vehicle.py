@@ -20,7 +20,7 @@ from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.playback import flights_to_play, played
-from cpfls_cli.flights.recordings import seen_twice
+from cpfls_cli.flights.recordings import refuse_seen, seen_twice
 from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.pages.source import source_of
@@ -62,7 +62,8 @@ def run(
     study = job.study
     learned, unseen = numbered_roles("flight", flights), numbered_roles("held-out", held_out)
     inputs, checkpoint, kept = begin_vehicle_search(job, learned | unseen, resume=resume)
-    twice = seen_twice(*([inputs[role] for role in roles] for roles in (learned, unseen)))
+    refuse_seen(*([inputs[role] for role in roles] for roles in (learned, unseen)))
+    twice = seen_twice(inputs[role] for role in learned)
     if config is not None:
         refuse_own(config.copy, job.output)
         check_outputs(job, config.copy)
@@ -93,6 +94,7 @@ def run(
             parts,
             _responses(vehicle, training),
             commanded=commanded,
+            shares=any(flight.shares for flight in training),
         )
         record = finish(job, found_vehicle, inputs)
     written: tuple[Text, ...] = ()

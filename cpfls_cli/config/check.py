@@ -17,7 +17,7 @@ from cpfls_cli.config.study import SECTIONS, Study
 from cpfls_cli.config.unknown import KEYS, with_guesses
 from cpfls_cli.errors import SettingError
 from cpfls_cli.identification.settings import PRESETS
-from cpfls_cli.inertia import symmetric
+from cpfls_cli.inertia import MEASURED, symmetric
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle_limits import beyond_any_vehicle, figures_of, figures_of_hubs
 
@@ -51,8 +51,6 @@ _KEYS_OF = {
     "drag_factor": f"rotors.{{}}.{KEYS['drag_factor']}",
 }
 """Keys of the section `vehicle` by the names of `vehicle_limits`."""
-_MEASURED = 1.1
-"""What a largest principal moment may have over the sum of the others: stated moments are measured, not exact."""
 
 Location = tuple[str, ...]
 
@@ -90,7 +88,7 @@ def gone_lines(data: dict[str, Any], source: str) -> list[str]:
 def _no_body(study: Study) -> Iterator[str]:
     """Refuse, of configs alone, moments of inertia of no body: a principal one is at most the sum of the others."""
     smallest, middle, largest = np.linalg.eigvalsh(symmetric(study.vehicle.inertia_kg_m2))
-    if largest > (smallest + middle) * _MEASURED:
+    if largest > (smallest + middle) * MEASURED:
         yield (
             f"vehicle.inertia_kg_m2 = {json.dumps(study.vehicle.inertia_kg_m2)}: no body has this inertia, its largest "
             f"principal moment {largest:.4g} is more than the other two together, {smallest + middle:.4g}; look at the "

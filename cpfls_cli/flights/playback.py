@@ -128,7 +128,8 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
     }
     named = tuple(f"{flight.name}: {warning}" for warning in warnings)
     wrong = contradictions(finding.of(flight.name) for finding in findings)
-    return LoggedFlight(flight.name, parts, hold or usual, words[actuation], named, wrong)
+    shares = actuation == "rotor_command" and flight.units.get(actuation) == "1"
+    return LoggedFlight(flight.name, parts, hold or usual, words[actuation], named, wrong, shares=shares)
 
 
 def _known(flight: ReadFlight, actuation: str, part: slice) -> dict[str, Array]:

@@ -335,20 +335,28 @@ def split_flights(given: Sequence[Recording], held_out: Sequence[Recording], set
     return _thirds(given[0], settings)
 
 
-def seen_twice(given: Iterable[InputFile], held_out: Iterable[InputFile]) -> tuple[str, ...]:
-    """Warn of files that stand for two flights: what is learned and judged on one flight says nothing of another."""
+def seen_twice(given: Iterable[InputFile]) -> tuple[str, ...]:
+    """Warn of files that stand for two flights."""
     learned: dict[str, str] = {}
     warnings = []
     for file in given:
         if file.sha256 in learned:
             warnings.append(f"{file.name}: is given twice, also as {learned[file.sha256]}")
         learned[file.sha256] = file.name
-    warnings += [
-        f"{file.name}: is learned from and held out at once, so what is said of it says nothing of flights not seen"
-        for file in held_out
-        if file.sha256 in learned
-    ]
     return tuple(warnings)
+
+
+def refuse_seen(given: Iterable[InputFile], held_out: Iterable[InputFile]) -> None:
+    """Refuse to judge on a flight of the same content as one that is learned from."""
+    learned = {file.sha256: file.name for file in given}
+    for file in held_out:
+        if file.sha256 in learned:
+            same = learned[file.sha256]
+            also = "" if same == file.name else f" (as {same})"
+            raise InputError(
+                f"{file.name}: is both learned from{also} and held out, so nothing would be judged; leave it out of "
+                "one of them, or hold out another flight"
+            )
 
 
 def _thirds(flight: Recording, settings: GapSettings) -> FlightSplit:

@@ -16,6 +16,7 @@ from cpfls_cli.artifacts.replay import (
     PlaybackGroup,
     ReplayRecord,
     SignalErrorGroup,
+    behind_both,
     better_to,
     lost_to,
 )
@@ -155,17 +156,22 @@ def playback_words(trust: str, held: PlaybackGroup | None, contradictions: Seque
         reached = better_to(held, "body_rate")
         yield f"Good for control of the attitude: it predicts body rates to {number(reached, 2)} s{_region(held)}."
     elif trust == Trust.NOT_CONTROL:
-        yield f"Not for control: it {lost_words(held)}, where a controller corrects what its model got wrong."
+        yield f"Not for control: it {joined(lost_words(held))}."
     else:
         yield "Do not use it: held out, its errors of the body rate add up to more than those of what knows no model."
 
 
-def lost_words(held: ErrorsByHorizon) -> str:
-    """Say where in rates or attitude a model loses to what knows no model, of horizons where control lives."""
-    return joined(
+def lost_words(held: ErrorsByHorizon) -> list[str]:
+    """Say where a model loses to what knows no model: where control lives, or in motion over all horizons."""
+    said = [
         f"loses in {_SIGNALS[signal][0]} to “{_WORDS[rival]}” {_between(low, high)}"
         for signal, (rival, low, high) in lost_to(held).items()
-    )
+    ]
+    behind = behind_both(held)
+    if behind:
+        motion = joined(_SIGNALS[signal][0] for signal in behind)
+        said.append(f"is worse in {motion} than “nothing moves” and “rate stays” both")
+    return said
 
 
 def _between(low: float, high: float) -> str:

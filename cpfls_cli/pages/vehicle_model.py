@@ -26,7 +26,7 @@ from cpfls_cli.artifacts.parameters import (
     vehicle_section,
 )
 from cpfls_cli.artifacts.rebuilt import vehicle_model
-from cpfls_cli.artifacts.replay import better_to
+from cpfls_cli.artifacts.replay import HeldOutGroup, better_to
 from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, ResponsesGroup, VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
@@ -74,7 +74,7 @@ _TURNS = ("x (roll to the right)", "y (nose down)", "z (yaw to the left)")
 _PUSHES = ("x (ahead)", "y (left)", "z (up)")
 _KINDS = {"torque": ("N m", {0, 1, 2}), "force": ("N", {3, 4, 5})}
 _FLIGHTS = {
-    THRUST: "log velocity (or position), and climb and descend: the known mass then tells thrust",
+    THRUST: "climb and descend more: the known mass then tells thrust",
     DRAG: "turn about yaw with fast steps while rolling and pitching, or state Izz; else only their ratio is known",
     INERTIA[0]: "roll with fast steps or a multisine: several changes of direction a second",
     INERTIA[1]: "pitch with fast steps or a multisine: several changes of direction a second",
@@ -109,11 +109,21 @@ def _as_forecast(record: VehicleRecord) -> str:
         return "not judged as a forecast"
     if word is Trust.DO_NOT_USE:
         return "predicts no better than what knows no model"
-    signals = {"rates": "body_rate"} if word is Trust.CONTROL else {"rates": "body_rate", "motion": "velocity"}
-    far = min(reached for name in signals.values() if np.isfinite(reached := better_to(held, name)))
+    signals = ("body_rate", "velocity") if word is Trust.SIMULATION else ("body_rate",)
+    far = min(better_to(held, name) for name in signals)
     what = "motion" if word is Trust.SIMULATION else "body rates"
-    against = f", but {lost_words(held)}" if word is Trust.NOT_CONTROL else ""
+    against = f", but {_against_control(record, held)}" if word is Trust.NOT_CONTROL else ""
     return f"predicts {what} {number(far, 2)} s ahead{against}"
+
+
+def _against_control(record: VehicleRecord, held: HeldOutGroup) -> str:
+    """Say why no control may rest on its forecast."""
+    said = lost_words(held)
+    if record.unreal:
+        said.append(f"rests on {joined(map(name_of, record.unreal))}, on a bound or of no body")
+    if record.responses is not None and record.responses.off:
+        said.append("has a frequency response about roll or pitch that is off")
+    return joined(said)
 
 
 def _as_vehicle(record: VehicleRecord) -> str:
@@ -125,7 +135,8 @@ def _as_vehicle(record: VehicleRecord) -> str:
         return "beside its constants an effect is missing"
     if record.trust == Trust.NOT_DETERMINED and too_heavy(record):
         return "inertia and drag factor are not the body's"
-    constants = [name_of(name) for name in record.untold if name in FOUND_AS.values()]
+    open_ = dict.fromkeys((*record.untold, *record.unreal))
+    constants = [name_of(name) for name in open_ if name in FOUND_AS.values()]
     if constants:
         return f"{joined(constants)} {'is' if len(constants) == 1 else 'are'} not the vehicle's own"
     return "its constants are told"
@@ -169,8 +180,11 @@ def _against(record: VehicleRecord) -> Iterator[str]:
 
 def _grounds_of_forecast(record: VehicleRecord) -> Iterator[str]:
     """Say what its forecast is good for, which model makes it, what it is beside, and how it was chosen."""
-    if not record.contradiction:
-        yield from playback_words(record.forecast_verdict, record.held_out, None)
+    held, word = record.held_out, record.forecast_verdict
+    if held is not None and word is Trust.NOT_CONTROL:
+        yield f"Not for control: it {_against_control(record, held)}."
+    elif not record.contradiction:
+        yield from playback_words(word, held, None)
     if record.instruments is None and record.responses is not None:
         yield from response_words(record.responses)
     if record.forecast is not None:
@@ -197,7 +211,7 @@ def _grounds_of_forecast(record: VehicleRecord) -> Iterator[str]:
 def details(vehicle: Source[VehicleRecord], index: int = 1) -> Iterator[Block]:
     """Say its constants first, then how well it predicts, its other numbers, and what to be careful with."""
     record = vehicle.record
-    yield _constants_table([each for each in parameters_of(record) if each.needed], index)
+    yield _constants_table(record, index)
     yield Folded("Errors of the forecast, by horizon", list(_forecast_blocks(record, index)), shown=True)
     yield Folded("Other numbers, and what would tell them", list(_number_blocks(vehicle, index)), shown=True)
     careful = [Text(each, "warning") for each in warnings(record)]
@@ -366,8 +380,14 @@ def _about_constants(record: VehicleRecord) -> Iterator[Block]:
         yield Text(f"Left at 0, since no lower error comes with it: {joined(idle)}.")
     for reason, same in groupby(filter(_wanting, listed), key=lambda each: each.reason):
         yield Text(f"{joined(each.name for each in same)}: {reason}.")
-    for flight, wanting in groupby(filter(_wanting, listed), key=lambda each: _FLIGHTS[each.key]):
+    for flight, wanting in groupby(filter(_wanting, listed), key=_to_fly):
         yield Text(f"To know {joined(each.name for each in wanting)}: {flight}.", "warning")
+
+
+def _to_fly(parameter: Parameter) -> str:
+    """Say what would tell a constant; thrust without a value is that of flights that lack velocity."""
+    lacking = parameter.key == THRUST and parameter.value is None
+    return f"{'log velocity (or position), and ' if lacking else ''}{_FLIGHTS[parameter.key]}"
 
 
 def _differences_table(record: VehicleRecord, index: int) -> Iterator[Table]:
@@ -387,11 +407,13 @@ def _wanting(parameter: Parameter) -> bool:
     return parameter.value is None or (parameter.low is not None and not parameter.determined)
 
 
-def _constants_table(listed: list[Parameter], index: int) -> Table:
+def _constants_table(record: VehicleRecord, index: int) -> Table:
+    listed = [each for each in parameters_of(record) if each.needed]
+    full = "" if record.full_speed is None else f" (at an assumed {number(record.full_speed, 4)} rad/s full speed)"
     stated = any(each.stated is not None for each in listed)
     rows: list[list[str | Cell]] = [
         [
-            f"{each.name}, {each.unit}",
+            f"{each.name}{full if each.key in (THRUST, DRAG) and each.determined else ''}, {each.unit}",
             Cell(_or_unknown(each.value, 4), "warning" if _wanting(each) else "plain"),
             *(_or_unknown(value, 3) for value in (each.low, each.high)),
             *([_or_unknown(each.stated, 3)] if stated else []),

@@ -106,6 +106,8 @@ class LoggedFlight:
         What of it no verdict can stand beside.
     group : str
         See `PlaybackFlight`.
+    shares : bool
+        Whether its commands are shares of the full speed of the rotors.
     """
 
     name: str
@@ -115,6 +117,7 @@ class LoggedFlight:
     warnings: tuple[str, ...]
     contradictions: tuple[str, ...] = ()
     group: str = ""
+    shares: bool = False
 
     @classmethod
     def of(cls, name: str, signals: Signals) -> LoggedFlight:

@@ -21,6 +21,10 @@ class Trust(StrEnum):
     DO_NOT_USE = "do-not-use"
 
 
+GOOD = (Trust.SIMULATION, Trust.CONTROL)
+"""Words that call a model good wherever it flies."""
+
+
 def worse(*words: Trust) -> Trust:
     """Give the worst of some words."""
     return max(words, key=list(Trust).index)
@@ -38,4 +42,4 @@ def capped(
         return Trust.DO_NOT_USE
     if trust is not Trust.DO_NOT_USE and (loop or not told):
         return Trust.LOOP if loop else worse(trust, Trust.NOT_DETERMINED)
-    return Trust.LACKING if lacks and trust in (Trust.SIMULATION, Trust.CONTROL) else trust
+    return Trust.LACKING if lacks and trust in GOOD else trust

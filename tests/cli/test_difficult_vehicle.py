@@ -57,17 +57,19 @@ def vehicle(config, folder):
 
 @pytest.fixture(scope="module")
 def flight(cpfls, config, folder):
-    plan, path = folder / "path.h5", folder / "flight.h5"
+    plan, path, other = (folder / f"{name}.h5" for name in ("path", "flight", "other"))
     words = ("--set", "trajectory.path=straight", "--set", "trajectory.direction=[-0.3, 1.0, 0.4]")
     for result in (
         cpfls("trajectory", config, "-o", plan, *words),
         cpfls("simulate", config, plan, "-o", path, "--accept-guesses"),
+        cpfls("simulate", config, plan, "-o", other, "--accept-guesses", "--seed", 2),
     ):
         assert result.exit_code == 0, result.stderr
-    record = read_any(path)
-    assert record.origin.cautions[0].startswith(GUESSED)
-    # As if it was measured: what its path was flown by is none of what follows.
-    write_record(path, record.with_header(replace(record.origin, cautions=())))
+    for made in (path, other):
+        record = read_any(made)
+        assert record.origin.cautions[0].startswith(GUESSED)
+        # As if it was measured: what its path was flown by is none of what follows.
+        write_record(made, record.with_header(replace(record.origin, cautions=())))
     return path
 
 
@@ -80,7 +82,7 @@ def command(config, flight, folder, tmp_path):
             "simulate": ("simulate", config, folder / "path.h5"),
             "replay": ("replay", config, "vehicle", flight, "--every", "50"),
             "trajectory": ("trajectory", config, *ROTATION, "--set", "trajectory.infeasible=report"),
-            "gap": ("gap", config, flight, "--held-out", flight, "--dry-run"),
+            "gap": ("gap", config, flight, "--held-out", flight.with_name("other.h5"), "--dry-run"),
             "compare": ("compare", config, flight, "--dry-run"),
             "response": ("response", config, flight, "--dry-run"),
             "identify": ("identify", config, flight, "--dry-run"),

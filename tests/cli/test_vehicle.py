@@ -386,14 +386,21 @@ def test_the_copy_of_the_config_is_no_other_output(refused, flights, tmp_path, n
     assert line == f"{tmp_path / name}: is what the command writes for -o {tmp_path / 'x.h5'}; name another file"
 
 
-def test_a_flight_that_is_learned_from_and_held_out_is_named(cpfls, config, flights, tmp_path):
-    output = tmp_path / "v.h5"
-    result = cpfls("vehicle", config, flights[0], "--held-out", flights[0], "-o", output)
-    assert result.exit_code == 0, result.stderr
-    assert "flight-1.h5: is learned from and held out at once" in result.stderr
-    result = cpfls("replay", config, output, flights[0], flights[0], "-o", tmp_path / "r.h5", "--every", 500)
+@pytest.mark.parametrize(("name", "also"), [("flight-1.h5", ""), ("copy.h5", " (as flight-1.h5)")])
+def test_a_flight_that_is_learned_from_is_not_held_out(refused, flights, tmp_path, name, also):
+    same = shutil.copy(flights[0], tmp_path / name)
+    line = refused(flights[0], options=("--held-out", same))
+    said = f"{name}: is both learned from{also} and held out, so nothing would be judged; leave it out of one of them"
+    assert line == f"{said}, or hold out another flight"
+
+
+def test_a_replay_names_flights_given_twice_and_those_that_the_vehicle_learned_from(
+    cpfls, config, flights, found, tmp_path
+):
+    words = (flights[0], flights[0], "-o", tmp_path / "r.h5", "--every", 500)
+    result = cpfls("replay", config, found.output, *words)
     assert "flight-1.h5: is given twice" in result.stderr
-    assert "flight-1.h5: v.h5 has learned from it" in result.stderr
+    assert "flight-1.h5: vehicle.h5 has learned from it" in result.stderr
 
 
 def test_a_velocity_in_another_unit_is_said(cpfls, config, flights, tmp_path):

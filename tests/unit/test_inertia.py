@@ -9,6 +9,7 @@ from cpfls_cli.inertia import (
     INERTIA_PARAMETERS,
     beyond_any_body,
     body_torque_columns,
+    more_than_others,
     symmetric,
     symmetric_columns,
 )
@@ -69,3 +70,10 @@ def test_a_body_with_all_its_mass_in_the_hubs_can_be_and_one_twice_as_heavy_cann
     twice = beyond_any_body(6.0, hubs, {name: 2 * value for name, value in in_hubs.items()})
     assert list(twice) == ["inertia.Ixx", "inertia.Iyy", "inertia.Izz"]
     assert twice["inertia.Iyy"] == pytest.approx(1.25**2 * 6 * 0.0904)
+
+
+@pytest.mark.parametrize(
+    ("moments", "named"), [((1.0, 2.0, 3.0), ()), ((3.4, 2.0, 1.0), ("Ixx",)), ((0.01, 0.1, 0.05), ("Iyy",))]
+)
+def test_a_moment_is_no_more_than_the_others_together_but_for_what_is_measured(moments, named):
+    assert more_than_others(moments) == named

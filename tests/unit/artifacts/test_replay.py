@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.replay import SignalErrorGroup, better_to, lost_to, trust_by_playback
+from cpfls_cli.artifacts.replay import SignalErrorGroup, behind_both, better_to, lost_to, trust_by_playback
 from cpfls_cli.validation.trust import Trust
 
 HORIZON = np.array([0.1, 0.2, 0.3, 0.4])
@@ -70,10 +70,20 @@ def late(horizon):
         # What nobody controls by.
         ((good, good, slow), Trust.SIMULATION),
         ((lambda horizon: 3 * horizon, good, good), Trust.DO_NOT_USE),
+        # Its rates merely fade, and nothing of it moves as the vehicle does.
+        ((good, good, lambda horizon: 2.1 * horizon), Trust.NOT_CONTROL),
     ],
 )
 def test_nothing_is_good_for_control_that_loses_where_control_lives(given, trust):
     assert trust_by_playback(held_out(*given)) == trust
+
+
+@pytest.mark.parametrize(("model", "behind"), [(0.9, ()), (1.5, ()), (2.1, ("position",))])
+def test_motion_is_behind_only_where_both_rivals_are_better(model, behind):
+    rows = np.array([4 * [model], 4 * [1.0], 4 * [2.0], STATED])
+    group = SignalErrorGroup(mae=rows, rms=np.zeros((4, 4, 3)))
+    errors = SimpleNamespace(horizon_s=HORIZON, errors={"velocity": None, "position": group})
+    assert behind_both(errors) == behind
 
 
 def test_a_loss_is_named_with_its_rival_and_horizons():

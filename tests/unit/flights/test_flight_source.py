@@ -70,14 +70,20 @@ def test_another_file_is_refused_with_path_and_remedy(source, change, said):
 PERIOD_S = 0.5
 
 
-def driven(path, *, unit="V", voltage=(12.5, 10.0)):
-    """A flight with a battery that sags, of a log with body torque."""
+def driven(path, *, unit="V", voltage=(12.5, 10.0), commands=None):
+    """A flight with a battery that sags, of a log with body torque, or with commands in a unit in its place."""
     rng = np.random.default_rng(4)
     mapped = {"voltage": {"columns": ["u"], "unit": unit}, "body_torque": {"columns": ["a", "b", "c"], "unit": "N m"}}
-    config = parse_config(resolved_yaml(Study()), "own") | {"import": {"signals": mapped}}
+    source = "column" if commands is None else "rotor-command"
+    if commands is not None:
+        mapped["rotor_command"] = {"columns": ["k", "l", "m", "n"], "unit": commands}
+        del mapped["body_torque"]
+    config = parse_config(resolved_yaml(Study()), "own") | {"import": {"signals": mapped, "torque_source": source}}
     study = validate(config, "own")
     header = Header("1", 1, resolved_yaml(study), {"log": InputFile("log.csv", "0" * 64, "CSV")})
-    signals = {name: rng.normal(size=(90, 3)) for name in ("attitude", "body_rate", "body_torque")}
+    signals = {name: rng.normal(size=(90, 3)) for name in ("attitude", "body_rate")}
+    name, columns = ("body_torque", 3) if commands is None else ("rotor_command", 4)
+    signals[name] = rng.uniform(0.2, 0.8, size=(90, columns))
     signals["voltage"] = np.linspace(*voltage, 90)
     write_record(path, FlightRecord(header=header, time=PERIOD_S * np.arange(90), **signals))
     return path
@@ -132,6 +138,13 @@ def test_a_voltage_that_no_battery_has_is_not_used_and_said(tmp_path, unit, volt
     assert [part.voltage for part in parts] == [None] * len(parts)
     assert len(re.findall(said, " ".join(warnings))) == 1
     assert "taken for that of a full battery" not in " ".join(warnings)
+
+
+@pytest.mark.parametrize(("unit", "shares"), [("1", True), ("rad/s", False), (None, False)])
+def test_a_flight_to_play_says_whether_its_commands_are_shares_of_a_full_speed(tmp_path, unit, shares):
+    path = driven(tmp_path / "flight.h5", commands=unit)
+    (flight,) = playback.flights_to_play([path], Study())
+    assert flight.shares is shares
 
 
 def test_an_import_says_what_is_wrong_with_a_voltage(tmp_path):

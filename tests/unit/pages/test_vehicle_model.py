@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.parameters import parameters_of, vehicle_section
+from cpfls_cli.artifacts.replay import HeldOutGroup, SignalErrorGroup
 from cpfls_cli.artifacts.vehicle_model import (
     FoundNumbersGroup,
     InstrumentsGroup,
@@ -199,3 +200,90 @@ def test_constants_that_lack_something_are_not_good(given, found, trust):
     said = " ".join(grounds(record))
     assert ("Below 2.0 Hz they explain less" in said) == ("used" in given)
     assert ("They do not tell the moments of inertia" in said) == (trust == Trust.NOT_DETERMINED)
+
+
+def _held_out(velocity):
+    """Playback over half a second that is twice as good as its rivals, but for the velocity."""
+    horizon = np.linspace(0.02, 0.5, 25)
+
+    def group(model):
+        rows = [model * horizon, 2 * horizon, 2 * horizon, 9 * horizon]
+        return SignalErrorGroup(mae=np.array(rows), rms=np.zeros((4, 25, 3)))
+
+    return HeldOutGroup(
+        flown=("other.h5",),
+        windows=9,
+        prediction=("model", "nothing-moves", "rate-stays", "stated"),
+        horizon_s=horizon,
+        diverged=np.zeros(4, dtype=np.int64),
+        body_rate=group(1.0),
+        velocity=group(velocity),
+    )
+
+
+def _of_inertia(*moments):
+    def changed(record):
+        return replace(record, vehicle=replace(record.vehicle, inertia=np.array([*moments, 0.0, 0.0, 0.0])))
+
+    return changed
+
+
+def _on_bound(record):
+    return replace(record, found=replace(record.found, at_bound=np.array([True, True])))
+
+
+def _off(record):
+    names, known = ("roll", "pitch"), np.array([101.0, 8.0])
+    return replace(record, responses=ResponsesGroup(name=names, cost=known, low=known, high=known))
+
+
+@pytest.mark.parametrize(
+    ("changed", "velocity", "why"),
+    [
+        (_on_bound, 1.0, "rests on Ixx, on a bound or of no body"),
+        (_of_inertia(0.03, 0.02, 0.02), 1.0, "rests on Ixx, on a bound or of no body"),
+        (_of_inertia(0.02, 0.004, 0.007), 1.0, "rests on Ixx, on a bound or of no body"),
+        (_off, 1.0, "has a frequency response about roll or pitch that is off"),
+        (replace, 2.1, "is worse in velocity than “nothing moves” and “rate stays” both"),
+    ],
+)
+def test_a_forecast_that_beats_its_rivals_in_rates_is_not_good_where_no_vehicle_makes_it(changed, velocity, why):
+    good = replace(record_of(whole()), held_out=_held_out(1.0))
+    assert good.forecast_verdict == Trust.SIMULATION
+    record = changed(replace(good, held_out=_held_out(velocity)))
+    assert record.forecast_verdict == Trust.NOT_CONTROL
+    assert record.verdict not in (Trust.SIMULATION, Trust.CONTROL)
+    assert title(record).startswith(f"predicts body rates 0.50 s ahead, but {why}; ")
+    said = [block.text for block in unfolded(answer(source_of_record(record))) if isinstance(block, Text)]
+    assert f"Not for control: it {why}." in said
+
+
+def test_the_size_of_a_thrust_factor_goes_with_the_full_speed_that_is_assumed():
+    record = record_of(whole())
+    numbers = replace(record.found, name=("thrust_factor", "drag_factor"), determined=np.array([True, False]))
+    shares = replace(record, found=numbers, full_speed=1000.0)
+
+    def named(record):
+        tables = [block for block in unfolded(answer(source_of_record(record))) if isinstance(block, Table)]
+        (table,) = [table for table in tables if table.name.startswith("vehicle-constants")]
+        return [row[0].text for row in table.cells][:2]
+
+    assert named(shares) == ["thrust factor (at an assumed 1000 rad/s full speed), N s^2", "drag factor, N m s^2"]
+    assert named(replace(shares, full_speed=None)) == ["thrust factor, N s^2", "drag factor, N m s^2"]
+
+
+@pytest.mark.parametrize("lacks", [True, False])
+def test_velocity_is_asked_for_only_where_flights_lack_it(lacks):
+    record = record_of(whole())
+    if lacks:
+        record = replace(record, guess=("thrust_factor",))
+    else:
+        found = replace(record.found, name=("thrust_factor", "drag_factor"), determined=np.array([False, True]))
+        record = replace(record, found=found)
+    (said,) = [
+        block.text
+        for block in unfolded(answer(source_of_record(record)))
+        if isinstance(block, Text) and block.text.startswith("To know thrust factor")
+    ]
+    first = "log velocity (or position), and " if lacks else ""
+    assert said == f"To know thrust factor: {first}climb and descend more: the known mass then tells thrust."
