@@ -101,12 +101,12 @@ def run(
         written = _write_config(config, record)
         checkpoint.remove()
     outcome = Outcome(
-        record.summary, (*answer(source_of(job, record)), *written), next=_next(job, record, flights, held_out)
+        record.summary, (*answer(source_of(job, record)), *written), next=next_commands(job, record, flights, held_out)
     )
     return stopped(outcome, "generations" if record.complete else "interrupted", signal, job.output)
 
 
-def _next(
+def next_commands(
     job: Job, record: VehicleRecord, flights: Sequence[Path], held_out: Sequence[Path]
 ) -> tuple[Sequence[str | Path], ...]:
     """Give the commands that show what was found, and that judge it, plan what would tell more, or hand it over."""
