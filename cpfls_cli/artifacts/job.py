@@ -57,6 +57,8 @@ class Job:
     open_numbers : {"refused", "guessed", "found"}
         What a command does that needs numbers which the config leaves open: it refuses, takes the guesses that stand
         for them, or has those of a vehicle that was found in their place.
+    found : Path or None
+        Vehicle that was found, whose numbers the commands that go on take as well.
     cautions : dict of str to None
         What speaks against the models and numbers that it rests on, in order: the output carries it.
     """
@@ -71,6 +73,7 @@ class Job:
     inputs: list[Path] = field(default_factory=list)
     config: Path = Path("CONFIG")
     open_numbers: Literal["refused", "guessed", "found"] = "refused"
+    found: Path | None = None
     cautions: dict[str, None] = field(default_factory=dict)
 
     def beside(self, name: str) -> Path:

@@ -64,7 +64,7 @@ def refuse_misplaced_config(command: str, given: Sequence[Path], output: Path | 
         exchanged = [config, *(given[0] if path == config else path for path in given[1:])]
         words = ["cpfls", command, *map(str, exchanged), *([] if output is None else ["-o", str(output)])]
         raise ConfigError(f"{given[0]}: is {what}, and the config comes first: {shlex.join(words)}")
-    made = f"`cpfls init {given[0]} -o study.yaml` writes one for it, and " if kind == "log" else ""
+    made = f"`cpfls init {shlex.quote(str(given[0]))} -o study.yaml` writes one for it, and " if kind == "log" else ""
     raise ConfigError(f"{given[0]}: is {what}, not a config (YAML); {made}`cpfls config` prints a commented default")
 
 
@@ -73,7 +73,9 @@ def what_it_is(path: Path) -> str | None:
     kind = _kind(path)
     if kind == "log":
         flight = path.name.partition(".")[0] + ("-flight.h5" if path.suffix == ".h5" else ".h5")
-        return f"{path}: is a log, and this takes what cpfls made: cpfls import CONFIG {path} -o {flight}"
+        words = ["cpfls", "import", "CONFIG", str(path), "-o", flight]
+        return f"{path}: is a log, and this takes what cpfls made: {shlex.join(words)}"
     if kind == "config":
-        return f"{path}: is a config, and this takes what cpfls made; `cpfls config {path}` shows it"
+        shows = shlex.join(["cpfls", "config", str(path)])
+        return f"{path}: is a config, and this takes what cpfls made; `{shows}` shows it"
     return None

@@ -7,12 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
+from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
-from cpfls_cli.commands.numbers import with_numbers
+from cpfls_cli.commands.numbers import go_on, to_fly, why_no_body_found, with_numbers
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
@@ -43,17 +44,17 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     given = with_seen(given, model, learned, known_by(roles, inputs))
     record = compared(job.study, given, base, progress_of(job.progress))
     record = finish_disagreement(job, record, learned, inputs)
-    return Outcome(record.summary, tuple(answer(source_of(job, record))), next=(_next(job, record, flights),))
+    return Outcome(record.summary, tuple(answer(source_of(job, record))), next=(_next(job, record, flights, model),))
 
 
-def _next(job: Job, record: DisagreementRecord, flights: Sequence[Path]) -> Command:
+def _next(job: Job, record: DisagreementRecord, flights: Sequence[Path], model: Path | None) -> Command:
     if record.audit.contradiction:
         return to_correct(job)
     if not record.gap.above_noise.any():
         return to_fly(job)
     if not record.is_base(job.study.vehicle):
-        return "cpfls", "gap", job.config, *flights, "-o", job.beside("gap")
-    return "cpfls", "diagnose", job.config, job.output, "-o", job.beside("diagnosis.h5")
+        return to_gap(job, flights, model)
+    return go_on(job, "diagnose", job.output, output=job.beside("diagnosis.h5"))
 
 
 def to_correct(job: Job) -> Command:
@@ -61,10 +62,13 @@ def to_correct(job: Job) -> Command:
     return "cpfls", "config", job.config, "--section", "import"
 
 
-def to_fly(job: Job) -> Command:
-    """Give the command that plans flights that tell more."""
-    signal = ("--hover", "30", "--excite", "roll,pitch", "--repeat", "4")
-    return "cpfls", "trajectory", job.config, *signal, "-o", job.beside("mission.h5")
+def to_gap(job: Job, flights: Sequence[Path], model: Path | None) -> Command:
+    """Give the command that names what is missing, from the model on where `cpfls gap` can start from it."""
+    if job.found is not None and why_no_body_found(job, job.found):
+        return to_fly(job)
+    starts = model is not None and (holds(model, VehicleRecord) or holds(model, IdentifiedRecord))
+    given: Sequence[str | Path] = ("--model", model) if model is not None and starts else ()
+    return go_on(job, "gap", *flights, *given, output=job.beside("gap"))
 
 
 def with_seen(given: Recordings, model: Path | None, learned: Sequence[LearnedFlight], judged: KnownBy) -> Recordings:

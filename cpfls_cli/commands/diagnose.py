@@ -14,7 +14,8 @@ from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, as_inputs
 from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.commands.compare import check_ignored, progress_of, to_correct, to_fly
+from cpfls_cli.commands.compare import check_ignored, progress_of, to_correct
+from cpfls_cli.commands.numbers import go_on, to_fly
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import numbered_roles
@@ -56,7 +57,7 @@ def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
     record = finish_diagnosis(job, record, compared, inputs)
     answered = whole_answer(source_of(job, record), diagnosis)
     notes: list[Block] = [*seen_notes(record), *notes_on_flights([record])]
-    to_extend = ("cpfls", "extend", job.config, job.output, "-o", job.beside("extended.h5"))
+    to_extend = go_on(job, "extend", job.output, output=job.beside("extended.h5"))
     to_report = ("cpfls", "report", job.config, disagreement, job.output, "-o", job.beside("report.html"))
     followed = next_command(job, record, to_extend, to_report, job.output)
     return Outcome(whole_summary(record, diagnosis), (*answered, *notes), next=(followed,))
@@ -84,7 +85,7 @@ def next_command(
         case GapVerdict.NAMED | GapVerdict.PARTIAL:
             return named
         case GapVerdict.AMBIGUOUS:
-            return "cpfls", "trajectory", job.config, "--for", diagnosis, "-o", job.beside("path.h5")
+            return go_on(job, "trajectory", "--for", diagnosis, output=job.beside("path.h5"))
         case GapVerdict.NO_GAP | GapVerdict.NOT_EXCITED:
             return to_fly(job)
     return unnamed

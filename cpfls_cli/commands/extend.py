@@ -14,6 +14,7 @@ from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.learned import LearnedFlight, as_inputs, joined_flights
 from cpfls_cli.artifacts.rebuilt import audit, vehicle_model
 from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.models import learned_by, read_base
@@ -35,6 +36,7 @@ _EXTENDS = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
 def run(job: Job, diagnosis: Path, model: Path | None) -> Outcome:
     """Put the named effects into a model and write it."""
     inputs = begin(job, {"diagnosis": diagnosis} | ({} if model is None else {"model": model}))
+    job = with_numbers(job, "extend", model)
     diagnosed = read_of_vehicle(diagnosis, DiagnosisRecord, job.study)
     base = vehicle_model(diagnosed.base) if model is None else read_base(model, job.study)
     named_effects(diagnosed)

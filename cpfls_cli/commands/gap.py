@@ -25,8 +25,8 @@ from cpfls_cli.commands.diagnose import (
     whole_summary,
 )
 from cpfls_cli.commands.extend import extended, finish_extended
-from cpfls_cli.commands.numbers import with_numbers
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.commands.numbers import go_on, why_no_body_found, with_numbers
+from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import learned_by, read_base
 from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, refuse_seen, split_flights
@@ -35,6 +35,7 @@ from cpfls_cli.gap.whole_vehicle import beside_rotors, has_effects, of_vehicle
 from cpfls_cli.pages.disagreement import where
 from cpfls_cli.pages.extended import model_with, warnings
 from cpfls_cli.pages.first_screen import notes_on_flights
+from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Block, Folded, Text
@@ -76,28 +77,35 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path
     The search adds one effect after another until nothing more can be named, so once through is all the way.
     """
     job = with_numbers(job, "gap", model)
+    why = "" if job.found is None else why_no_body_found(job, job.found)
+    if why:
+        raise InputError(
+            f"{job.found}: {why}, so no gap is told from it; --accept-guesses takes guesses from mass and arms, or fly "
+            f"what tells its inertia: {WHAT_TO_FLY}"
+        )
     given = _begin(job, flights, held_out, model)
     if job.dry_run:
         line = Text(f"{job.output}: would be filled; the config and all inputs are good")
         return Outcome({"dry_run": True, "output": str(job.output)}, (line,))
     answers = _answers(job, given)
-    summary = {**whole_summary(answers.diagnosed, answers.diagnosis), "disagreement": answers.disagreement.summary}
-    summary["extended"] = {"written": answers.extended is not None, "reason": answers.refused}
     with filled_folder(job.output, FILES) as folder:
         answers, written = _written(job, given, answers, folder)
+        summary = {**whole_summary(answers.diagnosed, answers.diagnosis), "disagreement": answers.disagreement.summary}
+        summary["extended"] = {"written": answers.extended is not None, "reason": answers.refused}
         text = json.dumps(as_json(summary), indent=1, allow_nan=False)
         write_text(folder / "gap.json", text + "\n")
         job.progress(0.97, 1, "report")
         # Without a bar of its own: the bar is that of the whole.
         report.run(replace(job, output=folder / "report.html", progress=lambda *_: None), written)
     job.progress(1, 1)
-    return Outcome(summary, tuple(_blocks(job, answers)), next=(_next(job, answers, flights),))
+    return Outcome(summary, tuple(_blocks(job, answers)), next=(_next(job, answers, flights, model),))
 
 
-def _next(job: Job, answers: _Answers, flights: Sequence[Path]) -> Command:
+def _next(job: Job, answers: _Answers, flights: Sequence[Path], model: Path | None) -> Command:
     folder = job.output
     to_replay: Command = ("cpfls", "replay", job.config, folder / FILES[2], *flights, "-o", job.beside("replay.h5"))
-    to_answer: Command = ("cpfls", "response", job.config, *flights, "-o", job.beside("response.h5"))
+    given = () if model is None else ("--model", model)
+    to_answer = go_on(job, "response", *flights, *given, output=job.beside("response.h5"))
     named = to_answer if answers.extended is None else to_replay
     return next_command(job, answers.diagnosed, named, to_answer, folder / FILES[1])
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.commands.numbers import go_on
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.consistency.numbers import beyond_belief
 from cpfls_cli.flightlog.results import ImportReport
@@ -43,7 +44,7 @@ def run(job: Job, log: Path) -> Outcome:
 def _next(job: Job, record: FlightRecord) -> Iterator[Command]:
     """Give the command that learns from the flight: a whole vehicle of rotors alone, a model of a torque."""
     if not record.lacks:
-        yield "cpfls", "identify", job.config, job.output, "-o", job.beside("model.h5")
+        yield go_on(job, "identify", job.output, output=job.beside("model.h5"))
     elif record.rotor_speed is not None or record.rotor_command is not None:
         yield "cpfls", "vehicle", job.config, job.output, "-o", job.beside("vehicle.h5")
 

@@ -81,7 +81,7 @@ class Case:
 def run(job: Job, diagnosis: Path | None = None, plot: bool = False) -> Outcome:
     """Plan the flight that tells most, and write it with waypoints for an autopilot."""
     study = job.study
-    with_numbers(job, "trajectory", None)
+    job = with_numbers(job, "trajectory", None)
     inputs = begin(job, {"diagnosis": diagnosis} if diagnosis else {})
     waypoints = job.output.with_name(f"{job.output.stem}-waypoints.csv")
     figures = figure_paths(job, figure_names(held=False) if plot else ())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,9 +10,14 @@ from cpfls_cli.artifacts.job import Job, require_numbers
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.config.check import why_no_body
+from cpfls_cli.config.unknown import needs_numbers
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.models import is_vehicle, with_found_numbers
 from cpfls_cli.pages.model import cautions_of
+from cpfls_cli.pages.repeats import WHAT_TO_FLY
+from cpfls_cli.report.outcome import Command
+from cpfls_cli.trajectory.consistency import coarsest_excited
 from cpfls_cli.words import joined
 
 
@@ -33,8 +39,10 @@ def with_numbers(job: Job, command: str, model: Path | None, *, whole: bool = Fa
     given = None if model is None or is_vehicle(model) or not model.is_file() else model
     if given is not None and holds(given, ModelRecord):
         job.cautions.update(dict.fromkeys(cautions_of(read_record(given, ModelRecord), given.name)))
-    if not whole and given is not None and job.study.vehicle.unknown and holds(given, VehicleRecord):
-        return replace(job, study=with_found_numbers(job.study, given), open_numbers="found")
+    if given is not None and job.study.vehicle.unknown and holds(given, VehicleRecord):
+        job = replace(job, found=given)
+        if not whole:
+            return _with_found(job, given)
     require_numbers(job, command, whole=whole)
     return job
 
@@ -53,4 +61,35 @@ def with_numbers_of(job: Job, found: Path) -> Job:
     unknown = joined(name.replace("_", " ") for name in job.study.vehicle.unknown)
     if unknown:
         job.cautions[f"{unknown}: null in the config, taken from {found.name}"] = None
-    return replace(job, study=with_found_numbers(job.study, found), open_numbers="found")
+    return _with_found(job, found)
+
+
+def _with_found(job: Job, found: Path) -> Job:
+    return replace(job, study=with_found_numbers(job.study, found), open_numbers="found", found=found)
+
+
+def why_no_body_found(job: Job, found: Path) -> str:
+    """Say why no body has the inertia that a vehicle puts into the config of a job; empty where one can have it."""
+    return why_no_body(with_found_numbers(job.study, found).vehicle) if "inertia" in job.study.vehicle.unknown else ""
+
+
+def to_fly(job: Job, output: Path | None = None) -> Command:
+    """Give the command that plans flights that tell more, `mission.h5` where no output is named."""
+    planned = job.study.trajectory
+    words = [job.config if word == "CONFIG" else word for word in WHAT_TO_FLY.split()[:-1]]
+    coarsest = coarsest_excited(planned.excite)
+    # A config of coarser paths is refused an excitation.
+    finer = ("--set", f"trajectory.sample_time_s={coarsest:g}") if planned.sample_time_s > coarsest else ()
+    return (*words[:-1], *finer, words[-1], output or job.beside("mission.h5"))
+
+
+def go_on(job: Job, command: str, *words: str | Path, output: Path) -> Command:
+    """Give a command that goes on with the config of a job; what that leaves open it takes as the job did."""
+    taken: Sequence[str | Path] = ()
+    # A path asks for none of them, but what a flight is to tell hangs on all.
+    if needs_numbers(job.study.vehicle, command) or (job.study.vehicle.unknown and "--for" in words):
+        if job.found is not None:
+            taken = () if "--model" in words else ("--model", job.found)
+        elif job.open_numbers == "guessed" or "--model" not in words:
+            taken = ("--accept-guesses",)
+    return "cpfls", command, job.config, *words, *taken, "-o", output

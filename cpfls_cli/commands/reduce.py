@@ -10,6 +10,7 @@ import numpy as np
 
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.selection import SelectionRecord
+from cpfls_cli.commands.numbers import go_on
 from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError
 from cpfls_cli.flights.training import flight_roles, split_training, uniform_regressor
@@ -17,7 +18,7 @@ from cpfls_cli.pages.selection import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.reduction.survey import survey
 from cpfls_cli.reduction.training_set import check_streamed, random_streamed, reduce_streamed
-from cpfls_cli.report.outcome import Command, Outcome, nothing_written
+from cpfls_cli.report.outcome import Outcome, nothing_written
 
 RANDOM_DRAWS = 20
 
@@ -37,16 +38,7 @@ def run(job: Job, flights: Sequence[Path]) -> Outcome:
     random = np.array([draw.condition_number for draw in draws])
     indices = split.training_indices[selection.indices]
     record = finish(job, SelectionRecord.of(selection, indices, surveyed.samples, random), inputs)
-    to_identify: Command = (
-        "cpfls",
-        "identify",
-        job.config,
-        *flights,
-        "--selection",
-        job.output,
-        "-o",
-        job.beside("model.h5"),
-    )
+    to_identify = go_on(job, "identify", *flights, "--selection", job.output, output=job.beside("model.h5"))
     return Outcome(record.summary, tuple(answer(source_of(job, record))), next=(to_identify,))
 
 

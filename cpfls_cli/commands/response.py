@@ -13,8 +13,8 @@ from cpfls_cli.artifacts.replay import VEHICLE, contradictions_of
 from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, ResponseRecord
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
-from cpfls_cli.commands.compare import to_correct, to_fly
-from cpfls_cli.commands.numbers import with_numbers
+from cpfls_cli.commands.compare import to_correct, to_gap
+from cpfls_cli.commands.numbers import to_fly, with_numbers
 from cpfls_cli.commands.replay import model_notes
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import learned_by, read_model
@@ -74,8 +74,7 @@ def _next(job: Job, record: ResponseRecord, flights: Sequence[Path], model: Path
         return to_fly(job)
     if NOT_ACCEPTABLE not in words and model is not None:
         return "cpfls", "export", model, "-o", job.beside(f"{model.stem}.c")
-    given = () if model is None else ("--model", model)
-    return "cpfls", "gap", job.config, *flights, *given, "-o", job.beside("gap")
+    return to_gap(job, flights, model)
 
 
 def _left_out(moved_by: Instruments, flights: Sequence[LoggedFlight]) -> Iterator[str]:

@@ -18,7 +18,7 @@ from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands import tracking
-from cpfls_cli.commands.numbers import with_numbers
+from cpfls_cli.commands.numbers import go_on, with_numbers
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError
@@ -101,7 +101,7 @@ def _inverse(
         raise ComputationError("\n".join([*problems, f"{trajectory}: no flight was written; {remedy}"]))
     record = finish(job, FlightRecord.of_simulation({"time": time, **flight.signals}, flight.noise_std), inputs)
     warnings = (Text(problem, "warning") for problem in problems)
-    to_reduce = ("cpfls", "reduce", job.config, job.output, "-o", job.beside("selection.h5"))
+    to_reduce = go_on(job, "reduce", job.output, output=job.beside("selection.h5"))
     return Outcome(_summary(flight, record), (*answer(source_of(job, record)), *warnings), next=(to_reduce,))
 
 
@@ -120,7 +120,7 @@ def _closed_loop(
     return Outcome(
         _summary(flight, record) | {"tracking": errors, "effects": effects},
         (autopilot_text(**errors), *calm, *answer(source_of(job, record)), *clipped),
-        next=(("cpfls", "gap", job.config, job.output, "-o", job.beside("gap")),),
+        next=(go_on(job, "gap", job.output, output=job.beside("gap")),),
     )
 
 

@@ -15,7 +15,7 @@ from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
 from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.trajectory import ExcitedGroup, TrajectoryRecord
 from cpfls_cli.commands.mission import Mission, mission_paths, mission_texts, write_mission
-from cpfls_cli.commands.numbers import with_numbers
+from cpfls_cli.commands.numbers import go_on, with_numbers
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError, SettingError
 from cpfls_cli.excitation.optimise import Excitation, optimised_rotation
@@ -113,7 +113,7 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False, mission: Mi
 
 def to_simulate(job: Job) -> Command:
     """Give the command that flies the path of a job."""
-    return "cpfls", "simulate", job.config, job.output, "-o", job.beside("flight.h5")
+    return go_on(job, "simulate", job.output, output=job.beside("flight.h5"))
 
 
 def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:

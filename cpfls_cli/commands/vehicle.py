@@ -14,6 +14,7 @@ from cpfls_cli.artifacts.output import refuse_own, write_text
 from cpfls_cli.artifacts.parameters import vehicle_section
 from cpfls_cli.artifacts.replay import HeldOutGroup, contradictions_of
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.commands.numbers import to_fly
 from cpfls_cli.commands.stopped import stopped, without_model
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.config.yaml_text import to_yaml
@@ -22,7 +23,6 @@ from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.playback import flights_to_play, played
 from cpfls_cli.flights.recordings import refuse_seen, seen_twice
 from cpfls_cli.pages.model import answer
-from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.parameters import MASS, blocks_of
@@ -103,12 +103,12 @@ def run(
         written = _write_config(config, record)
         checkpoint.remove()
     outcome = Outcome(
-        record.summary, (*answer(source_of(job, record)), *written), next=_next(job, record, flights, held_out)
+        record.summary, (*answer(source_of(job, record)), *written), next=next_commands(job, record, flights, held_out)
     )
     return stopped(outcome, "generations" if record.complete else "interrupted", signal, job.output)
 
 
-def _next(
+def next_commands(
     job: Job, record: VehicleRecord, flights: Sequence[Path], held_out: Sequence[Path]
 ) -> tuple[Sequence[str | Path], ...]:
     """Give the commands that show what was found, and that judge it, plan what would tell more, or hand it over."""
@@ -116,10 +116,9 @@ def _next(
     page = ("cpfls", "report", config, job.output, "-o", job.output.with_suffix(".html"))
     if not record.complete:
         return (page,)
-    if record.trust in (Trust.LOOP, Trust.NOT_DETERMINED, Trust.LACKING):
+    if record.trust in (Trust.LOOP, Trust.NOT_DETERMINED, Trust.LACKING, Trust.DO_NOT_USE):
         mission = job.output.with_name(f"{name}-mission.h5")
-        words = [config if word == "CONFIG" else word for word in WHAT_TO_FLY.split()[:-1]]
-        return page, (*words, mission)
+        return page, to_fly(job, mission)
     if not held_out and len(flights) > 1:
         judged = job.output.with_name(f"{name}-judged.h5")
         return page, ("cpfls", "vehicle", config, *flights[:-1], "--held-out", flights[-1], "-o", judged)

@@ -86,14 +86,27 @@ def gone_lines(data: dict[str, Any], source: str) -> list[str]:
 
 
 def _no_body(study: Study) -> Iterator[str]:
-    """Refuse, of configs alone, moments of inertia of no body: a principal one is at most the sum of the others."""
-    smallest, middle, largest = np.linalg.eigvalsh(symmetric(study.vehicle.inertia_kg_m2))
-    if largest > (smallest + middle) * MEASURED:
+    """Refuse, of configs alone, moments of inertia of no body: a principal one is at most the sum of the others.
+
+    What stands for one that a config leaves open is not stated by it.
+    """
+    why = why_no_body(study.vehicle)
+    if why and "inertia" not in study.vehicle.unknown:
         yield (
-            f"vehicle.inertia_kg_m2 = {json.dumps(study.vehicle.inertia_kg_m2)}: no body has this inertia, its largest "
-            f"principal moment {largest:.4g} is more than the other two together, {smallest + middle:.4g}; look at the "
-            "units and the order Ixx, Iyy, Izz, Ixy, Ixz, Iyz"
+            f"vehicle.inertia_kg_m2 = {json.dumps(study.vehicle.inertia_kg_m2)}: {why}; look at the units and the "
+            "order Ixx, Iyy, Izz, Ixy, Ixz, Iyz"
         )
+
+
+def why_no_body(vehicle: VehicleSettings) -> str:
+    """Say why no body has the inertia of a vehicle; empty where one can."""
+    smallest, middle, largest = np.linalg.eigvalsh(symmetric(vehicle.inertia_kg_m2))
+    if largest <= (smallest + middle) * MEASURED:
+        return ""
+    return (
+        f"no body has this inertia, its largest principal moment {largest:.4g} is more than the other two together, "
+        f"{smallest + middle:.4g}"
+    )
 
 
 def _no_vehicle(vehicle: VehicleSettings) -> Iterator[tuple[Location, str]]:

@@ -35,13 +35,15 @@ _OFF: Final[dict[Unknown, str]] = {
 }
 """How many times a guess real vehicles have: by the ranges above, and hover at 0.4 to 0.8 of the largest speed."""
 
-_TAKEN = frozenset({"import", "vehicle", "replay", "response", "report", "export", "predict", "compare", "trajectory"})
-_TAKEN |= {"simulate", "gap"}
+_TAKEN = frozenset({"import", "vehicle", "report", "export", "predict", "trajectory"})
+_GUESSED: Final = "guesses from mass and arms stand for what the config leaves open (--accept-guesses)"
+
+_OF_MODELS = frozenset({"replay", "response", "compare", "simulate", "gap", "extend"})
+_TAKEN |= _OF_MODELS
 """Commands that work with guesses; a report and an export are of a model, which has its own numbers.
 
-`predict`, `replay`, `response`, `compare`, `simulate` and `gap` do with those of a whole vehicle, and ask
-`require_known` where theirs is another; `trajectory` where torque or effects choose the path. Else guesses only serve
-to check what it asks of the rotors.
+`predict` and those of models do with those of a whole vehicle, and ask `require_known` where theirs is another;
+`trajectory` where torque or effects choose the path. Else guesses only serve to check what it asks of the rotors.
 """
 
 
@@ -103,9 +105,14 @@ def _guesses(vehicle: dict[str, Any], rotors: list[dict[str, Any]]) -> dict[Unkn
     }
 
 
+def is_of_guesses(caution: str) -> bool:
+    """Tell whether a caution, as `require_known` gives it, says that guesses were taken."""
+    return caution.startswith(_GUESSED)
+
+
 def needs_numbers(vehicle: VehicleSettings, command: str) -> bool:
     """Tell whether a command would take for facts what a config leaves open, of a vehicle without a model."""
-    return bool(vehicle.unknown) and command not in _TAKEN - {"replay", "simulate", "compare", "response"}
+    return bool(vehicle.unknown) and command not in _TAKEN - _OF_MODELS
 
 
 def require_known(study: Study, command: str, *, whole: bool = True, accept: bool = False) -> tuple[str, ...]:
@@ -122,8 +129,8 @@ def require_known(study: Study, command: str, *, whole: bool = True, accept: boo
     if accept:
         off = ", ".join(f"{name.replace('_', ' ')} {_OFF[name]}" for name in unknown)
         return (
-            f"guesses from mass and arms stand for what the config leaves open (--accept-guesses); of a guess real "
-            f"vehicles have times: {off}; torques, rates and gains that follow are off by as much",
+            f"{_GUESSED}; of a guess real vehicles have times: {off}; torques, rates and gains that follow are off by "
+            "as much",
         )
     keys = ", ".join(f"vehicle.{'' if name == 'inertia' else 'rotors.'}{KEYS[name]}" for name in unknown)
     ways = "--model VEHICLE.h5 takes the numbers that `cpfls vehicle` found, --accept-guesses those from mass and arms"

@@ -53,7 +53,7 @@ def share_words(share: float) -> str:
 
 def effect_sentence(effect: NamedEffect) -> str:
     """Say how large a named effect is, and how sure."""
-    return f"{capitalised(effect_title(effect.name))} ({effect.name}): {_size(effect)}."
+    return f"{capitalised(effect_title(effect.name))} ({effect.name}): {_size(effect, 'the gap')}."
 
 
 def capitalised(words: str) -> str:
@@ -63,17 +63,17 @@ def capitalised(words: str) -> str:
 
 def closest_sentence(effect: NamedEffect) -> str:
     """Say which effect came closest to a gap that it does not explain."""
-    return (
-        f"The closest was {effect_title(effect.name)}, which does not explain the gap: {effect.name}, {_size(effect)}."
-    )
+    size = _size(effect, "what the fit explains")
+    return f"The closest was {effect_title(effect.name)}, which does not explain the gap: {effect.name}, {size}."
 
 
-def _size(effect: NamedEffect) -> str:
+def _size(effect: NamedEffect, whole: str) -> str:
+    """Write the numbers of an effect, how sure it is, and its share of a whole."""
     chance = probability(effect.p_value)
     p_value = f"p {chance}" if chance.startswith("<") else f"p = {chance}"
     relative = effect.name.endswith(_RELATIVE)
     numbers = "; ".join(_relative(effect.name, c) if relative else _coefficient(c) for c in effect.coefficients)
-    return f"{numbers} ({p_value}, {share_words(effect.share)} of the gap)".lstrip()
+    return f"{numbers} ({p_value}, {share_words(effect.share)} of {whole})".lstrip()
 
 
 def _coefficient(coefficient: Estimate) -> str:
@@ -92,11 +92,12 @@ def _relative(effect: str, number: Estimate) -> str:
     return f"{name} {value} % [{low}, {high}]"
 
 
-def wrong_numbers(effects: NamedEffectsGroup) -> list[str]:
-    """List the numbers of the vehicle that a verdict calls wrong, each with its error, `Izz +24 %`."""
+def wrong_numbers(effects: NamedEffectsGroup) -> dict[str, str]:
+    """Give the numbers of the vehicle that a verdict calls wrong, each with its error, `Izz +24 %`, by identifier."""
     named = [effect for effect in effects.named if effect.name == VEHICLE_NUMBERS.name]
-    errors = [_error_words(effect.name, number) for effect in named for number in effect.coefficients]
-    return [f"{name} {value} %" for name, value, *_ in errors]
+    numbers = [(effect, number) for effect in named for number in effect.coefficients]
+    words = ((number.name, _error_words(effect.name, number)) for effect, number in numbers)
+    return {name: f"{short} {value} %" for name, (short, value, *_) in words}
 
 
 def _error_words(effect: str, number: Estimate) -> list[str]:

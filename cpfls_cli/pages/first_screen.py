@@ -11,6 +11,8 @@ from cpfls_cli.artifacts.diagnosis import KINDS, DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.gap_effects import PlaybackChangeGroup
 from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING
+from cpfls_cli.config.load import stored_study
+from cpfls_cli.config.unknown import is_of_guesses
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.naming.results import Alternative, GapVerdict
 from cpfls_cli.pages.effects import (
@@ -44,6 +46,8 @@ _TONES: dict[str, Tone] = {
     GapVerdict.FLIGHTS_DIFFER: "warning",
 }
 _EFFECTS_SHOWN = 2
+_PRINTED = 2
+"""Digits of what is played back."""
 _ENERGY = {"feeds": ", feeds energy into the motion", "drains": ", drains energy from the motion"}
 _USE = "take the model with it, extended.h5"
 _GUSTS = "nothing on the model: what is left are gusts or noise; fly in still air, or more runs, to see what is smaller"
@@ -106,8 +110,15 @@ def verdict_box(record: DiagnosisRecord) -> Box:
     named = [effect_sentence(effect) for effect in record.effects.named]
     named += [closest_sentence(effect) for effect in record.effects.closest]
     named += [NO_EFFECT] if record.only_gusts else []
+    named = [*_of_model(record), *named]
     label = record.verdict.replace("_", " ")
     return Box(label, _headline(record), named, _TONES.get(record.verdict, "note"))
+
+
+def _of_model(record: DiagnosisRecord) -> list[str]:
+    """Say what speaks first against the model that the gap is one of; of guesses the headline says it."""
+    said = [each for each in record.origin.cautions if not is_of_guesses(each)]
+    return [f"The gap is that of {said[0].rstrip('.')}."] if said else []
 
 
 def _headline(record: DiagnosisRecord) -> str:
@@ -138,9 +149,22 @@ def _blame(record: DiagnosisRecord) -> Iterator[str]:
     if sensors:
         yield f"The sensors are at fault: {joined(titles(sensors))}."
     if record.effects.names("parameter"):
-        wrong = wrong_numbers(record.effects)
-        which = ": its inertia or its thrust" if not wrong else f": {joined(wrong)} against the config"
-        yield f"{'Numbers of the vehicle are' if len(wrong) > 1 else 'A number of the vehicle is'} wrong{which}."
+        wrong = list(_wrong(record))
+        which = f": {joined(wrong)}" if wrong else ": its inertia or its thrust"
+        several = len(wrong_numbers(record.effects)) > 1
+        yield f"{'Numbers of the vehicle are' if several else 'A number of the vehicle is'} wrong{which}."
+
+
+def _wrong(record: DiagnosisRecord) -> Iterator[str]:
+    """Say of the wrong numbers how far they are off, and from what: from what was taken where the config has null."""
+    vehicle = stored_study(record.origin.config, "the diagnosis").vehicle
+    guessed = any(map(is_of_guesses, record.origin.cautions))
+    taken = "the guess" if guessed else "the vehicle that was found"
+    by_place: dict[str, list[str]] = {}
+    for name, words in wrong_numbers(record.effects).items():
+        quantity = "thrust_factor" if name == "thrust_scale" else name.rpartition("_")[0]
+        by_place.setdefault(taken if quantity in vehicle.unknown else "the config", []).append(words)
+    yield from (f"{joined(words)} against {place}" for place, words in by_place.items())
 
 
 def _ambiguous(record: DiagnosisRecord) -> str:
@@ -258,6 +282,9 @@ def next_steps(record: DiagnosisRecord) -> list[str]:
     if record.contradiction:
         return ["Correct what is wrong, in the section `import` of the config or in `vehicle`, and run this again."]
     usual = _GUSTS if record.only_gusts and record.verdict == GapVerdict.UNEXPLAINED else _NEXT.get(record.verdict)
+    farther = [] if record.playback is None else _farther_off(record.playback)
+    if usual and _USE in usual and farther:
+        usual = f"leave the model as it is: with what is named, held-out flights play back worse in {joined(farther)}"
     first = [f"to tell {flight}" for flight in _telling_flights(record)]
     # A rival that was not tried wants a signal, and two that do what one does another log; else a flight is planned.
     rivals = record.alternative.rows()
@@ -299,9 +326,18 @@ def _gap_row(record: DiagnosisRecord, channel: int) -> list[str | Cell]:
 def _playback_rows(playback: PlaybackChangeGroup) -> Iterator[list[str | Cell]]:
     for signal, end in playback.at_end.items():
         words, unit, scale = signal_scale(signal)
-        values = [number(scale * value, 2) for value in (end.before, end.after, end.without_model)]
+        values = [number(scale * value, _PRINTED) for value in (end.before, end.after, end.without_model)]
         than = f"{'worse' if end.worse else 'better'} than “{prediction_words(end.rival)}”"
         yield [f"playback, {words}", unit, *values, Cell(than, "warning" if end.worse else "plain")]
+
+
+def _farther_off(playback: PlaybackChangeGroup) -> list[str]:
+    """List the signals that the model with the effects plays back worse than the model as given, as printed."""
+    return [
+        signal_scale(signal)[0]
+        for signal, end in playback.at_end.items()
+        if float(number(end.after, _PRINTED)) > float(number(end.before, _PRINTED))
+    ]
 
 
 def _playback_words(playback: PlaybackChangeGroup) -> str:

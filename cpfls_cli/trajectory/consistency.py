@@ -11,7 +11,7 @@ from cpfls_cli.errors import SettingError
 from cpfls_cli.trajectory.profile import BaseProfile
 
 if TYPE_CHECKING:
-    from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
+    from cpfls_cli.trajectory.settings import ExciteSettings, TrajectorySettings, WaypointSettings
 
 _LARGEST_PEAK = 1e100
 # Of the fastest wave of an excitation, between which an autopilot and a simulation interpolate.
@@ -76,10 +76,15 @@ def _check_excited(settings: TrajectorySettings) -> None:
         return
     if settings.held or settings.path == "next-flight":
         raise SettingError("excite.axes", f"excite a path in space; path {settings.path} chooses its motion itself")
-    if high * settings.sample_time_s * _SAMPLES_IN_A_PERIOD > 1 + 1e-9:
+    if settings.sample_time_s > (1 + 1e-9) * coarsest_excited(asked):
         message = f"leaves less than {_SAMPLES_IN_A_PERIOD} samples in a period of {high:g} Hz, the top of"
-        remedy = f"lower it to {1 / (_SAMPLES_IN_A_PERIOD * high):.3g} or less"
+        remedy = f"lower it to {coarsest_excited(asked):.3g} or less"
         raise SettingError("sample_time_s", f"{message} excite.band_hz; {remedy}")
+
+
+def coarsest_excited(asked: ExciteSettings) -> float:
+    """Give the largest sample time that holds an excitation, s."""
+    return 1 / (_SAMPLES_IN_A_PERIOD * asked.band_hz[1])
 
 
 def _check_repeated(settings: TrajectorySettings) -> None:

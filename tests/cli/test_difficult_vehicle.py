@@ -13,6 +13,7 @@ from cpfls_cli.artifacts.store import read_any, write_record
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.export.registry import FORMS
+from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.playback.model import VehicleModel
 from tests.builders.command_line import undrawn
 from tests.builders.vehicle_models import record_of
@@ -26,6 +27,7 @@ HEADLINE = (
 HEAVY = "too heavy for 0.8 kg between these rotors (Ixx 0.05 where"
 ROTATION = ("--set", "trajectory.path=full-rotation")
 TRUE = (0.05, 0.0044, 0.0075)
+HEAVY_BODY = (0.05, 0.045, 0.0075)
 GUESSED = "guesses from mass and arms stand for what the config leaves open (--accept-guesses)"
 
 
@@ -47,10 +49,21 @@ def config(folder):
 
 @pytest.fixture(scope="module")
 def vehicle(config, folder):
-    """A vehicle whose flights show the loop, with an inertia that no body of its mass has."""
-    study, path = load_study(config), folder / "vehicle.h5"
-    record = record_of(VehicleModel(vehicle=replace(study.vehicle, inertia_kg_m2=TRUE)), resolved_yaml(study))
-    numbers = replace(record.found, value=np.array([TRUE[0], 0.0]), determined=np.array([False, True]))
+    """A vehicle whose flights show the loop, with an inertia that no body has."""
+    return written_vehicle(config, folder / "vehicle.h5", TRUE)
+
+
+@pytest.fixture(scope="module")
+def heavy(config, folder):
+    """The same with an inertia that a body can have, but none of its mass."""
+    return written_vehicle(config, folder / "heavy" / "vehicle.h5", HEAVY_BODY)
+
+
+def written_vehicle(config, path, inertia):
+    path.parent.mkdir(exist_ok=True)
+    study = load_study(config)
+    record = record_of(VehicleModel(vehicle=replace(study.vehicle, inertia_kg_m2=inertia)), resolved_yaml(study))
+    numbers = replace(record.found, value=np.array([inertia[0], 0.0]), determined=np.array([False, True]))
     write_record(path, replace(record, found=numbers, loop=replace(record.loop, shown=True)))
     return path
 
@@ -102,7 +115,7 @@ COMMANDS = ("simulate", "replay", "trajectory", "gap", "compare", "response", "i
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_refusal_names_both_ways_and_each_of_them_works(cpfls, refuse, command, vehicle, name):
+def test_a_refusal_names_both_ways_and_each_of_them_works(cpfls, refuse, command, vehicle, heavy, name):
     (line,) = refuse(*command(name))
     assert "vehicle.inertia_kg_m2" in line
     assert "--model VEHICLE.h5 takes the numbers that `cpfls vehicle` found" in line
@@ -112,7 +125,8 @@ def test_a_refusal_names_both_ways_and_each_of_them_works(cpfls, refuse, command
     (said,) = json.loads(guessed.stdout)["cautions"]
     assert said.startswith(GUESSED)
     assert "inertia 0.8 to 4" in said
-    found = cpfls(*command(name), "--model", vehicle, "--json", "--force")
+    # A gap is told from a body alone.
+    found = cpfls(*command(name), "--model", heavy if name == "gap" else vehicle, "--json", "--force")
     assert found.exit_code == 0, found.stderr
     first, *others = json.loads(found.stdout)["cautions"]
     assert first == f"vehicle.h5: {HEADLINE}"
@@ -130,6 +144,22 @@ def test_found_numbers_stand_in_for_open_ones(cpfls, command, vehicle, tmp_path)
     assert cpfls(*command("replay"), "--model", vehicle).exit_code == 0
     stored = yaml.safe_load(read_any(tmp_path / "out").origin.config)["vehicle"]
     assert stored["inertia_kg_m2"] == pytest.approx(TRUE)
+
+
+def test_what_was_made_from_an_inertia_of_no_body_is_read_again(cpfls, config, command, vehicle, tmp_path):
+    assert cpfls(*command("replay"), "--model", vehicle).exit_code == 0
+    with undrawn():
+        read = cpfls("report", config, tmp_path / "out", "-o", tmp_path / "page.html")
+    assert read.exit_code == 0, read.stderr
+
+
+def test_no_gap_is_told_from_an_inertia_of_no_body(refuse, command, vehicle):
+    (line,) = refuse(*command("gap"), "--model", vehicle)
+    assert line == (
+        f"{vehicle}: no body has this inertia, its largest principal moment 0.05 is more than the other two together, "
+        f"0.0119, so no gap is told from it; --accept-guesses takes guesses from mass and arms, or fly what tells its "
+        f"inertia: {WHAT_TO_FLY}"
+    )
 
 
 def test_only_a_vehicle_that_was_found_has_numbers_to_take(refuse, command, flight):

@@ -64,6 +64,13 @@ def test_a_log_where_an_artifact_belongs(refuse, log, study, tmp_path, command):
     assert line == f"{log}: is a log, and this takes what cpfls made: cpfls import CONFIG {log} -o log.h5"
 
 
+def test_a_name_with_spaces_can_be_pasted(refuse, log, tmp_path):
+    spaced = tmp_path / "my log.csv"
+    spaced.write_bytes(log.read_bytes())
+    (line,) = refuse("info", spaced)
+    assert line.endswith(f": cpfls import CONFIG '{spaced}' -o 'my log.h5'")
+
+
 def test_a_config_where_an_artifact_belongs(refuse, study):
     (line,) = refuse("info", study)
     assert line == f"{study}: is a config, and this takes what cpfls made; `cpfls config {study}` shows it"

@@ -2,19 +2,27 @@
 
 import shlex
 import shutil
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import patch
 
 import pytest
 import typer
+import yaml
 
+from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.cli import terminal
 from cpfls_cli.cli.app import app
+from cpfls_cli.config.load import load_study
+from cpfls_cli.config.study import resolved_yaml
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Table, unfolded
 from cpfls_cli.report.terminal import terminal_lines
 from tests.builders.shifted_flights import CONFIG, OFFSET, flight_table, save
 from tests.builders.studies import VEHICLE
 from tests.builders.unknown_logs import flat_log, flight, write_csv
+from tests.builders.vehicle_models import record_of
 
 COLUMNS, LINES, ANSWER, WIDEST = 80, 24, 15, 100
 WHOLE = ("config",)
@@ -49,7 +57,7 @@ def screens(cpfls, pipeline, study, tmp_path_factory):
             environment.chdir(folder)
             result = cpfls(command, *words, *options)
         assert told, result.output
-        shown[name] = SimpleNamespace(command=command, result=result, outcome=told[0])
+        shown[name] = SimpleNamespace(command=command, result=result, outcome=told[0], folder=folder)
 
     for source in (study, *pipeline.paths.values()):
         # Names as short as people's: a command is as long as the names in it.
@@ -57,6 +65,7 @@ def screens(cpfls, pipeline, study, tmp_path_factory):
     _of_torque(show)
     _of_gaps(show, folder)
     _of_logs(show, folder)
+    _of_open_numbers(show, folder)
     return shown
 
 
@@ -105,6 +114,30 @@ def _of_logs(show, folder):
     show("import", "import", "found.yaml", names[0], output="log1.h5")
 
 
+def _of_open_numbers(show, folder):
+    """Show what goes on from a vehicle whose config leaves its numbers open: they are guessed, or were found."""
+    config, data = folder / "open.yaml", yaml.safe_load(CONFIG + VEHICLE)
+    study = load_study(folder / "gap.yaml")
+    (folder / "own").mkdir()
+    write_record(folder / "own" / "vehicle.h5", record_of(VehicleModel(vehicle=study.vehicle), resolved_yaml(study)))
+    wide = VehicleModel(vehicle=replace(study.vehicle, inertia_kg_m2=(3.0, 0.6, 1.2)))
+    write_record(folder / "own" / "wide.h5", record_of(wide, resolved_yaml(study)))
+    data["vehicle"]["inertia_kg_m2"] = None
+    for rotor in data["vehicle"]["rotors"]:
+        rotor |= {"thrust_factor_n_s2": None, "drag_factor_n_m_s2": None}
+    config.write_text(yaml.safe_dump(data))
+    show("open: trajectory", "trajectory", "open.yaml", output="open-path.h5")
+    for name, taken in (("guessed", ("--accept-guesses",)), ("found", ("--model", "own/vehicle.h5"))):
+        own = f"{name}-"
+        show(f"{name}: trajectory", "trajectory", "open.yaml", *taken, output=f"{own}path.h5")
+        show(f"{name}: simulate", "simulate", "open.yaml", "open-path.h5", *taken, output=f"{own}flight.h5")
+        show(f"{name}: compare", "compare", "open.yaml", "flight_1.csv", *taken, output=f"{own}compared.h5")
+        show(f"{name}: response", "response", "open.yaml", "flight_1.csv", *taken, output=f"{own}response.h5")
+        show(f"{name}: diagnose", "diagnose", "open.yaml", f"{own}compared.h5", *taken, output=f"{own}named.h5")
+        show(f"{name}: gap", "gap", "open.yaml", "flight_1.csv", *taken, output=f"{own}gap")
+    show("wide: compare", "compare", "open.yaml", "flight_1.csv", "--model", "own/wide.h5", output="wide-compared.h5")
+
+
 NAMES = (
     *("trajectory", "mission", "simulate", "tracking", "reduce", "identify", "sweep", "response"),
     *("info flight", "info selection", "info diagnosis", "check", "effects", "effect payload", "effect flexible_mount"),
@@ -114,6 +147,15 @@ NAMES = (
 """Runs by name."""
 OF_MODELS = ("predict", "replay", "report", "export")
 """Of these the words are held beside their flights."""
+OF_OPEN_NUMBERS = (
+    "open: trajectory",
+    *(
+        f"{how}: {command}"
+        for how in ("guessed", "found")
+        for command in ("trajectory", "simulate", "compare", "response", "diagnose", "gap")
+    ),
+    "wide: compare",
+)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -134,6 +176,24 @@ def test_the_next_command_is_whole(screens, name):
     assert all(line.startswith("cpfls ") and "CONFIG" not in line and "FLIGHT" not in line for line in printed)
 
 
+@pytest.mark.parametrize("name", [*NAMES, *OF_MODELS, *OF_OPEN_NUMBERS])
+def test_the_next_command_is_accepted_where_it_was_printed(cpfls, screens, name, monkeypatch):
+    shown = screens[name]
+    monkeypatch.chdir(shown.folder)
+    for number, command in enumerate(shown.outcome.next):
+        words = [str(word) for word in command[1:]]
+        if any("ASK" in Path(word).read_text() for word in words if word.endswith(".yaml") and Path(word).exists()):
+            continue
+        # What a later command reads is made; all else is only checked, as if it was not there yet.
+        output = words.index("-o") + 1 if "-o" in words else None
+        made = output and any(words[output] in map(str, later) for later in shown.outcome.next[number + 1 :])
+        if output and not made:
+            words[output] = str(Path("next", words[output]))
+            Path(words[output]).parent.mkdir(parents=True, exist_ok=True)
+        result = cpfls(*words, *(["--force"] if made else ["--dry-run"]))
+        assert result.exit_code == 0, (words, result.output)
+
+
 @pytest.mark.parametrize("name", [*NAMES, *OF_MODELS])
 def test_no_table_is_wider_than_people_read(screens, name):
     tables = [block for block in unfolded(screens[name].outcome.blocks) if isinstance(block, Table)]
@@ -148,4 +208,4 @@ def _without_caption(table):
 def test_every_command_is_shown(screens):
     commands = set(typer.main.get_command(app).commands)
     assert {each.command for each in screens.values()} >= commands - {*WHOLE, "vehicle", "verify-export"}
-    assert set(screens) == {*NAMES, *OF_MODELS}
+    assert set(screens) == {*NAMES, *OF_MODELS, *OF_OPEN_NUMBERS}

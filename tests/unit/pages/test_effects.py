@@ -38,6 +38,8 @@ def test_ends_of_an_interval_can_be_told_apart_and_rounding_makes_no_certainty()
     assert closest_sentence(OFFSET).startswith(
         "The closest was offset of the centre of mass, which does not explain the gap: "
     )
+    # Of an effect that is not the answer the share is none of the gap.
+    assert closest_sentence(OFFSET).endswith("(p < 10⁻⁶, more than 99 % of what the fit explains).")
 
 
 def test_a_power_of_ten_that_all_three_have_stands_once():

@@ -1,5 +1,7 @@
 """The first screen of a diagnosis: each sentence from the facts of a record, and nothing that its numbers deny."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.pages.first_screen import counted_notes, first_screen, model_words, next_steps, notes_on_flights
 from cpfls_cli.report.content import Box, Facts, Table, Text
 from tests.builders import gap_artifacts as made
+from tests.builders.vehicle_search import CONFIG
 
 RIVALS = [("torque_bias", "com_offset", 0.98, "change the thrust", "")]
 USE = "Take the model with it, extended.h5"
@@ -85,6 +88,41 @@ def test_a_wrong_number_of_the_vehicle_is_named_as_people_do():
     assert box.sentences == [
         "Wrong inertia or thrust scale (parameter_error): Izz +24.0 % [+20.0, +28.1] (p < 10⁻⁶, 93 % of the gap)."
     ]
+
+
+GUESSED = "guesses from mass and arms stand for what the config leaves open (--accept-guesses); of a guess"
+
+
+@pytest.mark.parametrize(
+    ("moments", "cautions", "against"),
+    [
+        ("[0.0040, 0.0044, 0.0075]", (GUESSED,), "the config"),
+        ("null", (GUESSED,), "the guess"),
+        ("null", ("vehicle.h5: DO NOT USE",), "the vehicle that was found"),
+    ],
+)
+def test_a_number_is_wrong_against_what_was_taken_for_it(moments, cautions, against):
+    record = diagnosis(named=({"name": "parameter_error", "kind": "parameter"},))
+    made_with = replace(record.origin, config=CONFIG.replace("[0.0040, 0.0044, 0.0075]", moments), cautions=cautions)
+    box, *_ = screen(record.with_header(made_with))
+    assert box.title == f"A number of the vehicle is wrong: Izz +24.0 % against {against}."
+
+
+def test_what_speaks_against_the_model_stands_in_the_box():
+    record = diagnosis()
+    cautions = (GUESSED, "vehicle.h5: DO NOT USE: predicts no better.", "more")
+    box, *_ = screen(record.with_header(replace(record.origin, cautions=cautions)))
+    assert box.sentences[0] == "The gap is that of vehicle.h5: DO NOT USE: predicts no better."
+    assert "The gap is that of" not in "".join(screen(diagnosis())[0].sentences)
+
+
+@pytest.mark.parametrize("verdict", ["NAMED", "PARTIAL", "AMBIGUOUS"])
+def test_a_model_that_plays_back_worse_is_not_to_be_taken(verdict):
+    worse = made.played_pair(body_rate=(0.5, 0.3, 0.3, 0.4), attitude=(0.1, 0.3, 0.3, 0.2))
+    said = next_steps(diagnosis(verdict, **worse))
+    assert said[-1] == ("Leave the model as it is: with what is named, held-out flights play back worse in body rate.")
+    alike = made.played_pair(body_rate=(0.4001, 0.5, 0.5, 0.4), attitude=(0.1, 0.3, 0.3, 0.2))
+    assert "ake the model with it" in next_steps(diagnosis(verdict, **alike))[-1]
 
 
 def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_tells():

@@ -1,0 +1,27 @@
+"""What goes on from a vehicle that was found, by how far to trust it."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from cpfls_cli.artifacts.job import Job
+from cpfls_cli.commands.vehicle import next_commands
+from cpfls_cli.config.load import parse_config, validate
+from cpfls_cli.validation.trust import Trust
+from tests.builders.vehicle_search import CONFIG
+
+
+@pytest.mark.parametrize("trust", Trust)
+def test_a_vehicle_that_nobody_should_use_is_flown_for_and_not_handed_over(trust):
+    study = validate(parse_config(CONFIG, "config"), "config")
+    job = Job(study, Path("own/found.h5"), False, False, lambda *_: None, lambda _: None, config=Path("c.yaml"))
+    page, (_, command, *words) = next_commands(job, SimpleNamespace(complete=True, trust=trust), [Path("f.h5")], ())
+    assert page[:2] == ("cpfls", "report")
+    poor = trust in (Trust.LACKING, Trust.NOT_DETERMINED, Trust.LOOP, Trust.DO_NOT_USE)
+    assert command == ("trajectory" if poor else "export")
+    assert words[-1] == (Path("own/found-mission.h5") if poor else Path("own/found.c"))
+    coarse = replace(job, study=study.model_copy(update={"trajectory": replace(study.trajectory, sample_time_s=0.1)}))
+    _, (*mission, _) = next_commands(coarse, SimpleNamespace(complete=True, trust=Trust.LOOP), [Path("f.h5")], ())
+    assert "trajectory.sample_time_s=0.02" in mission
