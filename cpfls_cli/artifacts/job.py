@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.output import check_output
 from cpfls_cli.artifacts.spec import Header, InputFile, Record
 from cpfls_cli.artifacts.store import file_sha256, format_name, read_header, write_parts, write_record
 from cpfls_cli.config.study import Study, resolved_yaml
-from cpfls_cli.config.unknown import require_known
+from cpfls_cli.config.unknown import needs_numbers, require_known
 from cpfls_cli.errors import InputError, visible
 from cpfls_cli.version import __version__
 
@@ -86,6 +86,18 @@ def require_numbers(job: Job, command: str, *, whole: bool = True) -> None:
     if job.open_numbers != "found":
         said = require_known(job.study, command, whole=whole, accept=job.open_numbers == "guessed")
         job.cautions.update(dict.fromkeys(said))
+
+
+def go_on(job: Job, command: str, *words: str | Path, output: Path) -> tuple[str | Path, ...]:
+    """Give a command that goes on with the config of a job; what that leaves open it takes as the job did."""
+    taken: Sequence[str | Path] = ()
+    # A path asks for none of them, but what a flight is to tell hangs on all.
+    if needs_numbers(job.study.vehicle, command) or (job.study.vehicle.unknown and "--for" in words):
+        if job.found is not None:
+            taken = () if "--model" in words else ("--model", job.found)
+        elif job.open_numbers == "guessed" or "--model" not in words:
+            taken = ("--accept-guesses",)
+    return "cpfls", command, job.config, *words, *taken, "-o", output
 
 
 def begin(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:

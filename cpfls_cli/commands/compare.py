@@ -8,12 +8,12 @@ from pathlib import Path
 
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.job import Job, Progress, begin, finish
+from cpfls_cli.artifacts.job import Job, Progress, begin, finish, go_on
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
-from cpfls_cli.commands.numbers import go_on, to_fly, why_no_body_found, with_numbers
+from cpfls_cli.commands.numbers import to_fly, why_no_body_found, with_numbers
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError

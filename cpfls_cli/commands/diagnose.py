@@ -10,12 +10,12 @@ from typing import Any
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.gap_effects import effect_summary, estimate_summary
-from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.job import Job, begin, finish, go_on
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, as_inputs
 from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.commands.compare import check_ignored, progress_of, to_correct
-from cpfls_cli.commands.numbers import go_on, to_fly
+from cpfls_cli.commands.numbers import to_fly
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import numbered_roles

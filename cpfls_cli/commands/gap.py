@@ -10,7 +10,7 @@ from pathlib import Path
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.job import Job, input_file, take_inputs
+from cpfls_cli.artifacts.job import Job, go_on, input_file, take_inputs
 from cpfls_cli.artifacts.learned import LearnedFlight
 from cpfls_cli.artifacts.output import check_folder, filled_folder, refuse_inputs, write_text
 from cpfls_cli.artifacts.spec import InputFile
@@ -25,7 +25,7 @@ from cpfls_cli.commands.diagnose import (
     whole_summary,
 )
 from cpfls_cli.commands.extend import extended, finish_extended
-from cpfls_cli.commands.numbers import go_on, why_no_body_found, with_numbers
+from cpfls_cli.commands.numbers import why_no_body_found, with_numbers
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import learned_by, read_base

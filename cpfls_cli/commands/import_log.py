@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.job import Job, begin, finish
-from cpfls_cli.commands.numbers import go_on
+from cpfls_cli.artifacts.job import Job, begin, finish, go_on
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.consistency.numbers import beyond_belief
 from cpfls_cli.flightlog.results import ImportReport

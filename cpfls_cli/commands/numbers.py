@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +10,6 @@ from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.check import why_no_body
-from cpfls_cli.config.unknown import needs_numbers
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.models import is_vehicle, with_found_numbers
 from cpfls_cli.pages.model import cautions_of
@@ -81,15 +79,3 @@ def to_fly(job: Job, output: Path | None = None) -> Command:
     # A config of coarser paths is refused an excitation.
     finer = ("--set", f"trajectory.sample_time_s={coarsest:g}") if planned.sample_time_s > coarsest else ()
     return (*words[:-1], *finer, words[-1], output or job.beside("mission.h5"))
-
-
-def go_on(job: Job, command: str, *words: str | Path, output: Path) -> Command:
-    """Give a command that goes on with the config of a job; what that leaves open it takes as the job did."""
-    taken: Sequence[str | Path] = ()
-    # A path asks for none of them, but what a flight is to tell hangs on all.
-    if needs_numbers(job.study.vehicle, command) or (job.study.vehicle.unknown and "--for" in words):
-        if job.found is not None:
-            taken = () if "--model" in words else ("--model", job.found)
-        elif job.open_numbers == "guessed" or "--model" not in words:
-            taken = ("--accept-guesses",)
-    return "cpfls", command, job.config, *words, *taken, "-o", output

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.job import Job, begin, finish, go_on
 from cpfls_cli.artifacts.selection import SelectionRecord
-from cpfls_cli.commands.numbers import go_on
 from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError
 from cpfls_cli.flights.training import flight_roles, split_training, uniform_regressor

@@ -12,13 +12,13 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import MOTION, FlightRecord
-from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.job import Job, begin, finish, go_on
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands import tracking
-from cpfls_cli.commands.numbers import go_on, with_numbers
+from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError

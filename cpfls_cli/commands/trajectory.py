@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
+from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish, go_on
 from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.trajectory import ExcitedGroup, TrajectoryRecord
 from cpfls_cli.commands.mission import Mission, mission_paths, mission_texts, write_mission
-from cpfls_cli.commands.numbers import go_on, with_numbers
+from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError, SettingError
 from cpfls_cli.excitation.optimise import Excitation, optimised_rotation
