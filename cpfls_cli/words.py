@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from textwrap import wrap
 
 
 def joined(words: Iterable[str], last: str = "and") -> str:
@@ -16,3 +17,13 @@ def did_you_mean(name: str, known: Iterable[str], otherwise: str, *, most: int =
     """Ask whether one of the known names was meant that are most alike; say something else where none is."""
     near = get_close_matches(name, list(known), n=most, cutoff=cutoff)
     return f"did you mean {' or '.join(near)}?" if near else otherwise
+
+
+def broken(text: str, width: int | None, indent: str = "") -> list[str]:
+    """Break a sentence between words where a terminal has no room for it; None is the width of no terminal."""
+    line = indent + text
+    if width is None or len(line) <= width:
+        return [line]
+    return wrap(
+        line, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False, drop_whitespace=True
+    )

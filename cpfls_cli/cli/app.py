@@ -593,7 +593,7 @@ def verify_export(
 
 @_command()
 def info(file: FileArgument, *, common: Common) -> None:
-    """Show what an artifact holds and where it comes from."""
+    """Show what the command that wrote an artifact answered, what it holds and where it comes from."""
     with messages_for_errors():
         tell(_of("show").info(file), common)
 
@@ -707,4 +707,5 @@ def _run_with(
             outcome = cautioned(call(_of(title), job), job)
     if not common.dry_run:
         narration.wrote(output)
+        outcome = replace(outcome, written=output)
     tell(outcome, common)

@@ -5,21 +5,23 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import shlex
 import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 import typer
 
 from cpfls_cli.cli.misplaced import what_it_is
 from cpfls_cli.cli.options import Common
 from cpfls_cli.errors import CpflsError, InputError, NotAnArtifactError, visible
+from cpfls_cli.words import broken
 
 if TYPE_CHECKING:
     from cpfls_cli.report.content import Text
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 _BAR_WIDTH = 20
 # Unasked notes leave the answer on a small screen.
 _NOTE_LINES, _NOTE_WIDTH = 5, 80
+# A number that is no part of a name.
+_NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?!\.?\w)")
 # 128 plus the number of SIGPIPE: what a shell reports of the tools that this signal ends.
 _CLOSED_PIPE = 141
 # How often a log hears of long work, with -v and without.
@@ -66,20 +70,30 @@ def messages_for_errors() -> Iterator[None]:
 def tell(outcome: Outcome, common: Common) -> None:
     """Print what a command has to say, and end with its exit code."""
     from cpfls_cli.report.outcome import as_json
-    from cpfls_cli.report.terminal import warnings_of
 
     if isinstance(sys.stdout, io.TextIOWrapper):
         # An encoding without a degree sign must not end a command that has done its work.
         sys.stdout.reconfigure(errors="replace")
     if common.as_json:
         print(json.dumps(as_json(outcome.summary), allow_nan=False), flush=True)
-    elif not common.quiet:
+    # On one terminal what is printed last is what stays on the screen.
+    notes_first = not common.as_json and _columns() is not None and _columns(sys.stderr) is not None
+    if notes_first:
+        _show_notes(outcome, common)
+    if not common.quiet and not common.as_json:
         print("\n".join(_lines(outcome, whole=common.verbose)), flush=True)
+    if not notes_first:
+        _show_notes(outcome, common)
+    if outcome.exit_code:
+        raise typer.Exit(outcome.exit_code)
+
+
+def _show_notes(outcome: Outcome, common: Common) -> None:
+    from cpfls_cli.report.terminal import warnings_of
+
     if not common.quiet:
         for note in _notes(warnings_of(outcome.blocks), whole=common.verbose):
             _complain(note, "note")
-    if outcome.exit_code:
-        raise typer.Exit(outcome.exit_code)
 
 
 def _lines(outcome: Outcome, *, whole: bool) -> Iterator[str]:
@@ -97,24 +111,56 @@ def _lines(outcome: Outcome, *, whole: bool) -> Iterator[str]:
     more = () if whole else folded_words(outcome.blocks)
     if more:
         yield from terminal_lines([Text(f"more with -v: {'; '.join(more)}")], width)
+    if more and outcome.written is not None:
+        from cpfls_cli.commands.show import artifact_that_tells
+
+        # Nothing has to be computed again to read it.
+        artifact = artifact_that_tells(outcome.written)
+        if artifact is not None:
+            yield f"or with {visible(shlex.join(('cpfls', 'info', str(artifact), '-v')))}"
 
 
-def _columns() -> int | None:
-    """Give the columns of the terminal; None where standard output is none."""
-    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+def _columns(stream: TextIO | None = None) -> int | None:
+    """Give the columns of the terminal; None where the stream, standard output if none is given, is none."""
+    return shutil.get_terminal_size().columns if (stream or sys.stdout).isatty() else None
 
 
 def _notes(warnings: Sequence[Text], *, whole: bool) -> Iterator[str]:
     """Give the notes that are shown, and how many more there are: the first few lines, and what must always be seen."""
-    room, left = _NOTE_LINES, 0
-    for warning in warnings:
+    room, left, shown = _NOTE_LINES, 0, False
+    for warning in warnings if whole else _merged(warnings):
         room -= -(-len(f"cpfls: note: {warning.text}") // _NOTE_WIDTH)
-        if whole or warning.always or room >= 0 or warning is warnings[0]:
+        if whole or warning.always or room >= 0 or not shown:
+            shown = True
             yield warning.text
         else:
             left += 1
     if left:
         yield f"{left} more note{'s' if left > 1 else ''}: -v shows {'them' if left > 1 else 'it'}"
+
+
+def _merged(warnings: Sequence[Text]) -> Iterator[Text]:
+    """Join notes that say the same of several files, in the place of the first; numbers that differ become ranges."""
+    alike: dict[tuple[bool, str], list[Text]] = {}
+    for warning in warnings:
+        name, colon, said = warning.text.partition(": ")
+        alike.setdefault((bool(colon), _NUMBER.sub("#", said) if colon else name), []).append(warning)
+    for (named, _), same in alike.items():
+        if not named or len(same) == 1:
+            yield same[0]
+            continue
+        names, saids = zip(*(each.text.split(": ", 1) for each in same), strict=True)
+        ranges = map(_range_of, zip(*map(_NUMBER.findall, saids), strict=True))
+        first, *between = _NUMBER.split(saids[0])
+        said = first + "".join(number + words for number, words in zip(ranges, between, strict=True))
+        others = len(set(names)) - 1
+        more = f" and {others} more" if others else ""
+        yield replace(same[0], text=f"{names[0]}{more}: {said}", always=any(each.always for each in same))
+
+
+def _range_of(numbers: Sequence[str]) -> str:
+    low, high = min(numbers, key=float), max(numbers, key=float)
+    return low if float(low) == float(high) else f"{low} to {high}"
 
 
 @contextmanager
@@ -193,8 +239,10 @@ def _mute_output() -> None:
 
 
 def _complain(text: str, kind: str = "error") -> None:
+    width = _columns(sys.stderr)
     for line in _with_plain_names(text).rstrip("\n").split("\n"):
-        print(f"cpfls: {kind}: {line}", file=sys.stderr)
+        said = f"cpfls: {kind}: {line}"
+        print(said if width is None else "\n".join(broken(said, width)), file=sys.stderr)
 
 
 def _with_plain_names(text: str) -> str:

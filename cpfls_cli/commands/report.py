@@ -13,6 +13,7 @@ from cpfls_cli.artifacts.store import read_any
 from cpfls_cli.config.load import validate
 from cpfls_cli.config.study import resolved
 from cpfls_cli.config.yaml_text import parse_yaml
+from cpfls_cli.pages.comparison import model_verdicts
 from cpfls_cli.pages.page import Page, report_page
 from cpfls_cli.pages.source import Source, Sources, unique_labels
 from cpfls_cli.regressor.structure import model_structure
@@ -36,12 +37,12 @@ def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcom
     write_text(job.output, page.text)
     again = [f"{path}: given {times} times; shown once" for path, times in Counter(artifacts).items() if times > 1]
     equal = [f"{path}: holds the same as {distinct[files[path]]}; shown once" for path in files if path not in kept]
-    return _outcome(job.output, page, [*again, *equal])
+    return _outcome(job.output, page, given, [*again, *equal])
 
 
 def read_sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:
     """Read artifacts of any format for a report, each under a name of its own."""
-    labels = unique_labels([_printable(path.name) for path in paths], hashes)
+    labels = map(_printable, unique_labels(paths))
     given = zip(paths, labels, hashes, strict=True)
     return [source_of_record(read_any(path), path, label, sha256) for path, label, sha256 in given]
 
@@ -58,7 +59,7 @@ def _printable(name: str) -> str:
     return "".join(character if character.isprintable() else "\N{REPLACEMENT CHARACTER}" for character in name)
 
 
-def _outcome(output: Path, page: Page, repeated: Sequence[str]) -> Outcome:
+def _outcome(output: Path, page: Page, given: Sources, repeated: Sequence[str]) -> Outcome:
     size = len(page.text.encode())
     summary = {
         "output": str(output),
@@ -71,4 +72,4 @@ def _outcome(output: Path, page: Page, repeated: Sequence[str]) -> Outcome:
     counts = f"{len(page.sections)} sections, {len(page.figures)} figures, {len(page.tables)} tables, {size} bytes"
     lacks = [Text(f"not given: {', '.join(page.missing)}")] if page.missing else []
     warnings = (Text(sentence, "warning") for sentence in repeated)
-    return Outcome(summary, (Text(counts), *lacks, *warnings))
+    return Outcome(summary, (Text(counts), *lacks, *model_verdicts(given), *warnings))

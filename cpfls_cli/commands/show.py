@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.store import Outline, findings_of, read_outline, read_record
+from cpfls_cli.artifacts.spec import Record
+from cpfls_cli.artifacts.store import Outline, findings_of, read_any, read_outline
+from cpfls_cli.errors import InputError
 from cpfls_cli.pages.trust import trust_facts
 from cpfls_cli.report.content import Block, Facts, Folded, Table, Text
 from cpfls_cli.report.outcome import Outcome
 
 _FINDINGS_SHOWN = 8
+_CAUTION = "caution"
+_PAGES = {
+    "cpfls/trajectory": "trajectory",
+    "cpfls/selection": "selection",
+    "cpfls/model": "model",
+    "cpfls/sweep": "sweep",
+    "cpfls/prediction": "prediction",
+    "cpfls/replay": "replay",
+    "cpfls/response": "response",
+    "cpfls/disagreement": "disagreement",
+    "cpfls/diagnosis": "diagnosis",
+}
+"""Modules of `pages` that word an answer, by format; a flight, whose answer needs all of it, may not fit in memory."""
 
 
 def info(path: Path) -> Outcome:
@@ -31,23 +47,47 @@ def info(path: Path) -> Outcome:
         "cautions": list(header.cautions),
         "datasets": datasets,
     }
-    if artifact.spec.name != ModelRecord.FORMAT.name:
-        return Outcome(summary, description(artifact), next=(("cpfls", "check", path),))
-    model = read_record(path, ModelRecord)
-    gusts = model.vehicle.gusts
-    told = model.provenance | ({} if gusts is None else {"gusts": gusts.summary})
-    return Outcome(summary | told, description(artifact, trust_facts(model)))
+    followed = (("cpfls", "check", path),)
+    if artifact.spec.name not in _PAGES:
+        return Outcome(summary, description(artifact), next=followed)
+    record = read_any(path)
+    if not isinstance(record, ModelRecord):
+        return Outcome(summary, tuple(_answered(artifact, record, path)), next=followed)
+    gusts = record.vehicle.gusts
+    told = record.provenance | ({} if gusts is None else {"gusts": gusts.summary})
+    return Outcome(summary | told, tuple(_answered(artifact, record, path, trust_facts(record))))
 
 
-def description(artifact: Outline, more: Sequence[tuple[str, str]] = ()) -> tuple[Block, ...]:
-    """Tell where an artifact comes from, more facts on it, and what it holds, dataset by dataset."""
+def _answered(artifact: Outline, record: Record, path: Path, more: Sequence[tuple[str, str]] = ()) -> Iterator[Block]:
+    """Tell what an artifact is and what its command answered; where it comes from and what it holds is folded."""
+    what, origin, holds = description(artifact, more)
+    yield what
+    cautions = [row for row in origin.rows if row[0] == _CAUTION]
+    yield from [Facts(cautions)] if cautions else []
+    answers = import_module("cpfls_cli.pages.answers")
+    yield from answers.answer_again(_PAGES[artifact.spec.name], record, path)
+    yield Folded("where it comes from", [Facts([row for row in origin.rows if row[0] != _CAUTION])])
+    yield holds
+
+
+def artifact_that_tells(output: Path) -> Path | None:
+    """Find the artifact among what a command wrote whose `info` tells its answer again; None where there is none."""
+    path = output / "diagnosis.h5" if output.is_dir() else output
+    try:
+        return path if read_outline(path).spec.name in _PAGES else None
+    except InputError:
+        return None
+
+
+def description(artifact: Outline, more: Sequence[tuple[str, str]] = ()) -> tuple[Block, Facts, Block]:
+    """Tell what an artifact is, where it comes from with more facts on it, and what it holds, dataset by dataset."""
     header = artifact.header
     origin = [("made by", f"cpfls {header.version}, seed {header.seed}")]
     origin += [(role, f"{source.name} (sha256 {source.sha256[:12]})") for role, source in header.inputs.items()]
     rows = [_dataset_row(name, _describe_dataset(artifact, name)) for name in artifact.shapes]
     columns = ("Dataset", "Shape", "Unit", "What it holds")
     table = Table("datasets", "", columns, rows, frozenset(range(len(columns))), frozenset({3}))
-    origin += [("caution", each) for each in header.cautions]
+    origin += [(_CAUTION, each) for each in header.cautions]
     holds = Folded(f"what its {len(rows)} datasets hold", [table])
     return Text(f"{artifact.spec.name}: {artifact.spec.description}"), Facts([*origin, *more]), holds
 

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.artifacts.identified import IdentifiedRecord
+from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.parameters import FOUND_AS, Parameter, parameters_of
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.pages.identification import TORQUE
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import model_words, trust_words
@@ -47,6 +49,7 @@ _LONGEST = 60
 _ABSENT = "not there"
 # What a page looks like does not change a model.
 _LEFT_OUT = ("report",)
+_BEYOND = "beyond both intervals"
 
 _Model = Source[IdentifiedRecord]
 
@@ -360,24 +363,42 @@ def compared_vehicles_section(sources: Sources) -> Section | None:
     vehicles = sources.vehicles
     if len(vehicles) < 2:
         return None
-    listed = [{each.key: each for each in parameters_of(vehicle.record) if each.needed} for vehicle in vehicles]
     rows: list[list[str | Cell]] = []
-    for key in FOUND_AS:
-        known = [parameters[key] for parameters in listed if key in parameters]
-        if known:
-            apart = _apart(known)
-            tone: Tone = "warning" if apart else "plain"
-            values = [Cell(_with_interval(parameters.get(key)), tone) for parameters in listed]
-            differ = "beyond both intervals" if apart else ""
-            rows.append([f"{known[0].name}, {known[0].unit}", *values, differ])
+    for constants in _constants(vehicles):
+        known = [each for each in constants if each is not None]
+        apart = _apart(known)
+        tone: Tone = "warning" if apart else "plain"
+        values = [Cell(_with_interval(each), tone) for each in constants]
+        rows.append([f"{known[0].name}, {known[0].unit}", *values, _BEYOND if apart else ""])
     header = ("Constant", *(vehicle.label for vehicle in vehicles), "Differ")
     caption = (
         "Constants with 95 % intervals; in brackets what the flights do not tell. Marked where two of them lie beyond "
         "the intervals of both."
     )
-    judged = [(vehicle.label, model_words(vehicle.record).sentence) for vehicle in vehicles]
-    table = Table("vehicles-compared", caption, header, rows, frozenset(range(len(header))))
-    return Section("vehicles", "The vehicles side by side", [Facts(judged), table])
+    columns = frozenset(range(len(header)))
+    table = Table("vehicles-compared", caption, header, rows, columns, columns - {0})
+    return Section("vehicles", "The vehicles side by side", [_judged(vehicles), table])
+
+
+def model_verdicts(sources: Sources) -> Iterator[Block]:
+    """Say in a word how far to trust each model, and which constants of several vehicles differ."""
+    models = sources.of_kind(ModelRecord)
+    if models:
+        yield _judged(models)
+    if len(sources.vehicles) > 1:
+        listed = ([each for each in constants if each is not None] for constants in _constants(sources.vehicles))
+        apart = [known[0].name for known in listed if _apart(known)]
+        yield Text(f"differ {_BEYOND}: {joined(apart)}" if apart else f"no constant differs {_BEYOND}")
+
+
+def _judged(models: Sequence[Source[Any]]) -> Facts:
+    return Facts([(model.label, model_words(model.record).sentence) for model in models])
+
+
+def _constants(vehicles: Sequence[Source[VehicleRecord]]) -> Iterator[list[Parameter | None]]:
+    """Give each constant that one vehicle or more has, of all of them."""
+    listed = [{each.key: each for each in parameters_of(vehicle.record) if each.needed} for vehicle in vehicles]
+    yield from ([own.get(key) for own in listed] for key in FOUND_AS if any(key in own for own in listed))
 
 
 def _apart(known: Sequence[Parameter]) -> bool:

@@ -126,7 +126,7 @@ def _commands(sources: Sources) -> list[str]:
 def _paths(sources: Sources) -> dict[str, str]:
     """Name every artifact as those that were made from it call it; equal names go into folders of their own."""
     called = {file.sha256: file.name for source in sources.all for file in source.header.inputs.values()}
-    labels = {source.sha256: source.label.removesuffix(f" ({source.short_hash})") for source in sources.all}
+    labels = {source.sha256: source.label.rpartition("/")[2] for source in sources.all}
     names = {sha256: called.get(sha256, label) for sha256, label in labels.items()}
     count = Counter(names.values())
     return {sha256: name if count[name] == 1 else f"{sha256[:HASH_SHOWN]}/{name}" for sha256, name in names.items()}

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic
 
 from typing_extensions import TypeVar
@@ -12,7 +14,7 @@ from typing_extensions import TypeVar
 from cpfls_cli.artifacts.job import Job
 from cpfls_cli.artifacts.spec import Record
 from cpfls_cli.config.study import ReportSettings, resolved
-from cpfls_cli.report.content import HASH_SHOWN, Block, Origin, Section
+from cpfls_cli.report.content import Block, Origin, Section
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
@@ -122,13 +124,15 @@ class Sources:
         return next((source for source in self.all if source.sha256 == sha256), None)
 
 
-def unique_labels(names: Sequence[str], hashes: Sequence[str]) -> list[str]:
-    """Name files apart: a name that stands more than once gets the first digits of its hash."""
-    count = Counter(names)
-    return [
-        name if count[name] == 1 else f"{name} ({sha256[:HASH_SHOWN]})"
-        for name, sha256 in zip(names, hashes, strict=True)
-    ]
+def unique_labels(paths: Sequence[Path]) -> list[str]:
+    """Name files apart: those whose name stands more than once by as many of their folders as that takes."""
+    whole = [Path(os.path.abspath(path)).parts for path in paths]
+    labels = []
+    for parts in whole:
+        alike = {other for other in whole if other[-1] == parts[-1]}
+        depth = next(n for n in count(1) if len({other[-n:] for other in alike}) == len(alike))
+        labels.append("/".join(parts[-depth:]))
+    return labels
 
 
 def source_of(job: Job, record: R) -> Source[R]:

@@ -31,12 +31,15 @@ class Outcome:
         Not 0 where the work was stopped.
     next : tuple of Command
         To go on with, with the names of this run.
+    written : Path or None
+        File or folder that the command wrote.
     """
 
     summary: Mapping[str, Any]
     blocks: tuple[Block, ...] = ()
     exit_code: int = 0
     next: tuple[Command, ...] = ()
+    written: Path | None = None
 
 
 def cautioned(outcome: Outcome, job: Job) -> Outcome:

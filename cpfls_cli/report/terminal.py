@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable, Iterator, Sequence
-from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from cpfls_cli.errors import visible
 from cpfls_cli.report.content import Block, Box, Facts, Folded, Heading, Listing, Plot, Table, Text, Tone, unfolded
+from cpfls_cli.words import broken
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
@@ -39,11 +39,11 @@ def terminal_lines(
             case Text() if block.tone == "warning":
                 pass
             case Text() | Heading():
-                yield from _broken(block.text, width)
+                yield from broken(visible(block.text), width)
             case Box():
-                yield from _broken(f"{block.label}: {block.title}", width)
+                yield from broken(visible(f"{block.label}: {block.title}"), width)
                 for each in block.sentences:
-                    yield from _broken(each, width, "  ")
+                    yield from broken(visible(each), width, "  ")
             case Facts():
                 drawn = _grid(colour, header=False)
                 drawn.add_column(no_wrap=True)
@@ -55,8 +55,8 @@ def terminal_lines(
                 yield from _table(block, width, colour, whole=whole)
             case Listing():
                 yield from visible(block.text.rstrip()).split("\n")
-            case Folded() if whole:
-                yield from _broken(f"{block.summary}:", width)
+            case Folded() if whole and _says_something(block):
+                yield from broken(visible(f"{block.summary}:"), width)
                 yield from terminal_lines(block.blocks, width, colour=colour, whole=True)
             case Plot() | Folded():
                 pass
@@ -64,7 +64,14 @@ def terminal_lines(
 
 def folded_words(blocks: Iterable[Block]) -> tuple[str, ...]:
     """Say what is folded away."""
-    return tuple(dict.fromkeys(block.summary for block in blocks if isinstance(block, Folded)))
+    return tuple(dict.fromkeys(each.summary for each in blocks if isinstance(each, Folded) and _says_something(each)))
+
+
+def _says_something(block: Block) -> bool:
+    """Tell whether a block has lines: figures have none, and texts that warn stand elsewhere."""
+    if isinstance(block, Folded):
+        return any(map(_says_something, block.blocks))
+    return not isinstance(block, Plot) and not (isinstance(block, Text) and block.tone == "warning")
 
 
 def warnings_of(blocks: Iterable[Block]) -> tuple[Text, ...]:
@@ -72,19 +79,9 @@ def warnings_of(blocks: Iterable[Block]) -> tuple[Text, ...]:
     return tuple(block for block in unfolded(blocks) if isinstance(block, Text) and block.tone == "warning")
 
 
-def _broken(text: str, width: int | None, indent: str = "") -> list[str]:
-    """Break a sentence between words where a terminal has no room for it."""
-    line = indent + visible(text)
-    if width is None or len(line) <= width:
-        return [line]
-    return wrap(
-        line, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False, drop_whitespace=True
-    )
-
-
 def _table(table: Table, width: int | None, colour: bool, *, whole: bool) -> Iterator[str]:
     if table.caption:
-        yield from _broken(table.explained if whole else table.caption, width)
+        yield from broken(visible(table.explained if whole else table.caption), width)
     lines = _printed(_drawn(table, colour, unbroken=width is None), width, colour)
     if width is None and _widest(lines) > _WIDEST and table.sentences:
         excess = _widest(lines) - _WIDEST

@@ -15,6 +15,7 @@ import cpfls_cli
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.formats import record_of_format
 from tests.builders.artifacts import edited
+from tests.builders.studies import stages
 
 STAGES = ("trajectory", "flight", "selection", "model", "prediction")
 
@@ -39,6 +40,34 @@ def test_info_tells_origin_and_content(cpfls, pipeline, stage):
             assert entry["units"] == file[name].attrs["units"]
     lines = cpfls("info", path, "-v").stdout
     assert all(name in lines for name in summary["datasets"])
+
+
+@pytest.mark.usefixtures("pipeline")
+@pytest.mark.parametrize(
+    ("stage", "kept_nowhere"),
+    [
+        ("trajectory", ("549 samples over", "largest tilt")),
+        ("selection", ()),
+        ("model", ()),
+        ("prediction", ("model.h5 along flight.h5: the flight that it learned from",)),
+    ],
+)
+def test_info_says_what_the_command_answered(cpfls, study, tmp_path, stage, kept_nowhere):
+    """Nothing is computed again to read it; `kept_nowhere` begins what the command says and the artifact lacks."""
+    _, commands = stages(study, study.parent)
+    answered = cpfls(*commands[stage], "-o", tmp_path / f"{stage}.h5", "-v")
+    assert answered.exit_code == 0, answered.output
+    said = answered.stdout.partition("next:")[0].splitlines()
+    lines = [line for line in said if not line.startswith(kept_nowhere)]
+    assert len(lines) > 1
+    assert len(said) - len(lines) == len(kept_nowhere)
+    told = cpfls("info", tmp_path / f"{stage}.h5", "-v").stdout.splitlines()
+    assert told[0].startswith(f"cpfls/{stage}: ")
+    assert [line for line in lines if line not in told] == []
+    # Without -v the first part of it, and what is folded away by name.
+    first = cpfls("info", tmp_path / f"{stage}.h5").stdout.splitlines()
+    assert set(first) & set(lines)
+    assert "where it comes from; what its" in first[-1]
 
 
 @pytest.mark.parametrize(

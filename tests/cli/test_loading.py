@@ -39,7 +39,7 @@ def after(pipeline, study, tmp_path_factory):
     short = "trajectory={legs: 1, displacement_m: 1.0, period_s: 0.18, duration_s: 3.0, yaw_turn_rad: 0.3}"
     groups = {
         "nothing": [("--version",), ("--help",)],
-        "telling": [("info", pipeline.flight), ("check", pipeline.selection), ("info", pipeline.model)],
+        "telling": [("info", pipeline.flight), ("check", pipeline.selection), ("check", pipeline.model)],
         "reading": [("check", pipeline.model), ("check", pipeline.flight), ("config", study), ("config",)],
         "reduce": [("reduce", study, pipeline.flight, "-o", folder / "selection.h5")],
         "identify": [
@@ -123,6 +123,7 @@ def test_commands_load_no_room_that_they_do_not_work_in(after):
 
 
 def test_what_a_file_holds_is_told_without_the_numerics_that_made_it(after):
-    # How far to trust a model is told in a word, and words of trust stand in a module of their own.
+    # How far to trust a model is told in a word, and words of trust stand in a module of their own. What a command
+    # answered is worded by the pages, which `info` loads where there is an answer.
     rooms = {name.split(".")[1] for name in after["telling"] if name.startswith("cpfls_cli.") and not of_trust(name)}
     assert rooms.isdisjoint({"gap", "effects", "identification", "validation", "reduction", "weak_form", "pages"})

@@ -50,7 +50,7 @@ def screens(cpfls, pipeline, study, tmp_path_factory):
 
         with (
             patch("cpfls_cli.cli.app.tell", tell),
-            patch.object(terminal, "_columns", lambda: COLUMNS),
+            patch.object(terminal, "_columns", lambda *_: COLUMNS),
             pytest.MonkeyPatch.context() as environment,
         ):
             environment.setenv("NO_COLOR", "1")

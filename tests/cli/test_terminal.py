@@ -116,12 +116,47 @@ def told(capsys):
 
 
 def test_an_answer_ends_with_the_next_command_and_what_more_there_is(told):
-    blocks = (Text("the answer"), Folded("why", [Text("because")]), Folded("how", []))
+    blocks = (Text("the answer"), Folded("why", [Text("because")]), Folded("how", [Text("so")]))
     outcome = Outcome({}, blocks, next=(("cpfls", "check", Path("a name.h5")),))
     following = ["next:", "  cpfls check 'a name.h5'"]
     assert told(outcome) == [["the answer", *following, "more with -v: why; how"], []]
-    assert told(outcome, verbose=True) == [["the answer", "why:", "because", "how:", *following], []]
+    assert told(outcome, verbose=True) == [["the answer", "why:", "because", "how:", "so", *following], []]
     assert told(outcome, quiet=True) == [[], []]
+
+
+def test_an_answer_says_what_shows_more_of_it_without_computing_it_again(told, pipeline, tmp_path):
+    blocks = (Text("the answer"), Folded("why", [Text("because")]))
+    *_, more, last = told(Outcome({}, blocks, written=pipeline.model))[0]
+    assert (more, last) == ("more with -v: why", f"or with cpfls info {pipeline.model} -v")
+    # Neither a flight nor what is no artifact holds what was answered.
+    page = tmp_path / "page.html"
+    page.write_text("<!DOCTYPE html>")
+    for written in (pipeline.flight, page):
+        assert told(Outcome({}, blocks, written=written))[0][-1] == "more with -v: why"
+    assert told(Outcome({}, (Text("all"),), written=pipeline.model))[0] == ["all"]
+
+
+def test_notes_that_say_the_same_of_several_files_are_one(told):
+    slow = [
+        f"a log {name}.bin: logged at {rate} Hz (C1): too slow" for name, rate in (("x", 9.78), ("y", 10), ("z", 9.8))
+    ]
+    other = "a log y.bin: full of noise"
+    blocks = tuple(Text(note, "warning", always=True) for note in (slow[0], other, *slow[1:]))
+    merged = "a log x.bin and 2 more: logged at 9.78 to 10 Hz (C1): too slow"
+    assert told(Outcome({}, blocks))[1] == [f"cpfls: note: {each}" for each in (merged, other)]
+    # Asked for, each stands by itself.
+    assert told(Outcome({}, blocks), verbose=True)[1] == [f"cpfls: note: {block.text}" for block in blocks]
+    without = tuple(Text(note, "warning") for note in ("no colon", "name: no colon", "other: no colon"))
+    said = ["cpfls: note: no colon", "cpfls: note: name and 1 more: no colon"]
+    assert told(Outcome({}, without))[1] == said
+
+
+def test_on_a_terminal_notes_are_broken_between_words_and_come_before_the_answer(monkeypatch):
+    order = []
+    monkeypatch.setattr("cpfls_cli.cli.terminal._columns", lambda *_: 30)
+    monkeypatch.setattr("builtins.print", lambda text, **_: order.append(text))
+    tell(Outcome({}, (Text("the answer"), Text("a note of several words here", "warning"))), Common())
+    assert order == ["cpfls: note: a note of several\nwords here", "the answer"]
 
 
 def test_notes_leave_the_answer_on_the_screen(told):

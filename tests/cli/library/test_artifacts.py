@@ -86,7 +86,8 @@ def test_single_values_are_numbers_and_words(pipeline):
 
 
 def test_it_prints_what_info_prints(cpfls, pipeline):
-    assert f"{cpfls_cli.read(pipeline.flight)}\n" == cpfls("info", pipeline.flight).stdout
+    followed = f"next:\n  cpfls check {pipeline.flight}\n"
+    assert f"{cpfls_cli.read(pipeline.flight)}\n{followed}" == cpfls("info", pipeline.flight, "-v").stdout
 
 
 def test_it_is_written_again_byte_by_byte_and_never_over_a_file(pipeline, tmp_path):

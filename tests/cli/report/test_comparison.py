@@ -2,14 +2,17 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import read_artifact, write_artifact
+from cpfls_cli.artifacts.store import read_artifact, write_artifact, write_record
 from cpfls_cli.pages.comparison import differences
+from cpfls_cli.pages.source import unique_labels
 from tests.builders.evidence_artifacts import curves, steps, verdict
+from tests.builders.vehicle_models import record_of, whole
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -231,3 +234,28 @@ def test_a_model_that_is_the_rigid_body_hides_its_line_and_the_caption_says_so(c
     assert ("the grey line lies under its own" in caption) == same
     assert "what the structure does, not what the vehicle does" in caption
     assert "a band need not hold the truth" in caption
+
+
+def test_vehicles_of_equal_file_names_are_called_by_their_folders(cpfls, study, tmp_path):
+    record = record_of(whole())
+    paths = [tmp_path / folder / "vehicle.h5" for folder in ("still", "gusty")]
+    for path, factor in zip(paths, (1.0, 2.0), strict=True):
+        path.parent.mkdir()
+        numbers = {name: factor * getattr(record.found, name) for name in ("value", "low", "high")}
+        write_record(path, replace(record, found=replace(record.found, **numbers)))
+    output = tmp_path / "report.html"
+    result = cpfls("report", study, *paths, "-o", output)
+    assert result.exit_code == 0, result.stderr
+    *_, one, two, differ = result.stdout.splitlines()
+    assert [line.split()[0] for line in (one, two)] == ["still/vehicle.h5", "gusty/vehicle.h5"]
+    assert differ == "differ beyond both intervals: Ixx"
+    page = output.read_text(encoding="utf-8")
+    assert '<th scope="col" class="words sentence">Differ</th>' in page
+    assert "still/vehicle.h5" in page
+    same = cpfls("report", study, paths[0], "-o", tmp_path / "one.html").stdout.splitlines()
+    assert same[-1].startswith("vehicle.h5 ")
+
+
+def test_labels_take_as_many_folders_as_tell_files_apart():
+    paths = [Path(name) for name in ("/a/x/v.h5", "/b/x/v.h5", "/b/x/../m.h5", "n.h5")]
+    assert unique_labels(paths) == ["a/x/v.h5", "b/x/v.h5", "m.h5", "n.h5"]

@@ -114,3 +114,10 @@ def test_no_block_gives_a_terminal_orders():
     said = lines(*blocks)
     assert len(said) == 7
     assert all(line.isprintable() and "\\x1b]0;title\\x07red\\x1b[31m" in line for line in said)
+
+
+def test_what_holds_only_warnings_or_figures_has_no_heading():
+    careful = Folded("what to be careful with", [Text("a gust", "warning"), Folded("inner", [])])
+    assert lines(careful, whole=True) == []
+    assert folded_words([careful, Folded("why", [Text("because")])]) == ("why",)
+    assert [each.text for each in warnings_of([careful])] == ["a gust"]
