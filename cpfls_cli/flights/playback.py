@@ -60,7 +60,7 @@ def flights_to_play(paths: Sequence[Path], study: Study, hold: Hold | None = Non
         periods = [each.parts[0].period for each in (flight, first)]
         if abs(periods[0] - periods[1]) > _SAME_PERIOD * periods[1]:
             rates = [f"{1 / period:.4g} Hz" for period in periods]
-            one = max(1, floor(1 / max(each.parts[0].period for each in flights) + 1e-6))
+            one = max(1, floor((1 + _SAME_PERIOD) / max(each.parts[0].period for each in flights)))
             raise InputError(
                 f"{flight.name}: sampled at {rates[0]}, {first.name} at {rates[1]}, and this takes flights of one rate:"
                 f" --set import.rate_hz={one} gives it to logs, flights are imported again with it"
