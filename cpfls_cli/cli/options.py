@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import difflib
 import functools
 import inspect
@@ -123,8 +124,14 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
         if name != "common"
     ]
     left_out = _left_out(command.__name__.rstrip("_"), hints)
+    unheard = () if "config" in hints else _OF_A_CONFIG
     shared = [
-        inspect.Parameter(f.name, inspect.Parameter.KEYWORD_ONLY, default=f.default, annotation=common_hints[f.name])
+        inspect.Parameter(
+            f.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=f.default,
+            annotation=_hidden(common_hints[f.name]) if f.name in unheard else common_hints[f.name],
+        )
         for f in fields(Common)
         if f.name not in left_out
     ]
@@ -142,6 +149,18 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
     wrapped.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     wrapped.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return wrapped
+
+
+_OF_A_CONFIG = ("overrides", "seed")
+"""Options that a command without a config refuses with a word of its own, and does not offer."""
+
+
+def _hidden(hint: Any) -> Any:
+    """Leave an option out of the help of a command."""
+    kind, option = get_args(hint)
+    option = copy.copy(option)
+    option.hidden = True
+    return Annotated[kind, option]
 
 
 _OF_NUMBERS = ("accept_guesses", "numbers")

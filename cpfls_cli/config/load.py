@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from cpfls_cli.config.check import check_data, gone_lines
 from cpfls_cli.config.overrides import apply_override, setting_errors
@@ -86,8 +86,40 @@ def _refuse_asked(data: dict[str, Any], source: str) -> None:
         one = len(keys) == 1
         raise ConfigError(
             f"{source}: {', '.join(keys)} = {ASK}: no log says {'it' if one else 'them'}; write what is true of the"
-            f" vehicle in place of {ASK} (cpfls init --mass KG --arm M fills in mass and arm length)"
+            f" vehicle in place of {ASK}{how_to_fill_in(keys)}"
         )
+
+
+_EXAMPLES: Final = {"mass_kg": "0.8", "position_m": "[0.1, -0.1, 0.0]", "spin": "1"}
+_MEANT: Final = {
+    "mass_kg": "kg, with battery",
+    "position_m": "x forward, y left and z up from the centre of mass, m",
+    "spin": "1 counter-clockwise seen from above, -1 clockwise",
+}
+_FILLED_IN_BY: Final = {"mass_kg": "--mass KG", "position_m": "--arm M"}
+
+
+def how_to_fill_in(keys: Iterable[str], **known: str) -> str:
+    """Give an example of what to write for each of some keys, once for all rotors, what it means, and what else may.
+
+    Parameters
+    ----------
+    keys : iterable of str
+        With dots, as `ASK` stands at them.
+    known : str
+        Values that are better examples, by the last part of a key.
+    """
+    names = dict.fromkeys(key.rpartition(".")[2] for key in keys)
+    if "rotors" in names:
+        names = {name: None for name in (*names, "position_m", "spin") if name != "rotors"}
+    shown = [name for name in names if name in _EXAMPLES]
+    if not shown:
+        return ""
+    values = ", ".join(f"{name}: {known.get(name, _EXAMPLES[name])}" for name in shown)
+    # Where it is known how rotors turn, it is known where they are up to the length of the arms.
+    options = [option for name, option in _FILLED_IN_BY.items() if name in shown and "spin" not in shown]
+    by_init = f"; cpfls init {' '.join(options)} fills {'it' if len(shown) == 1 else 'them'} in" if options else ""
+    return f", such as {values} ({'; '.join(_MEANT[name] for name in shown)}){by_init}"
 
 
 def _asked(node: Any, path: str) -> Iterator[str]:

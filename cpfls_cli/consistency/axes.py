@@ -27,6 +27,9 @@ that hardly turns, errors of the others decide."""
 _POOR = 0.6
 """Correlation below which gyroscope and attitude do not show one motion."""
 
+_SURE_SIGMAS, _OVERLAP = 4.0, 4
+"""Standard errors of a correlation from which on it is none by chance, and windows that share a sample."""
+
 _DEGREES_PER_RADIAN = 180 / pi
 _UNIT_TOLERANCE = 1.3
 """Ratio within which a gain is that of a unit."""
@@ -94,18 +97,25 @@ def gyroscope_apart(seen: Array, read: Array) -> tuple[tuple[Finding, ...], tupl
     unlike : tuple of Finding
         One for each axis whose correlation is below 0.6.
     scaled : tuple of Finding
-        One for each other axis whose gain is not within 0.5 .. 2.
+        One for each axis that agrees whose gain is not within 0.5 .. 2, and for each other one whose gain is that of
+        degrees for radians: noise in one of the two brings the correlation down to the ratio of their sizes, and so
+        explains no gain beyond its inverse.
     """
     motion = np.maximum(seen.std(axis=0), read.std(axis=0))
     correlation = _correlated(seen, read)
+    turning = motion > max(_TURNING_RAD_S, _TURNING_SHARE * motion.max())
+    sure = _SURE_SIGMAS / np.sqrt(len(seen) / _OVERLAP)
     unlike, scaled = [], []
-    for axis in np.flatnonzero(motion > max(_TURNING_RAD_S, _TURNING_SHARE * motion.max())).tolist():
-        if correlation[axis, axis] < _POOR:
+    for axis in range(3):
+        same = float(correlation[axis, axis])
+        agrees = bool(turning[axis] and same >= _POOR)
+        if turning[axis] and not agrees:
             unlike.append(_one_axis_apart(axis, correlation))
+        if not agrees and same < sure:
             continue
         gain = float(read[:, axis].std() / seen[:, axis].std())
-        if not 1 / TWICE <= gain <= TWICE:
-            about, remedy = _unit_of_gain(gain)
+        about, remedy = _unit_of_gain(gain, _UNIT_TOLERANCE / (1.0 if agrees else same))
+        if about or (agrees and not 1 / TWICE <= gain <= TWICE):
             what = f"about body {_BODY_AXES[axis]} the body rate is {gain:.3g} times the attitude's derivative{about}"
             scaled.append(Finding(what, remedy, _SENSORS, gain))
     return tuple(unlike), tuple(scaled)
@@ -123,13 +133,13 @@ def _one_axis_apart(axis: int, correlation: Array) -> Finding:
     return Finding(f"{what} (correlation {same:.2f}{more})", remedy, _SENSORS, same)
 
 
-def _unit_of_gain(gain: float) -> tuple[str, str]:
-    """Name the mistake with a unit that makes a gain, and what mends it."""
+def _unit_of_gain(gain: float, tolerance: float) -> tuple[str, str]:
+    """Name the mistake with a unit that makes a gain within a ratio, and what mends it."""
     for factor, name, rate, angle in (
         (_DEGREES_PER_RADIAN, "180/pi", "deg/s", "rad"),
         (1 / _DEGREES_PER_RADIAN, "pi/180", "rad/s", "deg"),
     ):
-        if abs(log(gain / factor)) < log(_UNIT_TOLERANCE):
+        if abs(log(gain / factor)) < log(tolerance):
             return (
                 f", about {name}",
                 f"does the log hold rates in {rate} (import.signals.body_rate.unit, attitude_rate.unit), or angles in "

@@ -168,21 +168,22 @@ def _of_ardupilot(parameters: Parameters) -> Airframe | None:
 
 
 _PX4_ORDER = (("front right", 1), ("rear left", 1), ("front left", -1), ("rear right", -1))
-_USUAL: Final = {
+USUAL: Final = {
     "PX4": _PX4_ORDER,
     "ArduPilot": _PX4_ORDER,
     "Betaflight": (("rear right", -1), ("front right", 1), ("rear left", 1), ("front left", -1)),
     "Crazyflie": (("front right", 1), ("rear right", -1), ("rear left", 1), ("front left", -1)),
 }
+"""Places and spins of four rotors in an X, in the order in which a kind of log numbers them."""
 
 
 def usual_airframe(kind: str) -> Airframe | None:
     """Give the four rotors in an X as a kind of log numbers them if nothing is changed; None for an unknown kind."""
-    if kind not in _USUAL:
+    if kind not in USUAL:
         return None
     corner = 1 / hypot(1.0, 1.0)
     rotors = tuple(
-        RotorPlace(name, (corner * _CORNERS[name][0], corner * _CORNERS[name][1]), spin) for name, spin in _USUAL[kind]
+        RotorPlace(name, (corner * _CORNERS[name][0], corner * _CORNERS[name][1]), spin) for name, spin in USUAL[kind]
     )
     return Airframe(rotors, False, f"the numbers that {kind} gives the motors of an X, if nobody changed them", "named")
 

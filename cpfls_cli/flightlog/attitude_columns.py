@@ -180,6 +180,10 @@ def doubt_reading(seen: Seen, verdict: TakenReading) -> None:
                     seen.doubt(signal, Rival(text, f"the log agrees as well, with other columns turned; {_DECIDES}"))
         if other.body != best.body and "body_frame" not in doubted:
             doubted.add("body_frame")
-            for key, value in (("body_frame", other.body), ("world_frame", other.world)):
+            for key, readings in (("body_frame", (other.body, best.body)), ("world_frame", (other.world, best.world))):
                 choice, reason = seen.choices[key], f"the log agrees as well; {_DECIDES}"
-                seen.choose(key, choice.value, choice.reason, "guess", Rival(f"{key}: {value}", reason))
+                # The accelerometer may have chosen the other reading, and then this one is the rival.
+                rivals = [Rival(f"{key}: {value}", reason) for value in readings if value != choice.value][:1]
+                known = [rival.text for rival in choice.rivals]
+                rivals = [*choice.rivals, *(rival for rival in rivals if rival.text not in known)]
+                seen.choose(key, choice.value, choice.reason, "guess" if rivals else choice.sure, *rivals)

@@ -127,6 +127,27 @@ def _doubt_rates(seen: Seen, named: Named, fit: AxisFit) -> None:
 # Position and velocity.
 
 
+def position_by_velocity(seen: Seen) -> None:
+    """Put the position first whose derivative is the velocity, where that of the first by name is clearly not."""
+    velocity, positions = seen.first("velocity"), seen.candidates.get("position", ())
+    if velocity is None or len(positions) < 2:
+        return
+    measured = slow(seen.grid(velocity), seen.rate_hz)
+    left = [
+        1 - fit_axes(slow(first_derivative(seen.grid(own), seen.rate_hz), seen.rate_hz), measured).explained
+        for own in positions
+    ]
+    best = int(np.argmin(left))
+    if best and left[best] < min(1 - GOOD, _CLOSER * left[0]):
+        chosen, first = positions[best], positions[0]
+        others = [own for own in positions if own is not chosen]
+        seen.candidates = {**seen.candidates, "position": (chosen, *others)}
+        seen.left_out.append(
+            f"{', '.join(first.group.columns)}: also a position, whose derivative explains {100 * (1 - left[0]):.0f} %"
+            f" of the velocity, and that of {', '.join(chosen.group.columns)} {100 * (1 - left[best]):.0f} %"
+        )
+
+
 def tell_places(seen: Seen, reading: Reading | None) -> None:
     """Take position and velocity in the axes in which the lean explains the motion, and the one derives the other."""
     position, velocity = seen.first("position"), seen.first("velocity")

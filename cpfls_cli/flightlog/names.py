@@ -20,6 +20,7 @@ from cpfls_cli.flightlog.vocabulary import (
     KNOWN,
     MEANINGS,
     NOT_MEASURED,
+    ONE_WORD,
     PX4,
     RATE_WORDS,
     SECOND_HAND,
@@ -74,7 +75,10 @@ class ColumnGroup:
         """Words of the pattern in lower case, without numbers and without the unit at its end."""
         before, _, after = self.pattern.rpartition(self.ending) if self.ending else (self.pattern, "", "")
         parts = re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+", f"{before} {after}".replace("*", " "))
-        return tuple(part.lower() for part in parts if not part.isdecimal())
+        words = " ".join(part.lower() for part in parts if not part.isdecimal())
+        for pattern, one in ONE_WORD.items():
+            words = re.sub(pattern, one, words)
+        return tuple(words.split())
 
 
 def _symbols(text: str) -> str:
@@ -310,7 +314,7 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
         motors = words == ("m",) or bool({"motor", "motors"} & own)
         return (fast and not own & ASKED) if signal == "rotor_speed" else bool(own & ASKED) or (motors and not fast)
     if signal == "position":
-        return re.search(r"(^|[^A-Za-z])\*($|[^A-Za-z])", group.pattern) is not None
+        return re.search(r"(^|[^A-Za-z])([Pp]|[Pp]os)?\*($|[^A-Za-z])", group.pattern) is not None
     if group.kind == "angles" and signal in ("attitude", "body_rate"):
         pqr = group.columns[0].removesuffix(group.ending) == "p"
         turns = pqr or ends_in_speed or bool(own & {*RATE_WORDS.split(), "speed"})

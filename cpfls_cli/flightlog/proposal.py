@@ -16,6 +16,7 @@ from cpfls_cli.flightlog.settings import SETPOINTS, ColumnMap, SignalMap, Signal
 from cpfls_cli.flightlog.topics import Topics
 from cpfls_cli.units import UnitName, known_unit
 from cpfls_cli.vehicle_limits import IN_ROOM, room, thrust_number
+from cpfls_cli.words import joined
 
 _SURENESS: Final = ("data", "named", "guess")
 _WORTH_IT = 0.8
@@ -228,9 +229,11 @@ def _time_column(logs: Sequence[KnownLog]) -> str | None:
             return None
     if wrong:
         clocks = [f"{one.recognition.time_column} in {one.recognition.time_unit}" for one in (first, wrong[-1])]
+        odd = {one.name: (one.recognition.time_column, one.recognition.time_unit) for one in wrong}
+        way = _way_on([(one, odd.get(one.name)) for one in logs])
         raise InputError(
             f"{first.name} and {wrong[-1].name}: the stamps are {clocks[0]} and {clocks[1]}, so one config cannot suit"
-            " both: run cpfls init for each of them"
+            f" both: {way}"
         )
     return first.recognition.time_column
 
@@ -244,9 +247,7 @@ def _merged_signals(logs: Sequence[KnownLog]) -> tuple[Guess, ...]:
             surest, found = _setpoint_of_all(surest, found)
         lacking = [one for one in logs if not set(surest[1].columns.columns) <= one.columns]
         others = {guess.columns: one.name for one, guess in found if one in lacking}
-        for one, guess in found:
-            if one not in lacking:
-                _require_same_map(name, surest, (one, guess))
+        _require_same_map(name, surest, [(one, guess) for one, guess in found if one not in lacking])
         merged.append(_standing_in(surest[1], others, [one.name for one in lacking]))
     order = {guess.signal: number for number, guess in enumerate(logs[0].recognition.signals)}
     return tuple(sorted(merged, key=lambda guess: order.get(guess.signal, len(order))))
@@ -280,19 +281,37 @@ def _standing_in(guess: Guess, others: Mapping[SignalMap, str], lacking: Sequenc
     return replace(guess, columns=columns, reason=reason)
 
 
-def _require_same_map(name: SignalName, surest: tuple[KnownLog, Guess], other: tuple[KnownLog, Guess]) -> None:
+def _require_same_map(
+    name: SignalName, surest: tuple[KnownLog, Guess], others: Sequence[tuple[KnownLog, Guess]]
+) -> None:
     """Refuse two maps of a signal that both logs are sure of."""
-    (first, kept), (second, guess) = surest, other
-    same = replace(kept.columns, required=True) == replace(guess.columns, required=True)
-    if same or "guess" in (guess.sure, kept.sure):
-        return
-    maps = [
-        f"{', '.join(g.columns.columns)} in {g.columns.unit} (sign {g.columns.sign or 'as logged'}) in {one.name}"
-        for one, g in (surest, other)
-    ]
-    raise InputError(
-        f"{first.name} and {second.name}: {name} is {maps[0]} and {maps[1]}, so one config cannot suit both: run cpfls"
-        " init for each of them"
+    first, kept = surest
+    sure = [(one, guess) for one, guess in others if "guess" not in (guess.sure, kept.sure)]
+    read = [(one, replace(guess.columns, required=True)) for one, guess in sure]
+    for (second, columns), (_, guess) in zip(read, sure, strict=True):
+        if columns == replace(kept.columns, required=True):
+            continue
+        maps = [
+            f"{', '.join(g.columns.columns)} in {g.columns.unit} (sign {g.columns.sign or 'as logged'}) in {one.name}"
+            for one, g in (surest, (second, guess))
+        ]
+        raise InputError(
+            f"{first.name} and {second.name}: {name} is {maps[0]} and {maps[1]}, so one config cannot suit both:"
+            f" {_way_on(read)}"
+        )
+
+
+def _way_on(read: Sequence[tuple[KnownLog, object]]) -> str:
+    """Say which logs to leave out where most are read alike, and else to look into each by itself."""
+    kinds = [[one for one, value in read if value == kind] for kind in dict.fromkeys(value for _, value in read)]
+    most, *others = sorted(kinds, key=len, reverse=True)
+    if len(most) == max(map(len, others), default=0):
+        return "run cpfls init for each of them"
+    odd = [one for own in others for one in own]
+    reads, them = ("reads", "it") if len(odd) == 1 else ("read", "them")
+    return (
+        f"{joined([one.name for one in odd])} {reads} otherwise than {joined([one.name for one in most])}: leave {them}"
+        f" out, or run cpfls init for {them} apart"
     )
 
 
@@ -303,9 +322,10 @@ def _merged_choices(logs: Sequence[KnownLog]) -> tuple[KeyChoice, ...]:
         first, kept = min(found, key=lambda entry: _SURENESS.index(entry[1].sure))
         for one, choice in found:
             if choice.value != kept.value and "guess" not in (choice.sure, kept.sure):
+                read = [(log, own.value) for log, own in found if own.sure != "guess"]
                 raise InputError(
                     f"{first.name} and {one.name}: import.{key} would be {kept.value} for the one and {choice.value}"
-                    " for the other: run cpfls init for each of them"
+                    f" for the other: {_way_on(read)}"
                 )
         merged.append(kept)
     return tuple(merged)

@@ -14,7 +14,7 @@ from cpfls_cli.flightlog.attitude_columns import BODY_OF, doubt_reading, read_at
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.flown import FlownPart, find_flown
 from cpfls_cli.flightlog.log_table import LogTable, holding_values, make_grid, refuse_dead_rotors
-from cpfls_cli.flightlog.motion_columns import tell_acceleration, tell_body_rate, tell_places
+from cpfls_cli.flightlog.motion_columns import position_by_velocity, tell_acceleration, tell_body_rate, tell_places
 from cpfls_cli.flightlog.nameless import nameless_signals
 from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals
 from cpfls_cli.flightlog.readings import Reading
@@ -47,6 +47,9 @@ _ORDER: Final[tuple[SignalName, ...]] = (
     "voltage",
 )
 _WITH_BODY = {"body_rate", "acceleration", "attitude", "quaternion"}
+_SHOWN = 4
+"""Groups of columns that are named where others are taken for the same."""
+
 _UP: Final = {"FLU": "up", "FRD": "down"}
 
 
@@ -87,6 +90,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         raise InputError(flown.reasons[0])
     seen = Seen(log, candidates, _part(log, flown), level)
     seen.warnings += [] if log.time_doubt is None else [log.time_doubt]
+    position_by_velocity(seen)
     verdict = read_attitude(seen)
     reading = None if verdict is None else verdict.best
     tell_places(seen, reading)
@@ -100,6 +104,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     _tell_wrench(seen)
     _doubt_columns(seen)
     tell_setpoints(seen, parameters, system)
+    _list_unused(seen)
     driving = rotors.speed or rotors.command
     return _gathered(seen, flown, speeds, moved, "" if driving is None else driving.kind)
 
@@ -263,6 +268,20 @@ def _doubt_columns(seen: Seen) -> None:
         if odd:
             seen.warnings.append(f"{name}: {'; '.join(odd)}")
             seen.doubt(name)
+
+
+def _list_unused(seen: Seen) -> None:
+    """Name the columns that are by their names as good a signal of the motion as those that are taken."""
+    used = {column for guess in seen.guesses.values() for column in guess.columns.columns}
+    said = [words.partition(": ")[0] for words in seen.left_out]
+    for name, found in seen.candidates.items():
+        if name not in _WITH_BODY | {"position", "velocity"}:
+            continue
+        unused = [own.group for own in found if not used & {*own.group.columns} and own.group.pattern not in said]
+        groups = [words for group in unused if (words := ", ".join(group.columns)) not in said]
+        if groups:
+            more = f" and {len(groups) - _SHOWN} more" if len(groups) > _SHOWN else ""
+            seen.left_out.append(f"{'; '.join(groups[:_SHOWN])}{more}: also {name} by name, not used")
 
 
 def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy | None, kind: str) -> Recognition:

@@ -122,6 +122,8 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
             )
             command = None
     warnings = [warning for guess in (speed, command) if guess is not None for warning in _too_slow(guess)]
+    if speed is None and command is None:
+        warnings += [warning for own in found["rotor_command"] for warning in _beyond_commands(own, parameters)][:1]
     shares = command is not None and command.columns.unit == "1"
     return RotorColumns(
         speed=speed,
@@ -167,6 +169,22 @@ def _too_slow(guess: RotorGuess) -> Iterator[str]:
             f"the rotors are logged at {guess.rate_hz:.3g} Hz ({guess.columns.columns[0]}): too slow for motors that"
             " follow within some 50 ms; log them at 100 Hz or more"
         )
+
+
+def _beyond_commands(found: Found, parameters: Parameters) -> Iterator[str]:
+    """Say where columns that are else commands of rotors hold numbers that no command is."""
+    named, time, values = found
+    beyond = (values < min(own.low for own in RANGES)) | (values > max(own.high for own in RANGES))
+    kept = ~beyond.any(axis=1)
+    if kept.all() or kept.sum() < _FEWEST_SAMPLES or _guess((named, time[kept], values[kept]), parameters) is None:
+        return
+    row = int(np.argmin(kept))
+    index = int(np.argmax(np.abs(values).max(axis=0)))
+    yield (
+        f"{', '.join(named.group.columns)} look like commands of rotors but for {named.group.columns[index]}, which"
+        f" reaches {values[np.argmax(np.abs(values[:, index])), index]:.3g}: no command is that large, from"
+        f" {time[row] - time[0]:.4g} s after the first stamp on; cut the log there, and run cpfls init again"
+    )
 
 
 def _is_electric(named: Named) -> bool:

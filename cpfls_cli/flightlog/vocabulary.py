@@ -224,6 +224,9 @@ class Meaning(NamedTuple):
     never: str = ""
 
 
+ONE_WORD: Final = {r"\bang vel(ocity)?\b": "angvel"}
+"""Words of a name that mean together what neither does, as a pattern, and the one word that means it."""
+
 RATE_WORDS: Final = "gyro gyr gyroscope gyros omega om w rate rates angular angvel pqr"
 MEANINGS: Final = (
     Meaning(
@@ -237,7 +240,7 @@ MEANINGS: Final = (
         f" {RATE_WORDS}",
     ),
     Meaning("velocity", "vel velocity v linear twist", "xyz numbers", 3, 2, "angular acc acceleration a"),
-    Meaning("acceleration", "acc accel accelerometer acceleration a sf f", "xyz numbers", 3, 2, "angular"),
+    Meaning("acceleration", "acc accel accelerometer acceleration a sf f", "xyz numbers", 3, 2, "angular ang"),
     Meaning("body_rate", RATE_WORDS, "xyz angles numbers", 3),
     Meaning("body_torque", "torque tau moment", "xyz angles numbers", 3),
     Meaning("attitude", "rpy euler attitude att angle angles ypr", "xyz angles numbers", 3),

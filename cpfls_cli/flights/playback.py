@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import floor
 from pathlib import Path
 from typing import Any
 
@@ -59,9 +60,10 @@ def flights_to_play(paths: Sequence[Path], study: Study, hold: Hold | None = Non
         periods = [each.parts[0].period for each in (flight, first)]
         if abs(periods[0] - periods[1]) > _SAME_PERIOD * periods[1]:
             rates = [f"{1 / period:.4g} Hz" for period in periods]
+            one = max(1, floor((1 + _SAME_PERIOD) / max(each.parts[0].period for each in flights)))
             raise InputError(
-                f"{flight.name}: sampled at {rates[0]}, {first.name} at {rates[1]}; play them back one by one, or "
-                "import them with import.rate_hz"
+                f"{flight.name}: sampled at {rates[0]}, {first.name} at {rates[1]}, and this takes flights of one rate:"
+                f" --set import.rate_hz={one} gives it to logs, flights are imported again with it"
             )
     stated = doubts(beyond_belief(study.vehicle))
     return (replace(first, warnings=(*stated, *first.warnings)), *flights[1:])

@@ -7,10 +7,11 @@ import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import sqrt
 from typing import Any, Final
 
-from cpfls_cli.config.load import ASK
-from cpfls_cli.flightlog.airframe import Airframe, RotorPlace
+from cpfls_cli.config.load import ASK, how_to_fill_in
+from cpfls_cli.flightlog.airframe import USUAL, Airframe, RotorPlace
 from cpfls_cli.flightlog.proposal import DECIDES_ROTORS, Proposal
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival
 from cpfls_cli.flightlog.settings import ColumnMap
@@ -62,9 +63,6 @@ def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
         chosen = (f"{choice.key} {choice.value}{_guessed(choice)}" for choice in proposal.choices)
         yield Text(", ".join(chosen))
     yield Text(_rotors_in_words(proposal))
-    asked = asked_keys(proposal, stated)
-    if asked:
-        yield Text(f"to be filled in by hand, marked {ASK} in {output}: {_asked_words(asked)}", "warning", always=True)
     why = [] if proposal.airframe is None else [Text(f"rotors: {proposal.airframe.reason}")]
     yield Folded("the reason of each guess", [_reasons_table(proposal), *why])
     yield from (Text(warning, "warning", always=True) for warning in proposal.warnings)
@@ -79,6 +77,15 @@ def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
         cut += [Text(f"{prefix}{reason}") for reason in reasons]
         cut += [Text(f"{prefix}not mapped: {words}", "note") for words in one.recognition.left_out]
     yield Folded("what is cut or not mapped", cut)
+    asked = asked_keys(proposal, stated)
+    if asked:
+        # Last, since the commands that follow it refuse the config until it is done.
+        side = None if stated.arm_m is None else f"{stated.arm_m / sqrt(2):.3g}"
+        known = {} if side is None else {"position_m": f"[{side}, -{side}, 0.0]"}
+        yield Text(
+            f"first edit {output}: write {_asked_words(asked)} in place of {ASK}{how_to_fill_in(asked, **known)}; then"
+            " go on"
+        )
 
 
 def _topic(proposal: Proposal) -> str:
@@ -255,6 +262,11 @@ def _rotors(proposal: Proposal, stated: Stated) -> Iterator[str]:
             " mass, in m; spin 1 turns counter-clockwise seen from above, -1 clockwise.",
             2,
         )
+        if proposal.rotors == 4:
+            usual = (
+                f"{kind}: {', '.join(f'{place} {spin}' for place, spin in order)}" for kind, order in USUAL.items()
+            )
+            yield from _comment(f"Four in an X are usually, from M1 to M4, in {'; in '.join(usual)}.", 2)
     else:
         if airframe.is_guess:
             yield from _comment(f"Not known. A guess from {airframe.reason}; {DECIDES_ROTORS}.", 2)

@@ -73,12 +73,15 @@ def test_what_only_a_person_knows_is_asked_for_and_refused_in_one_sentence(cpfls
     assert "front right: [0.707 a, -0.707 a, 0.0]" in text
     asked = "vehicle.mass_kg, " + ", ".join(f"vehicle.rotors.{index}.position_m" for index in range(4))
     by_hand = "vehicle.mass_kg, position_m of M1, M2, M3 and M4"
-    assert f"to be filled in by hand, marked ASK in {tmp_path / 'study.yaml'}: {by_hand}\n" in result.stderr
     study = tmp_path / "study.yaml"
-    sentence = (
-        f"{study}: {asked} = ASK: no log says them; write what is true of the vehicle in place of ASK (cpfls init"
-        " --mass KG --arm M fills in mass and arm length)"
+    such_as = (
+        "in place of ASK, such as mass_kg: 0.8, position_m: [0.1, -0.1, 0.0] (kg, with battery; x forward, y left and z"
+        " up from the centre of mass, m); cpfls init --mass KG --arm M fills them in"
     )
+    before, _, after = result.stdout.partition("next:\n")
+    assert before.endswith(f"first edit {study}: write {by_hand} {such_as}; then go on\n")
+    assert "ASK" not in after
+    sentence = f"{study}: {asked} = ASK: no log says them; write what is true of the vehicle {such_as}"
     for words in (
         ("import", study, log, "-o", tmp_path / "flight.h5"),
         ("vehicle", study, log, "-o", tmp_path / "vehicle.h5"),
@@ -91,8 +94,8 @@ def test_what_only_a_person_knows_is_asked_for_and_refused_in_one_sentence(cpfls
     assert cpfls("config", study).exit_code == 0
     study.write_text(filled.replace("mass_kg: 0.8", "mass_kg: ASK"))
     assert refuse("config", study) == [
-        f"{study}: vehicle.mass_kg = ASK: no log says it; write what is true of the vehicle in place of ASK"
-        " (cpfls init --mass KG --arm M fills in mass and arm length)"
+        f"{study}: vehicle.mass_kg = ASK: no log says it; write what is true of the vehicle in place of ASK, such as"
+        " mass_kg: 0.8 (kg, with battery); cpfls init --mass KG fills it in"
     ]
     assert cpfls("config", study, "--set", "vehicle.mass_kg=0.8").exit_code == 0
 
@@ -197,6 +200,18 @@ def test_one_config_cannot_suit_logs_of_other_axes(refuse, tmp_path, own):
     assert line.endswith("so one config cannot suit both: run cpfls init for each of them")
 
 
+def test_the_one_log_of_other_axes_is_named_to_be_left_out(refuse, tmp_path, own):
+    turned = named(own.rate @ FLIP, "gyro_x", "gyro_y", "gyro_z")
+    odd = write_csv(tmp_path / "odd.csv", flat_log(own, rate=turned))
+    one, two = (write_csv(tmp_path / f"{name}.csv", flat_log(own)) for name in ("one", "two"))
+    for logs in ((odd, one, two), (one, odd, two)):
+        (line,) = refuse("init", *logs, "-o", tmp_path / "study.yaml")
+        assert line.endswith(
+            f"so one config cannot suit both: {odd} reads otherwise than {one} and {two}: leave it out, or run cpfls"
+            " init for it apart"
+        )
+
+
 def test_two_vehicles_in_one_call_are_refused(refuse, tmp_path, own):
     first = write_csv(tmp_path / "one.csv", flat_log(own))
     swapped = named(own.speed[:, [1, 0, 2, 3]] * 60 / (2 * np.pi), "rpm1", "rpm2", "rpm3", "rpm4")
@@ -227,9 +242,13 @@ def test_a_log_without_rotors_is_imported_and_drives_nothing(cpfls, proposed, tm
 def test_rotors_that_nothing_tells_are_asked_for(proposed, tmp_path, own):
     noise = np.random.default_rng(2).normal(500, 3, own.speed.shape)
     speed = named(noise, "rotor1", "rotor2", "rotor3", "rotor4")
-    result, _, data = proposed(
+    result, text, data = proposed(
         write_csv(tmp_path / "log.csv", flat_log(own, speed=speed)), "--mass", MASS, "--arm", ARM
     )
+    assert "such as position_m: [0.113, -0.113, 0.0], spin: 1 (" in result.stdout
+    assert "fills them in" not in result.stdout
+    comments = " ".join(text.replace("#", "").split())
+    assert "in Betaflight: rear right -1, front right 1, rear left 1, front left -1" in comments
     assert {(rotor["position_m"], rotor["spin"]) for rotor in data["vehicle"]["rotors"]} == {("ASK", "ASK")}
     assert "4 rotors; neither parameters nor the motion say where they are" in result.stdout
 
@@ -246,7 +265,7 @@ def test_a_log_of_px4_brings_its_rotors_along(proposed, tmp_path, own):
     assert "THR_MDL_FAC is 1" in text
     assert [rotor["spin"] for rotor in data["vehicle"]["rotors"]] == [spin for _, _, spin in HUBS]
     assert data["vehicle"]["rotors"][0]["position_m"] == pytest.approx([0.11, -0.12, 0.0])
-    assert "marked ASK" not in result.stderr
+    assert "ASK" not in result.stdout + result.stderr
 
 
 @pytest.mark.parametrize(

@@ -311,6 +311,7 @@ def test_flights_of_different_rates_are_refused(refused, shifted, tmp_path):
     np.savetxt(log, table, delimiter=",", header="t,wx,wy,wz,om1,om2,om3,om4", comments="", fmt="%.9g")
     message = refused("vehicle", shifted[1], log)
     assert message.startswith("slow.csv: sampled at 50 Hz, flight_2.csv at 100 Hz")
+    assert "--set import.rate_hz=50 gives it to logs" in message
 
 
 def test_a_missing_model_is_refused(refused, shifted, tmp_path):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.consistency.axes import gyroscope_apart
 from cpfls_cli.consistency.check import check
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.smoothing import low_pass
@@ -104,3 +105,24 @@ def test_a_gain_between_a_half_and_two_is_let_pass(gain, warned):
 def test_noise_alone_is_no_gain():
     assert gains(log(noise=0.3, held=5)) == []
     assert gains(log(noise=5.0)) == []
+
+
+def gentle(noise):
+    """Rates of windows by an attitude as noisy as that, and by a gyroscope: below what is judged axis by axis."""
+    motion, other = 0.04 * np.random.default_rng(3).standard_normal((2, 800, 3))
+    return motion + noise * other, motion
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.5, 2.5])
+@pytest.mark.parametrize(("degrees", "words"), [(180 / np.pi, "about 180/pi"), (np.pi / 180, "about pi/180")])
+def test_a_unit_of_a_gyroscope_is_told_beneath_noise_that_hides_its_motion(noise, degrees, words):
+    seen, read = gentle(noise)
+    _, scaled = gyroscope_apart(seen, degrees * read)
+    assert [words in each.what for each in scaled] == [True] * 3
+    assert gyroscope_apart(seen, read)[1] == ()
+
+
+def test_what_does_not_follow_the_attitude_tells_no_unit():
+    seen, _ = gentle(0.0)
+    other = 0.04 * np.random.default_rng(5).standard_normal(seen.shape)
+    assert gyroscope_apart(seen, other * np.pi / 180) == ((), ())

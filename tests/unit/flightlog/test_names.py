@@ -19,6 +19,10 @@ def first(names, signal, system=""):
         ("qx qy qz qw", "quaternion", "qw qx qy qz"),
         ("omega_x omega_y omega_z", "body_rate", "omega_x omega_y omega_z"),
         ("gyro.x gyro.y gyro.z", "body_rate", "gyro.x gyro.y gyro.z"),
+        ("ang_vel_x ang_vel_y ang_vel_z", "body_rate", "ang_vel_x ang_vel_y ang_vel_z"),
+        ("angVelX angVelY angVelZ", "body_rate", "angVelX angVelY angVelZ"),
+        ("px py pz", "position", "px py pz"),
+        ("posX posY posZ", "position", "posX posY posZ"),
         ("gyroADC[0] gyroADC[1] gyroADC[2]", "body_rate", "gyroADC[0] gyroADC[1] gyroADC[2]"),
         ("IMU.GyrX IMU.GyrY IMU.GyrZ", "body_rate", "IMU.GyrX IMU.GyrY IMU.GyrZ"),
         ("RATE.R RATE.P RATE.Y", "body_rate", "RATE.R RATE.P RATE.Y"),
@@ -100,3 +104,8 @@ def test_of_an_autopilot_only_known_columns_drive_rotors():
 def test_events_of_a_card_stand_before_the_names_of_a_crazyflie():
     named = first("fixedFrequency.gyro.x fixedFrequency.gyro.y fixedFrequency.gyro.z", "body_rate", "Crazyflie uSD")
     assert (named.unit, named.frame) == ("deg/s", "FLU")
+
+
+@pytest.mark.parametrize("signal", ["velocity", "acceleration"])
+def test_what_turns_is_no_translation(signal):
+    assert first("ang_vel_x ang_vel_y ang_vel_z ang_acc_x ang_acc_y ang_acc_z", signal) is None

@@ -161,6 +161,21 @@ def test_a_velocity_in_body_axes_is_left_out(own):
     assert "a velocity in body axes" in recognition.left_out[0]
 
 
+def test_the_position_whose_derivative_is_the_velocity_is_taken_and_the_other_one_named(own):
+    drifting = own.position + np.random.default_rng(4).normal(0.0, 0.3, own.position.shape).cumsum(axis=0)
+    both = named(drifting, "x", "y", "z") | named(own.position, "mocap_x", "mocap_y", "mocap_z")
+    recognition = seen(flat_log(own, position=both))
+    assert recognition.signal("position").columns.columns == ("mocap_x", "mocap_y", "mocap_z")
+    assert any(words.startswith("x, y, z: also a position, whose") for words in recognition.left_out)
+
+
+def test_of_two_positions_that_fit_the_velocity_the_first_by_name_is_taken(own):
+    both = named(own.position, "x", "y", "z") | named(own.position + 1.0, "mocap_x", "mocap_y", "mocap_z")
+    recognition = seen(flat_log(own, position=both))
+    assert recognition.signal("position").columns.columns == PLACE
+    assert recognition.left_out == ("mocap_x, mocap_y, mocap_z: also position by name, not used",)
+
+
 def test_lengths_in_millimetres_are_told_by_what_the_lean_does(own):
     log = flat_log(own, position=named(1000 * own.position, *PLACE), velocity=named(1000 * own.velocity, *SPEED))
     recognition = assert_the_flight_comes_back(log, own)
@@ -193,6 +208,16 @@ def test_outputs_without_a_motor_are_left_out(own):
     names = [f"motor{number}_pwm" for number in range(1, 7)]
     guess = seen(flat_log(own, speed=named(np.hstack([1000 + own.speed, idle]), *names))).signal("rotor_command")
     assert guess.columns.columns == tuple(names[:4])
+
+
+def test_commands_that_blow_up_are_said_with_the_moment(own):
+    commands = 65.536 * own.speed
+    commands[2500:, 1] = 1.25e6
+    recognition = seen(flat_log(own, speed=named(commands, "motor_m1", "motor_m2", "motor_m3", "motor_m4")))
+    assert recognition.rotors == 0
+    (warning,) = recognition.warnings
+    assert "motor_m2, which reaches 1.25e+06: no command is that large, from 25 s after the first stamp on" in warning
+    assert warning.endswith("cut the log there, and run cpfls init again")
 
 
 def test_stamps_in_microseconds_are_known_by_their_steps(own):

@@ -1,11 +1,16 @@
 """`init` is never sure of what it cannot know: names that lie, columns that are odd, and what nothing decides."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.flightlog.airframe import airframe_from_motion
+from cpfls_cli.flightlog.attitude_columns import doubt_reading
+from cpfls_cli.flightlog.log_table import LogTable
 from cpfls_cli.flightlog.proposal import known_log, propose
+from cpfls_cli.flightlog.recognised import Seen
 from tests.builders.unknown_logs import FLIP, GRAVITY, HUBS, NED, flat_log, flight, named, quaternion
 
 GYRO, ACC = ("gyro_x", "gyro_y", "gyro_z"), ("acc_x", "acc_y", "acc_z")
@@ -202,6 +207,21 @@ def test_gravity_that_points_the_wrong_way_is_a_guess_with_its_rivals():
 def test_an_accelerometer_alone_may_log_gravity():
     proposal = proposed(attitude=None, position=None, velocity=None, force=named(OWN.specific_force @ FLIP, *ACC))
     assert choices(proposal)["body_frame"] == ("FRD", "guess")
+
+
+def test_what_is_chosen_is_no_rival_of_itself():
+    """The accelerometer has chosen FRD, and the attitude can be read as of either."""
+    log = flat_log(OWN)
+    seen = Seen(LogTable(log.topics, log.units), {}, slice(None), None)
+    seen.choose("body_frame", "FRD", "by the accelerometer", "guess")
+    seen.choose("world_frame", "NED", "as the body", "guess")
+    best, other = (
+        SimpleNamespace(attitude=SimpleNamespace(order=(0, 1, 2)), maps={}, body=body, world=world)
+        for body, world in (("FLU", "ENU"), ("FRD", "NED"))
+    )
+    doubt_reading(seen, SimpleNamespace(best=best, tied=(other,)))
+    rivals = {key: [rival.text for rival in choice.rivals] for key, choice in seen.choices.items()}
+    assert rivals == {"body_frame": ["body_frame: FLU"], "world_frame": ["world_frame: ENU"]}
 
 
 @pytest.mark.parametrize(
