@@ -99,13 +99,15 @@ _MEANT: Final = {
 _FILLED_IN_BY: Final = {"mass_kg": "--mass KG", "position_m": "--arm M"}
 
 
-def how_to_fill_in(keys: Iterable[str], **known: str) -> str:
+def how_to_fill_in(keys: Iterable[str], *, brief: bool = False, **known: str) -> str:
     """Give an example of what to write for each of some keys, once for all rotors, what it means, and what else may.
 
     Parameters
     ----------
     keys : iterable of str
         With dots, as `ASK` stands at them.
+    brief : bool
+        Without what they mean, and without examples where a command fills them in.
     known : str
         Values that are better examples, by the last part of a key.
     """
@@ -119,6 +121,8 @@ def how_to_fill_in(keys: Iterable[str], **known: str) -> str:
     # Where it is known how rotors turn, it is known where they are up to the length of the arms.
     options = [option for name, option in _FILLED_IN_BY.items() if name in shown and "spin" not in shown]
     by_init = f"; cpfls init {' '.join(options)} fills {'it' if len(shown) == 1 else 'them'} in" if options else ""
+    if brief:
+        return by_init or f", such as {values}"
     return f", such as {values} ({'; '.join(_MEANT[name] for name in shown)}){by_init}"
 
 

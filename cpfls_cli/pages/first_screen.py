@@ -30,6 +30,7 @@ from cpfls_cli.pages.replay import prediction_words, signal_scale
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Table, Text, Tone, in_short
 from cpfls_cli.report.numbers import number, plain, sentence
+from cpfls_cli.rounding import less
 from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
@@ -48,6 +49,8 @@ _TONES: dict[str, Tone] = {
 _EFFECTS_SHOWN = 2
 _PRINTED = 2
 """Digits of what is played back."""
+_VISIBLE = 0.05
+"""Share of the error without a model by which a playback has to grow to be called worse."""
 _ENERGY = {"feeds": ", feeds energy into the motion", "drains": ", drains energy from the motion"}
 _USE = "take the model with it, extended.h5"
 _GUSTS = "nothing on the model: what is left are gusts or noise; fly in still air, or more runs, to see what is smaller"
@@ -332,11 +335,11 @@ def _playback_rows(playback: PlaybackChangeGroup) -> Iterator[list[str | Cell]]:
 
 
 def _farther_off(playback: PlaybackChangeGroup) -> list[str]:
-    """List the signals that the model with the effects plays back worse than the model as given, as printed."""
+    """List the signals that the model with the effects plays back visibly worse than the model as given."""
     return [
         signal_scale(signal)[0]
         for signal, end in playback.at_end.items()
-        if float(number(end.after, _PRINTED)) > float(number(end.before, _PRINTED))
+        if less(end.before + _VISIBLE * end.without_model, end.after)
     ]
 
 

@@ -82,10 +82,8 @@ def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
         # Last, since the commands that follow it refuse the config until it is done.
         side = None if stated.arm_m is None else f"{stated.arm_m / sqrt(2):.3g}"
         known = {} if side is None else {"position_m": f"[{side}, -{side}, 0.0]"}
-        yield Text(
-            f"first edit {output}: write {_asked_words(asked)} in place of {ASK}{how_to_fill_in(asked, **known)}; then"
-            " go on"
-        )
+        how = how_to_fill_in(asked, brief=True, **known)
+        yield Text(f"first edit {output}: write {_asked_words(asked)} in place of {ASK}{how}")
 
 
 def _topic(proposal: Proposal) -> str:

@@ -79,7 +79,8 @@ def test_what_only_a_person_knows_is_asked_for_and_refused_in_one_sentence(cpfls
         " up from the centre of mass, m); cpfls init --mass KG --arm M fills them in"
     )
     before, _, after = result.stdout.partition("next:\n")
-    assert before.endswith(f"first edit {study}: write {by_hand} {such_as}; then go on\n")
+    by_init = "in place of ASK; cpfls init --mass KG --arm M fills them in"
+    assert before.endswith(f"first edit {study}: write {by_hand} {by_init}\n")
     assert "ASK" not in after
     sentence = f"{study}: {asked} = ASK: no log says them; write what is true of the vehicle {such_as}"
     for words in (
@@ -245,7 +246,7 @@ def test_rotors_that_nothing_tells_are_asked_for(proposed, tmp_path, own):
     result, text, data = proposed(
         write_csv(tmp_path / "log.csv", flat_log(own, speed=speed)), "--mass", MASS, "--arm", ARM
     )
-    assert "such as position_m: [0.113, -0.113, 0.0], spin: 1 (" in result.stdout
+    assert "such as position_m: [0.113, -0.113, 0.0], spin: 1\n" in result.stdout
     assert "fills them in" not in result.stdout
     comments = " ".join(text.replace("#", "").split())
     assert "in Betaflight: rear right -1, front right 1, rear left 1, front left -1" in comments
