@@ -12,7 +12,7 @@ NAMES = ["front right", "rear left", "front left", "rear right"]
 
 @pytest.fixture(scope="module")
 def own():
-    return flight()
+    return flight(seconds=20.0)
 
 
 def topic(own, every, columns):

@@ -17,7 +17,7 @@ LATE = 10
 
 @pytest.fixture(scope="module")
 def own():
-    return flight()
+    return flight(seconds=20.0)
 
 
 def ahead(values):

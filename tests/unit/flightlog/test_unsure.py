@@ -18,12 +18,12 @@ PLACE, SPEED, Q = ("x", "y", "z"), ("vx", "vy", "vz"), ("qw", "qx", "qy", "qz")
 ANGLES = ("roll", "pitch", "yaw")
 RPM = 60 / (2 * np.pi)
 NAMES = {(1, -1): "front right", (-1, 1): "rear left", (1, 1): "front left", (-1, -1): "rear right"}
-OWN = flight()
+OWN, LONGER = flight(seconds=20.0), flight()
 UP_DOWN = np.array([1.0, 1.0, -1.0])
 
 
-def proposed(**changed):
-    log = flat_log(OWN, **changed)
+def proposed(own=OWN, **changed):
+    log = flat_log(own, **changed)
     return propose([known_log("log", log.topics, log.units, log.parameters, log.system)], None, None)
 
 
@@ -239,7 +239,7 @@ def test_a_column_that_is_another_one_or_nothing_makes_a_guess(columns, said):
 
 
 def test_a_gyroscope_of_another_flight_is_a_guess():
-    proposal = proposed(rate=named(flight(seed=9).rate, *GYRO))
+    proposal = proposed(rate=named(flight(seconds=20.0, seed=9).rate, *GYRO))
     assert signal(proposal, "body_rate").sure == "guess"
     assert any("the derivative of the attitude explains only" in warning for warning in proposal.warnings)
 
@@ -254,12 +254,12 @@ def test_three_of_four_rotors_are_a_guess():
 @pytest.mark.parametrize(
     ("stamps", "said"),
     [
-        (np.arange(len(OWN.time)) * 1.0, "t rises by 1 from row to row"),
-        (1e4 * OWN.time, "which no unit makes: is the unit of the stamps right?"),
+        (np.arange(len(LONGER.time)) * 1.0, "t rises by 1 from row to row"),
+        (1e4 * LONGER.time, "which no unit makes: is the unit of the stamps right?"),
     ],
 )
 def test_stamps_that_count_something_else_are_doubted(stamps, said):
-    assert any(said in warning for warning in proposed(t={"t": stamps}).warnings)
+    assert any(said in warning for warning in proposed(LONGER, t={"t": stamps}).warnings)
 
 
 def test_a_layout_in_which_single_rotors_push_the_wrong_way_is_no_known_one():
