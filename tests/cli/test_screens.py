@@ -19,11 +19,13 @@ from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Table, unfolded
 from cpfls_cli.report.terminal import terminal_lines
+from tests.builders.command_line import undrawn
 from tests.builders.shifted_flights import CONFIG, OFFSET, flight_table, save
 from tests.builders.studies import VEHICLE
 from tests.builders.unknown_logs import flat_log, flight, write_csv
 from tests.builders.vehicle_models import record_of
 
+pytestmark = pytest.mark.usefixtures("undrawn")
 COLUMNS, LINES, ANSWER, WIDEST = 80, 24, 15, 100
 WHOLE = ("config",)
 """Prints a file, to be written into one."""
@@ -49,6 +51,7 @@ def screens(cpfls, pipeline, study, tmp_path_factory):
             terminal.tell(outcome, common)
 
         with (
+            undrawn(),
             patch("cpfls_cli.cli.app.tell", tell),
             patch.object(terminal, "_columns", lambda *_: COLUMNS),
             pytest.MonkeyPatch.context() as environment,
