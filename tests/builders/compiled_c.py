@@ -90,12 +90,12 @@ def evaluate(folder, name, motion):
     return drive(driver(folder, [name]), motion)
 
 
-def driver(folder, names, optimised="-O0"):
+def driver(folder, names):
     """Compile exported models with all checks into one program that takes states."""
     includes = "\n".join(f'#include "{name}.h"' for name in names)
     models = "\n".join(MODEL.format(number=number, name=name) for number, name in enumerate(names))
     (folder / "main.c").write_text(MAIN.format(includes=includes, models=models))
-    return build(folder, ["main.c", *(f"{name}.c" for name in names)], optimised, *CHECKS)
+    return build(folder, ["main.c", *(f"{name}.c" for name in names)], "-O0", *CHECKS)
 
 
 def drive(program, motion, model=0):

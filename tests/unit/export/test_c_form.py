@@ -12,7 +12,7 @@ from tests.builders.compiled_c import CHECKS, build, drive, driver, require_gcc,
 from tests.builders.exported_models import CASES, Case, errors, model_of, sheet_of, states, wanted_of
 
 OUTSIDE, NOT_FINITE, VERTICAL = 1, 2, 4
-SAMPLES = {"paper": 50_000, "default": 50_000}
+SAMPLES = {"paper": 10_000, "default": 10_000}
 QUICK = ("paper", "default", "rigid body, rules", "zero width, classic", "nothing at all")
 ALLOWED = 1e-12
 
@@ -31,21 +31,12 @@ def exported(folder, model, name="vehicle"):
 @pytest.fixture(scope="module")
 def computed(tmp_path_factory):
     """What the exported C of a case computes along a motion; all cases are compiled together, with all checks."""
-    programs = {}
-    # Optimising takes longer than it saves on few states.
-    for optimised, group in (("-O1", [*SAMPLES]), ("-O0", [name for name in CASES if name not in SAMPLES])):
-        folder = tmp_path_factory.mktemp("cases")
-        names = [f"case_{number}" for number in range(len(group))]
-        for name, case in zip(names, group, strict=True):
-            exported(folder, model_of(CASES[case]), name)
-        program = driver(folder, names, optimised)
-        programs |= {case: (program, number) for number, case in enumerate(group)}
-
-    def drive_case(case, motion):
-        program, number = programs[case]
-        return drive(program, motion, number)
-
-    return drive_case
+    folder = tmp_path_factory.mktemp("cases")
+    names = {case: f"case_{number}" for number, case in enumerate(CASES)}
+    for case, name in names.items():
+        exported(folder, model_of(CASES[case]), name)
+    program = driver(folder, [*names.values()])
+    return lambda case, motion: drive(program, motion, [*names].index(case))
 
 
 @pytest.mark.parametrize("name", CASES)

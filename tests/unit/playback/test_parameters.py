@@ -5,7 +5,16 @@ import pytest
 
 from cpfls_cli.playback import vehicle
 from cpfls_cli.playback.evaluation import Evaluated
-from cpfls_cli.playback.fit import FitWindows, fit, loss_of, rate_stays, uncertainty, window_errors, window_sums
+from cpfls_cli.playback.fit import (
+    FitWindows,
+    fit,
+    loss_of,
+    rate_stays,
+    uncertainty,
+    window_errors,
+    window_loss,
+    window_sums,
+)
 from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.kernels import Airflow, errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
@@ -42,9 +51,7 @@ def test_the_gradient_is_the_difference_quotient_for_every_number(flight, rules)
     step = 1e-5
     for place, number in enumerate(free.numbers):
         moved = step * scale[place] * np.eye(len(values))[place]
-        ahead, behind = (
-            window_sums(Evaluated.of(free.base, v), windows, group)[0] for v in (values + moved, values - moved)
-        )
+        ahead, behind = (window_loss(Evaluated.of(free.base, v), windows) for v in (values + moved, values - moved))
         assert gradient[place] == pytest.approx((ahead - behind) / (2 * step), rel=1e-4, abs=1e-6), number.name
 
 
