@@ -1,5 +1,6 @@
 """Other systems as far as can be told here: names that they lack, their texts, and their folders."""
 
+import json
 import subprocess
 import sys
 
@@ -10,7 +11,7 @@ from tests.builders.studies import TINY, VEHICLE
 
 # What Windows lacks, but for what Python itself stands on here.
 ABSENT = """
-import os, signal, sys
+import json, os, signal, sys
 
 for name in ("fcntl", "resource", "termios", "pwd", "grp", "tty", "pty"):
     sys.modules[name] = None
@@ -22,14 +23,20 @@ for name in ("SIGPIPE", "SIGHUP", "SIGALRM", "SIGUSR1", "SIGUSR2", "SIGQUIT", "S
         delattr(signal, name)
 from cpfls_cli.cli.main import run
 
-run()
+for words in json.loads(sys.argv[1]):
+    sys.argv = ["cpfls", *words]
+    try:
+        run()
+    except SystemExit as end:
+        if end.code:
+            raise
 """
 
 
-def elsewhere(folder, *words):
-    ended = subprocess.run(
-        [sys.executable, "-c", ABSENT, *map(str, words)], cwd=folder, capture_output=True, timeout=300, check=False
-    )
+def elsewhere(folder, *commands):
+    """Run commands one after the other in a process of their own."""
+    called = [sys.executable, "-c", ABSENT, json.dumps(commands)]
+    ended = subprocess.run(called, cwd=folder, capture_output=True, timeout=300, check=False)
     assert ended.returncode == 0, ended.stderr.decode()
     return ended.stdout.decode("utf-8")
 
@@ -52,14 +59,17 @@ def log(ends):
 
 def test_commands_run_where_names_of_this_system_are_absent(folder):
     (folder / "tiny.yaml").write_text(TINY + VEHICLE, encoding="utf-8")
-    elsewhere(folder, "trajectory", "tiny.yaml", "-o", "path.h5")
-    elsewhere(folder, "simulate", "tiny.yaml", "path.h5", "-o", "flight ü.h5")
-    elsewhere(folder, "reduce", "tiny.yaml", "flight ü.h5", "-o", "selection.h5")
     words = ("--selection", "selection.h5", "-o", "model.h5", "--workers", "2")
-    elsewhere(folder, "identify", "tiny.yaml", "flight ü.h5", *words)
-    elsewhere(folder, "export", "model.h5", "-o", "model.json", "--force")
-    assert "flight" in elsewhere(folder, "info", "flight ü.h5")
-    elsewhere(folder, "check", "model.h5")
+    elsewhere(
+        folder,
+        ("trajectory", "tiny.yaml", "-o", "path.h5"),
+        ("simulate", "tiny.yaml", "path.h5", "-o", "flight ü.h5"),
+        ("reduce", "tiny.yaml", "flight ü.h5", "-o", "selection.h5"),
+        ("identify", "tiny.yaml", "flight ü.h5", *words),
+        ("export", "model.h5", "-o", "model.json", "--force"),
+        ("check", "model.h5"),
+    )
+    assert "flight" in elsewhere(folder, ("info", "flight ü.h5"))
 
 
 @pytest.mark.parametrize("ends", ["\n", "\r\n"])

@@ -23,8 +23,13 @@ def syntax(path):
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
+@cache
+def nodes(path):
+    return list(ast.walk(syntax(path)))
+
+
 def functions(path):
-    return [node for node in ast.walk(syntax(path)) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
+    return [node for node in nodes(path) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
 
 
 def body_lines(function):
@@ -41,7 +46,7 @@ def test_functions_are_short():
 
 def test_classes_are_of_one_thought():
     """With their docstrings, which grow with the attributes: a class that is longer does several things."""
-    classes = [(path, node) for path in MODULES for node in ast.walk(syntax(path)) if isinstance(node, ast.ClassDef)]
+    classes = [(path, node) for path in MODULES for node in nodes(path) if isinstance(node, ast.ClassDef)]
     lengths = {f"{path}:{node.name}": node.end_lineno - node.lineno + 1 for path, node in classes}
     assert {name: length for name, length in lengths.items() if length > LONGEST_CLASS} == {}
 
@@ -152,8 +157,7 @@ def test_a_dataset_is_looked_up_by_its_path_in_artifacts_only():
     for path in MODULES:
         name = path.relative_to(PACKAGE).as_posix()
         if not name.startswith("artifacts/") and name not in OF_ALL_FORMATS:
-            nodes = ast.walk(syntax(path))
-            lookups[name] = [text for node in nodes if (text := looked_up(node)) is not None]
+            lookups[name] = [text for node in nodes(path) if (text := looked_up(node)) is not None]
     assert {name: texts for name, texts in lookups.items() if texts} == {}
 
 
@@ -201,7 +205,7 @@ FEW_LINES = 80
 def lines_of_code(path):
     """Count lines without docstrings, comments, imports and blank lines."""
     left_out = set()
-    for node in ast.walk(syntax(path)):
+    for node in nodes(path):
         is_text = (
             isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
         )
@@ -215,7 +219,7 @@ def test_a_module_has_two_users_or_is_long_enough():
     names = {".".join(("cpfls_cli", *path.relative_to(PACKAGE).with_suffix("").parts)): path for path in MODULES}
     users = {name: set() for name in names}
     for user, path in names.items():
-        for node in ast.walk(syntax(path)):
+        for node in nodes(path):
             if isinstance(node, ast.ImportFrom) and node.module and path.name != "__init__.py":
                 for used in {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)} & names.keys():
                     users[used].add(user)

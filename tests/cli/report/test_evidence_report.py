@@ -11,6 +11,7 @@ import pytest
 
 from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.store import read_artifact, write_artifact
+from tests.builders.command_line import undrawn
 from tests.builders.evidence_artifacts import REASONS, with_evidence
 
 EVIDENCE = ["validation", "residuals", "uncertainty", "steps"]
@@ -61,7 +62,8 @@ def bare(pipeline, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def page(report, model):
-    return report(model())
+    with undrawn(told=True):
+        return report(model())
 
 
 def test_the_made_evidence_keeps_to_the_format(model):
