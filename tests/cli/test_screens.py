@@ -27,6 +27,10 @@ from tests.builders.vehicle_models import record_of
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 COLUMNS, LINES, ANSWER, WIDEST = 80, 24, 15, 100
+SLOWLY = {"computed_torque.control_rate_hz": 20, "computed_torque.integration_rate_hz": 20}
+SLOWLY |= {"closed_loop.integration_rate_hz": 100}
+COARSE = [word for key, rate in SLOWLY.items() for word in ("--set", f"simulation.{key}={rate}")]
+"""What a screen says hangs on no step of an integration."""
 WHOLE = ("config",)
 """Prints a file, to be written into one."""
 
@@ -78,7 +82,7 @@ def _of_torque(show):
     excited = ("--hover", "20", "--excite", "roll,pitch", "--repeat", "2")
     show("mission", "trajectory", "tiny.yaml", *excited, *quick, output="mission.h5")
     show("simulate", "simulate", "tiny.yaml", "path.h5", output="other.h5")
-    show("tracking", "simulate", "tiny.yaml", "path.h5", "--model", "model.h5", output="tracked.h5")
+    show("tracking", "simulate", "tiny.yaml", "path.h5", "--model", "model.h5", *COARSE, output="tracked.h5")
     show("reduce", "reduce", "tiny.yaml", "flight.h5", output="few.h5")
     show("identify", "identify", "tiny.yaml", "flight.h5", "--validate", "other.h5", output="found.h5")
     show("sweep", "sweep", "tiny.yaml", "flight.h5", "--set", "sweep.seeds=2", output="sweep.h5")
@@ -133,7 +137,7 @@ def _of_open_numbers(show, folder):
     for name, taken in (("guessed", ("--accept-guesses",)), ("found", ("--model", "own/vehicle.h5"))):
         own = f"{name}-"
         show(f"{name}: trajectory", "trajectory", "open.yaml", *taken, output=f"{own}path.h5")
-        show(f"{name}: simulate", "simulate", "open.yaml", "open-path.h5", *taken, output=f"{own}flight.h5")
+        show(f"{name}: simulate", "simulate", "open.yaml", "open-path.h5", *taken, *COARSE, output=f"{own}flight.h5")
         show(f"{name}: compare", "compare", "open.yaml", "flight_1.csv", *taken, output=f"{own}compared.h5")
         show(f"{name}: response", "response", "open.yaml", "flight_1.csv", *taken, output=f"{own}response.h5")
         show(f"{name}: diagnose", "diagnose", "open.yaml", f"{own}compared.h5", *taken, output=f"{own}named.h5")
