@@ -1,9 +1,12 @@
 """Models of every structure with random coefficients, states that hurt, and sheets to export."""
 
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 import yaml
 
 from cpfls_cli.artifacts.evidence import VerdictGroup
@@ -12,7 +15,7 @@ from cpfls_cli.artifacts.scores import JudgedGroup
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.commands.vehicle_sheets import bare_sheet
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
-from cpfls_cli.export.points import expected
+from cpfls_cli.export.points import expected, reference_run
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.fuzzy.membership import breakpoints
@@ -104,6 +107,14 @@ def _special(model: InertiaFunctions, axis: int) -> np.ndarray:
 
 
 VEHICLE = VehicleSettings()
+
+
+@contextmanager
+def short_runs():
+    """Write runs of three steps for an export to test itself by, where nobody runs that: half of the time of it."""
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr("cpfls_cli.export.points.reference_run", partial(reference_run, steps=3))
+        yield
 
 
 def sheet_of(model: InertiaFunctions, **changes) -> Sheet:

@@ -10,6 +10,7 @@ from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.source import c_source, python_source
 from tests.builders.compiled_c import CHECKS, build, written
+from tests.builders.exported_models import short_runs
 
 MAIN = """
 #include "vehicle.h"
@@ -90,7 +91,8 @@ class InC:
     """A vehicle as compiled C."""
 
     def __init__(self, folder, model, *flags):
-        written(folder, "vehicle", c_source(sheet_of_vehicle(model), "vehicle"))
+        with short_runs():
+            written(folder, "vehicle", c_source(sheet_of_vehicle(model), "vehicle"))
         (folder / "main.c").write_text(MAIN)
         self.program = build(folder, ["main.c", "vehicle.c"], *(flags or CHECKS))
 
@@ -128,7 +130,8 @@ class InPython:
 
     def __init__(self, _folder, model):
         self.names = {"__name__": "vehicle"}
-        exec(python_source(sheet_of_vehicle(model), "vehicle.py"), self.names)
+        with short_runs():
+            exec(python_source(sheet_of_vehicle(model), "vehicle.py"), self.names)
 
     def wrench(self, air, rate, rotor):
         return np.hstack(self.names["wrench"](air, rate, rotor))

@@ -1,16 +1,14 @@
 """A module exported from any structure computes what the library computes."""
 
 import warnings
-from functools import partial
 
 import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from cpfls_cli.export.points import reference_run
 from cpfls_cli.export.source import python_source
-from tests.builders.exported_models import Case, errors, model_of, sheet_of, states, wanted_of
+from tests.builders.exported_models import Case, errors, model_of, sheet_of, short_runs, states, wanted_of
 
 functions = st.integers(1, 15)
 structures = st.fixed_dictionaries(
@@ -26,10 +24,9 @@ structures = st.fixed_dictionaries(
 
 
 @pytest.fixture(autouse=True, scope="module")
-def short_runs():
-    """Runs by which a module would test itself are written into it and not looked at here: three steps are enough."""
-    with pytest.MonkeyPatch.context() as monkeypatch:
-        monkeypatch.setattr("cpfls_cli.export.points.reference_run", partial(reference_run, steps=3))
+def untested():
+    """No module tests itself here."""
+    with short_runs():
         yield
 
 

@@ -9,7 +9,7 @@ from cpfls_cli.dynamics.rigid_body import vertical
 from cpfls_cli.export.source import c_source
 from cpfls_cli.regressor.motion import Motion
 from tests.builders.compiled_c import CHECKS, build, drive, driver, require_gcc, written
-from tests.builders.exported_models import CASES, Case, errors, model_of, sheet_of, states, wanted_of
+from tests.builders.exported_models import CASES, Case, errors, model_of, sheet_of, short_runs, states, wanted_of
 
 OUTSIDE, NOT_FINITE, VERTICAL = 1, 2, 4
 SAMPLES = {"paper": 10_000, "default": 10_000}
@@ -33,8 +33,9 @@ def computed(tmp_path_factory):
     """What the exported C of a case computes along a motion; all cases are compiled together, with all checks."""
     folder = tmp_path_factory.mktemp("cases")
     names = {case: f"case_{number}" for number, case in enumerate(CASES)}
-    for case, name in names.items():
-        exported(folder, model_of(CASES[case]), name)
+    with short_runs():
+        for case, name in names.items():
+            exported(folder, model_of(CASES[case]), name)
     program = driver(folder, [*names.values()])
     return lambda case, motion: drive(program, motion, [*names].index(case))
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli.export.source import python_source
-from tests.builders.exported_models import CASES, errors, model_of, sheet_of, states, wanted_of
+from tests.builders.exported_models import CASES, errors, model_of, sheet_of, short_runs, states, wanted_of
 
-SAMPLES = {"paper": 20_000, "default": 20_000}
+SAMPLES = {"paper": 10_000, "default": 10_000}
 ALLOWED = 1e-12
 
 DRIVER = """
@@ -43,7 +43,8 @@ def evaluated(tmp_path_factory):
     for index, name in enumerate(CASES):
         model, stem = model_of(CASES[name]), f"case_{index}"
         motion = states(model, SAMPLES.get(name, 2000), seed=index)
-        (folder / f"{stem}.py").write_text(python_source(sheet_of(model), f"{stem}.py"))
+        with short_runs():
+            (folder / f"{stem}.py").write_text(python_source(sheet_of(model), f"{stem}.py"))
         np.save(folder / f"{stem}.npy", np.array([motion.attitude, motion.rate, motion.acceleration]))
         cases[name] = (model, motion, folder / f"{stem}.npz")
     words = [sys.executable, "-I", "-c", DRIVER, str(folder), *(f"case_{index}" for index in range(len(CASES)))]
