@@ -118,6 +118,7 @@ def heavier(flights, folder, change, name):
     return written(folder, name, whole)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_constants_are_found_and_written_into_a_config(cpfls, flights, folder):
     config = heavier(flights, folder, open_constants, "logs.yaml")
     copy = folder / "found.yaml"
@@ -141,6 +142,7 @@ def test_constants_are_found_and_written_into_a_config(cpfls, flights, folder):
     assert "Guesses stand here for what the config leaves open: drag factor, inertia and thrust factor." in page
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_an_added_mass_is_found_beside_what_is_shared(cpfls, flights, folder):
     config = heavier(flights, folder, same_vehicle, "groups.yaml")
     result = cpfls("vehicle", config, folder / "flight.csv", folder / "loaded.csv", "-o", folder / "g.h5", "--json")

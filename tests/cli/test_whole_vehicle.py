@@ -218,6 +218,7 @@ def test_torque_and_force_are_what_the_motion_takes(cpfls, config, vehicle, flig
     assert np.diag(record.inertia[0]) == pytest.approx(WHOLE.vehicle.inertia_kg_m2, rel=0.01)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_people_read_what_a_prediction_is_held_against(cpfls, config, vehicle, noisy, tmp_path):
     result = cpfls("predict", config, vehicle, noisy, "-o", tmp_path / "p.h5")
     assert result.exit_code == 0, result.stderr

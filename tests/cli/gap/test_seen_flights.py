@@ -46,6 +46,7 @@ def test_a_file_of_before_says_it_of_whole_flights(extended, tmp_path):
         assert sorted(file["inputs"]) == ["diagnosis", "flight-1", "flight-2"]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_predict_says_that_it_has_seen_the_flight(cpfls, gap_config, two_models, with_attitude, tmp_path):
     flight = tmp_path / "flight.h5"
     assert cpfls("import", gap_config, with_attitude[0], "-o", flight).exit_code == 0
@@ -74,6 +75,7 @@ def test_replay_and_compare_warn_of_flights_seen(
     assert "flight_5.csv: extended.h5" not in result.stdout
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_only_what_the_command_reads_is_asked_for(cpfls, gap_config, extended, tmp_path):
     page = tmp_path / "page.md"
     assert cpfls("report", gap_config, extended, "-o", page).exit_code == 0
