@@ -2,6 +2,7 @@
 
     python benchmarks/low_frequency_torque.py [NANODRONE] [NANOBENCH]
     python benchmarks/low_frequency_torque.py --training     without the path that is kept aside
+    python benchmarks/low_frequency_torque.py --truth        simulated flights with flapping and nothing else missing
 
 NANODRONE is what `benchmarks/nanodrone.py` reads, NANOBENCH the folder datasets/dataset of syediu/nanobench-iros2026
 (commit 0ae7d68). Default are the folders nanodrone and nanobench in CPFLS_FLIGHTS; a vehicle whose folder is absent is
@@ -35,14 +36,31 @@ from matplotlib.figure import Figure
 from benchmarks.shared.nanobench_files import INERTIA as NANOBENCH_INERTIA
 from benchmarks.shared.nanobench_files import MASS as NANOBENCH_MASS
 from benchmarks.shared.nanobench_files import commanded_flights, late_by_lag
-from benchmarks.shared.nanodrone_files import ARM, INERTIA, MASS, PERIOD, TEST, THRUST_FACTOR, TRAINING, flights
+from benchmarks.shared.nanodrone_files import (
+    ARM,
+    INERTIA,
+    MASS,
+    PERIOD,
+    TEST,
+    THRUST_FACTOR,
+    TRAINING,
+    VEHICLE,
+    flights,
+)
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.playback.balances import band_windows
 from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.kernels import MeasuredMotion
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import GREY, line, plot, style_of
+from cpfls_cli.rotations import rotation_matrix
+from cpfls_cli.simulation.measured import measure
+from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
+from tests.builders.gusty_flights import EVERY, GUSTS, MEMORY_S, SMALL, STEP_S, path_of
+from tests.builders.gusty_flights import Flight as Asked
 from tests.builders.recorded_flights import FLIGHTS
 
 OUTPUT = Path(__file__).resolve().parents[1] / "docs" / "low-frequency-torque.svg"
@@ -62,6 +80,8 @@ NAMED_CLIMBS = ("descent of 0.8 m/s", "level", "climb of 0.8 m/s")
 """Speeds across the rotors and climbs at which the moment of the flow is drawn, m/s."""
 MIDDLES = (0.55, 1.0, 1.7, 4.0)
 """Of the bands, Hz."""
+TRUE_FLAPPING, TRUE_S, WIDER = -1.0e-7, 60.0, 4.0
+"""Of simulated flights: the coefficient, about that of the nano-drone, their length, and how much wider a path is."""
 SMALLEST_FLOW = 0.1
 """m/s, that keeps the iteration of the induced velocity from dividing by nothing."""
 
@@ -288,15 +308,35 @@ def _laid(window: object, signals: Array) -> Array:
 
 def nanodrone(folder: Path, names: Sequence[str]) -> tuple[Run, ...]:
     """Read flights of the nano-drone benchmark, whose rotor speeds are measured."""
+    return tuple(_by_speed(each.name.split("_")[0], each.motion, each.speed) for each in flights(folder, names))
+
+
+def _by_speed(path: str, motion: MeasuredMotion, speed: Array) -> Run:
+    front_right, back_right, back_left, front_left = THRUST_FACTOR * speed.T**2
+    torque = ARM * np.stack(
+        [back_left + front_left - front_right - back_right, back_right + back_left - front_right - front_left], axis=1
+    )
+    thrust = (front_right + back_right + back_left + front_left) / (MASS * GRAVITY)
+    return Run(path, motion, torque, thrust, speed.sum(axis=1))
+
+
+def simulated() -> tuple[Run, ...]:
+    """Fly two paths four times by the package's autopilot in gusts, with the moment of flapping hubs."""
+    gusts = Gusts(np.array([*np.multiply(GUSTS, INERTIA), *[0.0] * 3]), np.array([*MEMORY_S, *[1.0] * 3]))
+    model = VehicleModel(vehicle=VEHICLE, gusts=gusts)
+    loop = ClosedLoopSettings(effects={"flapping_moment": (TRUE_FLAPPING,)}, gusts=True, rotor_time_constant_s=0.02)
+    noise = {"body_rate": SMALL.gyro_noise, "rotor_speed": 2.0}
+    settings = SimulationSettings(mode="closed-loop", closed_loop=loop, noise=noise)
     found = []
-    for flight in flights(folder, names):
-        front_right, back_right, back_left, front_left = THRUST_FACTOR * flight.speed.T**2
-        torque = ARM * np.stack(
-            [back_left + front_left - front_right - back_right, back_right + back_left - front_right - front_left],
-            axis=1,
-        )
-        thrust = (front_right + back_right + back_left + front_left) / (MASS * GRAVITY)
-        found.append(Run(flight.name.split("_")[0], flight.motion, torque, thrust, flight.speed.sum(axis=1)))
+    for path, draw in product(range(2), range(4)):
+        asked = WIDER * path_of(Asked(SMALL, path=path), round(TRUE_S / STEP_S))[::EVERY]
+        planned = dict(zip(("position", "velocity", "acceleration"), np.split(asked, 3, axis=1), strict=True))
+        planned |= dict.fromkeys(("attitude", "attitude_rate", "attitude_acceleration"), np.zeros((len(asked), 3)))
+        time, rng = PERIOD * np.arange(len(asked)), np.random.default_rng([path, draw])
+        logged = measure(time, planned, VEHICLE, settings, rng, model=model).signals
+        rotation = rotation_matrix(logged["attitude"])
+        motion = MeasuredMotion(logged["position"], logged["velocity"], rotation, logged["body_rate"], PERIOD)
+        found.append(_by_speed(f"path {path + 1}", motion, logged["rotor_speed"]))
     return tuple(found)
 
 
@@ -578,8 +618,13 @@ def main() -> None:
     parser.add_argument("nanodrone", type=Path, nargs="?", default=FLIGHTS / "nanodrone")
     parser.add_argument("nanobench", type=Path, nargs="?", default=FLIGHTS / "nanobench")
     parser.add_argument("--training", action="store_true", help="leave the path that is kept aside unread")
+    parser.add_argument("--truth", action="store_true", help="simulated flights, and nothing else")
     given = parser.parse_args()
-    vehicles = list(_vehicles(given.nanodrone, given.nanobench, aside=not given.training))
+    if given.truth:
+        groups: dict[str, tuple[str, ...] | None] = {"path 1": ("path 1",), "path 2": ("path 2",)}
+        vehicles = [Vehicle("simulated", simulated(), INERTIA[0], MASS * GRAVITY, True, groups, {})]
+    else:
+        vehicles = list(_vehicles(given.nanodrone, given.nanobench, aside=not given.training))
     if not vehicles:
         sys.exit(f"{given.nanodrone} and {given.nanobench} are absent; see the head of this file")
     bands = [f"{band} Hz" for band in BANDS]
