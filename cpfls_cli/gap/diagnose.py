@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, has_force
 from cpfls_cli.gap.balance.weak_flight import Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
+from cpfls_cli.gap.naming.by_instruments import by_instruments
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     impossible_ratios,
@@ -33,6 +35,7 @@ from cpfls_cli.gap.naming.leftover import Leftover, beside_the_unnamed, not_exci
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
 from cpfls_cli.gap.naming.search import forward_selection
+from cpfls_cli.gap.residual.air import Air, air, in_air, known_motion
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.windows import Recording, common_windows
@@ -47,11 +50,14 @@ class DiagnosisRun:
 
     Attributes
     ----------
+    air : Air or None
+        Gusts in the training flights; None where nothing but noise is left, or the flights are too short.
     hypothesis : System
         Of the training flights, with the chosen effects.
     """
 
     diagnosis: Diagnosis
+    air: Air | None
     audit: Audit
     hypothesis: System
     estimates: Estimates
@@ -75,7 +81,8 @@ def diagnose(
 
     The sensors are audited first and repaired where they are at fault. Effects are then added one at a time while each
     explains more of blocks it has not seen than chance does anywhere in the catalogue; what is chosen is judged on
-    the held-out flights, once.
+    the held-out flights, once. Where instruments tell that what is left is gusts, these are a part of the noise, the
+    effects are sought once more beside them, and their numbers come by instruments.
 
     Parameters
     ----------
@@ -95,19 +102,18 @@ def diagnose(
     windows = common_windows([*training, *held], settings)
     audited = audit([recording.signals for recording in training], windows)
     prepared = Preparation(windows, model, settings, audited)
-    weak = prepared.repaired(training)
-    effects, steps, found, refusals = _searched(weak, settings, rng, progress)
-    progress(0.65, "estimates")
-    floor = steps[-1].floor
-    judge = Judge(weak, prepared.logged(held), prepared.repaired(held), floor, settings, rng)
-    first = judge.judge(found)
-    judgement, unconfirmed = judge.confirmed(first)
-    refusals += unconfirmed
-    differ = differences(first, judgement, steps[0], judge, settings)
-    judgement = first if differ else judgement
+    flights = _Flights(prepared.repaired(training), prepared.logged(held), prepared.repaired(held))
+    named = quiet = _named(flights, settings, rng, progress)
+    gusts = _gusts(named, training, settings, rng)
+    if gusts is not None and gusts.told.any():
+        flights = flights.in_air(gusts)
+        named = _named(flights, settings, rng, progress)
+        named = named._replace(judgement=_by_instruments(named, training, settings))
+        gusts = _gusts(named, training, settings, rng)
+    weak, (effects, steps, judge, judgement, refusals, differ) = flights.training, named
     hypothesis, _, estimates = judgement.found
     progress(0.75, "rivals")
-    effect_shares = shares(weak, hypothesis.chosen, estimates, floor)
+    effect_shares = shares(weak, hypothesis.chosen, estimates, judge.floor)
     estimates, unnamed = beside_the_unnamed(judgement.found, steps[-1], effects, settings, rng)
     judged = [
         judge_effect(weak, hypothesis.chosen, index, estimates, float(effect_shares[index]), effects, settings, rng)
@@ -119,8 +125,68 @@ def diagnose(
     notes = [] if differ else [*_doubts(unnamed, judged, settings), *(refused.sentence for refused in refusals)]
     notes = [*not_judged(judgement.held_out), *notes]
     remainder = judge.remainder(judgement.found)
-    diagnosis = _concluded(judged, faults, judgement, remainder, differ, notes, steps, settings, torque_alone, audited)
-    return DiagnosisRun(diagnosis, audited, hypothesis, estimates, judgement.held_out)
+    excited = _excited(hypothesis, quiet.judge.floor)
+    diagnosis = _concluded(
+        judged, faults, judgement, remainder, differ, notes, steps, excited, settings, torque_alone, audited
+    )
+    return DiagnosisRun(diagnosis, gusts, audited, hypothesis, estimates, judgement.held_out)
+
+
+class _Flights(NamedTuple):
+    """Flights that train, and those held out as logged and repaired."""
+
+    training: Sequence[WeakFlight]
+    logged: Sequence[WeakFlight]
+    repaired: Sequence[WeakFlight]
+
+    def in_air(self, gusts: Air) -> _Flights:
+        """Give all of them the floor of their air."""
+        return _Flights(*(in_air(flights, gusts) for flights in self))
+
+
+class _Named(NamedTuple):
+    """What was named, on which grounds, and what was refused."""
+
+    effects: list[Effect]
+    steps: list[RankedStep]
+    judge: Judge
+    judgement: Judgement
+    refusals: list[Refusal]
+    differ: tuple[str, ...]
+
+
+def _named(
+    flights: _Flights, settings: GapSettings, rng: np.random.Generator, progress: Callable[[float, str], None]
+) -> _Named:
+    """Search for effects, and judge them on the flights held out."""
+    effects, steps, found, refusals = _searched(flights.training, settings, rng, progress)
+    progress(0.65, "estimates")
+    judge = Judge(*flights, steps[-1].floor, settings, rng)
+    first = judge.judge(found)
+    judgement, unconfirmed = judge.confirmed(first)
+    differ = differences(first, judgement, steps[0], judge, settings)
+    return _Named(effects, steps, judge, first if differ else judgement, [*refusals, *unconfirmed], differ)
+
+
+def _gusts(named: _Named, training: Sequence[Recording], settings: GapSettings, rng: np.random.Generator) -> Air | None:
+    """Find gusts in what is left of the flights, where they were found before or anything is left."""
+    found, judge = named.judgement.found, named.judge
+    if not any(flight.air.any() for flight in judge.training) and not judge.remainder(found).unexplained:
+        return None
+    given = known_motion(training)
+    return air(found.hypothesis, found.estimates.linear, found.block, given, settings, rng)
+
+
+def _by_instruments(named: _Named, training: Sequence[Recording], settings: GapSettings) -> Judgement:
+    """Judge what was named with the numbers that instruments tell."""
+    given, judge = known_motion(training), named.judge
+    return judge.judge(by_instruments(named.judgement.found, given, judge.floor, settings))
+
+
+def _excited(hypothesis: System, floor: Array) -> bool:
+    """Tell whether anything moved enough to show a gap, above the floor of the sensors alone."""
+    inertial = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
+    return bool((inertial[:, :3].std(axis=0) > _EXCITED_FLOORS * floor[:3]).any())
 
 
 def _doubts(unnamed: Sequence[str], judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[str]:
@@ -192,6 +258,7 @@ def _concluded(
     differ: tuple[str, ...],
     notes: Sequence[str],
     steps: Sequence[RankedStep],
+    excited: bool,
     settings: GapSettings,
     torque_alone: tuple[tuple[str, float], ...],
     audited: Audit,
@@ -214,8 +281,6 @@ def _concluded(
     stays = gap_stays(
         held_out.size(held_out.parameters).floors, held_out.size(held_out.after).floors, least, len(named)
     )
-    inertial = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
-    excited = bool((inertial[:, :3].std(axis=0) > _EXCITED_FLOORS * floor[:3]).any())
     verdict = verdict_of(effects, rivals, known, tuple(removed.values()) or (1.0,), stays, excited, settings)
     # A fit that asks for numbers that no vehicle has says that the log is wrong, not the vehicle.
     wrong = (*audited.contradictions, *contradictions(impossible(impossible_ratios(estimates.parameters))))

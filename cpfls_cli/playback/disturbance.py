@@ -18,11 +18,11 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import contiguous, half_width, mean_error
+from cpfls_cli.blocks import contiguous, half_width, jackknife_error, mean_error
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.gusts import Gusts
-from cpfls_cli.playback.instruments import Instruments
+from cpfls_cli.playback.instruments import Instruments, Told
 from cpfls_cli.playback.loop import wrench_during
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.weak_form.windows import Windows, windows
@@ -63,6 +63,10 @@ class FoundGusts:
     size, low, high : array, shape (axis,), N m and N
         Standard deviation; where none is known, NaN, 0, and the size of all that is left. NaN where the body is not
         known either.
+    noise : array, shape (axis, 2)
+        Variance of the white noise beside it, and of that which a derivative is taken of, as of samples.
+    foretold, foretold_error : array, shape (axis,)
+        Share of all that is left which instruments foretell, and its standard error; NaN without instruments.
     """
 
     size: Array
@@ -71,7 +75,10 @@ class FoundGusts:
     memory: Array
     memory_low: Array
     memory_high: Array
-    told_by: str
+    told_by: Told
+    noise: Array
+    foretold: Array
+    foretold_error: Array
 
     @property
     def gusts(self) -> Gusts | None:
@@ -83,18 +90,23 @@ class FoundGusts:
         return Gusts(size, memory) if known.any() else None
 
 
+ENDS = ("size", "low", "high", "memory", "memory_low", "memory_high")
+"""Sizes and memories among the fields of `FoundGusts`."""
+
+
 class _Powers(NamedTuple):
     """Power of what does not come again.
 
     Attributes
     ----------
-    power : array, shape (block, axis, frequency)
-        Sums over the pieces of a block, squared units of torque and force.
+    power, whole : array, shape (block, axis, frequency)
+        Sums over the pieces of a block, squared units of torque and force; of that, and of all that is left.
     pieces : array, shape (block,)
         How many there are.
     """
 
     power: Array
+    whole: Array
     pieces: IntArray
 
 
@@ -180,14 +192,42 @@ def find_gusts(
     ----------
     Whittle 1953; White 1982 (errors from the scatter of slopes); Uhlenbeck and Ornstein 1930.
     """
+    rows = 6 if all(flight.translates for flight in given.flown) else 3
+    sides = [_sides(model, flight)[..., :rows] for flight in given.flown]
+    found = gusts_in(sides, given, given.kind if told else "none")
+    if found is None:
+        return None
+    bodies = [f"inertia.{name}" for name in INERTIA_PARAMETERS[:3]] + ["thrust_factor"] * 3
+    open_ = [not determined.get(name, True) for name in bodies[:rows]]
+    for name in ENDS:
+        getattr(found, name)[open_] = np.nan
+    return found
+
+
+def gusts_in(sides: Sequence[Array], given: Instruments, told_by: Told) -> FoundGusts | None:
+    """Find sizes and memories of gusts in what both sides of a balance differ by; see `find_gusts`.
+
+    Parameters
+    ----------
+    sides : sequence of array, shape (time, 2, axis), N m s and N m, N s and N
+        For each run momentum, and what changes it.
+    given : Instruments
+        Of these runs.
+    told_by : str
+        Which instruments to take.
+
+    Returns
+    -------
+    FoundGusts or None
+        None for flights that are too short or of several rates.
+    """
     period = given.flown[0].motion.period
     longest = max((part.stop - part.start for flight in given.flown for part in flight.stretches), default=0) * period
     length = min(_PIECE_S, _RUN_SHARE * longest)
     if length < _SHORTEST_S or any(flight.motion.period != period for flight in given.flown):
         return None
     band = _Band.of(period, length)
-    told_by = given.kind if told else "none"
-    powers = _powers(model, given, band, told_by)
+    powers = _powers(sides, given, band, told_by)
     if len(powers.pieces) < _FEWEST_BLOCKS:
         return None
     runs = min((len(beside) + 1 for beside in given.repeats.beside if beside), default=1)
@@ -195,16 +235,23 @@ def find_gusts(
     shared = np.sqrt(2 * runs / (2 * runs - 1)) if told_by == "repeats" else 1.0
     axes = [_Axis(band, power, powers.pieces) for power in powers.power.swapaxes(0, 1)]
     columns = np.array([axis.bound() if told_by == "none" else axis.found(shared) for axis in axes])
-    bodies = [f"inertia.{name}" for name in INERTIA_PARAMETERS[:3]] + ["thrust_factor"] * 3
-    columns[[not determined.get(name, True) for name in bodies[: len(axes)]]] = np.nan
-    size, low, high, memory, memory_low, memory_high = columns.T
-    return FoundGusts(size, low, high, memory, memory_low, memory_high, told_by)
+    foretold, error = _share_foretold(powers)
+    none = np.full(len(axes), np.nan) if told_by == "none" else 1.0
+    ends = dict(zip(ENDS, columns.T[: len(ENDS)], strict=True))
+    shares = {"foretold": none * foretold, "foretold_error": none * shared * error}
+    return FoundGusts(**ends, told_by=told_by, noise=columns[:, len(ENDS) :], **shares)
 
 
-def _powers(model: VehicleModel, given: Instruments, band: _Band, told_by: str) -> _Powers:
+def _share_foretold(powers: _Powers) -> tuple[Array, Array]:
+    """Compute the shares of all that is left which instruments foretell, and their standard errors, shape (axis,)."""
+    both = np.where(np.arange(powers.power.shape[2]) > 0, 2.0, 1.0)
+    kept, whole = powers.power @ both, powers.whole @ both
+    without = 1 - (kept.sum(axis=0) - kept) / (whole.sum(axis=0) - whole)
+    return 1 - kept.sum(axis=0) / whole.sum(axis=0), jackknife_error(without)
+
+
+def _powers(sides: Sequence[Array], given: Instruments, band: _Band, told_by: Told) -> _Powers:
     """Take the power of what does not come again, by block of a run."""
-    rows = 6 if all(flight.translates for flight in given.flown) else 3
-    sides = [_sides(model, flight)[..., :rows] for flight in given.flown]
     left = [band.left(flight, own) for flight, own in zip(given.flown, sides, strict=True)]
     if told_by == "repeats":
         beside = [
@@ -218,15 +265,16 @@ def _powers(model: VehicleModel, given: Instruments, band: _Band, told_by: str) 
     period = given.flown[0].motion.period
     seen = sum(len(own) for own in left) * band.pieces.hop * period
     block_s = min(_PIECE_S, max(seen / _BLOCKS, _LEAST_BLOCK_S))
-    power, count = [], []
+    power, whole, count = [], [], []
     for flight, own, known in zip(given.flown, left, beside, strict=True):
         there = np.isfinite(known).all(axis=(1, 2))
-        products = (own * np.conj(own - known)).real[there]
+        products, squares = (own * np.conj(own - known)).real[there], np.abs(own[there]) ** 2
         block = band.starts(flight)[there] * period // block_s
         for each in np.unique(block):
             power.append(products[block == each].sum(axis=0))
+            whole.append(squares[block == each].sum(axis=0))
             count.append(int((block == each).sum()))
-    return _Powers(np.array(power), np.array(count, dtype=np.int64))
+    return _Powers(np.array(power), np.array(whole), np.array(count, dtype=np.int64))
 
 
 def _sides(model: VehicleModel, flight: PlaybackFlight) -> Array:
@@ -300,7 +348,7 @@ class _Axis:
         scale = len(self._lags) * self._noise[0, 0]
         blocks = (self._power[:, 0] + 2 * self._power[:, 1:].sum(axis=1)) / self._count / scale
         largest = blocks.mean() + half_width(mean_error(blocks), len(blocks))
-        return np.array([np.nan, 0.0, np.sqrt(max(largest, 0.0)), np.nan, np.nan, np.nan])
+        return np.array([np.nan, 0.0, np.sqrt(max(largest, 0.0)), *[np.nan] * 5])
 
     def found(self, shared: float) -> Array:
         """Give size and memory with their intervals, as columns of `FoundGusts`; the bound where they are not known.
@@ -318,7 +366,9 @@ class _Axis:
         if not inside or 2 * half[0] > np.log(_KNOWN) or size**2 < _SEEN * everything[2] ** 2:
             return everything
         ends = np.clip([memory * np.exp(-half[1]), memory * np.exp(half[1])], *_MEMORY_S)
-        return np.array([size, size * np.exp(-half[0]), size * np.exp(half[0]), memory, *ends])
+        return np.array(
+            [size, size * np.exp(-half[0]), size * np.exp(half[0]), memory, *ends, *np.exp(fit.numbers[2:])]
+        )
 
     def _fit(self) -> _Fit:
         """Maximise the likelihood over logarithms of squared size, memory and the two noises."""

@@ -33,6 +33,9 @@ A velocity may be what a loop of position asks for: that answers gusts so slowly
 """
 
 
+Told = Literal["repeats", "setpoints", "none"]
+"""What tells gusts and what a model lacks apart."""
+
 FOLDS = 5
 """Parts of the flights that are kept aside in turn."""
 _ANSWERED_S = 0.5
@@ -81,7 +84,7 @@ class Instruments:
     names: tuple[str, ...]
 
     @property
-    def kind(self) -> Literal["repeats", "setpoints", "none"]:
+    def kind(self) -> Told:
         """What most can be told from: runs of a path tell more than what was asked for."""
         if self.repeats.likeness:
             return "repeats"

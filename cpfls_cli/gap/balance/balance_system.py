@@ -168,7 +168,7 @@ def is_free(candidate: Candidate) -> bool:
 
 
 def floors(hypothesis: System, coefficients: Array) -> Array:
-    """Estimate the noise floor of each channel over all flights.
+    """Estimate the noise floor of each channel over all flights, the air in it where that is known.
 
     Parameters
     ----------
@@ -183,6 +183,7 @@ def floors(hypothesis: System, coefficients: Array) -> Array:
     square, count = np.zeros(6), np.zeros(6)
     for number, flight in enumerate(hypothesis.flights):
         floor = noise_floor(left_over(hypothesis, number, coefficients), flight.windows, flight.cut_off)
+        floor = np.maximum(floor, flight.air)
         square += len(flight) * flight.known * floor**2
         count += len(flight) * flight.known
     noise = np.sqrt(square / np.maximum(count, 1))

@@ -64,6 +64,8 @@ class WeakFlight:
         1 for numbers of the vehicle that the flight can show, 0 for the inertia about axes that hardly turn.
     cut_off : array, shape (6,), Hz
         Of the filters that the signals of each channel went through before they were logged; infinite for none.
+    air : array, shape (6,), N m and N
+        Standard deviation that gusts and noise give averages over the windows; 0 where no gusts are known.
     seen : dict
         Rows of candidates on the signals as they are, by effect and shape, so that no search computes them twice.
     """
@@ -75,6 +77,7 @@ class WeakFlight:
     known: BoolArray
     turns: Array
     cut_off: Array = field(default_factory=lambda: np.full(6, np.inf))
+    air: Array = field(default_factory=lambda: np.zeros(6))
     seen: dict[CandidateKey, Array] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:

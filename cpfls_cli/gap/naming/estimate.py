@@ -98,6 +98,19 @@ def _estimated(hypothesis: System, weight: Array, block: IntArray, linear: Array
     left_out[:, moving] += _one_step(
         equations(hypothesis, weight).around(linear, ~held, moving_shapes / weight[..., None]), block
     )
+    return estimates_of(hypothesis, values, left_out)
+
+
+def estimates_of(hypothesis: System, values: Array, left_out: Array) -> Estimates:
+    """Tell numbers from coefficients and shapes, with those of fits that each left one block out.
+
+    Parameters
+    ----------
+    values : array, shape (number,)
+        Coefficients of the base, then shapes.
+    left_out : array, shape (block, number)
+    """
+    linear = values[: hypothesis.base.shape[2]]
     (vehicle, own), *_ = hypothesis.places
     parameters = _of(vehicle, hypothesis, values[own], left_out[:, own], np.zeros(0), left_out[:, :0])
     places = {candidate.key: place for candidate, place in hypothesis.places}

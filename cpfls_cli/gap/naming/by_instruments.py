@@ -1,0 +1,177 @@
+"""Numbers of a hypothesis in gusts, by what was asked: a loop that answers gusts does not mix into them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.effects.catalogue.parameter_error import coupling
+from cpfls_cli.gap.balance.balance_system import System, system
+from cpfls_cli.gap.balance.refine import fit_within_bounds, shape_columns
+from cpfls_cli.gap.naming.earned import NamedFit
+from cpfls_cli.gap.naming.estimate import Estimates, estimates_of
+from cpfls_cli.gap.naming.scoring import information
+from cpfls_cli.gap.residual.air import foretold_rows
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.playback.instruments import Instruments
+
+_PER_WINDOW = 8
+"""Windows that begin within one: between them what another run has is interpolated."""
+
+_FEWEST_BLOCKS = 8
+"""Whose scatter tells an error."""
+
+_STRONG = 10.0
+"""F of an instrument from which on it tells a number (Staiger and Stock 1997)."""
+
+
+class _Run(NamedTuple):
+    """Windows of a run in floors: what each number moves and last what is left, and what is known of that.
+
+    Attributes
+    ----------
+    rows, known : array, shape (window, 6, number + 1)
+    block : array of int, shape (window,)
+    """
+
+    rows: Array
+    known: Array
+    block: IntArray
+
+
+def by_instruments(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> NamedFit:
+    """Fit a hypothesis anew to what instruments know of its flights.
+
+    With X what each number moves along a run, r what is left, and Z what instruments know of X, the numbers change by d
+    with ``sum Z^T (r - X d) = 0``. A gust goes with X, which the loop moves to answer it, and not with Z. Numbers that
+    instruments hardly tell stay as they were. Bounds count as standard deviations of a normal prior, as in the search.
+
+    Parameters
+    ----------
+    given : Instruments
+        Of the same flights.
+    floor : array, shape (6,)
+
+    Returns
+    -------
+    NamedFit
+        The same effects; as it was where the flights are too short to tell errors.
+
+    References
+    ----------
+    Söderström and Stoica 2002 (instrumental variables in closed loop); Staiger and Stock 1997 (weak instruments).
+    """
+    hypothesis, linear = found.hypothesis, found.estimates.linear
+    moving = _movable(hypothesis, floor)
+    runs = list(_runs(hypothesis, linear, given, floor, settings))
+    blocks = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(run.block for run in runs)]))
+    if len(blocks) < _FEWEST_BLOCKS:
+        return found
+    crossed = np.array([sum(_crossed(run, run.block == block) for run in runs) for block in blocks])
+    moving &= _strength(crossed) > _STRONG
+    kept = crossed[:, np.append(moving, False)][:, :, np.append(moving, True)]
+    values, prior = np.concatenate([linear, hypothesis.shape_values]), _prior(hypothesis)[moving]
+    whole = kept.sum(axis=0)
+    change, *without = (_solved(sums, values[moving], prior) for sums in (whole, *(whole - kept)))
+    left_out = np.tile(values, (len(blocks), 1))
+    left_out[:, moving] += without
+    values[moving] += change
+    there = hypothesis.with_shapes(values[len(linear) :]) if len(hypothesis.shapes) else hypothesis
+    return NamedFit(there, found.block, _told(found, estimates_of(there, values, left_out), moving))
+
+
+def _movable(hypothesis: System, floor: Array) -> BoolArray:
+    """Mark numbers that are free, coefficients of the base and then shapes, shape (number,).
+
+    What couples the rates is in no config, and shows only where several axes turn at once, which instruments hardly
+    tell.
+    """
+    _, held = fit_within_bounds(hypothesis, np.tile(floor, (len(hypothesis.residual), 1)), of_vehicle=True)
+    free = ~held & hypothesis.base.any(axis=(0, 1))
+    of_vehicle = hypothesis.places[0][1]
+    free[of_vehicle] &= coupling(np.ones(of_vehicle.stop)) == 0
+    return np.concatenate([free, np.ones(len(hypothesis.shapes), dtype=bool)])
+
+
+def _strength(crossed: Array) -> Array:
+    """Compute how sure it is over blocks that each number goes with what is known of it, as F; 0 where it does not."""
+    each = np.diagonal(crossed[:, :-1, :-1], axis1=1, axis2=2)
+    error = np.sqrt(len(each)) * each.std(axis=0, ddof=1)
+    return np.asarray(np.square(np.maximum(each.sum(axis=0), 0.0) / np.where(error > 0, error, np.inf)))
+
+
+def _prior(hypothesis: System) -> Array:
+    """Give the information that bounds are, shape (number,)."""
+    places = [
+        information(candidate.effect, place.stop - place.start, hypothesis.vehicle)
+        for candidate, place in hypothesis.places
+    ]
+    return np.array([*np.concatenate(places), *(1.0 / np.ptp(shape.grid) ** 2 for shape in hypothesis.shapes)])
+
+
+def _solved(sums: Array, values: Array, prior: Array) -> Array:
+    """Solve for the change of numbers at values, of products, shape (number, number + 1)."""
+    matrix, right = sums[:, :-1] + np.diag(prior), sums[:, -1] - prior * values
+    scale = np.sqrt(np.abs(np.diag(matrix)))
+    return np.asarray(np.linalg.solve(matrix / np.outer(scale, scale), right / scale) / scale)
+
+
+def _crossed(run: _Run, of_block: BoolArray) -> Array:
+    """Sum products of what is known of each number and what all of them move, as of windows half of which overlap."""
+    known, rows = run.known[of_block], run.rows[of_block]
+    return np.asarray(np.einsum("wck,wcl->kl", known, rows, optimize=True) * (2 / _PER_WINDOW))
+
+
+def _told(before: NamedFit, after: Estimates, moved: BoolArray) -> Estimates:
+    """Keep the intervals of effects and numbers of the vehicle that instruments do not tell."""
+    hypothesis = before.hypothesis
+    places = {candidate.key: place for candidate, place in hypothesis.places}
+    first, effects = hypothesis.base.shape[2], []
+    for candidate, *both in zip(hypothesis.chosen, before.estimates.effects, after.effects, strict=True):
+        shapes = slice(first, first := first + len(candidate.effect.shapes))
+        own = moved[places.get(candidate.key, slice(0))], moved[shapes]
+        effects.append(both[bool(np.concatenate(own).any())])
+    names = [each.name for each in hypothesis.free[0].effect.coefficients]
+    told = {name for name, there in zip(names, moved, strict=False) if there}
+    own_numbers = {each.name: each for each in before.estimates.parameters}
+    parameters = tuple(each if each.name in told else own_numbers.get(each.name, each) for each in after.parameters)
+    return replace(after, effects=tuple(effects), parameters=parameters)
+
+
+def _runs(hypothesis: System, linear: Array, given: Instruments, floor: Array, settings: GapSettings) -> Iterator[_Run]:
+    """Lay windows over runs, and beside them what instruments know."""
+    usual = hypothesis.flights[0].windows
+    windows = replace(usual, hop=max(1, len(usual.weight) // _PER_WINDOW))
+    there = system([replace(flight, windows=windows, seen={}) for flight in hypothesis.flights], hypothesis.chosen)
+    columns = [there.base, shape_columns(there, linear), there.left(linear)[..., None]]
+    rows = np.concatenate(columns, axis=2) / floor[:, None]
+    own, middles = [], []
+    for run in given.runs:
+        begins = windows.hop * np.arange((there.flight_index == run.flight).sum())
+        inside = (begins >= run.part.start) & (begins + len(windows.weight) <= run.part.stop)
+        own.append(rows[there.flight_index == run.flight][inside])
+        middles.append(begins[inside] - run.part.start + len(windows.weight) // 2)
+    known = foretold_rows(given, windows, own) if given.kind == "setpoints" else _beside(given, own, middles)
+    length = settings.block_s / windows.period
+    for number, (mine, theirs, middle) in enumerate(zip(own, known, middles, strict=True)):
+        path, place = given.repeats.path(number, len(given.flown[number]))
+        told = np.isfinite(theirs).all(axis=(1, 2)) & np.isfinite(place[middle])
+        along = (place[middle[told]] // length).astype(np.int64)
+        yield _Run(mine[told], theirs[told], path + len(given.runs) * along)
+
+
+def _beside(given: Instruments, rows: Sequence[Array], middles: Sequence[IntArray]) -> Iterator[Array]:
+    """Average what the other runs have at the same places of the path, shape (window, ...); NaN where there is none."""
+    for number, (own, middle) in enumerate(zip(rows, middles, strict=True)):
+        total, count = np.zeros_like(own), np.zeros(len(own))
+        for other, places in given.repeats.beside[number].items():
+            place, flat = places[middle], rows[other].reshape(len(rows[other]), -1)
+            inside = (place >= middles[other][0]) & (place <= middles[other][-1]) if len(flat) else place < 0
+            moved = [np.interp(place[inside], middles[other], column) for column in flat.T]
+            total[inside] += np.stack(moved, axis=1).reshape(-1, *own.shape[1:])
+            count += inside
+        yield np.where(count[:, None, None] > 0, total / np.maximum(count, 1)[:, None, None], np.nan)

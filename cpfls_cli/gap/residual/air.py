@@ -1,0 +1,157 @@
+"""Whether what is left of a gap is the air: gusts that nothing foretells that was asked, their size and memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.gap.balance.balance_system import System, left_over
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
+from cpfls_cli.gap.residual.dependence import joined_states, rank_dependence, state_signals, without_actuation
+from cpfls_cli.gap.settings import ERRORS, GapSettings
+from cpfls_cli.playback.disturbance import ENDS, FoundGusts, gusts_in
+from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.instruments import Instruments, foretold, instruments, late, late_by
+from cpfls_cli.weak_form.windows import Recording, Windows
+
+_FORETOLD = 1 / 3
+"""Share of what is left that instruments may foretell, at 95 %, where it is called the air: mostly, and by size to less
+than a fifth."""
+
+_TELLS = 0.05
+"""Share that a curve of one signal has to explain to count, as of what follows a signal elsewhere."""
+
+
+@dataclass(frozen=True)
+class Air:
+    """Gusts in flights.
+
+    Attributes
+    ----------
+    found : FoundGusts
+        Of all channels; of those that are not told a bound.
+    told : array of bool, shape (6,)
+        Channels of which instruments tell that what is left is gusts and noise.
+    """
+
+    found: FoundGusts
+    told: BoolArray
+
+    def floor(self, windows: Windows) -> Array:
+        """Compute what gusts and noise do to averages over windows: standard deviation, 0 where they are not told.
+
+        Returns
+        -------
+        array, shape (6,), N m and N
+        """
+        weight = windows.weight
+        apart = windows.period * np.abs(np.subtract.outer(np.arange(len(weight)), np.arange(len(weight))))
+        total = np.zeros(6)
+        for channel in np.flatnonzero(self.told):
+            gusts = self.found.size[channel] ** 2 * (weight @ np.exp(-apart / self.found.memory[channel]) @ weight)
+            total[channel] = gusts + self.found.noise[channel] @ [(weight**2).sum(), (windows.slope**2).sum()]
+        return np.sqrt(total)
+
+
+def known_motion(recordings: Sequence[Recording]) -> Instruments:
+    """Find what of flights was asked for from outside of their loops."""
+    return instruments([LoggedFlight.of(each.name, each.signals).playback for each in recordings])
+
+
+def air(
+    hypothesis: System,
+    linear: Array,
+    block: IntArray,
+    given: Instruments,
+    settings: GapSettings,
+    rng: np.random.Generator,
+) -> Air | None:
+    """Find gusts in what a hypothesis leaves of flights.
+
+    What the vehicle does goes with what was asked of it, and comes again where that does; a gust does neither. Without
+    instruments nothing tells them apart: a rotor answers every torque, and the noise of its gyroscope too.
+
+    Parameters
+    ----------
+    linear : array, shape (column,)
+        Coefficients of its base.
+    block : array of int, shape (window,)
+    given : Instruments
+        Of the same flights.
+
+    Returns
+    -------
+    Air or None
+        None for flights that are too short or of several rates.
+    """
+    left = [left_over(hypothesis, number, linear) for number in range(len(hypothesis.flights))]
+    sides = []
+    for run in given.runs:
+        momentum, direct = left[run.flight].momentum, left[run.flight].direct
+        assert momentum is not None, "a balance has both"
+        sides.append(np.stack([momentum[run.part], -direct[run.part]], axis=1))
+    found, bound = gusts_in(sides, given, given.kind), gusts_in(sides, given, "none")
+    if found is None or bound is None:
+        return None
+    known = np.all([flight.known for flight in hypothesis.flights], axis=0)
+    told = known & np.isfinite(found.size) & (found.foretold + ERRORS * found.foretold_error < _FORETOLD)
+    if given.kind == "setpoints" and told.any():
+        told &= ~_follows_what_was_asked(hypothesis, linear, block, given, settings, rng)
+    parts = {name: np.where(told, getattr(found, name), getattr(bound, name)) for name in ENDS}
+    parts = {name: np.where(known, values, np.nan) for name, values in parts.items()}
+    return Air(replace(found, **parts), told)
+
+
+def in_air(flights: Sequence[WeakFlight], air: Air) -> list[WeakFlight]:
+    """Give flights the floor of their air."""
+    return [replace(flight, air=air.floor(flight.windows) * flight.known) for flight in flights]
+
+
+def foretold_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) -> list[Array]:
+    """Predict rows of windows over runs, shape (window, ...), from what was asked for; NaN for runs without setpoints.
+
+    Parameters
+    ----------
+    rows : sequence of array, shape (window, ...)
+        Of each run.
+    """
+    lags = late_by(windows.period, max(1, windows.hop // 2))
+    numbers = [number for number, asked in enumerate(given.setpoints) if asked is not None and len(rows[number])]
+    asked = [
+        windows.average(np.hstack([late(setpoint, lag) for lag in lags]))
+        for number in numbers
+        if (setpoint := given.setpoints[number]) is not None
+    ]
+    found = [np.full_like(own, np.nan) for own in rows]
+    if numbers:
+        told = foretold(np.concatenate(asked), np.concatenate([rows[number] for number in numbers]))
+        ends = np.cumsum([len(rows[number]) for number in numbers])[:-1]
+        for number, own in zip(numbers, np.split(told, ends), strict=True):
+            found[number] = own
+    return found
+
+
+def _follows_what_was_asked(
+    hypothesis: System,
+    linear: Array,
+    block: IntArray,
+    given: Instruments,
+    settings: GapSettings,
+    rng: np.random.Generator,
+) -> BoolArray:
+    """Mark channels that surely follow a curve of a signal, as far as what was asked foretells that signal."""
+    flights = hypothesis.flights
+    if [run.flight for run in given.runs] != list(range(len(flights))):
+        return np.ones(6, dtype=bool)
+    states = [without_actuation(state_signals(*pair)) for pair in zip(flights, hypothesis.signals, strict=True)]
+    names = [name for name in states[0] if all(name in state for state in states)]
+    flown = [np.stack([state[name] for name in names], axis=1) for state in states]
+    known = foretold_rows(given, flights[0].windows, flown)
+    asked = [dict(zip(names, rows.T, strict=True)) for rows in known]
+    state = joined_states([own | {"time": one["time"]} for own, one in zip(asked, states, strict=True)])
+    ranked = rank_dependence(hypothesis.left(linear), hypothesis.flight_index, block, state, settings.shifts, rng)
+    sure = [each for each in ranked if each.p_value <= settings.significance and each.r2 > _TELLS]
+    return np.isin(CHANNELS, [each.channel for each in sure])
