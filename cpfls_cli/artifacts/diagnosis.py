@@ -10,6 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.audit import AuditGroup
 from cpfls_cli.artifacts.comes_again import ComesAgainGroup
+from cpfls_cli.artifacts.disturbance import DisturbanceGroup, GustAxis
 from cpfls_cli.artifacts.gap_effects import (
     GapChangeGroup,
     NamedEffectsGroup,
@@ -268,6 +269,7 @@ class DiagnosisRecord(Record):
     learned: LearnedGroup | None = group(default=None)
     again_before: ComesAgainGroup | None = group("comes_again_before", default=None)
     again_after: ComesAgainGroup | None = group("comes_again_after", default=None)
+    disturbance: DisturbanceGroup | None = group(default=None)
 
     @classmethod
     def of(
@@ -313,6 +315,7 @@ class DiagnosisRecord(Record):
             shares=np.array([diagnosis.shares.get(kind, np.nan) for kind in KINDS]),
             again_before=ComesAgainGroup.of(change.again_before),
             again_after=ComesAgainGroup.of(change.again_after),
+            disturbance=None if diagnosed.air is None else DisturbanceGroup.of(diagnosed.air.found),
         )
 
     @property
@@ -359,6 +362,14 @@ class DiagnosisRecord(Record):
         return LargestGap(channels, "", np.nan, np.nan, np.nan, share)
 
     @property
+    def gusts(self) -> tuple[GustAxis, ...]:
+        """Gusts that what is left of the flights is, by axis; none where nothing tells."""
+        found = self.disturbance
+        if found is None or self.contradiction:
+            return ()
+        return tuple(axis for axis in found.axes(self.base.inertia, self.base.mass) if np.isfinite(axis.size))
+
+    @property
     def only_gusts(self) -> bool:
         """Whether a gap is left of which it is known that it does not come again."""
         left = above_noise(self.gap.after_floors).any() and not self.contradiction
@@ -391,6 +402,7 @@ class DiagnosisRecord(Record):
             "comes_again": self.again_before
             and self.again_after
             and {"before": self.again_before.summary, "after": self.again_after.summary},
+            "disturbance": self.disturbance and self.disturbance.summary(self.base.inertia, self.base.mass),
             "playback": self.playback and self.playback.summary,
             "whiteness": self.whiteness and self.whiteness.summary,
             "torque_alone": rows_of(self.torque_alone),

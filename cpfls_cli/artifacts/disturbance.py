@@ -40,7 +40,7 @@ class GustAxis(NamedTuple):
 
 @record
 class DisturbanceGroup:
-    """Gusts in the flights that the vehicle was found in, as torque about body axes and force along them."""
+    """Gusts in the flights that a model was found in or held against, torque about body axes and force along them."""
 
     told_by: str = dataset("what told gusts from what the model lacks: repeats, setpoints or none")
     name: tuple[str, ...] = dataset("roll, pitch, yaw, x, y, z", "gust")
@@ -50,6 +50,9 @@ class DisturbanceGroup:
     memory: Array = dataset("time in which a gust falls to 37 %", "gust", units="s", gaps=True)
     memory_low: Array = dataset("lower end of the 95 % interval", "gust", units="s", gaps=True)
     memory_high: Array = dataset("upper end of the 95 % interval", "gust", units="s", gaps=True)
+    foretold: Array | None = dataset(
+        "share of all that is left which repeats or setpoints foretell", "gust", gaps=True, default=None
+    )
 
     @classmethod
     def of(cls, found: FoundGusts) -> Self:
@@ -73,6 +76,7 @@ class DisturbanceGroup:
             "axes": {
                 axis.name: {
                     "unit": "N m" if axis.turns else "N",
+                    "foretold": None if self.foretold is None else _known(self.foretold[number]),
                     **{
                         name if place < 3 else f"{name}_s": _known(getattr(self, name)[number])
                         for place, name in enumerate(columns)

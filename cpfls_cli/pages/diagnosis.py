@@ -14,6 +14,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord, FreeRunsGroup, PictureGroup
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.pages.disagreement import lead
+from cpfls_cli.pages.disturbance import gust_table, left_to_gusts
 from cpfls_cli.pages.effects import (
     coefficients_table,
     effect_title,
@@ -111,6 +112,11 @@ def diagnosis_blocks(diagnosis: Source[DiagnosisRecord], index: int) -> Iterator
         yield gap_picture_figure(f"gap-picture-{index}", record.picture, after)
     yield Heading("The gap on held-out flights")
     yield from _sizes(record, index)
+    if record.disturbance is not None and record.gusts:
+        yield Heading("Gusts")
+        yield Text(left_to_gusts(record.gusts))
+        axes = list(record.disturbance.axes(record.base.inertia, record.base.mass))
+        yield gust_table(f"gusts-{index}", axes, record.disturbance)
     yield Heading("Effects and their numbers")
     yield from _effects(record, index)
 

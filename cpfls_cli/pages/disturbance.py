@@ -1,12 +1,12 @@
-"""Gusts in the flights that a vehicle was found in: in words, and as a table."""
+"""Gusts in the flights that a model was found in or held against: in words, and as a table."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from cpfls_cli.artifacts.disturbance import GustAxis
+from cpfls_cli.artifacts.disturbance import DisturbanceGroup, GustAxis
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.report.content import Block, Table, Text
 from cpfls_cli.report.numbers import number
@@ -25,12 +25,26 @@ def gust_blocks(record: VehicleRecord, index: int) -> Iterator[Block]:
     axes = list(record.disturbance.axes(record.vehicle.inertia, record.vehicle.mass))
     yield Text(gust_words(axes, record.disturbance.told_by))
     if record.vehicle.gusts is not None:
-        yield _table(axes, record, index)
+        yield gust_table(f"vehicle-gusts-{index}", axes, record.disturbance)
 
 
 def still_air_text() -> Text:
     """Say of a flight that the gusts which its model holds were not played."""
     return Text("flown in still air; the model holds the gusts of its flights: --gusts plays them")
+
+
+def left_to_gusts(axes: Sequence[GustAxis]) -> str:
+    """Say that what is left is gusts: sizes and how long they last, rotations first."""
+    said = []
+    for own in ([axis for axis in axes if axis.turns], [axis for axis in axes if not axis.turns]):
+        if own:
+            sizes, lasting = (
+                ", ".join(number(value, 2) for value in each)
+                for each in ([axis.size for axis in own], [axis.memory for axis in own])
+            )
+            where = f"{'about' if own[0].turns else 'along'} {', '.join(axis.name for axis in own)}"
+            said.append(f"{sizes} {_unit(own[0])} {where}, lasting {lasting} s")
+    return f"What is left is gusts, {'; '.join(said)}: nothing that was asked of the vehicle foretells them."
 
 
 def gust_words(axes: list[GustAxis], told_by: str) -> str:
@@ -72,9 +86,8 @@ def _where(axis: GustAxis) -> str:
     return f"about {axis.name}" if axis.turns else f"along {axis.name}"
 
 
-def _table(axes: list[GustAxis], record: VehicleRecord, index: int) -> Table:
-    found = record.disturbance
-    assert found is not None, "shown only where it is"
+def gust_table(name: str, axes: Sequence[GustAxis], found: DisturbanceGroup) -> Table:
+    """Tabulate gusts by axis, in units of torque and force."""
     rows = [
         [
             _where(axis),
@@ -89,4 +102,4 @@ def _table(axes: list[GustAxis], record: VehicleRecord, index: int) -> Table:
         "a gust falls to 37 %."
     )
     header = ("Gusts", "Unit", "Size", "From", "To", "Lasting, s", "From", "To")
-    return Table(f"vehicle-gusts-{index}", caption, header, rows, frozenset({0, 1}))
+    return Table(name, caption, header, rows, frozenset({0, 1}))

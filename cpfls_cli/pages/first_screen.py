@@ -15,6 +15,7 @@ from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.unknown import is_of_guesses
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.naming.results import Alternative, GapVerdict
+from cpfls_cli.pages.disturbance import left_to_gusts
 from cpfls_cli.pages.effects import (
     capitalised,
     closest_sentence,
@@ -113,6 +114,7 @@ def verdict_box(record: DiagnosisRecord) -> Box:
     named = [effect_sentence(effect) for effect in record.effects.named]
     named += [closest_sentence(effect) for effect in record.effects.closest]
     named += [NO_EFFECT] if record.only_gusts else []
+    named += [left_to_gusts(record.gusts)] if record.gusts else []
     named = [*_of_model(record), *named]
     label = record.verdict.replace("_", " ")
     return Box(label, _headline(record), named, _TONES.get(record.verdict, "note"))
@@ -129,7 +131,7 @@ def _headline(record: DiagnosisRecord) -> str:
         return contradicted(record.contradiction[0])
     match record.verdict:
         case GapVerdict.NO_GAP:
-            return "Nothing is missing that these flights can show."
+            return f"Nothing is missing that these flights can show{' beside their gusts' if record.gusts else ''}."
         case GapVerdict.NOT_EXCITED:
             return "These flights move too little to show whether anything is missing."
         case GapVerdict.UNEXPLAINED:
@@ -207,7 +209,7 @@ def _beside(record: DiagnosisRecord) -> Iterator[tuple[str, str]]:
         yield "What it is", f"{capitalised(effect_title(effect.name))}: {effect.sentence}"
     if record.verdict != GapVerdict.AMBIGUOUS:
         yield from (("To tell", flight) for flight in _telling_flights(record))
-    if record.again_before is None and record.largest_gap is not None:
+    if record.again_before is None and record.largest_gap is not None and not record.gusts:
         yield "Gusts", NOT_SPLIT
     yield "Fitted to", ", ".join(record.flights.names(TRAINING))
     yield "Held out", ", ".join(record.flights.names(HELD_OUT))
@@ -284,7 +286,9 @@ def next_steps(record: DiagnosisRecord) -> list[str]:
     """Say what to do next, in sentences."""
     if record.contradiction:
         return ["Correct what is wrong, in the section `import` of the config or in `vehicle`, and run this again."]
-    usual = _GUSTS if record.only_gusts and record.verdict == GapVerdict.UNEXPLAINED else _NEXT.get(record.verdict)
+    only_gusts = record.only_gusts and record.verdict == GapVerdict.UNEXPLAINED
+    only_gusts |= bool(record.gusts) and record.verdict == GapVerdict.NO_GAP
+    usual = _GUSTS if only_gusts else _NEXT.get(record.verdict)
     farther = [] if record.playback is None else _farther_off(record.playback)
     if usual and _USE in usual and farther:
         usual = f"leave the model as it is: with what is named, held-out flights play back worse in {joined(farther)}"
@@ -308,13 +312,18 @@ def _held_out_table(record: DiagnosisRecord, index: int) -> Table:
     rows += [] if record.playback is None else list(_playback_rows(record.playback))
     within = ", ".join(record.gap.channel[channel] for channel in quiet)
     caption = [
-        "Held-out flights, before and after. To beat: the noise floor, or no model.",
+        f"Held-out flights, before and after. To beat: the noise floor{_beside_gusts(record)}, or no model.",
         "" if record.playback is None else _playback_words(record.playback),
         f"Within the noise: {within}." if within else "",
         "" if record.effects.names() else f"After: {model_words(record)}.",
     ]
     header = ("Held out", "Unit", "Before", "After", "To beat", "That is")
     return Table(f"held-out-{index}", " ".join(filter(None, caption)), header, rows, frozenset({0, 1, 5}))
+
+
+def _beside_gusts(record: DiagnosisRecord) -> str:
+    """Say that a floor holds gusts too, where it does."""
+    return ", which holds the gusts" if record.gusts else ""
 
 
 def _gap_row(record: DiagnosisRecord, channel: int) -> list[str | Cell]:

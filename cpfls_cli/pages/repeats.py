@@ -24,7 +24,8 @@ WHAT_TO_FLY = "cpfls trajectory CONFIG --hover 30 --excite roll,pitch --repeat 4
 
 NOT_SPLIT = (
     "No two of these flights repeat a path, so the gap cannot be split into what comes again (an effect that the model "
-    f"lacks) and what does not (gusts, noise). To fly: {WHAT_TO_FLY}"
+    "lacks) and what does not (gusts, noise). Logged setpoints of position or velocity tell that too. To fly: "
+    f"{WHAT_TO_FLY}"
 )
 NO_EFFECT = "What is left does not come again: no effect of the vehicle explains it."
 _TITLE = "What comes again"
