@@ -22,6 +22,9 @@ FOUND = FoundGusts(
     memory_low=np.array([0.2, np.nan, np.nan, 0.8, np.nan, np.nan]),
     memory_high=np.array([0.8, np.nan, np.nan, 1.3, np.nan, np.nan]),
     told_by="repeats",
+    noise=np.zeros((6, 2)),
+    foretold=np.full(6, 0.1),
+    foretold_error=np.full(6, 0.05),
 )
 
 
