@@ -17,9 +17,9 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Instruments, foretold, instruments, late, late_by
 from cpfls_cli.weak_form.windows import Recording, Windows
 
-_FORETOLD = 1 / 3
-"""Share of what is left that instruments may foretell, at 95 %, where it is called the air: mostly, and by size to less
-than a fifth."""
+_FORETOLD = {"repeats": 1 / 2, "setpoints": 1 / 3, "none": 0.0}
+"""Share of what is left that instruments may foretell, at 95 %, where it is called the air: the smaller part of it.
+Other runs show all that the vehicle does again, and a linear answer to setpoints about two thirds of it."""
 
 _TELLS = 0.05
 """Share that a curve of one signal has to explain to count, as of what follows a signal elsewhere."""
@@ -97,7 +97,7 @@ def air(
     if found is None or bound is None:
         return None
     known = np.all([flight.known for flight in hypothesis.flights], axis=0)
-    told = known & np.isfinite(found.size) & (found.foretold + ERRORS * found.foretold_error < _FORETOLD)
+    told = known & np.isfinite(found.size) & (found.foretold + ERRORS * found.foretold_error < _FORETOLD[given.kind])
     if given.kind == "setpoints" and told.any():
         told &= ~_follows_what_was_asked(hypothesis, linear, block, given, settings, rng)
     parts = {name: np.where(told, getattr(found, name), getattr(bound, name)) for name in ENDS}

@@ -1,0 +1,92 @@
+"""Gusts called gusts where instruments tell, effects named beside them, and their numbers, in flights of known truth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.gap.balance.weak_flight import weak_flight
+from cpfls_cli.gap.diagnose import diagnose
+from cpfls_cli.gap.extended import plain
+from cpfls_cli.gap.naming.ranking import block_index
+from cpfls_cli.gap.naming.results import GapVerdict
+from cpfls_cli.gap.residual.air import air, known_motion
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.weak_form.windows import Recording, common_windows
+from tests.builders.gusty_flights import CALM, GUSTS, MEMORY_S, SMALL, Flight, gusty_flights, logged
+
+HEAVY = 1.15
+"""What the config takes the inertia about x for, over the true one."""
+
+TRUE = SMALL._replace(drag=0.0, damping=0.0)
+DAMPED = TRUE._replace(damping=6e-5)
+INERTIA = np.array(TRUE.inertia)
+FEW = GapSettings(shifts=39)
+
+
+@pytest.fixture(scope="module")
+def flown():
+    """Four flights of as many paths, and four of one, in gusts; three in which damping is missed, in both airs."""
+    asked = [Flight(TRUE, GUSTS, path, path, reach=3.0) for path in range(4)]
+    again = [Flight(TRUE, GUSTS, 9, run, reach=3.0) for run in range(4)]
+    damped = [Flight(DAMPED, gusts, path, path, reach=3.0) for gusts in (CALM, GUSTS) for path in range(3)]
+    each = list(gusty_flights([*asked, *again, *damped], 30.0))
+    return {"asked": each[:4], "again": each[4:8], "calm": each[8:11], "damped": each[11:]}
+
+
+def recorded(flights, vehicle, *, setpoints):
+    parts = [logged(each if setpoints else replace(each, setpoints={}), vehicle).parts[0] for each in flights]
+    return [Recording(flight.name, signals) for flight, signals in zip(flights, parts, strict=True)]
+
+
+def heavier(vehicle):
+    return replace(vehicle, inertia_kg_m2=(HEAVY * vehicle.inertia_kg_m2[0], *vehicle.inertia_kg_m2[1:]))
+
+
+def diagnosed(recordings):
+    return diagnose(recordings[:3], recordings[3:], FEW, np.random.default_rng(1))
+
+
+def tells_sizes(found):
+    sizes, memories = found.size[:3] / INERTIA / GUSTS, found.memory[:3] / MEMORY_S
+    assert np.all((sizes > 0.7) & (sizes < 1.3))
+    assert np.all((memories > 0.5) & (memories < 2.0))
+
+
+@pytest.mark.parametrize(("kind", "setpoints"), [("asked", True), ("again", False)])
+def test_a_wrong_inertia_is_named_in_gusts_with_its_number(flown, kind, setpoints):
+    run = diagnosed(recorded(flown[kind], heavier(TRUE.vehicle), setpoints=setpoints))
+    assert run.air is not None
+    assert run.air.told[:3].all()
+    tells_sizes(run.air.found)
+    assert run.diagnosis.verdict is GapVerdict.NAMED
+    (effect,) = run.diagnosis.effects
+    (number,) = effect.coefficients
+    assert (effect.name, number.name) == ("parameter_error", "inertia_x")
+    assert number.low < 1 / HEAVY - 1 < number.high < 0
+
+
+def test_gusts_alone_are_no_gap_where_instruments_tell_and_one_where_none_does(flown):
+    told = diagnosed(recorded(flown["asked"], TRUE.vehicle, setpoints=True))
+    assert told.diagnosis.verdict is GapVerdict.NO_GAP
+    assert told.air is not None
+    tells_sizes(told.air.found)
+    untold = diagnosed(recorded(flown["asked"], TRUE.vehicle, setpoints=False))
+    assert untold.diagnosis.verdict is GapVerdict.UNEXPLAINED
+    assert untold.air is not None
+    assert not untold.air.told.any()
+    assert np.isnan(untold.air.found.size).all()
+    assert np.all(untold.air.found.high[:3] > INERTIA * GUSTS)
+
+
+@pytest.mark.parametrize(("kind", "turning"), [("calm", [False, False]), ("damped", [True, True])])
+def test_what_the_vehicle_does_is_not_called_gusts(flown, kind, turning):
+    recordings = recorded(flown[kind], TRUE.vehicle, setpoints=True)
+    windows, model = common_windows(recordings, FEW), plain(None)
+    hypothesis = model.system([weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings])
+    block = block_index(hypothesis, FEW)
+    found = air(hypothesis, model.linear, block, known_motion(recordings), FEW, np.random.default_rng(1))
+    assert found is not None
+    # In gusts four fifths of what is left are theirs.
+    assert found.told[:2].tolist() == turning
+    assert np.all(found.found.foretold[:2] > 3 * found.found.foretold_error[:2])
