@@ -315,7 +315,7 @@ class DiagnosisRecord(Record):
             shares=np.array([diagnosis.shares.get(kind, np.nan) for kind in KINDS]),
             again_before=ComesAgainGroup.of(change.again_before),
             again_after=ComesAgainGroup.of(change.again_after),
-            disturbance=None if diagnosed.air is None else DisturbanceGroup.of(diagnosed.air.found),
+            disturbance=None if diagnosed.air is None else DisturbanceGroup.of(diagnosed.air.found, diagnosed.air.told),
         )
 
     @property
@@ -363,11 +363,20 @@ class DiagnosisRecord(Record):
 
     @property
     def gusts(self) -> tuple[GustAxis, ...]:
-        """Gusts that what is left of the flights is, by axis; none where nothing tells."""
+        """Gusts that are all that is left of the flights, by axis; none where nothing tells."""
+        return self._gusts(alone=True)
+
+    @property
+    def gusts_beside(self) -> tuple[GustAxis, ...]:
+        """Gusts beside which something else is left, by axis; none where nothing tells."""
+        return self._gusts(alone=False)
+
+    def _gusts(self, *, alone: bool) -> tuple[GustAxis, ...]:
         found = self.disturbance
-        if found is None or self.contradiction:
+        if found is None or found.alone is None or self.contradiction:
             return ()
-        return tuple(axis for axis in found.axes(self.base.inertia, self.base.mass) if np.isfinite(axis.size))
+        pairs = zip(found.axes(self.base.inertia, self.base.mass), found.alone, strict=True)
+        return tuple(axis for axis, own in pairs if own == alone and np.isfinite(axis.size))
 
     @property
     def only_gusts(self) -> bool:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.spec import dataset, group_of, record
 from cpfls_cli.playback.gusts import GUST_AXES
 
@@ -54,10 +54,12 @@ class DisturbanceGroup:
         "share of all that is left which repeats or setpoints foretell", "gust", gaps=True, default=None
     )
 
+    alone: BoolArray | None = dataset("whether all that is left of a gap is gusts and noise", "gust", default=None)
+
     @classmethod
-    def of(cls, found: FoundGusts) -> Self:
-        """Arrange what was found."""
-        return group_of(cls, found, name=GUST_AXES[: len(found.size)])
+    def of(cls, found: FoundGusts, alone: BoolArray | None = None) -> Self:
+        """Arrange what was found, and of a gap where it is all that is left."""
+        return group_of(cls, found, name=GUST_AXES[: len(found.size)], alone=alone)
 
     def axes(self, inertia: Array, mass: float) -> Iterator[GustAxis]:
         """Give each axis as the acceleration of a body of these inertia parameters, kg m^2, and this mass, kg."""
@@ -76,6 +78,7 @@ class DisturbanceGroup:
             "axes": {
                 axis.name: {
                     "unit": "N m" if axis.turns else "N",
+                    "alone": None if self.alone is None else bool(self.alone[number]),
                     "foretold": None if self.foretold is None else _known(self.foretold[number]),
                     **{
                         name if place < 3 else f"{name}_s": _known(getattr(self, name)[number])

@@ -112,9 +112,9 @@ def diagnosis_blocks(diagnosis: Source[DiagnosisRecord], index: int) -> Iterator
         yield gap_picture_figure(f"gap-picture-{index}", record.picture, after)
     yield Heading("The gap on held-out flights")
     yield from _sizes(record, index)
-    if record.disturbance is not None and record.gusts:
+    if record.disturbance is not None and (record.gusts or record.gusts_beside):
         yield Heading("Gusts")
-        yield Text(left_to_gusts(record.gusts))
+        yield from [Text(left_to_gusts(record.gusts))] if record.gusts else []
         axes = list(record.disturbance.axes(record.base.inertia, record.base.mass))
         yield gust_table(f"gusts-{index}", axes, record.disturbance)
     yield Heading("Effects and their numbers")

@@ -69,6 +69,11 @@ def gust_words(axes: list[GustAxis], told_by: str) -> str:
 _UNTOLD = ": all that the model leaves, for nothing tells gusts from what it lacks"
 
 
+def beside_gaps(axes: Sequence[GustAxis]) -> str:
+    """Tell the gusts that do not come again beside a gap that does."""
+    return f"{'; '.join(_size(axis) for axis in axes)}: what does not come again."
+
+
 def _size(axis: GustAxis) -> str:
     size = f"{number(axis.size, 2)} {_unit(axis)} {_where(axis)} ({_ends(axis.low, axis.high)})"
     return f"{size}, lasting {number(axis.memory, 2)} s ({_ends(axis.memory_low, axis.memory_high)})"

@@ -15,7 +15,7 @@ from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.unknown import is_of_guesses
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.naming.results import Alternative, GapVerdict
-from cpfls_cli.pages.disturbance import left_to_gusts
+from cpfls_cli.pages.disturbance import beside_gaps, left_to_gusts
 from cpfls_cli.pages.effects import (
     capitalised,
     closest_sentence,
@@ -211,6 +211,8 @@ def _beside(record: DiagnosisRecord) -> Iterator[tuple[str, str]]:
         yield from (("To tell", flight) for flight in _telling_flights(record))
     if record.again_before is None and record.largest_gap is not None and not record.gusts:
         yield "Gusts", NOT_SPLIT
+    elif record.gusts_beside:
+        yield "Gusts", beside_gaps(record.gusts_beside)
     yield "Fitted to", ", ".join(record.flights.names(TRAINING))
     yield "Held out", ", ".join(record.flights.names(HELD_OUT))
     yield "Why", sentence(record.split)

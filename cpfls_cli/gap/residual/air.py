@@ -32,9 +32,9 @@ class Air:
     Attributes
     ----------
     found : FoundGusts
-        Of all channels; of those that are not told a bound.
+        Of all channels; a bound where nothing tells gusts from what the model lacks.
     told : array of bool, shape (6,)
-        Channels of which instruments tell that what is left is gusts and noise.
+        Channels of which instruments tell that all that is left is gusts and noise.
     """
 
     found: FoundGusts
@@ -100,7 +100,9 @@ def air(
     told = known & np.isfinite(found.size) & (found.foretold + ERRORS * found.foretold_error < _FORETOLD[given.kind])
     if given.kind == "setpoints" and told.any():
         told &= ~_follows_what_was_asked(hypothesis, linear, block, given, settings, rng)
-    parts = {name: np.where(told, getattr(found, name), getattr(bound, name)) for name in ENDS}
+    # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
+    sized = told | (given.kind == "repeats")
+    parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in ENDS}
     parts = {name: np.where(known, values, np.nan) for name, values in parts.items()}
     return Air(replace(found, **parts), told)
 
