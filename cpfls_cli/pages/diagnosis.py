@@ -123,8 +123,8 @@ def diagnosis_blocks(diagnosis: Source[DiagnosisRecord], index: int) -> Iterator
 
 def _sizes(record: DiagnosisRecord, index: int) -> Iterator[Block]:
     caption = (
-        "The gap on flights held out from the fit, root mean square. A floor is what noise alone would leave; a gap of "
-        f"up to {CLEAR:g} floors is none."
+        "The gap on flights held out from the fit, root mean square. A floor is what noise "
+        f"{'and gusts' if record.gusts else 'alone'} would leave; a gap of up to {CLEAR:g} floors is none."
     )
     yield gap_table(f"gap-{index}", record.gap, caption)
     if record.gap.known:
