@@ -362,6 +362,12 @@ class DiagnosisRecord(Record):
         return LargestGap(channels, "", np.nan, np.nan, np.nan, share)
 
     @property
+    def inertia(self) -> Array:
+        """Inertia parameters of the model, kg m^2, with the errors of its moments that are named."""
+        numbers = {each.name: each.value for effect in self.effects.named for each in effect.coefficients}
+        return self.base.inertia * [*(1 + numbers.get(f"inertia_{axis}", 0.0) for axis in "xyz"), 1.0, 1.0, 1.0]
+
+    @property
     def gusts(self) -> tuple[GustAxis, ...]:
         """Gusts that are all that is left of the flights, by axis; none where nothing tells."""
         return self._gusts(alone=True)
@@ -375,7 +381,7 @@ class DiagnosisRecord(Record):
         found = self.disturbance
         if found is None or found.alone is None or self.contradiction:
             return ()
-        pairs = zip(found.axes(self.base.inertia, self.base.mass), found.alone, strict=True)
+        pairs = zip(found.axes(self.inertia, self.base.mass), found.alone, strict=True)
         return tuple(axis for axis, own in pairs if own == alone and np.isfinite(axis.size))
 
     @property
@@ -411,7 +417,7 @@ class DiagnosisRecord(Record):
             "comes_again": self.again_before
             and self.again_after
             and {"before": self.again_before.summary, "after": self.again_after.summary},
-            "disturbance": self.disturbance and self.disturbance.summary(self.base.inertia, self.base.mass),
+            "disturbance": self.disturbance and self.disturbance.summary(self.inertia, self.base.mass),
             "playback": self.playback and self.playback.summary,
             "whiteness": self.whiteness and self.whiteness.summary,
             "torque_alone": rows_of(self.torque_alone),

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.spec import dataset, group_of, record
-from cpfls_cli.playback.gusts import GUST_AXES
+from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 
 if TYPE_CHECKING:
     from cpfls_cli.playback.disturbance import FoundGusts
@@ -60,6 +60,14 @@ class DisturbanceGroup:
     def of(cls, found: FoundGusts, alone: BoolArray | None = None) -> Self:
         """Arrange what was found, and of a gap where it is all that is left."""
         return group_of(cls, found, name=GUST_AXES[: len(found.size)], alone=alone)
+
+    @property
+    def gusts(self) -> Gusts:
+        """The gusts that are known; none on other axes."""
+        known = np.isfinite(self.size)
+        size, memory = np.zeros(len(GUST_AXES)), np.ones(len(GUST_AXES))
+        size[: len(known)][known], memory[: len(known)][known] = self.size[known], self.memory[known]
+        return Gusts(size, memory)
 
     def axes(self, inertia: Array, mass: float) -> Iterator[GustAxis]:
         """Give each axis as the acceleration of a body of these inertia parameters, kg m^2, and this mass, kg."""

@@ -93,9 +93,13 @@ def extended(
     base: VehicleModel,
 ) -> ExtendedRecord:
     """Put the effects that a diagnosis names into a model; refused where the held-out gap does not shrink."""
-    extension = extend(training, held, named_effects(diagnosis), audit(diagnosis.audit), study.gap, base.fuzzy)
+    gusty_floor = diagnosis.gap.floor if diagnosis.gusts else None
+    named = named_effects(diagnosis), audit(diagnosis.audit)
+    extension = extend(training, held, *named, study.gap, base.fuzzy, gusty_floor)
     stated = base.vehicle if has_effects(base) else study.vehicle
     whole, given = (on_top_of(base, whole_vehicle(each, stated)) for each in (extension.model, plain(base.fuzzy)))
+    if diagnosis.disturbance is not None and diagnosis.gusts:
+        whole = replace(whole, gusts=diagnosis.disturbance.gusts)
     require_body(extension.model, stated)
     played = played_pairs(held, whole, given)
     playback = PlaybackChangeGroup.of_pairs(played, errors_by_horizon(played, study.gap.horizon_s))

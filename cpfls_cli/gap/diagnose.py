@@ -141,7 +141,8 @@ class _Flights(NamedTuple):
 
     def in_air(self, gusts: Air) -> _Flights:
         """Give all of them the floor of their air."""
-        return _Flights(*(in_air(flights, gusts) for flights in self))
+        floor = gusts.floor(self.training[0].windows)
+        return _Flights(*(in_air(flights, floor) for flights in self))
 
 
 class _Named(NamedTuple):

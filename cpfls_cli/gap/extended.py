@@ -23,10 +23,13 @@ from cpfls_cli.gap.balance.weak_flight import (
     WeakFlight,
     nuisance,
 )
+from cpfls_cli.gap.naming.by_instruments import by_instruments
+from cpfls_cli.gap.naming.earned import NamedFit
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, weighted_estimates
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import NamedEffect
+from cpfls_cli.gap.residual.air import in_air, known_motion
 from cpfls_cli.gap.settings import VISIBLE, GapSettings
 from cpfls_cli.weak_form.windows import Recording, common_windows
 
@@ -138,6 +141,7 @@ def extend(
     audit: Audit,
     settings: GapSettings,
     base: InertiaModel | None,
+    gusty_floor: Array | None = None,
 ) -> Refit:
     """Refit a model together with effects and evaluate it on held-out flights.
 
@@ -149,6 +153,8 @@ def extend(
         Faults of the sensors that are repaired.
     base : InertiaModel or None
         None for the rigid body of the vehicle.
+    gusty_floor : array, shape (6,), N m and N, or None
+        Noise floor with the gusts of the flights, beside which the numbers come by instruments; None for no gusts.
 
     Raises
     ------
@@ -156,13 +162,19 @@ def extend(
         If the gap on the held-out flights does not shrink in the channels that change.
     """
     prepared = Preparation(common_windows([*training, *held], settings), base, settings, audit)
-    flights = prepared.repaired(training)
+    flights, logged, repaired = prepared.repaired(training), prepared.logged(held), prepared.repaired(held)
+    if gusty_floor is not None:
+        flights, logged, repaired = (in_air(each, gusty_floor) for each in (flights, logged, repaired))
     chosen = [effect.candidate for effect in effects if effect.candidate is not None]
     start = refined(flights, chosen, best_floor(system(flights, chosen)))
     floor = best_floor(start)
-    hypothesis, estimates = weighted_estimates(start, floor, block_index(start, settings))
+    block = block_index(start, settings)
+    hypothesis, estimates = weighted_estimates(start, floor, block)
+    if gusty_floor is not None:
+        found = NamedFit(hypothesis, block, estimates)
+        hypothesis, _, estimates = by_instruments(found, known_motion(training), floor, settings)
     scatter = relative_scatter(hypothesis, estimates.linear, floor)
-    unseen = held_out(prepared.logged(held), prepared.repaired(held), hypothesis, estimates.linear, scatter)
+    unseen = held_out(logged, repaired, hypothesis, estimates.linear, scatter)
     _require_smaller(unseen)
     model = ExtendedModel.of(base, hypothesis, estimates, audit)
     return Refit(model, tuple(_renewed(effects, hypothesis, estimates)), estimates, unseen)

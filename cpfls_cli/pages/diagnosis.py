@@ -115,7 +115,7 @@ def diagnosis_blocks(diagnosis: Source[DiagnosisRecord], index: int) -> Iterator
     if record.disturbance is not None and (record.gusts or record.gusts_beside):
         yield Heading("Gusts")
         yield from [Text(left_to_gusts(record.gusts))] if record.gusts else []
-        axes = list(record.disturbance.axes(record.base.inertia, record.base.mass))
+        axes = list(record.disturbance.axes(record.inertia, record.base.mass))
         yield gust_table(f"gusts-{index}", axes, record.disturbance)
     yield Heading("Effects and their numbers")
     yield from _effects(record, index)

@@ -107,9 +107,9 @@ def air(
     return Air(replace(found, **parts), told)
 
 
-def in_air(flights: Sequence[WeakFlight], air: Air) -> list[WeakFlight]:
-    """Give flights the floor of their air."""
-    return [replace(flight, air=air.floor(flight.windows) * flight.known) for flight in flights]
+def in_air(flights: Sequence[WeakFlight], floor: Array) -> list[WeakFlight]:
+    """Give flights a floor of gusts and noise, shape (6,)."""
+    return [replace(flight, air=floor * flight.known) for flight in flights]
 
 
 def foretold_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) -> list[Array]:
