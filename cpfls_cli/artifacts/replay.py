@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.spec import BODY, WORLD, Format, Record, columns_of, dataset, group, group_of, record, rows_of
-from cpfls_cli.playback.replay import PREDICTIONS, drawn_runs, where_better
+from cpfls_cli.playback.replay import AFTER, MODEL, PREDICTIONS, WITHOUT_MODEL, drawn_runs, where_better
 from cpfls_cli.rounding import less
 from cpfls_cli.validation.trust import Trust
 
@@ -33,7 +33,6 @@ CONTROL_BAND = (0.04, 0.25)
 """Horizons in s at which a controller of the attitude corrects what its model got wrong."""
 
 _DRAWN_RUNS = 12
-_MODEL = 0
 
 
 @record
@@ -46,20 +45,14 @@ class SignalErrorGroup:
     rms: Array = dataset("root mean square error by axis", "prediction", "horizon", "axis", units="SI")
 
     @classmethod
-    def of(cls, errors: SignalErrors | None, rows: int | None = None) -> Self | None:
-        """Arrange the errors of the first predictions; None where no flight knows the signal."""
-        return None if errors is None else cls(mae=errors.mae[:rows], rms=errors.rms[:rows])
+    def of(cls, errors: SignalErrors | None, rows: Sequence[int]) -> Self | None:
+        """Arrange the errors of some predictions; None where no flight knows the signal."""
+        return None if errors is None else cls(mae=errors.mae[rows], rms=errors.rms[rows])
 
     @property
     def total(self) -> Array:
         """Sum of the mean norms over the horizon, by prediction."""
         return np.asarray(self.mae.sum(axis=1))
-
-    @property
-    def rival(self) -> int:
-        """What a model has to beat: the better over all horizons of the two predictions that know no model."""
-        nothing, stays = 1, 2
-        return stays if less(self.total[stays], self.total[nothing]) else nothing
 
     def summary(self, prediction: int) -> dict[str, Any]:
         """One prediction for machines."""
@@ -92,7 +85,7 @@ class ErrorsByHorizon(Protocol):
 
     @property
     def prediction(self) -> tuple[str, ...]:
-        """What predicts: what is played back, "nothing moves", "rate stays", and what it is compared with, if any."""
+        """What predicts, by the names of `playback.replay`: they say which row of `errors` is whose."""
         ...
 
     @property
@@ -104,6 +97,29 @@ class ErrorsByHorizon(Protocol):
     def errors(self) -> Mapping[str, SignalErrorGroup | None]:
         """Errors by signal."""
         ...
+
+
+def row_of(errors: ErrorsByHorizon, *names: str) -> int:
+    """Find the row of a prediction, the first of these names that is there."""
+    return next(errors.prediction.index(name) for name in names if name in errors.prediction)
+
+
+def played_row(errors: ErrorsByHorizon) -> int:
+    """Find the row of what is judged: a model, or the one with effects."""
+    return row_of(errors, MODEL, AFTER)
+
+
+def rival_rows(errors: ErrorsByHorizon) -> list[int]:
+    """List the rows of what knows no model, which a model has to beat."""
+    return [row_of(errors, name) for name in WITHOUT_MODEL]
+
+
+def rival_row(errors: ErrorsByHorizon, group: SignalErrorGroup) -> int:
+    """Find what is best, over all horizons, of what knows no model; of ties the first."""
+    best, *others = rival_rows(errors)
+    for row in others:
+        best = row if less(group.total[row], group.total[best]) else best
+    return best
 
 
 def _by_signal(found: PlaybackGroup | ReplayRecord) -> dict[str, SignalErrorGroup | None]:
@@ -154,18 +170,18 @@ class PlaybackGroup:
     position: SignalErrorGroup | None = group(default=None)
 
     @classmethod
-    def of(cls, flights: Sequence[Played], replay: Replay, prediction: Sequence[str], **more: Any) -> Self:
-        """Arrange a replay without its windows; predictions beyond those named are left out."""
-        rows = len(prediction)
+    def of(cls, flights: Sequence[Played], replay: Replay, names: Mapping[str, str], **more: Any) -> Self:
+        """Arrange a replay without its windows: what it calls its predictions; others are left out."""
+        rows = [replay.predictions.index(name) for name in names]
         groups = {signal: SignalErrorGroup.of(found, rows) for signal, found in replay.errors.items()}
         assert groups["body_rate"] is not None, "every flight has rates"
         steps = np.arange(1, groups["body_rate"].mae.shape[1] + 1)
         return cls(
             flown=tuple(played.flight.name for played in flights),
             windows=len(replay.windows.start),
-            prediction=tuple(prediction),
+            prediction=tuple(names.values()),
             horizon_s=flights[0].flight.motion.period * steps,
-            diverged=(replay.windows.diverged[:rows] >= 0).sum(axis=1),
+            diverged=(replay.windows.diverged[rows] >= 0).sum(axis=1),
             **groups,  # type: ignore[arg-type]  # only the body rate is always known
             **more,
         )
@@ -211,7 +227,7 @@ class HeldOutGroup(PlaybackGroup):
         """Arrange a replay without its windows, and where the model is better than what knows no model."""
         better = where_better(flights, replay.windows)
         region = None if better is None else group_of(RegionGroup, better)
-        return cls.of(flights, replay, replay.predictions, better=region)
+        return cls.of(flights, replay, {name: name for name in replay.predictions}, better=region)
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -232,13 +248,13 @@ def better_to(errors: ErrorsByHorizon, signal: str) -> float:
     group = errors.errors[signal]
     if group is None:
         return float("nan")
-    summed = np.cumsum(group.mae[:3], axis=1)
-    better = np.flatnonzero(less(summed[_MODEL], summed[1:].min(axis=0)))
+    summed = np.cumsum(group.mae, axis=1)
+    better = np.flatnonzero(less(summed[played_row(errors)], summed[rival_rows(errors)].min(axis=0)))
     return float(errors.horizon_s[better[-1]]) if len(better) else 0.0
 
 
-def lost_to(errors: ErrorsByHorizon, row: int = _MODEL) -> dict[str, tuple[str, float, float]]:
-    """Find where a prediction of rates or attitude loses to what knows no model at horizons where control lives.
+def lost_to(errors: ErrorsByHorizon) -> dict[str, tuple[str, float, float]]:
+    """Find where a model loses in rates or attitude to what knows no model at horizons where control lives.
 
     Returns
     -------
@@ -248,15 +264,16 @@ def lost_to(errors: ErrorsByHorizon, row: int = _MODEL) -> dict[str, tuple[str, 
     horizon, (low, high) = errors.horizon_s, CONTROL_BAND
     # A rounding error is no horizon apart.
     inside = ~less(horizon, low) & ~less(high, horizon) if not less(horizon[-1], low) else np.ones(len(horizon), bool)
+    row, rows = played_row(errors), rival_rows(errors)
     lost: dict[str, tuple[str, float, float]] = {}
     for signal in ("body_rate", "attitude"):
         group = errors.errors[signal]
         if group is None:
             continue
-        rivals = group.mae[1:3]
+        rivals = group.mae[rows]
         where = np.flatnonzero(inside & less(rivals.min(axis=0), group.mae[row]))
         if len(where):
-            rival = errors.prediction[1 + int(rivals[:, where[0]].argmin())]
+            rival = errors.prediction[rows[int(rivals[:, where[0]].argmin())]]
             lost[signal] = (rival, float(horizon[where[0]]), float(horizon[where[-1]]))
     return lost
 
@@ -265,7 +282,8 @@ def behind_both(errors: ErrorsByHorizon) -> tuple[str, ...]:
     """List what of velocity and position a model predicts worse, over all horizons, than each that knows no model."""
     groups = {signal: errors.errors[signal] for signal in ("velocity", "position")}
     totals = {signal: group.total for signal, group in groups.items() if group is not None}
-    return tuple(signal for signal, total in totals.items() if less(total[1:3].max(), total[_MODEL]))
+    model, rivals = played_row(errors), rival_rows(errors)
+    return tuple(signal for signal, total in totals.items() if less(total[rivals].max(), total[model]))
 
 
 def trust_by_playback(held_out: PlaybackGroup | None) -> Trust:
@@ -334,7 +352,7 @@ class WindowGroup:
         for index, time in enumerate(times):
             own = windows.flight == index
             start[own] = time[windows.start[own]]
-        after = windows.diverged[_MODEL]
+        after = windows.diverged[PREDICTIONS.index(MODEL)]
         return cls(
             flight=windows.flight,
             start=start,
@@ -432,12 +450,13 @@ class ReplayRecord(Record):
     ) -> Self:
         """Arrange a replay."""
         errors, windows, period = replay.errors, replay.windows, played[0].flight.motion.period
-        groups = {signal: SignalErrorGroup.of(found) for signal, found in errors.items()}
+        rows = range(len(replay.predictions))
+        groups = {signal: SignalErrorGroup.of(found, rows) for signal, found in errors.items()}
         assert groups["body_rate"] is not None, "every flight has rates"
         horizon = groups["body_rate"].mae.shape[1]
         return cls(
             played=name,
-            prediction=PREDICTIONS,
+            prediction=replay.predictions,
             asked_s=asked.horizon_s,
             every=asked.every,
             hold=asked.hold or USUAL,
@@ -485,7 +504,7 @@ class ReplayRecord(Record):
                 {
                     "flight": self.flight.name[self.window.flight[index]],
                     "start_s": float(self.window.start[index]),
-                    "error_rad_s": float(self.window.error[_MODEL, index]),
+                    "error_rad_s": float(self.window.error[played_row(self), index]),
                 }
                 for index in self.worst.window
             ],

@@ -26,7 +26,7 @@ from cpfls_cli.artifacts.parameters import (
     vehicle_section,
 )
 from cpfls_cli.artifacts.rebuilt import vehicle_model
-from cpfls_cli.artifacts.replay import HeldOutGroup, better_to
+from cpfls_cli.artifacts.replay import HeldOutGroup, better_to, played_row
 from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, ResponsesGroup, VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
@@ -247,7 +247,7 @@ def worth(record: VehicleRecord) -> Iterator[str]:
         yield next(instrument_words(record, record.instruments))
     held = record.held_out
     if held is not None:
-        last = {name: group.mae[0, -1] for name, group in held.errors.items() if group is not None}
+        last = {name: group.mae[played_row(held), -1] for name, group in held.errors.items() if group is not None}
         ends = joined(f"{number(last[name] * scale, 3)} {unit}" for name, unit, scale in _ENDS if name in last)
         yield f"Held out, it ends {ends} off what was measured after {held.horizon_s[-1]:.3g} s, mean."
 

@@ -19,8 +19,14 @@ MODEL, NOTHING_MOVES, RATE_STAYS, STATED = "model", "nothing-moves", "rate-stays
 PREDICTIONS = (MODEL, NOTHING_MOVES, RATE_STAYS, STATED)
 """The model; the whole state stays; rates and velocity stay; the rigid body and the rotors that the config states."""
 
+WITHOUT_MODEL = (NOTHING_MOVES, RATE_STAYS)
+"""What knows no model, and is what a model has to beat."""
+
 WITH_PAST = "with-past"
 """Behind these: a model that is told of the flight before each start too, beside one that is not."""
+
+BEFORE, AFTER = "before", "after"
+"""A model as given and with the effects that were found, where these are what is compared."""
 
 _BATCH = 100_000
 """Steps of free runs at a time, which bounds the memory."""
@@ -204,7 +210,7 @@ class Region:
 
 def where_better(flights: Sequence[Played], windows: ReplayWindows) -> Region | None:
     """Find the speeds and rates at which a model is better; None where it is nowhere."""
-    rivals = [PREDICTIONS.index(name) for name in (NOTHING_MOVES, RATE_STAYS)]
+    rivals = [PREDICTIONS.index(name) for name in WITHOUT_MODEL]
     better = windows.of_model < windows.size[rivals].min(axis=0)
     if not better.any():
         return None
@@ -235,14 +241,14 @@ class _Sums:
         self.square = np.zeros((4, len(self.predictions), self.horizon, 3))
 
     def add(self, prediction: int, errors: Array, knows: Mapping[str, bool]) -> None:
-        """Add the errors of a batch, shape (run, horizon, 4, 3)."""
+        """Add the errors of a batch by one of the predictions, shape (run, horizon, 4, 3)."""
         norms = np.sqrt(np.einsum("nhsa,nhsa->nhs", errors, errors)).sum(axis=0)
         squares = np.einsum("nhsa,nhsa->hsa", errors, errors)
         for row, signal in enumerate(SIGNALS):
             if knows[signal]:
                 self.norm[row, prediction] += norms[:, row]
                 self.square[row, prediction] += squares[:, row]
-                self.count[signal] += len(errors) if prediction == 0 else 0
+                self.count[signal] += len(errors) if prediction == self.predictions.index(MODEL) else 0
 
     def errors(self) -> dict[str, SignalErrors | None]:
         """Take the means."""

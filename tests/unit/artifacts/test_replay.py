@@ -5,10 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.replay import SignalErrorGroup, behind_both, better_to, lost_to, trust_by_playback
+from cpfls_cli.artifacts.replay import SignalErrorGroup, behind_both, better_to, lost_to, rival_row, trust_by_playback
 from cpfls_cli.validation.trust import Trust
 
 HORIZON = np.array([0.1, 0.2, 0.3, 0.4])
+PREDICTION = ("model", "nothing-moves", "rate-stays", "stated")
 NOTHING, STAYS, STATED = [1.0, 2.0, 3.0, 4.0], [2.0, 2.0, 2.0, 2.0], [9.0] * 4
 
 
@@ -25,7 +26,7 @@ NOTHING, STAYS, STATED = [1.0, 2.0, 3.0, 4.0], [2.0, 2.0, 2.0, 2.0], [9.0] * 4
 )
 def test_sums_up_to_a_horizon_are_compared(model, horizon):
     group = SignalErrorGroup(mae=np.array([model, NOTHING, STAYS, STATED]), rms=np.zeros((4, 4, 3)))
-    errors = SimpleNamespace(horizon_s=HORIZON, errors={"body_rate": group, "velocity": None})
+    errors = SimpleNamespace(horizon_s=HORIZON, errors={"body_rate": group, "velocity": None}, prediction=PREDICTION)
     assert better_to(errors, "body_rate") == horizon
     assert np.isnan(better_to(errors, "velocity"))
 
@@ -40,9 +41,7 @@ def held_out(rate, attitude=None, velocity=None):
 
     known = {"body_rate": rate, "attitude": attitude, "velocity": velocity, "position": None}
     errors = {name: None if model is None else group(model(horizon)) for name, model in known.items()}
-    return SimpleNamespace(
-        horizon_s=horizon, errors=errors, prediction=("model", "nothing-moves", "rate-stays", "stated")
-    )
+    return SimpleNamespace(horizon_s=horizon, errors=errors, prediction=PREDICTION)
 
 
 def good(horizon):
@@ -82,7 +81,7 @@ def test_nothing_is_good_for_control_that_loses_where_control_lives(given, trust
 def test_motion_is_behind_only_where_both_rivals_are_better(model, behind):
     rows = np.array([4 * [model], 4 * [1.0], 4 * [2.0], STATED])
     group = SignalErrorGroup(mae=rows, rms=np.zeros((4, 4, 3)))
-    errors = SimpleNamespace(horizon_s=HORIZON, errors={"velocity": None, "position": group})
+    errors = SimpleNamespace(horizon_s=HORIZON, errors={"velocity": None, "position": group}, prediction=PREDICTION)
     assert behind_both(errors) == behind
 
 
@@ -90,3 +89,14 @@ def test_a_loss_is_named_with_its_rival_and_horizons():
     lost = lost_to(held_out(slow, good))
     assert list(lost) == ["body_rate"]
     assert lost["body_rate"] == ("nothing-moves", pytest.approx(0.04), pytest.approx(0.1))
+
+
+def test_rows_are_found_by_their_names():
+    """Whatever the order in which a file holds them."""
+    mixed = ("with-past", "stated", "rate-stays", "model", "nothing-moves")
+    rows = {"model": good(HORIZON), "nothing-moves": 3 * HORIZON, "rate-stays": 2 * HORIZON}
+    mae = np.array([rows.get(name, 9 * HORIZON) for name in mixed])
+    group = SignalErrorGroup(mae=mae, rms=np.zeros((5, 4, 3)))
+    errors = SimpleNamespace(horizon_s=HORIZON, errors={"body_rate": group}, prediction=mixed)
+    assert rival_row(errors, group) == mixed.index("rate-stays")
+    assert better_to(errors, "body_rate") == 0.4
