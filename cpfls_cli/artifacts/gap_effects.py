@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.artifacts.replay import PlaybackGroup, played_row, rival_row, row_of
+from cpfls_cli.artifacts.replay import FADING, PlaybackGroup, played_row, rival_row, row_of
 from cpfls_cli.artifacts.spec import BODY, columns_of, dataset, group, record, rows_of
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS, effect
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
 from cpfls_cli.gap.naming.results import Estimate, NamedEffect
 from cpfls_cli.gap.settings import CLEAR, WORSE
-from cpfls_cli.playback.replay import AFTER, BEFORE, MODEL, NOTHING_MOVES, RATE_STAYS, STATED
+from cpfls_cli.playback.replay import AFTER, BEFORE, MODEL, NOTHING_MOVES, STATED
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.naming.results import GapSize
@@ -374,7 +374,7 @@ class EndError(NamedTuple):
     before, after : float
         Mean errors of the model as given and with the effects.
     rival : str
-        What knows no model and is better over all horizons: `nothing-moves` or `rate-stays`.
+        What knows no model and is best over all horizons: `nothing-moves`, `rate-stays` or `rate-fades`.
     without_model : float
         Its mean error.
     """
@@ -394,6 +394,8 @@ class EndError(NamedTuple):
 class PlaybackChangeGroup(PlaybackGroup):
     """Held-out flights played back before and after."""
 
+    fading_s: float | None = dataset(FADING, units="s", default=None)
+
     @property
     def played(self) -> str:
         """What is played back."""
@@ -402,8 +404,9 @@ class PlaybackChangeGroup(PlaybackGroup):
     @classmethod
     def of_pairs(cls, flights: Sequence[Played], replay: Replay) -> Self:
         """Arrange a replay of a model with effects and the model as given, without its windows."""
-        names = {MODEL: AFTER, NOTHING_MOVES: NOTHING_MOVES, RATE_STAYS: RATE_STAYS, STATED: BEFORE}
-        return cls.of(flights, replay, names)
+        names = {MODEL: AFTER, STATED: BEFORE}
+        every = {name: names.get(name, name) for name in replay.predictions}
+        return cls.of(flights, replay, every, fading_s=flights[0].fading_s)
 
     @property
     def at_end(self) -> dict[str, EndError]:
@@ -420,4 +423,4 @@ class PlaybackChangeGroup(PlaybackGroup):
     def summary(self) -> dict[str, Any]:
         """The playback for machines."""
         ends = {name: {**end._asdict(), "worse": end.worse} for name, end in self.at_end.items()}
-        return {"at_end": ends, **super().summary}
+        return {"at_end": ends, "fading_s": self.fading_s, **super().summary}

@@ -9,7 +9,15 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.spec import BODY, WORLD, Format, Record, columns_of, dataset, group, group_of, record, rows_of
-from cpfls_cli.playback.replay import AFTER, MODEL, PREDICTIONS, WITHOUT_MODEL, drawn_runs, where_better
+from cpfls_cli.playback.replay import (
+    AFTER,
+    MODEL,
+    PREDICTIONS,
+    RATE_FADES,
+    WITHOUT_MODEL,
+    drawn_runs,
+    where_better,
+)
 from cpfls_cli.rounding import less
 from cpfls_cli.validation.trust import Trust
 
@@ -29,8 +37,14 @@ USUAL = "usual"
 CONTROL_HORIZON = 0.1
 """Horizon in s to which a controller of the attitude relies on its model."""
 
+FADING = "time constant with which the body rates of the training flights fade"
+"""Of the prediction "rate fades"."""
+
 CONTROL_BAND = (0.04, 0.25)
 """Horizons in s at which a controller of the attitude corrects what its model got wrong."""
+
+_VISIBLY = 0.95
+"""Ratio of errors that is visible: on real flights decay by axis, in place of one time constant, saves up to 3 %."""
 
 _DRAWN_RUNS = 12
 
@@ -43,16 +57,31 @@ class SignalErrorGroup:
         "mean norm of the error; of attitudes the geodesic distance", "prediction", "horizon", units="SI"
     )
     rms: Array = dataset("root mean square error by axis", "prediction", "horizon", "axis", units="SI")
+    chance: Array | None = dataset(
+        "half of the 95 % interval of the difference of its mean norm from that of the model, over blocks of windows",
+        "prediction",
+        "horizon",
+        units="SI",
+        least=0.0,
+        default=None,
+    )
 
     @classmethod
     def of(cls, errors: SignalErrors | None, rows: Sequence[int]) -> Self | None:
         """Arrange the errors of some predictions; None where no flight knows the signal."""
-        return None if errors is None else cls(mae=errors.mae[rows], rms=errors.rms[rows])
+        if errors is None:
+            return None
+        chance = None if errors.chance is None else errors.chance[rows]
+        return cls(mae=errors.mae[rows], rms=errors.rms[rows], chance=chance)
 
     @property
     def total(self) -> Array:
         """Sum of the mean norms over the horizon, by prediction."""
         return np.asarray(self.mae.sum(axis=1))
+
+    def by_chance(self, row: int) -> Array:
+        """Give how far errors of a prediction are from those of the model by chance; 0 where too few windows tell."""
+        return np.zeros(self.mae.shape[1]) if self.chance is None else self.chance[row]
 
     def summary(self, prediction: int) -> dict[str, Any]:
         """One prediction for machines."""
@@ -111,7 +140,7 @@ def played_row(errors: ErrorsByHorizon) -> int:
 
 def rival_rows(errors: ErrorsByHorizon) -> list[int]:
     """List the rows of what knows no model, which a model has to beat."""
-    return [row_of(errors, name) for name in WITHOUT_MODEL]
+    return [row_of(errors, name) for name in WITHOUT_MODEL if name in errors.prediction]
 
 
 def rival_row(errors: ErrorsByHorizon, group: SignalErrorGroup) -> int:
@@ -225,7 +254,7 @@ class HeldOutGroup(PlaybackGroup):
     @classmethod
     def judged(cls, flights: Sequence[Played], replay: Replay) -> Self:
         """Arrange a replay without its windows, and where the model is better than what knows no model."""
-        better = where_better(flights, replay.windows)
+        better = where_better(flights, replay)
         region = None if better is None else group_of(RegionGroup, better)
         return cls.of(flights, replay, {name: name for name in replay.predictions}, better=region)
 
@@ -240,10 +269,10 @@ class HeldOutGroup(PlaybackGroup):
 
 
 def better_to(errors: ErrorsByHorizon, signal: str) -> float:
-    """Find the longest horizon, s, up to which the errors of the model add up to less than those of both its rivals.
+    """Find the longest horizon, s, up to which the errors of the model add up to less than those of all its rivals.
 
-    They are "nothing moves" and "rate stays". Sums are compared, because over the first samples noise of the start
-    decides, and there nothing beats a state that stays. 0 where there is none, NaN for a signal that no flight knows.
+    They are what knows no model. Sums are compared, because over the first samples noise of the start decides, and
+    there nothing beats a state that stays. 0 where there is none, NaN for a signal that no flight knows.
     """
     group = errors.errors[signal]
     if group is None:
@@ -256,26 +285,50 @@ def better_to(errors: ErrorsByHorizon, signal: str) -> float:
 def lost_to(errors: ErrorsByHorizon) -> dict[str, tuple[str, float, float]]:
     """Find where a model loses in rates or attitude to what knows no model at horizons where control lives.
 
+    A loss is one beyond chance, as far as chance is known.
+
     Returns
     -------
     dict of str to (str, float, float)
         By signal: the rival that it loses to first, and from which horizon to which, s.
     """
-    horizon, (low, high) = errors.horizon_s, CONTROL_BAND
-    # A rounding error is no horizon apart.
-    inside = ~less(horizon, low) & ~less(high, horizon) if not less(horizon[-1], low) else np.ones(len(horizon), bool)
+    horizon, inside = errors.horizon_s, _inside(errors)
     row, rows = played_row(errors), rival_rows(errors)
     lost: dict[str, tuple[str, float, float]] = {}
     for signal in ("body_rate", "attitude"):
         group = errors.errors[signal]
         if group is None:
             continue
-        rivals = group.mae[rows]
-        where = np.flatnonzero(inside & less(rivals.min(axis=0), group.mae[row]))
+        loses = np.array([inside & less(group.mae[each] + group.by_chance(each), group.mae[row]) for each in rows])
+        where = np.flatnonzero(loses.any(axis=0))
         if len(where):
-            rival = errors.prediction[rows[int(rivals[:, where[0]].argmin())]]
-            lost[signal] = (rival, float(horizon[where[0]]), float(horizon[where[-1]]))
+            first, last = where[[0, -1]]
+            rival = rows[int(np.where(loses[:, first], group.mae[rows, first], np.inf).argmin())]
+            lost[signal] = (errors.prediction[rival], float(horizon[first]), float(horizon[last]))
     return lost
+
+
+def _inside(errors: ErrorsByHorizon) -> BoolArray:
+    """Flag the horizons where control lives; all of a playback that ends before."""
+    horizon, (low, high) = errors.horizon_s, CONTROL_BAND
+    # A rounding error is no horizon apart.
+    return ~less(horizon, low) & ~less(high, horizon) if not less(horizon[-1], low) else np.ones(len(horizon), bool)
+
+
+def like_fading(errors: ErrorsByHorizon) -> float | None:
+    """Find where a model has to beat "rate fades" in rates, s; None where it does, visibly and by more than chance.
+
+    That is the end of where control lives: what knows nothing of the torque has forgotten most there. None too where
+    it is not known how rates fade.
+    """
+    group = errors.errors["body_rate"]
+    if group is None or RATE_FADES not in errors.prediction:
+        return None
+    last = int(np.flatnonzero(_inside(errors))[-1])
+    fades, model = row_of(errors, RATE_FADES), played_row(errors)
+    most = np.minimum(group.mae[fades] - group.by_chance(fades), _VISIBLY * group.mae[fades])
+    better = less(group.mae[model], most)[last]
+    return None if better else float(errors.horizon_s[last])
 
 
 def behind_both(errors: ErrorsByHorizon) -> tuple[str, ...]:
@@ -291,8 +344,8 @@ def trust_by_playback(held_out: PlaybackGroup | None) -> Trust:
 
     Good for simulation where errors of rates, attitude, velocity and position, as far as the flights know them, add
     up to less over the horizon than those of what knows no model; for control where those of the rates do, over
-    0.1 s at least. Nothing is good for either that loses in rates or attitude where control lives, or whose velocity
-    or position is worse than both of what knows no model: mere decay of the rates predicts rates as well.
+    0.1 s at least. Nothing is good for either that loses in rates or attitude where control lives, that predicts rates
+    there no better than mere decay, or whose velocity or position is worse than all of what knows no model.
     """
     if held_out is None:
         return Trust.NOT_JUDGED
@@ -300,7 +353,7 @@ def trust_by_playback(held_out: PlaybackGroup | None) -> Trust:
     reached = {signal: better_to(held_out, signal) for signal, group in known.items() if group is not None}
     if reached["body_rate"] < min(CONTROL_HORIZON, last):
         return Trust.DO_NOT_USE
-    if lost_to(held_out) or behind_both(held_out):
+    if lost_to(held_out) or like_fading(held_out) or behind_both(held_out):
         return Trust.NOT_CONTROL
     simulates = known["velocity"] is not None and all(horizon >= last for horizon in reached.values())
     return Trust.SIMULATION if simulates else Trust.CONTROL
@@ -416,13 +469,15 @@ class ReplayRecord(Record):
 
     played: str = dataset("what is played back: a file, or vehicle for that of /config")
     prediction: tuple[str, ...] = dataset(
-        "the model; nothing moves: the whole state stays; rates and velocity stay; the vehicle that the config states",
+        "model; nothing-moves: the whole state stays; rate-stays: rates and velocity; stated: the vehicle of the "
+        "config; rate-fades: rates fade by fading_s, velocity stays",
         "prediction",
     )
     asked_s: float = dataset("longest horizon, as asked for", units="s")
     every: int = dataset("samples from one begin to the next")
     hold: str = dataset("what is between samples, as asked for: linear, previous; usual where nothing was")
     history_s: float | None = dataset("how much of the flight before a start the model uses", units="s", default=None)
+    fading_s: float | None = dataset(FADING, units="s", default=None)
     horizon_s: Array = dataset("horizons", "horizon", units="s")
     diverged: IntArray = dataset("windows in which a prediction ran away and was stopped", "prediction")
     body_rate: SignalErrorGroup = group()
@@ -461,6 +516,7 @@ class ReplayRecord(Record):
             every=asked.every,
             hold=asked.hold or USUAL,
             history_s=asked.history_s or None,
+            fading_s=played[0].fading_s,
             horizon_s=period * np.arange(1, horizon + 1),
             diverged=(windows.diverged >= 0).sum(axis=1),
             flight=PlayedFlightsGroup.of(flights, played, windows),
@@ -493,6 +549,7 @@ class ReplayRecord(Record):
         return {
             "played": self.played,
             "history_s": self.history_s or 0.0,
+            "fading_s": self.fading_s,
             "horizon_s": self.horizon_s.tolist(),
             "windows": self.windows,
             "models": {name: self._prediction(index) for index, name in enumerate(self.prediction)},

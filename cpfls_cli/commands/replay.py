@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.replay import ReplayRecord
 from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
-from cpfls_cli.flights.models import holds_forecast, is_vehicle, learned_by, read_model, read_observer
+from cpfls_cli.flights.models import holds_forecast, is_vehicle, learned_by, read_fading, read_model, read_observer
 from cpfls_cli.flights.playback import flights_to_play, played, repairs_of
 from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.pages.replay import answer
@@ -38,7 +38,8 @@ def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) 
     to_play = read_model(model, job.study, forecast=True)
     observer = read_observer(model, options.history_s) if options.history_s > 0 else None
     given = flights_to_play(flights, job.study, options.hold)
-    pairs = [played(to_play, flight, job.study.vehicle) for flight in given]
+    fading_s = read_fading(model)
+    pairs = [replace(played(to_play, flight, job.study.vehicle), fading_s=fading_s) for flight in given]
     horizon = _samples(options.horizon_s, given[0], "--horizon")
     if observer is not None:
         _samples(observer.past_s, given[0], "--history")

@@ -18,6 +18,7 @@ from cpfls_cli.artifacts.replay import (
     SignalErrorGroup,
     behind_both,
     better_to,
+    like_fading,
     lost_to,
     played_row,
     rival_row,
@@ -32,6 +33,7 @@ from cpfls_cli.playback.replay import (
     BEFORE,
     MODEL,
     NOTHING_MOVES,
+    RATE_FADES,
     RATE_STAYS,
     STATED,
     WITH_PAST,
@@ -62,6 +64,7 @@ _WORDS = {
     AFTER: "with the effects",
     NOTHING_MOVES: "nothing moves",
     RATE_STAYS: "rate stays",
+    RATE_FADES: "rate fades",
     STATED: "stated vehicle",
     BEFORE: "as given",
     WITH_PAST: "with the past",
@@ -81,6 +84,7 @@ _STYLES = {
     AFTER: _JUDGED,
     NOTHING_MOVES: HELD,
     RATE_STAYS: BASELINE,
+    RATE_FADES: {"color": GREY, "linestyle": (0, (5, 1.5, 1, 1.5)), "linewidth": 1.2},
     STATED: _AS_STATED,
     BEFORE: _AS_STATED,
     WITH_PAST: {**style_of(2), "linewidth": 2.0, "zorder": 4},
@@ -98,7 +102,7 @@ def answer(replay: Source[ReplayRecord], index: int = 1) -> Iterator[Block]:
 
 
 def _grounds(record: ReplayRecord, index: int) -> Iterator[Block]:
-    yield errors_table(record, index)
+    yield Folded("Errors by horizon", [errors_table(record, index)], shown=True)
     yield from _worst(record, index)
 
 
@@ -182,15 +186,24 @@ def playback_words(trust: str, held: PlaybackGroup | None, contradictions: Seque
 
 def lost_words(held: ErrorsByHorizon) -> list[str]:
     """Say where a model loses to what knows no model: where control lives, or in motion over all horizons."""
+    lost, faded = lost_to(held), like_fading(held)
     said = [
-        f"loses in {_SIGNALS[signal][0]} to “{_WORDS[rival]}” {_between(low, high)}"
-        for signal, (rival, low, high) in lost_to(held).items()
+        f"loses in {_SIGNALS[signal][0]} to “{_WORDS[rival]}” {_between(low, high)}{_by_chance(held, signal)}"
+        for signal, (rival, low, high) in lost.items()
     ]
+    if faded is not None and "body_rate" not in lost:
+        beyond = _by_chance(held, "body_rate")
+        said.append(f"does not beat “{_WORDS[RATE_FADES]}” in body rate at {_seconds(faded)}{beyond}")
     behind = behind_both(held)
     if behind:
         motion = joined(_SIGNALS[signal][0] for signal in behind)
         said.append(f"is worse in {motion} than “nothing moves” and “rate stays” both")
     return said
+
+
+def _by_chance(held: ErrorsByHorizon, signal: str) -> str:
+    group = held.errors[signal]
+    return "" if group is None or group.chance is None else " by more than chance"
 
 
 def _between(low: float, high: float) -> str:

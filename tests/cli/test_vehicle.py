@@ -101,7 +101,7 @@ def test_people_read_verdict_and_numbers(cpfls, config, flights, found, tmp_path
     assert first.endswith(" s ahead; its constants are told.")
     assert len(lines) < 15, "verdicts, numbers, next commands"
     whole = cpfls("vehicle", config, flights[0], "--held-out", flights[1], "-o", output, "--force", "-v").stdout
-    for words in ("Body rate: better than “nothing moves” at every horizon", "linear damping d_x", "stated vehicle"):
+    for words in ("Body rate: better than “rate fades” at every horizon", "linear damping d_x", "stated vehicle"):
         assert words in whole
         assert words not in result.stdout
 
