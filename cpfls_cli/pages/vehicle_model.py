@@ -19,6 +19,7 @@ from cpfls_cli.artifacts.parameters import (
     OF_TURNING,
     THRUST,
     Parameter,
+    excess,
     is_learned,
     name_of,
     parameters_of,
@@ -172,7 +173,10 @@ def _against(record: VehicleRecord) -> Iterator[str]:
     bound = [name_of(name) for name in record.on_bound]
     if bound:
         yield f"{joined(bound)}: on a bound of what is tried, so the flights ask for more; no number of the vehicle."
-    told = {*record.on_bound, *(OF_TURNING if heavy else ())}
+    too_much = {} if heavy else excess(record)
+    for name, why in too_much.items():
+        yield f"{name_of(name)}: {why}; a number that predicts, not the body's, and no config gets it."
+    told = {*record.on_bound, *(OF_TURNING if heavy else too_much)}
     open_ = [name_of(name) for name in record.untold if name not in told]
     if open_ and record.trust != Trust.LOOP:
         yield f"Not determined, for the flights say too little of it: {joined(open_)}."

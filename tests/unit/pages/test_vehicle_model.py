@@ -102,6 +102,39 @@ def test_an_inertia_that_no_body_has_is_no_constant_however_narrow_its_interval(
     assert vehicle_section(record)["inertia_kg_m2"][0] == pytest.approx(0.004 if told else record.vehicle.inertia[0])
 
 
+@pytest.mark.parametrize(
+    ("determined", "section"),
+    [
+        ([False, False], [0.004, 0.004, 0.005]),
+        ([False, True], [0.004, 0.004, 0.005]),
+        # What was stated does not go with what was found.
+        ([True, True], [0.03, 0.004, None]),
+    ],
+)
+def test_no_config_gets_a_moment_of_inertia_that_no_body_has(determined, section):
+    record = record_of(whole())
+    found = replace(
+        record.found,
+        name=("inertia.Ixx", "inertia.Iyy"),
+        value=np.array([0.03, 0.004]),
+        stated=np.full(2, 0.004),
+        determined=np.array(determined),
+        at_bound=np.array([False, False]),
+    )
+    moments = np.array([0.03, 0.004, 0.005, 0.0, 0.0, 0.0])
+    record = replace(record, found=found, vehicle=replace(record.vehicle, inertia=moments))
+    assert vehicle_section(record)["inertia_kg_m2"] == section
+
+
+def test_a_moment_that_no_body_has_is_said_with_its_reason():
+    record = _of_inertia(0.02, 0.004, 0.007)(record_of(whole()))
+    record = replace(record, found=replace(record.found, determined=np.array([False, True])))
+    (row,) = [each for each in parameters_of(record) if each.key == "inertia_kg_m2.0"]
+    assert row.reason.startswith("no body has it, for the other two are 0.011 kg m^2 together: a number that predicts")
+    assert "Ixx: no body has it" in " ".join(cautions(record))
+    assert "say too little of it: Ixx" not in " ".join(cautions(record))
+
+
 def test_flights_that_show_the_loop_are_said_first_and_leave_no_good_word():
     record = record_of(whole())
     loop = LoopGroup(
