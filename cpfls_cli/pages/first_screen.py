@@ -18,8 +18,8 @@ from cpfls_cli.gap.naming.results import Alternative, GapVerdict
 from cpfls_cli.pages.effects import (
     capitalised,
     closest_sentence,
-    effect_sentence,
     effect_title,
+    named_sentences,
     share_words,
     titles,
     wrong_numbers,
@@ -110,7 +110,7 @@ def _floors(record: DiagnosisRecord, channel: int) -> str:
 
 def verdict_box(record: DiagnosisRecord) -> Box:
     """Say what a diagnosis found, and how much of it."""
-    named = [effect_sentence(effect) for effect in record.effects.named]
+    named = named_sentences(record.effects.named)
     named += [closest_sentence(effect) for effect in record.effects.closest]
     named += [NO_EFFECT] if record.only_gusts else []
     named = [*_of_model(record), *named]
