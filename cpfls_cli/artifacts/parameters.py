@@ -155,7 +155,7 @@ def _reason(record: VehicleRecord, row: dict[str, Any]) -> str:
         return f"{excess(record)[name]}: a number that predicts, not the body's"
     if others:
         return f"only its ratio to {' and '.join(others)} is known: they trade against each other"
-    return "the flights say too little of it: its interval is too wide"
+    return "the flights say too little about it: its interval is too wide"
 
 
 def too_heavy(record: VehicleRecord) -> str:

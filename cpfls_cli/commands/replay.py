@@ -26,7 +26,7 @@ from cpfls_cli.playback.replay import Played, ReplayOptions, ReplayWindows, repl
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.words import joined
 
-_FORECAST = "{}: its forecast along logged rotor speeds is played, loop and all; its constants are another model"
+_FORECAST = "{}: its forecast along logged rotor speeds is played, loop included; its constants are a different model"
 
 
 def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) -> Outcome:
@@ -70,8 +70,8 @@ def _past_notes(observer: Observer, pairs: Sequence[Played], windows: ReplayWind
         short += int(np.sum(past_of(pair.flight, starts, samples)[1].sum(axis=1) < samples))
     if short:
         yield (
-            f"{short} of {len(windows.start)} windows begin less than {observer.past_s:g} s after the begin of a "
-            "stretch: they use the past that there is"
+            f"{short} of {len(windows.start)} windows begin less than {observer.past_s:g} s after the start of a "
+            f"stretch and use what past there is"
         )
 
 

@@ -171,7 +171,7 @@ def playback_words(trust: str, held: PlaybackGroup | None, contradictions: Seque
         yield f"Do not use it. {contradicted(first)}"
         yield from map(sentence, others)
     elif held is None:
-        yield "No flight was held out, so what it is good for is open; --held-out FLIGHT says it."
+        yield "No flight was held out, so it is open what the model is good for; --held-out FLIGHT tells."
     elif trust == Trust.SIMULATION:
         reached = min(better_to(held, "body_rate"), better_to(held, "velocity"))
         yield f"Good for simulation and for control to {number(reached, 2)} s{_region(held)}."
@@ -181,7 +181,10 @@ def playback_words(trust: str, held: PlaybackGroup | None, contradictions: Seque
     elif trust == Trust.NOT_CONTROL:
         yield f"Not for control: it {joined(lost_words(held))}."
     else:
-        yield "Do not use it: held out, its errors of the body rate add up to more than those of what knows no model."
+        yield (
+            "Do not use it: on held-out flights its body-rate errors add up to more than those of a baseline without a "
+            "model."
+        )
 
 
 def lost_words(held: ErrorsByHorizon) -> list[str]:
@@ -238,7 +241,7 @@ def _rivals(record: ErrorsByHorizon) -> dict[str, tuple[SignalErrorGroup, int]]:
 def _sentence(record: ErrorsByHorizon, name: str, group: SignalErrorGroup, rival: int) -> str:
     words, (model, other) = _SIGNALS[name][0].capitalize(), group.total[[played_row(record), rival]]
     if other == 0:
-        return f"{words}: “{_WORDS[record.prediction[rival]]}” has no error, for the flight shows no motion."
+        return f"{words}: “{_WORDS[record.prediction[rival]]}” has no error, because the flight shows no motion."
     if less(model, other):
         much = f"over all horizons its errors are {whole_percent(float(1 - model / other))} smaller"
     else:
@@ -459,7 +462,7 @@ def worst_figure(name: str, record: ReplayRecord) -> Plot:
                 line(axes, time, model, label="playback", **_PLAYED)
                 keep_in_view(axes, [measured], model)
                 axes.set_ylabel(AXES[row] if column == 0 else "")
-        figure.supxlabel("time from the begin, s", fontsize=9.5)
+        figure.supxlabel("time from the start, s", fontsize=9.5)
         figure.supylabel("body rate, rad/s", fontsize=9.5)
         legend_over(figure, grid[0][0])
 
@@ -496,7 +499,7 @@ def drawn_figure(name: str, record: ReplayRecord) -> Plot:
         legend_over(figure, panels[0])
 
     caption = (
-        f"A stretch of {flight} beside its playback, which begins anew from the flight after each horizon. Of all such "
+        f"A stretch of {flight} beside its playback, which restarts from the flight after each horizon. Of all such "
         "stretches half are better and half are worse."
     )
     return plot(name, caption, "A flight beside its playback over time", 0.8 + 1.25 * len(panels_of), draw)
@@ -518,10 +521,10 @@ def where_figure(name: str, record: ReplayRecord) -> Plot:
             plain_ticks(axes.yaxis)
             axes.set_title(flight)
             axes.set_ylabel("error, rad/s")
-        panels[-1].set_xlabel("begin of the window, s")
+        panels[-1].set_xlabel("start of the window, s")
         legend_over(figure, panels[0])
 
-    caption = "Where the model is good: mean error of the body rate over the horizon, by the begin of the window."
+    caption = "Where the model is good: mean error of the body rate over the horizon, by the start of the window."
     return plot(
         name, caption, "Error of the body rate over the time of each flight", 0.9 + 1.3 * len(record.flight.name), draw
     )
