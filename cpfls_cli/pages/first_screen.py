@@ -53,7 +53,9 @@ _VISIBLE = 0.05
 """Share of the error without a model by which a playback has to grow to be called worse."""
 _ENERGY = {"feeds": ", feeds energy into the motion", "drains": ", drains energy from the motion"}
 _USE = "take the model with it, extended.h5"
-_GUSTS = "nothing on the model: what is left are gusts or noise; fly in still air, or more runs, to see what is smaller"
+_GUSTS = (
+    "nothing on the model: what is left is gusts or noise; to see smaller effects, fly in still air or fly more runs"
+)
 _PLAN = "`cpfls trajectory CONFIG --for diagnosis.h5 -o path.h5` plans such a flight"
 _NEXT: dict[str, str] = {
     GapVerdict.NAMED: _USE,

@@ -70,7 +70,7 @@ def _nothing(again: ComesAgainGroup, what: str) -> str:
     """Say that nothing comes again, if that is known."""
     most = whole_percent(again.most)
     if not again.nothing:
-        return f"whether {what} comes again these runs do not tell: up to {most} of it may"
+        return f"these runs do not tell whether {what} comes again: up to {most} of it may"
     return (
         f"{what} does not come again (at most {most} of it): gusts or noise, and no effect of the vehicle explains it"
     )
@@ -124,7 +124,7 @@ def _part_words(again: ComesAgainGroup, channel: int, part: Part, after: ComesAg
     explained = again.explained[channel, part.bands]
     if (explained > _TELLS).all():
         low, high = (whole_percent(float(each)) for each in (explained.min(), explained.max()))
-        words += f" (of the motion that does the model explains {low if low == high else f'{low} to {high}'})"
+        words += f" (of the motion that comes again the model explains {low if low == high else f'{low} to {high}'})"
     return words
 
 
@@ -158,9 +158,10 @@ def again_blocks(
 def _explanation(again: ComesAgainGroup) -> str:
     runs = f"{again.runs} runs of {'one path' if again.paths == 1 else f'{again.paths} paths'}"
     return (
-        f"{runs} ({joined(again.flights)}) are held against each other. What of the gap goes with that of another run "
-        "at the same place of the path was asked for in both: the model lacks something there, or a sensor has a fault "
-        "that comes again with the path. What does not is that run's own: gusts and noise, the floor that no model of "
+        f"{runs} ({joined(again.flights)}) are held against each other. The part of the gap that agrees with another "
+        f"run at the same place of the path was asked for in both: the model lacks something there, or a sensor has a "
+        f"fault "
+        "that comes again with the path. The rest is the run's own: gusts and noise, the floor that no model of "
         "the vehicle goes below."
     )
 

@@ -36,7 +36,8 @@ def test_the_largest_share_that_comes_again_stands_first():
         "there."
     )
     assert box.sentences[1] == (
-        "Torque about y (pitch): 50 % comes again from 0.25 to 1.5 Hz (of the motion that does the model explains 85 % "
+        "Torque about y (pitch): 50 % comes again from 0.25 to 1.5 Hz (of the motion that comes again the model "
+        "explains 85 % "
         "to 90 %). The rest: gusts of about 3.3 rad/s², or noise that is not white."
     )
     assert len(box.sentences) == 6
@@ -52,7 +53,7 @@ def test_where_nothing_comes_again_no_effect_explains_the_gap():
 
 def test_what_runs_do_not_tell_is_open():
     box = again_box(made.comes_again(NOTHING, error=0.5))
-    assert box.title == "Whether the gap comes again these runs do not tell: up to 100 % of it may."
+    assert box.title == "These runs do not tell whether the gap comes again: up to 100 % of it may."
     assert "nothing surely comes again" in box.sentences[0]
 
 
