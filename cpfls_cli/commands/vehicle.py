@@ -211,13 +211,13 @@ def _check_groups(groups: Sequence[GroupSettings], training: Sequence[LoggedFlig
         if group.name not in flown:
             names = joined(repr(name) for name in group.flights)
             raise ConfigError(
-                f"playback.groups: no flight that trains is of {group.name}: none is called like {names}; name its "
-                "files there or leave the group out"
+                f"playback.groups: no training flight belongs to {group.name}: no file name matches {names}; name its "
+                f"files there or leave the group out"
             )
     if "" not in flown:
         raise ConfigError(
-            "playback.groups: every flight is of a group; one at least has to be of the section vehicle, whose mass "
-            "gives all numbers their size"
+            "playback.groups: every flight belongs to a group; at least one has to be of the section vehicle, whose "
+            "mass gives all numbers their size"
         )
 
 
