@@ -61,7 +61,7 @@ def again_box(before: ComesAgainGroup, after: ComesAgainGroup | None = None, eff
     share, channel, part = max(found, key=lambda each: each[0])
     title = (
         f"Of the gap in the {channel_words(CHANNELS[channel])} {_where(part)} {whole_percent(share)} comes again: the "
-        "model lacks an effect there."
+        f"model{'' if after is None else ' as given'} lacks an effect there."
     )
     return Box("REPEATS", title, [*lines, *left], "note")
 

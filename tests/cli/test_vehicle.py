@@ -123,8 +123,8 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     assert worth[0].startswith("GOOD FOR SIMULATION AND CONTROL: predicts motion ")
     rate, horizon = model["body_rate"]["mae"][-1], json.loads(replayed.stdout)["horizon_s"]
     last = horizon[-1] if isinstance(horizon, list) else horizon
-    assert worth[1].startswith(f"Held out, it ends {rate:.3g} rad/s, ")
-    assert worth[1].endswith(f" m off what was measured after {last:.3g} s, mean.")
+    assert worth[1].startswith(f"On held-out flights it ends {rate:.3g} rad/s, ")
+    assert worth[1].endswith(f" m off the measured motion after {last:.3g} s, on average.")
     assert worth[2] == "JSON holds all of it."
     predicted = cpfls("predict", config, found.output, flights[1], "-o", tmp_path / "prediction.h5", "--json")
     assert predicted.exit_code == 0, predicted.stderr

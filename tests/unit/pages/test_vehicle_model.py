@@ -132,7 +132,7 @@ def test_a_moment_that_no_body_has_is_said_with_its_reason():
     (row,) = [each for each in parameters_of(record) if each.key == "inertia_kg_m2.0"]
     assert row.reason.startswith("no body has it, for the other two are 0.011 kg m^2 together: a number that predicts")
     assert "Ixx: no body has it" in " ".join(cautions(record))
-    assert "say too little of it: Ixx" not in " ".join(cautions(record))
+    assert "say too little about it: Ixx" not in " ".join(cautions(record))
 
 
 def test_flights_that_show_the_loop_are_said_first_and_leave_no_good_word():
