@@ -69,7 +69,7 @@ def test_replay_and_compare_warn_of_flights_seen(
     assert whole in result.stderr
     assert "flight_3.csv: extended.h5" not in result.stderr
     result = cpfls("compare", gap_config, *with_attitude, "--model", two_models, "-o", tmp_path / "d.h5", "--json")
-    part = "flight_4.csv: extended.h5 has learned from its first 1600 of 2400 samples, so that shows nothing"
+    part = "flight_4.csv: extended.h5 has learned from its first 1600 of 2400 samples, so that says nothing"
     assert part in result.stdout
     assert "flight_5.csv: extended.h5" not in result.stdout
 
