@@ -19,7 +19,7 @@ from cpfls_cli.artifacts.replay import PlaybackGroup
 from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.replay import PREDICTIONS
+from cpfls_cli.playback.replay import STATED
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.compare import Disagreement, WorstChannel
@@ -175,7 +175,11 @@ class DisagreementRecord(Record):
             stretch=StretchGroup.of(disagreement.stretches),
             dependence=DependenceGroup.of(disagreement.dependence),
             heat_map=None if disagreement.worst is None else HeatMapGroup.of(disagreement.worst),
-            playback=PlaybackGroup.of(disagreement.played, disagreement.playback, PREDICTIONS[:3]),
+            playback=PlaybackGroup.of(
+                disagreement.played,
+                disagreement.playback,
+                {name: name for name in disagreement.playback.predictions if name != STATED},
+            ),
             not_excited=NotExcitedGroup.of(disagreement.not_excited),
             audit=AuditGroup.of(disagreement.audit),
             warning=(*disagreement.audit.filtered, *warnings),

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.artifacts.replay import PlaybackGroup
+from cpfls_cli.artifacts.replay import FADING, PlaybackGroup, played_row, rival_row, row_of
 from cpfls_cli.artifacts.spec import BODY, columns_of, dataset, group, record, rows_of
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS, effect
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
 from cpfls_cli.gap.naming.results import Estimate, NamedEffect
 from cpfls_cli.gap.settings import CLEAR, WORSE
-from cpfls_cli.playback.replay import NOTHING_MOVES, RATE_STAYS
+from cpfls_cli.playback.replay import AFTER, BEFORE, MODEL, NOTHING_MOVES, STATED
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.naming.results import GapSize
@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 
 _GROWN = 1.05
 """Ratio of the gaps after and before from which on a channel is marked; two digits show no less."""
-
-BEFORE, AFTER = "before", "after"
-"""Predictions of held-out flights: by the model as given and with the effects."""
 
 _EVALUATED = ("wrench", "actuator")
 """Kinds of effects that are part of a model; faults of sensors are repaired, numbers of the vehicle refitted."""
@@ -377,7 +374,7 @@ class EndError(NamedTuple):
     before, after : float
         Mean errors of the model as given and with the effects.
     rival : str
-        What knows no model and is better over all horizons: `nothing-moves` or `rate-stays`.
+        What knows no model and is best over all horizons: `nothing-moves`, `rate-stays` or `rate-fades`.
     without_model : float
         Its mean error.
     """
@@ -397,6 +394,8 @@ class EndError(NamedTuple):
 class PlaybackChangeGroup(PlaybackGroup):
     """Held-out flights played back before and after."""
 
+    fading_s: float | None = dataset(FADING, units="s", default=None)
+
     @property
     def played(self) -> str:
         """What is played back."""
@@ -405,20 +404,23 @@ class PlaybackChangeGroup(PlaybackGroup):
     @classmethod
     def of_pairs(cls, flights: Sequence[Played], replay: Replay) -> Self:
         """Arrange a replay of a model with effects and the model as given, without its windows."""
-        return cls.of(flights, replay, (AFTER, NOTHING_MOVES, RATE_STAYS, BEFORE))
+        names = {MODEL: AFTER, STATED: BEFORE}
+        every = {name: names.get(name, name) for name in replay.predictions}
+        return cls.of(flights, replay, every, fading_s=flights[0].fading_s)
 
     @property
     def at_end(self) -> dict[str, EndError]:
         """Errors at the longest horizon by signal, of those that move."""
-        known = {name: found for name, found in self.errors.items() if found is not None and found.total[1] > 0}
-        ends = {name: (found.mae[:, -1].tolist(), found.rival) for name, found in known.items()}
-        return {
-            name: EndError(error[3], error[0], self.prediction[rival], error[rival])
-            for name, (error, rival) in ends.items()
-        }
+        before, after, nothing = row_of(self, BEFORE), played_row(self), row_of(self, NOTHING_MOVES)
+        ends = {}
+        for name, found in self.errors.items():
+            if found is not None and found.total[nothing] > 0:
+                rival, error = rival_row(self, found), found.mae[:, -1].tolist()
+                ends[name] = EndError(error[before], error[after], self.prediction[rival], error[rival])
+        return ends
 
     @property
     def summary(self) -> dict[str, Any]:
         """The playback for machines."""
         ends = {name: {**end._asdict(), "worse": end.worse} for name, end in self.at_end.items()}
-        return {"at_end": ends, **super().summary}
+        return {"at_end": ends, "fading_s": self.fading_s, **super().summary}

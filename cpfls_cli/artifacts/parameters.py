@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.effects.registry import CENTRE_OF_MASS
-from cpfls_cli.inertia import INERTIA_PARAMETERS, beyond_any_body
+from cpfls_cli.inertia import INERTIA_PARAMETERS, MEASURED, beyond_any_body, more_than_others, symmetric
 
 if TYPE_CHECKING:
     from cpfls_cli.artifacts.vehicle_model import VehicleRecord
@@ -150,9 +151,11 @@ def _reason(record: VehicleRecord, row: dict[str, Any]) -> str:
         return "these flights show the loop, not the vehicle"
     if name in OF_TURNING and too_heavy(record):
         return too_heavy(record)
+    if name in excess(record):
+        return f"{excess(record)[name]}: a number that predicts, not the body's"
     if others:
         return f"only its ratio to {' and '.join(others)} is known: they trade against each other"
-    return "the flights say too little of it: its interval is too wide"
+    return "the flights say too little about it: its interval is too wide"
 
 
 def too_heavy(record: VehicleRecord) -> str:
@@ -169,6 +172,17 @@ def too_heavy(record: VehicleRecord) -> str:
         f"too heavy for {vehicle.mass:.3g} kg between these rotors ({told}, kg m^2): numbers that predict, not the "
         "body's"
     )
+
+
+def excess(record: VehicleRecord) -> dict[str, str]:
+    """Say of a moment of inertia that was found and is more than the other two together that no body has it."""
+    moments = record.vehicle.inertia[:3]
+    named = {f"inertia.{name}": float(moments[INERTIA_PARAMETERS.index(name)]) for name in more_than_others(moments)}
+    return {
+        name: f"no body has it, for the other two are {moments.sum() - moment:.3g} kg m^2 together"
+        for name, moment in named.items()
+        if name in record.found.name
+    }
 
 
 def _held(record: VehicleRecord, key: str) -> float:
@@ -200,6 +214,12 @@ def vehicle_section(record: VehicleRecord) -> dict[str, Any]:
     # A product that is not known is none; a moment that is not known is to be found.
     inertia = [relied_on(key, vehicle.inertia[place]) for place, key in enumerate(INERTIA)]
     inertia[3:] = [value or 0.0 for value in inertia[3:]]
+    if all(inertia[:3]) and not _of_a_body(np.array(inertia)):
+        # Numbers that were found beside stated ones that do not go with them: those are to be found too.
+        inertia[:3] = [
+            value if known[key].determined else None for key, value in zip(INERTIA, inertia[:3], strict=False)
+        ]
+        inertia[:3] = [None] * 3 if all(inertia[:3]) else inertia[:3]
     section: dict[str, Any] = {
         "gravity_m_s2": vehicle.gravity,
         "mass_kg": _rounded(vehicle.mass),
@@ -217,6 +237,12 @@ def vehicle_section(record: VehicleRecord) -> dict[str, Any]:
         "rotor_speed_max_rad_s": rotors.speed_max,
     }
     return section
+
+
+def _of_a_body(inertia: Array) -> bool:
+    """Tell whether no principal moment is more than the other two together, which a config refuses."""
+    smallest, middle, largest = np.linalg.eigvalsh(symmetric(inertia))
+    return bool(largest <= MEASURED * (smallest + middle))
 
 
 def _open(parameter: Parameter) -> bool:

@@ -9,7 +9,15 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.spec import BODY, WORLD, Format, Record, columns_of, dataset, group, group_of, record, rows_of
-from cpfls_cli.playback.replay import PREDICTIONS, drawn_runs, where_better
+from cpfls_cli.playback.replay import (
+    AFTER,
+    MODEL,
+    PREDICTIONS,
+    RATE_FADES,
+    WITHOUT_MODEL,
+    drawn_runs,
+    where_better,
+)
 from cpfls_cli.rounding import less
 from cpfls_cli.validation.trust import Trust
 
@@ -29,11 +37,16 @@ USUAL = "usual"
 CONTROL_HORIZON = 0.1
 """Horizon in s to which a controller of the attitude relies on its model."""
 
+FADING = "time constant with which the body rates of the training flights fade"
+"""Of the prediction "rate fades"."""
+
 CONTROL_BAND = (0.04, 0.25)
 """Horizons in s at which a controller of the attitude corrects what its model got wrong."""
 
+_VISIBLY = 0.95
+"""Ratio of errors that is visible: on real flights decay by axis, in place of one time constant, saves up to 3 %."""
+
 _DRAWN_RUNS = 12
-_MODEL = 0
 
 
 @record
@@ -44,22 +57,31 @@ class SignalErrorGroup:
         "mean norm of the error; of attitudes the geodesic distance", "prediction", "horizon", units="SI"
     )
     rms: Array = dataset("root mean square error by axis", "prediction", "horizon", "axis", units="SI")
+    chance: Array | None = dataset(
+        "half of the 95 % interval of the difference of its mean norm from that of the model, over blocks of windows",
+        "prediction",
+        "horizon",
+        units="SI",
+        least=0.0,
+        default=None,
+    )
 
     @classmethod
-    def of(cls, errors: SignalErrors | None, rows: int | None = None) -> Self | None:
-        """Arrange the errors of the first predictions; None where no flight knows the signal."""
-        return None if errors is None else cls(mae=errors.mae[:rows], rms=errors.rms[:rows])
+    def of(cls, errors: SignalErrors | None, rows: Sequence[int]) -> Self | None:
+        """Arrange the errors of some predictions; None where no flight knows the signal."""
+        if errors is None:
+            return None
+        chance = None if errors.chance is None else errors.chance[rows]
+        return cls(mae=errors.mae[rows], rms=errors.rms[rows], chance=chance)
 
     @property
     def total(self) -> Array:
         """Sum of the mean norms over the horizon, by prediction."""
         return np.asarray(self.mae.sum(axis=1))
 
-    @property
-    def rival(self) -> int:
-        """What a model has to beat: the better over all horizons of the two predictions that know no model."""
-        nothing, stays = 1, 2
-        return stays if less(self.total[stays], self.total[nothing]) else nothing
+    def by_chance(self, row: int) -> Array:
+        """Give how far errors of a prediction are from those of the model by chance; 0 where too few windows tell."""
+        return np.zeros(self.mae.shape[1]) if self.chance is None else self.chance[row]
 
     def summary(self, prediction: int) -> dict[str, Any]:
         """One prediction for machines."""
@@ -92,7 +114,7 @@ class ErrorsByHorizon(Protocol):
 
     @property
     def prediction(self) -> tuple[str, ...]:
-        """What predicts: what is played back, "nothing moves", "rate stays", and what it is compared with, if any."""
+        """What predicts, by the names of `playback.replay`: they say which row of `errors` is whose."""
         ...
 
     @property
@@ -104,6 +126,29 @@ class ErrorsByHorizon(Protocol):
     def errors(self) -> Mapping[str, SignalErrorGroup | None]:
         """Errors by signal."""
         ...
+
+
+def row_of(errors: ErrorsByHorizon, *names: str) -> int:
+    """Find the row of a prediction, the first of these names that is there."""
+    return next(errors.prediction.index(name) for name in names if name in errors.prediction)
+
+
+def played_row(errors: ErrorsByHorizon) -> int:
+    """Find the row of what is judged: a model, or the one with effects."""
+    return row_of(errors, MODEL, AFTER)
+
+
+def rival_rows(errors: ErrorsByHorizon) -> list[int]:
+    """List the rows of what knows no model, which a model has to beat."""
+    return [row_of(errors, name) for name in WITHOUT_MODEL if name in errors.prediction]
+
+
+def rival_row(errors: ErrorsByHorizon, group: SignalErrorGroup) -> int:
+    """Find what is best, over all horizons, of what knows no model; of ties the first."""
+    best, *others = rival_rows(errors)
+    for row in others:
+        best = row if less(group.total[row], group.total[best]) else best
+    return best
 
 
 def _by_signal(found: PlaybackGroup | ReplayRecord) -> dict[str, SignalErrorGroup | None]:
@@ -154,18 +199,18 @@ class PlaybackGroup:
     position: SignalErrorGroup | None = group(default=None)
 
     @classmethod
-    def of(cls, flights: Sequence[Played], replay: Replay, prediction: Sequence[str], **more: Any) -> Self:
-        """Arrange a replay without its windows; predictions beyond those named are left out."""
-        rows = len(prediction)
+    def of(cls, flights: Sequence[Played], replay: Replay, names: Mapping[str, str], **more: Any) -> Self:
+        """Arrange a replay without its windows: what it calls its predictions; others are left out."""
+        rows = [replay.predictions.index(name) for name in names]
         groups = {signal: SignalErrorGroup.of(found, rows) for signal, found in replay.errors.items()}
         assert groups["body_rate"] is not None, "every flight has rates"
         steps = np.arange(1, groups["body_rate"].mae.shape[1] + 1)
         return cls(
             flown=tuple(played.flight.name for played in flights),
             windows=len(replay.windows.start),
-            prediction=tuple(prediction),
+            prediction=tuple(names.values()),
             horizon_s=flights[0].flight.motion.period * steps,
-            diverged=(replay.windows.diverged[:rows] >= 0).sum(axis=1),
+            diverged=(replay.windows.diverged[rows] >= 0).sum(axis=1),
             **groups,  # type: ignore[arg-type]  # only the body rate is always known
             **more,
         )
@@ -209,9 +254,9 @@ class HeldOutGroup(PlaybackGroup):
     @classmethod
     def judged(cls, flights: Sequence[Played], replay: Replay) -> Self:
         """Arrange a replay without its windows, and where the model is better than what knows no model."""
-        better = where_better(flights, replay.windows)
+        better = where_better(flights, replay)
         region = None if better is None else group_of(RegionGroup, better)
-        return cls.of(flights, replay, replay.predictions, better=region)
+        return cls.of(flights, replay, {name: name for name in replay.predictions}, better=region)
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -224,48 +269,74 @@ class HeldOutGroup(PlaybackGroup):
 
 
 def better_to(errors: ErrorsByHorizon, signal: str) -> float:
-    """Find the longest horizon, s, up to which the errors of the model add up to less than those of both its rivals.
+    """Find the longest horizon, s, up to which the errors of the model add up to less than those of all its rivals.
 
-    They are "nothing moves" and "rate stays". Sums are compared, because over the first samples noise of the start
-    decides, and there nothing beats a state that stays. 0 where there is none, NaN for a signal that no flight knows.
+    They are what knows no model. Sums are compared, because over the first samples noise of the start decides, and
+    there nothing beats a state that stays. 0 where there is none, NaN for a signal that no flight knows.
     """
     group = errors.errors[signal]
     if group is None:
         return float("nan")
-    summed = np.cumsum(group.mae[:3], axis=1)
-    better = np.flatnonzero(less(summed[_MODEL], summed[1:].min(axis=0)))
+    summed = np.cumsum(group.mae, axis=1)
+    better = np.flatnonzero(less(summed[played_row(errors)], summed[rival_rows(errors)].min(axis=0)))
     return float(errors.horizon_s[better[-1]]) if len(better) else 0.0
 
 
-def lost_to(errors: ErrorsByHorizon, row: int = _MODEL) -> dict[str, tuple[str, float, float]]:
-    """Find where a prediction of rates or attitude loses to what knows no model at horizons where control lives.
+def lost_to(errors: ErrorsByHorizon) -> dict[str, tuple[str, float, float]]:
+    """Find where a model loses in rates or attitude to what knows no model at horizons where control lives.
+
+    A loss is one beyond chance, as far as chance is known.
 
     Returns
     -------
     dict of str to (str, float, float)
         By signal: the rival that it loses to first, and from which horizon to which, s.
     """
-    horizon, (low, high) = errors.horizon_s, CONTROL_BAND
-    # A rounding error is no horizon apart.
-    inside = ~less(horizon, low) & ~less(high, horizon) if not less(horizon[-1], low) else np.ones(len(horizon), bool)
+    horizon, inside = errors.horizon_s, _inside(errors)
+    row, rows = played_row(errors), rival_rows(errors)
     lost: dict[str, tuple[str, float, float]] = {}
     for signal in ("body_rate", "attitude"):
         group = errors.errors[signal]
         if group is None:
             continue
-        rivals = group.mae[1:3]
-        where = np.flatnonzero(inside & less(rivals.min(axis=0), group.mae[row]))
+        loses = np.array([inside & less(group.mae[each] + group.by_chance(each), group.mae[row]) for each in rows])
+        where = np.flatnonzero(loses.any(axis=0))
         if len(where):
-            rival = errors.prediction[1 + int(rivals[:, where[0]].argmin())]
-            lost[signal] = (rival, float(horizon[where[0]]), float(horizon[where[-1]]))
+            first, last = where[[0, -1]]
+            rival = rows[int(np.where(loses[:, first], group.mae[rows, first], np.inf).argmin())]
+            lost[signal] = (errors.prediction[rival], float(horizon[first]), float(horizon[last]))
     return lost
+
+
+def _inside(errors: ErrorsByHorizon) -> BoolArray:
+    """Flag the horizons where control lives; all of a playback that ends before."""
+    horizon, (low, high) = errors.horizon_s, CONTROL_BAND
+    # A rounding error is no horizon apart.
+    return ~less(horizon, low) & ~less(high, horizon) if not less(horizon[-1], low) else np.ones(len(horizon), bool)
+
+
+def like_fading(errors: ErrorsByHorizon) -> float | None:
+    """Find where a model has to beat "rate fades" in rates, s; None where it does, visibly and by more than chance.
+
+    That is the end of where control lives: what knows nothing of the torque has forgotten most there. None too where
+    it is not known how rates fade.
+    """
+    group = errors.errors["body_rate"]
+    if group is None or RATE_FADES not in errors.prediction:
+        return None
+    last = int(np.flatnonzero(_inside(errors))[-1])
+    fades, model = row_of(errors, RATE_FADES), played_row(errors)
+    most = np.minimum(group.mae[fades] - group.by_chance(fades), _VISIBLY * group.mae[fades])
+    better = less(group.mae[model], most)[last]
+    return None if better else float(errors.horizon_s[last])
 
 
 def behind_both(errors: ErrorsByHorizon) -> tuple[str, ...]:
     """List what of velocity and position a model predicts worse, over all horizons, than each that knows no model."""
     groups = {signal: errors.errors[signal] for signal in ("velocity", "position")}
     totals = {signal: group.total for signal, group in groups.items() if group is not None}
-    return tuple(signal for signal, total in totals.items() if less(total[1:3].max(), total[_MODEL]))
+    model, rivals = played_row(errors), rival_rows(errors)
+    return tuple(signal for signal, total in totals.items() if less(total[rivals].max(), total[model]))
 
 
 def trust_by_playback(held_out: PlaybackGroup | None) -> Trust:
@@ -273,8 +344,8 @@ def trust_by_playback(held_out: PlaybackGroup | None) -> Trust:
 
     Good for simulation where errors of rates, attitude, velocity and position, as far as the flights know them, add
     up to less over the horizon than those of what knows no model; for control where those of the rates do, over
-    0.1 s at least. Nothing is good for either that loses in rates or attitude where control lives, or whose velocity
-    or position is worse than both of what knows no model: mere decay of the rates predicts rates as well.
+    0.1 s at least. Nothing is good for either that loses in rates or attitude where control lives, that predicts rates
+    there no better than mere decay, or whose velocity or position is worse than all of what knows no model.
     """
     if held_out is None:
         return Trust.NOT_JUDGED
@@ -282,7 +353,7 @@ def trust_by_playback(held_out: PlaybackGroup | None) -> Trust:
     reached = {signal: better_to(held_out, signal) for signal, group in known.items() if group is not None}
     if reached["body_rate"] < min(CONTROL_HORIZON, last):
         return Trust.DO_NOT_USE
-    if lost_to(held_out) or behind_both(held_out):
+    if lost_to(held_out) or like_fading(held_out) or behind_both(held_out):
         return Trust.NOT_CONTROL
     simulates = known["velocity"] is not None and all(horizon >= last for horizon in reached.values())
     return Trust.SIMULATION if simulates else Trust.CONTROL
@@ -334,7 +405,7 @@ class WindowGroup:
         for index, time in enumerate(times):
             own = windows.flight == index
             start[own] = time[windows.start[own]]
-        after = windows.diverged[_MODEL]
+        after = windows.diverged[PREDICTIONS.index(MODEL)]
         return cls(
             flight=windows.flight,
             start=start,
@@ -398,13 +469,15 @@ class ReplayRecord(Record):
 
     played: str = dataset("what is played back: a file, or vehicle for that of /config")
     prediction: tuple[str, ...] = dataset(
-        "the model; nothing moves: the whole state stays; rates and velocity stay; the vehicle that the config states",
+        "model; nothing-moves: the whole state stays; rate-stays: rates and velocity; stated: the vehicle of the "
+        "config; rate-fades: rates fade by fading_s, velocity stays",
         "prediction",
     )
     asked_s: float = dataset("longest horizon, as asked for", units="s")
     every: int = dataset("samples from one begin to the next")
     hold: str = dataset("what is between samples, as asked for: linear, previous; usual where nothing was")
     history_s: float | None = dataset("how much of the flight before a start the model uses", units="s", default=None)
+    fading_s: float | None = dataset(FADING, units="s", default=None)
     horizon_s: Array = dataset("horizons", "horizon", units="s")
     diverged: IntArray = dataset("windows in which a prediction ran away and was stopped", "prediction")
     body_rate: SignalErrorGroup = group()
@@ -432,16 +505,18 @@ class ReplayRecord(Record):
     ) -> Self:
         """Arrange a replay."""
         errors, windows, period = replay.errors, replay.windows, played[0].flight.motion.period
-        groups = {signal: SignalErrorGroup.of(found) for signal, found in errors.items()}
+        rows = range(len(replay.predictions))
+        groups = {signal: SignalErrorGroup.of(found, rows) for signal, found in errors.items()}
         assert groups["body_rate"] is not None, "every flight has rates"
         horizon = groups["body_rate"].mae.shape[1]
         return cls(
             played=name,
-            prediction=PREDICTIONS,
+            prediction=replay.predictions,
             asked_s=asked.horizon_s,
             every=asked.every,
             hold=asked.hold or USUAL,
             history_s=asked.history_s or None,
+            fading_s=played[0].fading_s,
             horizon_s=period * np.arange(1, horizon + 1),
             diverged=(windows.diverged >= 0).sum(axis=1),
             flight=PlayedFlightsGroup.of(flights, played, windows),
@@ -474,6 +549,7 @@ class ReplayRecord(Record):
         return {
             "played": self.played,
             "history_s": self.history_s or 0.0,
+            "fading_s": self.fading_s,
             "horizon_s": self.horizon_s.tolist(),
             "windows": self.windows,
             "models": {name: self._prediction(index) for index, name in enumerate(self.prediction)},
@@ -485,7 +561,7 @@ class ReplayRecord(Record):
                 {
                     "flight": self.flight.name[self.window.flight[index]],
                     "start_s": float(self.window.start[index]),
-                    "error_rad_s": float(self.window.error[_MODEL, index]),
+                    "error_rad_s": float(self.window.error[played_row(self), index]),
                 }
                 for index in self.worst.window
             ],

@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.disturbance import DisturbanceGroup
 from cpfls_cli.artifacts.learned import LearnedGroup
 from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
 from cpfls_cli.artifacts.parameters import DRAG, FOUND_AS, GUESSES, INERTIA, is_learned, parameters_of
-from cpfls_cli.artifacts.replay import HeldOutGroup, trust_by_playback
+from cpfls_cli.artifacts.replay import FADING, HeldOutGroup, trust_by_playback
 from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, response_word
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.inertia import EXPLAINED, beyond_any_body, more_than_others
@@ -280,6 +280,7 @@ class VehicleRecord(ModelRecord):
     forecast: VehicleGroup | None = group(default=None, apart=True)
     history: ObserverGroup | None = group(default=None)
     held_out: HeldOutGroup | None = group(default=None)
+    fading_s: float | None = dataset(FADING, units="s", default=None)
     share: SharesGroup = group()
     airspeed: float = dataset("speed in the rotor plane that 95 % of the training samples stay below", units="m/s")
     evaluated: int = dataset("structures that were judged")
@@ -310,6 +311,7 @@ class VehicleRecord(ModelRecord):
         learned: LearnedGroup | None = None,
         responses: Sequence[VehicleResponse] = (),
         *,
+        fading_s: float | None = None,
         commanded: bool,
         shares: bool = False,
     ) -> Self:
@@ -326,6 +328,7 @@ class VehicleRecord(ModelRecord):
             forecast=None if found.forecast is None else VehicleGroup.of(replace(found.forecast, commanded=commanded)),
             history=None if found.history is None else ObserverGroup.of(found.history),
             held_out=held_out,
+            fading_s=fading_s,
             share=SharesGroup(
                 name=tuple(share.name for share in found.shares),
                 torque=np.array([share.wrench[:3] for share in found.shares]),
@@ -469,6 +472,7 @@ class VehicleRecord(ModelRecord):
             "history": None if self.history is None else self.history.summary,
             "structures": rows_of(self.structure),
             "held_out": None if self.held_out is None else self.held_out.summary,
+            "fading_s": self.fading_s,
             "shares": {row.pop("name"): row for row in rows_of(self.share)},
             "evaluated": self.evaluated,
             "complete": self.complete,

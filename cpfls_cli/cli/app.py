@@ -81,19 +81,19 @@ ModelOption = Annotated[
     typer.Option(
         "--model",
         metavar="MODEL",
-        help="Made by `cpfls identify` or `vehicle` (`compare` takes one of `extend` too); without, the vehicle of the "
-        "config.",
+        help="Made by `cpfls identify` or `vehicle` (`compare` takes one of `extend` too); default: the vehicle of "
+        "the config.",
     ),
 ]
 WriteConfigOption = Annotated[
     Path | None,
     typer.Option(
-        "--write-config", metavar="FILE", help="Write the config again with the numbers that a search to its end found."
+        "--write-config", metavar="FILE", help="Write the config again with the numbers of a finished search."
     ),
 ]
 HeldOutOption = Annotated[
     list[Path] | None,
-    typer.Option("--held-out", metavar="FLIGHT", help="Judge on this flight, learn nothing of it; may be repeated."),
+    typer.Option("--held-out", metavar="FLIGHT", help="Judge on this flight, learn nothing from it; may be repeated."),
 ]
 ValidateOption = Annotated[
     list[Path] | None,
@@ -146,12 +146,12 @@ JudgedOption = Annotated[
     typer.Option(
         "--model",
         metavar="MODEL",
-        help="Made by `cpfls identify`, `extend` or `vehicle`; without, the vehicle of the config.",
+        help="Made by `cpfls identify`, `extend` or `vehicle`; default: the vehicle of the config.",
     ),
 ]
 HorizonOption = Annotated[
     float | None,
-    typer.Option("--horizon", metavar="TIME", parser=seconds, help="Longest horizon (1, 1s); without, half a second."),
+    typer.Option("--horizon", metavar="TIME", parser=seconds, help="Longest horizon (1, 1s); default: half a second."),
 ]
 HistoryOption = Annotated[
     float | None,
@@ -177,8 +177,8 @@ HoldOption = Annotated[
     Between | None,
     typer.Option(
         "--hold",
-        help="Between samples a rotor speed is a straight line, or what it was; without, measured ones the first, "
-        "commands the second.",
+        help="Between samples a rotor speed is a straight line, or its last value; default: the first for measured "
+        "speeds, the second for commands.",
     ),
 ]
 
@@ -482,7 +482,7 @@ def report(
     output: OutputOption,
     form: Annotated[
         Form | None,
-        typer.Option("--format", help="Form of the report; without, by the suffix of FILE (.md, .json), else html."),
+        typer.Option("--format", help="Form of the report; default: by the suffix of FILE (.md, .json), else html."),
     ] = None,
     *,
     common: Common,
@@ -549,7 +549,7 @@ def export(
             "--format",
             help="json: every parameter, with names and units; c: C99 source and header, no dependencies; python: a "
             "module that needs NumPy only; sdf (Gazebo), mjcf (MuJoCo), rotorpy, casadi, jax: the vehicle for a "
-            "simulator or a library; without, by the suffix of FILE (.json, .c, .py, .xml, .sdf).",
+            "simulator or a library; default: by the suffix of FILE (.json, .c, .py, .xml, .sdf).",
         ),
     ] = None,
     name: Annotated[
@@ -557,7 +557,7 @@ def export(
         typer.Option(
             "--name",
             metavar="NAME",
-            help="Prefix of the names in C, name in JSON and XML; without, from the name of FILE.",
+            help="Prefix of the names in C, name in JSON and XML; default: from the name of FILE.",
         ),
     ] = None,
     *,

@@ -53,8 +53,8 @@ class Common:
         bool,
         typer.Option(
             "--accept-guesses",
-            help="Take guesses from mass and arms for what the config leaves open; the answer says how far it hangs on "
-            "them.",
+            help="Take guesses from mass and arms for what the config leaves open; the answer says how far it depends "
+            "on them.",
         ),
     ] = False
     numbers: Annotated[

@@ -67,7 +67,7 @@ ExciteOption = Annotated[
     ),
 ]
 SignalOption = Annotated[
-    Signal | None, typer.Option("--signal", help="What excites; without, that of the config, a multisine if none.")
+    Signal | None, typer.Option("--signal", help="What excites; default: that of the config, a multisine if none.")
 ]
 BandOption = Annotated[
     str | None, typer.Option("--band", metavar="LOW,HIGH", help="Band of the test signal, Hz; 0.5,5 if none is set.")

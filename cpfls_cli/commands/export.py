@@ -84,7 +84,7 @@ def _prefix_of(output: Path, form: str, name: str | None) -> str:
     if name is None:
         return identifier(output.stem)
     if ENDINGS[form] == ".py":
-        raise InputError(f"--name {name}: a module of Python is called as its file is; leave --name out, or rename -o")
+        raise InputError(f"--name {name}: a Python module is named after its file; leave --name out, or rename -o")
     return checked_identifier(name)
 
 

@@ -19,7 +19,7 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.models import learned_by, read_base
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
-from cpfls_cli.gap.before_after import errors_by_horizon, left_out, played_pairs
+from cpfls_cli.gap.before_after import errors_by_horizon, left_out, played_pairs, rates_fade
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
 from cpfls_cli.gap.whole_vehicle import beside_rotors, has_effects, on_top_of, require_body, whole_vehicle
@@ -101,7 +101,7 @@ def extended(
     if diagnosis.disturbance is not None and diagnosis.gusts:
         whole = replace(whole, gusts=diagnosis.disturbance.gusts)
     require_body(extension.model, stated)
-    played = played_pairs(held, whole, given)
+    played = played_pairs(held, whole, given, rates_fade(training, study.gap.horizon_s))
     playback = PlaybackChangeGroup.of_pairs(played, errors_by_horizon(played, study.gap.horizon_s))
     missing = left_out(whole, whole.beside_table, held)
     return ExtendedRecord.of(extension, stated, whole, playback, missing)

@@ -80,7 +80,8 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path
     why = "" if job.found is None else why_no_body_found(job, job.found)
     if why:
         raise InputError(
-            f"{job.found}: {why}, so no gap is told from it; --accept-guesses takes guesses from mass and arms, or fly "
+            f"{job.found}: {why}, so no gap can be measured against it; --accept-guesses takes guesses from mass and "
+            f"arms, or fly "
             f"what tells its inertia: {WHAT_TO_FLY}"
         )
     given = _begin(job, flights, held_out, model)

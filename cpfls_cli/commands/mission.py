@@ -41,7 +41,7 @@ def mission_of(study: Study, forms: Sequence[str], home: str | None) -> Mission:
     if settings.path == "next-flight" and set(asked) - {CSV}:
         raise InputError(f"--format {asked[-1]}: a next flight is a curve; only a CSV holds it, and is always written")
     if ARDUPILOT in asked and not settings.excite.axes:
-        raise InputError("--format ardupilot: writes sweeps for its System ID mode; say of what with --excite AXES")
+        raise InputError("--format ardupilot: writes sweeps for its System ID mode; say which axes with --excite AXES")
     if PX4 in asked and home is None:
         raise InputError("--format px4: a mission needs its place on earth; add --home LAT,LON,HEIGHT")
     if home is not None and PX4 not in asked:

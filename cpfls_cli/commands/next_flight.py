@@ -147,8 +147,8 @@ def _named(study: Study, room: Room) -> Case:
 
 
 _NO_NOISE = (
-    "simulation.noise is empty, so the floors are no more than rounding and 0.3 % of torque and weight: how sure the "
-    "flight is of real logs is told with --for DIAGNOSIS, or with the noise of the sensors in simulation.noise"
+    "simulation.noise is empty, so the floors are no more than rounding and 0.3 % of torque and weight: to learn how "
+    "sure the flight is with real logs, give --for DIAGNOSIS, or the noise of the sensors in simulation.noise"
 )
 
 
@@ -168,7 +168,7 @@ def _left_open(study: Study, path: Path) -> Case:
     effects = [each.true.candidate.effect for each in questions]
     logged = logged_signals(flights[0].signals)
     more = needed_signals(effects) - logged
-    notes = (f"log {', '.join(sorted(more))} too: the flights so far lack it, and without it no flight tells",)
+    notes = (f"log {', '.join(sorted(more))} too: the flights so far lack it, and without it no flight can tell",)
     commanded = any("command" in each.needs for each in effects) or flights[0].signals.commanded
     logging = Logging(logged | more, commanded, floor, study.gap, base)
     return Case(questions, flights, logging, notes if more else ())

@@ -54,7 +54,7 @@ def with_numbers_of(job: Job, found: Path) -> Job:
         If it is no vehicle that was found.
     """
     if not (found.is_file() and holds(found, VehicleRecord)):
-        raise InputError(f"--model {found}: is no vehicle that `cpfls vehicle` found")
+        raise InputError(f"--model {found}: is not a vehicle that `cpfls vehicle` found")
     job.cautions.update(dict.fromkeys(cautions_of(read_record(found, VehicleRecord), found.name)))
     unknown = joined(name.replace("_", " ") for name in job.study.vehicle.unknown)
     if unknown:

@@ -92,4 +92,4 @@ class Added:
         given = {"--signal": self.signal, "--band": self.band, "--size": self.size}
         for option, value in given.items():
             if value is not None and not study.trajectory.excite.axes:
-                raise InputError(f"{option} {value}: describes an excitation; say of what with --excite AXES")
+                raise InputError(f"{option} {value}: describes an excitation; say which axes with --excite AXES")

@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.replay import ReplayRecord
 from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
-from cpfls_cli.flights.models import holds_forecast, is_vehicle, learned_by, read_model, read_observer
+from cpfls_cli.flights.models import holds_forecast, is_vehicle, learned_by, read_fading, read_model, read_observer
 from cpfls_cli.flights.playback import flights_to_play, played, repairs_of
 from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.pages.replay import answer
@@ -26,7 +26,7 @@ from cpfls_cli.playback.replay import Played, ReplayOptions, ReplayWindows, repl
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.words import joined
 
-_FORECAST = "{}: its forecast along logged rotor speeds is played, loop and all; its constants are another model"
+_FORECAST = "{}: its forecast along logged rotor speeds is played, loop included; its constants are a different model"
 
 
 def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) -> Outcome:
@@ -38,7 +38,8 @@ def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) 
     to_play = read_model(model, job.study, forecast=True)
     observer = read_observer(model, options.history_s) if options.history_s > 0 else None
     given = flights_to_play(flights, job.study, options.hold)
-    pairs = [played(to_play, flight, job.study.vehicle) for flight in given]
+    fading_s = read_fading(model)
+    pairs = [replace(played(to_play, flight, job.study.vehicle), fading_s=fading_s) for flight in given]
     horizon = _samples(options.horizon_s, given[0], "--horizon")
     if observer is not None:
         _samples(observer.past_s, given[0], "--history")
@@ -69,8 +70,8 @@ def _past_notes(observer: Observer, pairs: Sequence[Played], windows: ReplayWind
         short += int(np.sum(past_of(pair.flight, starts, samples)[1].sum(axis=1) < samples))
     if short:
         yield (
-            f"{short} of {len(windows.start)} windows begin less than {observer.past_s:g} s after the begin of a "
-            "stretch: they use the past that there is"
+            f"{short} of {len(windows.start)} windows begin less than {observer.past_s:g} s after the start of a "
+            f"stretch and use what past there is"
         )
 
 

@@ -64,8 +64,8 @@ def _answered(artifact: Outline, record: Record, path: Path, more: Sequence[tupl
     yield what
     cautions = [row for row in origin.rows if row[0] == _CAUTION]
     yield from [Facts(cautions)] if cautions else []
-    answers = import_module("cpfls_cli.pages.answers")
-    yield from answers.answer_again(_PAGES[artifact.spec.name], record, path)
+    source = import_module("cpfls_cli.pages.source")
+    yield from source.answer_again(_PAGES[artifact.spec.name], record, path)
     yield Folded("where it comes from", [Facts([row for row in origin.rows if row[0] != _CAUTION])])
     yield holds
 

@@ -26,7 +26,7 @@ from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.parameters import MASS, blocks_of
-from cpfls_cli.playback.replay import replay
+from cpfls_cli.playback.replay import fading, replay
 from cpfls_cli.playback.settings import GroupSettings
 from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError
 from cpfls_cli.playback.vehicle import FoundVehicle, find_vehicle
@@ -81,7 +81,8 @@ def run(
         checkpoint.remove()
     with checkpoint.kept():
         vehicle, signal = _found(job, training, checkpoint, kept or {})
-        judged = _judged(vehicle, rest, job) if rest else None
+        fading_s = fading([flight.playback for flight in training], _horizon(job, training[0]))
+        judged = _judged(vehicle, rest, job, fading_s) if rest else None
         warnings = [*twice, *(warning for flight in read for warning in flight.warnings)]
         commanded = any(flight.parts[0].commanded for flight in training)
         samples = [sum(map(len, flight.parts)) for flight in training]
@@ -93,6 +94,7 @@ def run(
             contradictions_of(read),
             parts,
             _responses(vehicle, training),
+            fading_s=fading_s,
             commanded=commanded,
             shares=any(flight.shares for flight in training),
         )
@@ -167,10 +169,10 @@ def _found(
     return vehicle, watch.signal
 
 
-def _judged(vehicle: FoundVehicle, flights: Sequence[LoggedFlight], job: Job) -> HeldOutGroup:
+def _judged(vehicle: FoundVehicle, flights: Sequence[LoggedFlight], job: Job, fading_s: float) -> HeldOutGroup:
     """Play a vehicle back along flights that it was not found in, from every sample."""
     models = {"": vehicle.forecast or vehicle.model, **vehicle.others}
-    pairs = [played(models[flight.group], flight, job.study.vehicle) for flight in flights]
+    pairs = [replace(played(models[flight.group], flight, job.study.vehicle), fading_s=fading_s) for flight in flights]
     if vehicle.history is not None:
         pairs = [replace(pair, with_past=replace(pair.model, observer=vehicle.history)) for pair in pairs]
     errors = replay(
@@ -209,13 +211,13 @@ def _check_groups(groups: Sequence[GroupSettings], training: Sequence[LoggedFlig
         if group.name not in flown:
             names = joined(repr(name) for name in group.flights)
             raise ConfigError(
-                f"playback.groups: no flight that trains is of {group.name}: none is called like {names}; name its "
-                "files there or leave the group out"
+                f"playback.groups: no training flight belongs to {group.name}: no file name matches {names}; name its "
+                f"files there or leave the group out"
             )
     if "" not in flown:
         raise ConfigError(
-            "playback.groups: every flight is of a group; one at least has to be of the section vehicle, whose mass "
-            "gives all numbers their size"
+            "playback.groups: every flight belongs to a group; at least one has to be of the section vehicle, whose "
+            "mass gives all numbers their size"
         )
 
 

@@ -39,7 +39,7 @@ def sheet_of(path: Path, name: str, file: InputFile, *, force: bool) -> Sheet:
             "incomplete"
         )
     if sheet.verdict == "do-not-use" and not force:
-        raise InputError(f"{path}: its verdict is do-not-use; --force exports it all the same, marked so")
+        raise InputError(f"{path}: its verdict is do-not-use; --force exports it anyway, marked as such")
     return replace(sheet, name=name, file=path.name, sha256=file.sha256)
 
 

@@ -81,7 +81,7 @@ def gone_lines(data: dict[str, Any], source: str) -> list[str]:
     """Say of the keys of a file that are gone what to do."""
     sections = {section: values for section, values in data.items() if isinstance(values, dict)}
     held = [f"{section}.{key}" for section, key in sorted(_GONE) if key in sections.get(section, ())]
-    why = "is no key any more: remove it; `make reproduce` writes the page that compares a study with the paper"
+    why = "is no longer a key: remove it; `make reproduce` writes the page that compares a study with the paper"
     return [f"{source}: {key}: {why}" for key in held]
 
 

@@ -47,7 +47,7 @@ def read_config(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError:
         raise ConfigError(f"{path}: not a text file; a config is YAML in UTF-8") from None
     if len(content) > _LARGEST:
-        raise ConfigError(f"{path}: is larger than {_LARGEST / 1e6:g} MB, and no config is")
+        raise ConfigError(f"{path}: is larger than {_LARGEST / 1e6:g} MB, which no config is")
     return parse_config(text, str(path))
 
 

@@ -129,7 +129,8 @@ def require_known(study: Study, command: str, *, whole: bool = True, accept: boo
     if accept:
         off = ", ".join(f"{name.replace('_', ' ')} {_OFF[name]}" for name in unknown)
         return (
-            f"{_GUESSED}; of a guess real vehicles have times: {off}; torques, rates and gains that follow are off by "
+            f"{_GUESSED}; as multiples of these guesses, real vehicles have {off}; torques, rates and gains that "
+            f"follow are off by "
             "as much",
         )
     keys = ", ".join(f"vehicle.{'' if name == 'inertia' else 'rotors.'}{KEYS[name]}" for name in unknown)

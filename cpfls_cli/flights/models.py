@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.learned import LearnedFlight
 from cpfls_cli.artifacts.model import ModelRecord
@@ -57,6 +58,14 @@ def read_observer(path: Path, past_s: float) -> Observer:
             "--history"
         )
     return observer(held, past_s)
+
+
+def read_fading(path: Path) -> float | None:
+    """Read how fast body rates fade in the flights that a model was found in, s; None where its file does not know."""
+    record = None if is_vehicle(path) else read_record(path, ModelRecord)
+    if isinstance(record, ExtendedRecord):
+        return None if record.playback is None else record.playback.fading_s
+    return record.fading_s if isinstance(record, VehicleRecord) else None
 
 
 def holds_forecast(path: Path) -> bool:

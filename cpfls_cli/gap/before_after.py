@@ -20,7 +20,7 @@ from cpfls_cli.gap.whole_vehicle import on_top_of, whole_vehicle
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import Runs, apart, free_runs, made_ready
-from cpfls_cli.playback.replay import MODEL, STATED, Played, Replay, drawn_runs, replay
+from cpfls_cli.playback.replay import MODEL, STATED, Played, Replay, drawn_runs, fading, replay
 from cpfls_cli.rounding import largest
 from cpfls_cli.weak_form.windows import Recording, Windows, common_windows
 
@@ -54,8 +54,21 @@ class PlayedPair(Played):
         return Played(self.logged, self.stated, self.stated)
 
 
-def played_pairs(recordings: Sequence[Recording], model: VehicleModel, given: VehicleModel) -> list[PlayedPair]:
+def rates_fade(training: Sequence[Recording], horizon_s: float) -> float:
+    """Fit the time constant with which body rates of training flights fade, s."""
+    flights = [LoggedFlight.of(recording.name, recording.signals).playback for recording in training]
+    return fading(flights, max(1, round(horizon_s / flights[0].motion.period)))
+
+
+def played_pairs(
+    recordings: Sequence[Recording], model: VehicleModel, given: VehicleModel, fading_s: float | None = None
+) -> list[PlayedPair]:
     """Make flights, a model with effects and the model as given ready for playback.
+
+    Parameters
+    ----------
+    fading_s : float or None, s
+        How fast rates of the flights fade that the effects were found in (`rates_fade`); None where none train.
 
     Raises
     ------
@@ -67,7 +80,7 @@ def played_pairs(recordings: Sequence[Recording], model: VehicleModel, given: Ve
         flight = LoggedFlight.of(recording.name, recording.signals)
         along, player = made_ready(model, flight)
         logged, stated = (along, player) if given is model else made_ready(given, flight)
-        pairs.append(PlayedPair(along, player, stated, logged))
+        pairs.append(PlayedPair(along, player, stated, logged, fading_s=fading_s))
     return pairs
 
 
@@ -257,7 +270,7 @@ def before_after(
     with_effects, given = (whole_vehicle(each, stated) for each in (model, plain(model.base)))
     if base is not None:
         with_effects, given = on_top_of(base, with_effects), on_top_of(base, given)
-    played = played_pairs(held, with_effects, given)
+    played = played_pairs(held, with_effects, given, rates_fade(training, settings.horizon_s))
     in_floors = unseen.before * unseen.known / unseen.floor
     found = stretches(in_floors, np.concatenate(centres), index, level=0.0)
     return BeforeAfter(

@@ -124,7 +124,7 @@ def diagnosis_blocks(diagnosis: Source[DiagnosisRecord], index: int) -> Iterator
 def _sizes(record: DiagnosisRecord, index: int) -> Iterator[Block]:
     caption = (
         "The gap on flights held out from the fit, root mean square. A floor is what noise "
-        f"{'and gusts' if record.gusts else 'alone'} would leave; a gap of up to {CLEAR:g} floors is none."
+        f"{'and gusts' if record.gusts else 'alone'} would leave; a gap of up to {CLEAR:g} floors does not count."
     )
     yield gap_table(f"gap-{index}", record.gap, caption)
     if record.gap.known:
@@ -185,7 +185,7 @@ def free_runs_figure(name: str, run: FreeRunsGroup, after: str, *, repaired: boo
         if leaves_view((about["measured"], about["after"]), about["before"])
     ]
     leaves = f" About {' and '.join(astray)} the model as given leaves the figure." if astray else ""
-    faults = " Measured are the rates without the faults of the sensors; before starts from the log as it is."
+    faults = " Measured: the rates without the faults of the sensors; before: starts from the log as it is."
     caption = (
         f"{run.flight}, where the model as given was farthest off (about {AXES[run.axis]}). At each dotted line the "
         "simulation starts from the measured rates and then runs freely on the rotor speeds of the flight. Before: the "

@@ -18,8 +18,8 @@ def gust_blocks(record: VehicleRecord, index: int) -> Iterator[Block]:
     if record.disturbance is None:
         if record.loop.shown and record.instruments is None:
             yield Text(
-                "Gusts: their sizes are not known. Beside a body that is not known, what torque leaves of the rotation "
-                "says nothing of them."
+                "Gusts: their sizes are not known, because the body is not: what its torque leaves unexplained says "
+                "nothing about them."
             )
         return
     axes = list(record.disturbance.axes(record.vehicle.inertia, record.vehicle.mass))
@@ -66,7 +66,7 @@ def gust_words(axes: list[GustAxis], told_by: str) -> str:
     return " ".join(said)
 
 
-_UNTOLD = ": all that the model leaves, for nothing tells gusts from what it lacks"
+_UNTOLD = ": all that the model leaves, because nothing separates gusts from what it lacks"
 
 
 def beside_gaps(axes: Sequence[GustAxis]) -> str:

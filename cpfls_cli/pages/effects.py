@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,6 +31,10 @@ _NUMBERS = {
 }
 
 
+_ROUNDED = 0.01
+"""What rounding of shares in whole per cent makes of a sum."""
+
+
 def effect_title(name: str) -> str:
     """Say what people call an effect."""
     return CATALOGUE[name].title if name in CATALOGUE else name.replace("_", " ")
@@ -51,9 +55,18 @@ def share_words(share: float) -> str:
     return whole_percent(share).replace("> ", "more than ").replace("< ", "less than ")
 
 
-def effect_sentence(effect: NamedEffect) -> str:
+def named_sentences(effects: Sequence[NamedEffect]) -> list[str]:
+    """Say how large named effects are, and how sure.
+
+    What is lost without each may add up to more than the gap, since others take over less than all of it.
+    """
+    overlap = sum(effect.share for effect in effects) > 1.0 + _ROUNDED
+    return [effect_sentence(effect, "the gap returns without it" if overlap else "the gap") for effect in effects]
+
+
+def effect_sentence(effect: NamedEffect, whole: str = "the gap") -> str:
     """Say how large a named effect is, and how sure."""
-    return f"{capitalised(effect_title(effect.name))} ({effect.name}): {_size(effect, 'the gap')}."
+    return f"{capitalised(effect_title(effect.name))} ({effect.name}): {_size(effect, whole)}."
 
 
 def capitalised(words: str) -> str:

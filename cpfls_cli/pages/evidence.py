@@ -122,7 +122,7 @@ def ridge_sentence(ridge: RidgeGroup) -> str:
     if np.isinf(ridge.weight[best]) or gain <= 0:
         return (
             "On blocks that were left out no fuzzy part does better than the rigid body alone: this flight holds no "
-            "evidence for an inertia that depends on attitude in another way than a rigid body's does."
+            "evidence for an inertia that depends on attitude in any other way than a rigid body's does."
         )
     reduction = (
         f"On blocks that were left out, the best fuzzy part reduces the error of the rigid body by {percent(gain)}"

@@ -72,7 +72,10 @@ def identified_warnings(model: IdentifiedRecord, path: object) -> Iterator[str]:
     if model.verdict is None or model.verdict.label is None:
         off = not stored_study(model.origin.config, path).identification.validation.enabled
         why = "identification.validation.enabled was off when it was identified" if off else "it was not validated"
-        yield f"{path}: holds no verdict: {why}; nothing says how far to trust it; `cpfls identify` it with it on"
+        yield (
+            f"{path}: holds no verdict ({why}), so nothing says how far to trust it; run `cpfls identify` with "
+            "identification.validation.enabled: true"
+        )
     elif model.verdict.label == "do-not-use":
         against = [reason for reason, speaks in model.verdict.reasons if speaks < 0]
         yield ": ".join([f"{path}: its verdict is do-not-use, exported all the same", *against[:1]])
@@ -108,7 +111,7 @@ def verification_answer(form: str, told: Sequence[str], flight: LoggedFlight, fo
         ("playback of the model", found.errors[0]),
         ("nothing moves", found.still),
     )
-    yield table("verification", "Off what was measured at the end of a run, mean.", measured)
+    yield table("verification", "Mean error at the end of a run.", measured)
     apart = (
         ("in all, mean", found.errors[2]),
         ("not held by the target, largest", found.missing),
@@ -116,7 +119,7 @@ def verification_answer(form: str, told: Sequence[str], flight: LoggedFlight, fo
         ("equations, largest", found.equations),
     )
     between = table("verification-apart", f"Between {title} and playback at the end of a run.", apart)
-    yield Folded(f"What {title} does not hold, and how far that is", [between, *map(Text, told)])
+    yield Folded(f"What {title} does not hold, and how large that is", [between, *map(Text, told)])
     yield from (Text(warning, "warning") for warning in flight.warnings)
 
 

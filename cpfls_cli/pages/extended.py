@@ -8,7 +8,7 @@ import numpy as np
 
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.pages.effects import coefficients_table, effect_sentence, intervals_figure, parameters_table, titles
+from cpfls_cli.pages.effects import coefficients_table, intervals_figure, named_sentences, parameters_table, titles
 from cpfls_cli.pages.gap import gap_sizes_figure, gap_table
 from cpfls_cli.pages.replay import playback_figure, playback_text, playback_words
 from cpfls_cli.pages.source import Source, Sources, section_of_each
@@ -33,7 +33,7 @@ def title(record: ExtendedRecord) -> str:
 def grounds(record: ExtendedRecord) -> Iterator[str]:
     """Say how far to trust an extended model, what it was extended by, and how its largest gap changes."""
     yield from playback_words(record.trust, record.playback, record.audit.contradiction)
-    yield from (effect_sentence(effect) for effect in record.effects.named)
+    yield from named_sentences(record.effects.named)
     yield _shrunk(record)
 
 

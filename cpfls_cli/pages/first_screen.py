@@ -19,8 +19,8 @@ from cpfls_cli.pages.disturbance import beside_gaps, left_to_gusts
 from cpfls_cli.pages.effects import (
     capitalised,
     closest_sentence,
-    effect_sentence,
     effect_title,
+    named_sentences,
     share_words,
     titles,
     wrong_numbers,
@@ -54,7 +54,9 @@ _VISIBLE = 0.05
 """Share of the error without a model by which a playback has to grow to be called worse."""
 _ENERGY = {"feeds": ", feeds energy into the motion", "drains": ", drains energy from the motion"}
 _USE = "take the model with it, extended.h5"
-_GUSTS = "nothing on the model: what is left are gusts or noise; fly in still air, or more runs, to see what is smaller"
+_GUSTS = (
+    "nothing on the model: what is left is gusts or noise; to see smaller effects, fly in still air or fly more runs"
+)
 _PLAN = "`cpfls trajectory CONFIG --for diagnosis.h5 -o path.h5` plans such a flight"
 _NEXT: dict[str, str] = {
     GapVerdict.NAMED: _USE,
@@ -111,7 +113,7 @@ def _floors(record: DiagnosisRecord, channel: int) -> str:
 
 def verdict_box(record: DiagnosisRecord) -> Box:
     """Say what a diagnosis found, and how much of it."""
-    named = [effect_sentence(effect) for effect in record.effects.named]
+    named = named_sentences(record.effects.named)
     named += [closest_sentence(effect) for effect in record.effects.closest]
     named += [NO_EFFECT] if record.only_gusts else []
     named += [left_to_gusts(record.gusts)] if record.gusts else []

@@ -128,7 +128,7 @@ def gap_sizes_figure(name: str, gap: GapChangeGroup) -> Plot:
     note = f" Marks at {plain(_LEAST)} stand for {plain(_LEAST)} or less." if hidden else ""
     caption = (
         f"Gap on held-out flights, in noise floors (logarithmic). A gap at the dashed line is as large as what noise "
-        f"alone leaves; within the grey band, up to {CLEAR:g} floors, it is none.{note}"
+        f"alone leaves; within the grey band, up to {CLEAR:g} floors, it does not count.{note}"
     )
     description = "Gap of each channel before and after, in noise floors"
     return plot(name, caption, description, 1.0 + 0.34 * len(channels), draw)

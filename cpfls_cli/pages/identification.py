@@ -72,7 +72,7 @@ def grounds(record: IdentifiedRecord) -> Iterator[str]:
     """Say how far to trust an identified model, where, and why; or how to find out."""
     if not record.validated:
         yield (
-            "It holds its scores only: no bands, no residuals, no verdict. To add them, identify it again with "
+            "It holds only its scores: no bands, no residuals, no verdict. To add them, identify it again with "
             "identification.validation.enabled: true: cpfls identify CONFIG FLIGHT... -o MODEL --set "
             "identification.validation.enabled=true."
         )

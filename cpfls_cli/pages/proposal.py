@@ -232,14 +232,14 @@ def config_text(proposal: Proposal, stated: Stated) -> str:
 
 def _vehicle(proposal: Proposal, stated: Stated) -> Iterator[str]:
     if stated.mass_kg is None:
-        yield from _comment("In kg, as it flew, with battery: no log says it.", 2)
+        yield from _comment("In kg, as it flew, with battery: no log states it.", 2)
     yield f"  mass_kg: {ASK if stated.mass_kg is None else _flow(stated.mass_kg)}"
     yield from _comment("null: not known; `cpfls vehicle` finds what the flights determine.", 2)
     yield f"  inertia_kg_m2: {NOT_KNOWN['inertia']}"
     if proposal.share_of_speed:
         yield from _comment(
-            "The commands are shares of the largest speed, which the log does not state: with another number here the"
-            " thrust factor comes out as another one, and the thrust as the same.",
+            "The commands are shares of the largest speed, which the log does not state: with a different number here "
+            "the thrust factor comes out different, but the thrust the same.",
             2,
         )
     yield f"  rotor_speed_max_rad_s: {_flow(proposal.speed_max)}"

@@ -31,6 +31,8 @@ NO_EFFECT = "What is left does not come again: no effect of the vehicle explains
 _TITLE = "What comes again"
 _TELLS = 0.05
 """Share of a motion that a model has to explain for that to be told."""
+_VISIBLE = 0.1
+"""Share of what comes again that is visible where it is left: effects that explain nine tenths of a gap are named."""
 _COLUMNS = 3
 _PARTS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("again, explained", {"facecolor": "white"}),
@@ -54,13 +56,13 @@ def again_box(before: ComesAgainGroup, after: ComesAgainGroup | None = None, eff
         (before.share_in(channel, part), channel, part) for channel in before.channels for part in before.parts(channel)
     ]
     lines = [_channel_sentence(before, channel, after) for channel in before.known]
-    left = [] if after is None or not found else list(_left(after, effects))
+    left = [] if after is None or not found else list(_left(before, after, effects))
     if not found:
         return Box("REPEATS", sentence(_nothing(before, "the gap")), [*lines, *left], "note")
     share, channel, part = max(found, key=lambda each: each[0])
     title = (
         f"Of the gap in the {channel_words(CHANNELS[channel])} {_where(part)} {whole_percent(share)} comes again: the "
-        "model lacks an effect there."
+        f"model{'' if after is None else ' as given'} lacks an effect there."
     )
     return Box("REPEATS", title, [*lines, *left], "note")
 
@@ -69,19 +71,30 @@ def _nothing(again: ComesAgainGroup, what: str) -> str:
     """Say that nothing comes again, if that is known."""
     most = whole_percent(again.most)
     if not again.nothing:
-        return f"whether {what} comes again these runs do not tell: up to {most} of it may"
+        return f"these runs do not tell whether {what} comes again: up to {most} of it may"
     return (
         f"{what} does not come again (at most {most} of it): gusts or noise, and no effect of the vehicle explains it"
     )
 
 
-def _left(after: ComesAgainGroup, effects: str) -> Iterator[str]:
-    """Say what effects leave of what comes again."""
-    if not after.channels:
-        yield sentence(f"{effects}, {_nothing(after, 'what is left')}")
-    else:
-        names = [channel_words(CHANNELS[channel]) for channel in after.channels]
+def _left(before: ComesAgainGroup, after: ComesAgainGroup, effects: str) -> Iterator[str]:
+    """Say what effects leave of what comes again; that more is missing only where a visible part is left."""
+    left = {channel: _left_in(before, after, channel) for channel in after.channels}
+    names = [channel_words(CHANNELS[channel]) for channel, share in left.items() if share > _VISIBLE]
+    if names:
         yield sentence(f"{effects}, part of what is left comes again, in the {joined(names)}: more is missing")
+    elif left:
+        most = whole_percent(max(left.values()))
+        yield sentence(f"{effects}, {most} at most of what comes again is left: no further effect shows")
+    else:
+        yield sentence(f"{effects}, {_nothing(after, 'what is left')}")
+
+
+def _left_in(before: ComesAgainGroup, after: ComesAgainGroup, channel: int) -> float:
+    """Compute the largest share that is left of what comes again in parts of a channel; infinite where none came."""
+    bands = [part.bands for part in after.parts(channel)]
+    came, left = ([float(np.nansum(each.again[channel, own])) for own in bands] for each in (before, after))
+    return max(now / then if then > 0 else np.inf for then, now in zip(came, left, strict=True))
 
 
 def _channel_sentence(before: ComesAgainGroup, channel: int, after: ComesAgainGroup | None) -> str:
@@ -112,7 +125,7 @@ def _part_words(again: ComesAgainGroup, channel: int, part: Part, after: ComesAg
     explained = again.explained[channel, part.bands]
     if (explained > _TELLS).all():
         low, high = (whole_percent(float(each)) for each in (explained.min(), explained.max()))
-        words += f" (of the motion that does the model explains {low if low == high else f'{low} to {high}'})"
+        words += f" (of the motion that comes again the model explains {low if low == high else f'{low} to {high}'})"
     return words
 
 
@@ -146,9 +159,10 @@ def again_blocks(
 def _explanation(again: ComesAgainGroup) -> str:
     runs = f"{again.runs} runs of {'one path' if again.paths == 1 else f'{again.paths} paths'}"
     return (
-        f"{runs} ({joined(again.flights)}) are held against each other. What of the gap goes with that of another run "
-        "at the same place of the path was asked for in both: the model lacks something there, or a sensor has a fault "
-        "that comes again with the path. What does not is that run's own: gusts and noise, the floor that no model of "
+        f"{runs} ({joined(again.flights)}) are held against each other. The part of the gap that agrees with another "
+        f"run at the same place of the path was asked for in both: the model lacks something there, or a sensor has a "
+        f"fault "
+        "that comes again with the path. The rest is the run's own: gusts and noise, the floor that no model of "
         "the vehicle goes below."
     )
 

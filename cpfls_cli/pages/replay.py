@@ -18,12 +18,26 @@ from cpfls_cli.artifacts.replay import (
     SignalErrorGroup,
     behind_both,
     better_to,
+    like_fading,
     lost_to,
+    played_row,
+    rival_row,
+    rival_rows,
+    row_of,
 )
 from cpfls_cli.pages.gap import AXES, MEASURED, keep_in_view
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.playback.replay import WITH_PAST
+from cpfls_cli.playback.replay import (
+    AFTER,
+    BEFORE,
+    MODEL,
+    NOTHING_MOVES,
+    RATE_FADES,
+    RATE_STAYS,
+    STATED,
+    WITH_PAST,
+)
 from cpfls_cli.report.canvas import (
     BASELINE,
     GREY,
@@ -45,29 +59,36 @@ from cpfls_cli.words import joined
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_MODEL, _NOTHING, _RATE, _STATED, _PAST = range(5)
 _WORDS = {
-    "model": "the model",
-    "after": "with the effects",
-    "nothing-moves": "nothing moves",
-    "rate-stays": "rate stays",
-    "stated": "stated vehicle",
-    "before": "as given",
-    "with-past": "with the past",
+    MODEL: "the model",
+    AFTER: "with the effects",
+    NOTHING_MOVES: "nothing moves",
+    RATE_STAYS: "rate stays",
+    RATE_FADES: "rate fades",
+    STATED: "stated vehicle",
+    BEFORE: "as given",
+    WITH_PAST: "with the past",
 }
+"""What is said of predictions, in the order in which they are shown."""
+
 _SIGNALS = {
     "body_rate": ("body rate", "rad/s", 1.0),
     "attitude": ("attitude", "°", 180.0 / np.pi),
     "velocity": ("velocity", "m/s", 1.0),
     "position": ("position", "m", 1.0),
 }
-_STYLES: tuple[dict[str, Any], ...] = (
-    {**style_of(0), "linewidth": 2.0, "zorder": 3},
-    HELD,
-    BASELINE,
-    {"color": GREY, "linestyle": "-", "linewidth": 0.9},
-    {**style_of(2), "linewidth": 2.0, "zorder": 4},
-)
+_JUDGED: dict[str, Any] = {**style_of(0), "linewidth": 2.0, "zorder": 3}
+_AS_STATED: dict[str, Any] = {"color": GREY, "linestyle": "-", "linewidth": 0.9}
+_STYLES = {
+    MODEL: _JUDGED,
+    AFTER: _JUDGED,
+    NOTHING_MOVES: HELD,
+    RATE_STAYS: BASELINE,
+    RATE_FADES: {"color": GREY, "linestyle": (0, (5, 1.5, 1, 1.5)), "linewidth": 1.2},
+    STATED: _AS_STATED,
+    BEFORE: _AS_STATED,
+    WITH_PAST: {**style_of(2), "linewidth": 2.0, "zorder": 4},
+}
 _PLAYED: dict[str, Any] = {**style_of(1), "linestyle": "-", "zorder": 3}
 _SHOWN_WORST = 3
 _SAID = 2
@@ -81,7 +102,7 @@ def answer(replay: Source[ReplayRecord], index: int = 1) -> Iterator[Block]:
 
 
 def _grounds(record: ReplayRecord, index: int) -> Iterator[Block]:
-    yield errors_table(record, index)
+    yield Folded("Errors by horizon", [errors_table(record, index)], shown=True)
     yield from _worst(record, index)
 
 
@@ -96,7 +117,8 @@ def verdict_box(replay: Source[ReplayRecord]) -> Box:
     rivals = _rivals(record)
     wrong = record.contradiction or ()
     sentences = [*beside_rivals(record), *_beside_stated(record)]
-    better = {name: bool(less(*group.total[[_MODEL, rival]])) for name, (group, rival) in rivals.items()}
+    model = played_row(record)
+    better = {name: bool(less(*group.total[[model, rival]])) for name, (group, rival) in rivals.items()}
     moving = [name for name, (group, rival) in rivals.items() if group.total[rival] > 0]
     if not moving:
         return Box("REPLAY", sentence(f"{_name(record)} cannot be judged: the flight shows no motion"), sentences)
@@ -124,7 +146,8 @@ def beside_past(errors: ErrorsByHorizon, past_s: float) -> Iterator[str]:
     """Say how much smaller errors are where the flight before each start is known as well, in one sentence, if any."""
     if WITH_PAST not in errors.prediction:
         return
-    totals = [(_SIGNALS[name][0], group.total[[_MODEL, _PAST]]) for name, group in errors.errors.items() if group]
+    rows = [played_row(errors), row_of(errors, WITH_PAST)]
+    totals = [(_SIGNALS[name][0], group.total[rows]) for name, group in errors.errors.items() if group]
     changes = joined(
         f"{words} {whole_percent(abs(float(1 - with_past / model)))} {'smaller' if with_past < model else 'larger'}"
         for words, (model, with_past) in totals
@@ -148,7 +171,7 @@ def playback_words(trust: str, held: PlaybackGroup | None, contradictions: Seque
         yield f"Do not use it. {contradicted(first)}"
         yield from map(sentence, others)
     elif held is None:
-        yield "No flight was held out, so what it is good for is open; --held-out FLIGHT says it."
+        yield "No flight was held out, so it is open what the model is good for; --held-out FLIGHT tells."
     elif trust == Trust.SIMULATION:
         reached = min(better_to(held, "body_rate"), better_to(held, "velocity"))
         yield f"Good for simulation and for control to {number(reached, 2)} s{_region(held)}."
@@ -158,20 +181,32 @@ def playback_words(trust: str, held: PlaybackGroup | None, contradictions: Seque
     elif trust == Trust.NOT_CONTROL:
         yield f"Not for control: it {joined(lost_words(held))}."
     else:
-        yield "Do not use it: held out, its errors of the body rate add up to more than those of what knows no model."
+        yield (
+            "Do not use it: on held-out flights its body-rate errors add up to more than those of a baseline without a "
+            "model."
+        )
 
 
 def lost_words(held: ErrorsByHorizon) -> list[str]:
     """Say where a model loses to what knows no model: where control lives, or in motion over all horizons."""
+    lost, faded = lost_to(held), like_fading(held)
     said = [
-        f"loses in {_SIGNALS[signal][0]} to “{_WORDS[rival]}” {_between(low, high)}"
-        for signal, (rival, low, high) in lost_to(held).items()
+        f"loses in {_SIGNALS[signal][0]} to “{_WORDS[rival]}” {_between(low, high)}{_by_chance(held, signal)}"
+        for signal, (rival, low, high) in lost.items()
     ]
+    if faded is not None and "body_rate" not in lost:
+        beyond = _by_chance(held, "body_rate")
+        said.append(f"does not beat “{_WORDS[RATE_FADES]}” in body rate at {_seconds(faded)}{beyond}")
     behind = behind_both(held)
     if behind:
         motion = joined(_SIGNALS[signal][0] for signal in behind)
         said.append(f"is worse in {motion} than “nothing moves” and “rate stays” both")
     return said
+
+
+def _by_chance(held: ErrorsByHorizon, signal: str) -> str:
+    group = held.errors[signal]
+    return "" if group is None or group.chance is None else " by more than chance"
 
 
 def _between(low: float, high: float) -> str:
@@ -198,15 +233,15 @@ def _name(record: ErrorsByHorizon) -> str:
 
 
 def _rivals(record: ErrorsByHorizon) -> dict[str, tuple[SignalErrorGroup, int]]:
-    """Pair each signal with what a model has to beat in it: the better of the two that know no model."""
+    """Pair each signal with what a model has to beat in it: the best of those that know no model."""
     known = {name: group for name, group in record.errors.items() if group is not None}
-    return {name: (group, group.rival) for name, group in known.items()}
+    return {name: (group, rival_row(record, group)) for name, group in known.items()}
 
 
 def _sentence(record: ErrorsByHorizon, name: str, group: SignalErrorGroup, rival: int) -> str:
-    words, (model, other) = _SIGNALS[name][0].capitalize(), group.total[[_MODEL, rival]]
+    words, (model, other) = _SIGNALS[name][0].capitalize(), group.total[[played_row(record), rival]]
     if other == 0:
-        return f"{words}: “{_WORDS[record.prediction[rival]]}” has no error, for the flight shows no motion."
+        return f"{words}: “{_WORDS[record.prediction[rival]]}” has no error, because the flight shows no motion."
     if less(model, other):
         much = f"over all horizons its errors are {whole_percent(float(1 - model / other))} smaller"
     else:
@@ -216,7 +251,7 @@ def _sentence(record: ErrorsByHorizon, name: str, group: SignalErrorGroup, rival
 
 def _where(record: ErrorsByHorizon, group: SignalErrorGroup, rival: int) -> str:
     """Say at which horizons the model is better: at the longest stretches of them, where they are many."""
-    better = less(group.mae[_MODEL], group.mae[rival])
+    better = less(group.mae[played_row(record)], group.mae[rival])
     longest = sorted(sorted(runs(better), key=lambda run: run[0] - run[1])[:_SAID])
     horizon = [_seconds(value) for value in record.horizon_s]
     stretches = [f"{horizon[a]} to {horizon[b]}" if a < b else horizon[a] for a, b in longest]
@@ -232,16 +267,17 @@ def _seconds(value: float) -> str:
 
 def _beside_stated(record: ReplayRecord) -> Iterator[str]:
     if record.played != VEHICLE:
-        total = record.body_rate.total
-        share = whole_percent(float(total[_MODEL] / total[_STATED])) if total[_STATED] > 0 else "—"
+        model, stated = record.body_rate.total[[played_row(record), row_of(record, STATED)]]
+        share = whole_percent(float(model / stated)) if stated > 0 else "—"
         yield f"The errors of its body rates are {share} of those of the vehicle that the config states."
 
 
 def _diverged(record: ReplayRecord) -> Iterator[str]:
-    for index, count in enumerate(record.diverged.tolist()):
-        if count and not (index == _STATED and record.played == VEHICLE):
-            others = (_WORDS[record.prediction[index]], "")
-            who, where = (_name(record), f", first {_first_lost(record)}") if index == _MODEL else others
+    for row in _shown(record):
+        count, prediction = int(record.diverged[row]), record.prediction[row]
+        if count:
+            others = (_WORDS[prediction], "")
+            who, where = (_name(record), f", first {_first_lost(record)}") if prediction == MODEL else others
             yield (
                 f"{who}: runs away in {count} of {record.windows} windows{where}; a run is stopped there and counts as "
                 "it stood"
@@ -256,8 +292,9 @@ def _first_lost(record: ReplayRecord) -> str:
 
 
 def _shown(record: ErrorsByHorizon) -> list[int]:
-    """List the predictions that are shown: the stated vehicle once."""
-    return [row for row in range(len(record.prediction)) if row != _STATED or record.played != VEHICLE]
+    """List the rows of the predictions that are shown, as they are: the stated vehicle once."""
+    twice = [STATED] if record.played == VEHICLE else []
+    return [record.prediction.index(name) for name in _WORDS if name in record.prediction and name not in twice]
 
 
 def errors_table(record: ErrorsByHorizon, index: int) -> Table:
@@ -265,15 +302,16 @@ def errors_table(record: ErrorsByHorizon, index: int) -> Table:
     last = len(record.horizon_s) - 1
     chosen = sorted({0, max((last + 1) // 5 - 1, 0), last})
     rows: list[list[str | Cell]] = []
+    model = played_row(record)
     for name, (group, rival) in _rivals(record).items():
         words, unit, scale = _SIGNALS[name]
         for row in _shown(record):
             values = [*(scale * group.mae[row, chosen]), scale * group.total[row]]
-            worse = row == _MODEL and not less(*group.total[[_MODEL, rival]])
+            worse = row == model and not less(*group.total[[model, rival]])
             cells = [number(float(value), 3) for value in values]
             rows.append(
                 [
-                    f"{words}, {unit}" if row == 0 else "",
+                    f"{words}, {unit}" if row == model else "",
                     _WORDS[record.prediction[row]],
                     *cells[:-1],
                     Cell(cells[-1], "warning" if worse else "plain"),
@@ -288,13 +326,13 @@ def errors_table(record: ErrorsByHorizon, index: int) -> Table:
 
 
 def _worst_table(record: ReplayRecord, index: int) -> Table:
-    window = record.window
+    window, compared = record.window, (played_row(record), row_of(record, NOTHING_MOVES))
     rows = [
         [
             str(rank),
             record.flight.name[window.flight[at]],
             f"{window.start[at]:.2f}",
-            *(number(float(window.error[row, at]), 3) for row in (_MODEL, _NOTHING)),
+            *(number(float(window.error[row, at]), 3) for row in compared),
         ]
         for rank, at in enumerate(record.worst.window, start=1)
     ]
@@ -321,11 +359,13 @@ def told_at(replay: ReplayRecord, sources: Sources) -> str | None:
 
 def _same_errors(first: ErrorsByHorizon, second: ErrorsByHorizon) -> bool:
     groups = zip(first.errors.values(), second.errors.values(), strict=True)
-    # A vehicle may be judged with the past as well, behind what a replay holds.
+    # A vehicle may be judged with the past as well.
+    both = [name for name in first.prediction if name in second.prediction]
+    own, others = ([errors.prediction.index(name) for name in both] for errors in (first, second))
     return all(
         a is b
         if a is None or b is None
-        else a.mae.shape[1] == b.mae.shape[1] and bool(tied(a.mae[:_PAST], b.mae[:_PAST]).all())
+        else a.mae.shape[1] == b.mae.shape[1] and bool(tied(a.mae[own], b.mae[others]).all())
         for a, b in groups
     )
 
@@ -387,8 +427,9 @@ def horizon_figure(name: str, record: ErrorsByHorizon) -> Plot:
             words, unit, scale = _SIGNALS[signal]
             values = scale * group.mae
             for row in reversed(_shown(record)):
-                line(axes, record.horizon_s, values[row], label=_WORDS[record.prediction[row]], **_STYLES[row])
-            top = 1.6 * float(values[[_MODEL, _NOTHING, _RATE]].max())
+                prediction = record.prediction[row]
+                line(axes, record.horizon_s, values[row], label=_WORDS[prediction], **_STYLES[prediction])
+            top = 1.6 * float(values[[played_row(record), *rival_rows(record)]].max())
             axes.set_ylim(0.0, min(top, 1.06 * float(values.max())) or 1.0)
             axes.set_title(f"{words}, {unit}")
         panels[-1].set_xlabel("horizon, s")
@@ -421,7 +462,7 @@ def worst_figure(name: str, record: ReplayRecord) -> Plot:
                 line(axes, time, model, label="playback", **_PLAYED)
                 keep_in_view(axes, [measured], model)
                 axes.set_ylabel(AXES[row] if column == 0 else "")
-        figure.supxlabel("time from the begin, s", fontsize=9.5)
+        figure.supxlabel("time from the start, s", fontsize=9.5)
         figure.supylabel("body rate, rad/s", fontsize=9.5)
         legend_over(figure, grid[0][0])
 
@@ -458,7 +499,7 @@ def drawn_figure(name: str, record: ReplayRecord) -> Plot:
         legend_over(figure, panels[0])
 
     caption = (
-        f"A stretch of {flight} beside its playback, which begins anew from the flight after each horizon. Of all such "
+        f"A stretch of {flight} beside its playback, which restarts from the flight after each horizon. Of all such "
         "stretches half are better and half are worse."
     )
     return plot(name, caption, "A flight beside its playback over time", 0.8 + 1.25 * len(panels_of), draw)
@@ -466,24 +507,24 @@ def drawn_figure(name: str, record: ReplayRecord) -> Plot:
 
 def where_figure(name: str, record: ReplayRecord) -> Plot:
     """Draw how far off the model is over the time of each flight."""
-    window = record.window
+    window, rows = record.window, [row_of(record, NOTHING_MOVES), played_row(record)]
 
     def draw(figure: Figure) -> None:
         panels = list(figure.subplots(len(record.flight.name), 1, squeeze=False)[:, 0])
         for index, (axes, flight) in enumerate(zip(panels, record.flight.name, strict=True)):
             own = window.flight == index
-            nothing, model = window.error[_NOTHING, own], window.error[_MODEL, own]
-            line(axes, window.start[own], nothing, label=_WORDS[record.prediction[_NOTHING]], **HELD)
-            line(axes, window.start[own], model, label=_WORDS[record.prediction[_MODEL]], **style_of(0))
+            nothing, model = (window.error[row, own] for row in rows)
+            line(axes, window.start[own], nothing, label=_WORDS[NOTHING_MOVES], **HELD)
+            line(axes, window.start[own], model, label=_WORDS[MODEL], **style_of(0))
             keep_in_view(axes, [nothing], model)
             axes.set_ylim(bottom=0.0)
             plain_ticks(axes.yaxis)
             axes.set_title(flight)
             axes.set_ylabel("error, rad/s")
-        panels[-1].set_xlabel("begin of the window, s")
+        panels[-1].set_xlabel("start of the window, s")
         legend_over(figure, panels[0])
 
-    caption = "Where the model is good: mean error of the body rate over the horizon, by the begin of the window."
+    caption = "Where the model is good: mean error of the body rate over the horizon, by the start of the window."
     return plot(
         name, caption, "Error of the body rate over the time of each flight", 0.9 + 1.3 * len(record.flight.name), draw
     )

@@ -38,7 +38,7 @@ _INSTRUMENTS = {
 }
 _LOOP = "not judged: these flights show the loop, not the vehicle"
 _REMEDY = (
-    "Nothing in these flights moves the vehicle and knows nothing of the gusts. The curves are those of vehicle and "
+    "Nothing in these flights moves the vehicle independently of the gusts. The curves are those of vehicle and "
     "autopilot together, and so is J; fly the same path several times, or log the setpoints of pilot or mission."
 )
 _AUDIBLE_DB, _AUDIBLE_DEG = 1.0, 7.6
@@ -79,7 +79,7 @@ def response_box(record: ResponseRecord) -> Box:
         return Box("RESPONSE", sentence(f"{name}: {_LOOP}"), [_REMEDY, *told], "warning")
     if not judged:
         return Box(
-            "RESPONSE", sentence(f"{name} cannot be judged: these flights excite nothing enough"), told, "warning"
+            "RESPONSE", sentence(f"{name} cannot be judged: these flights excite no response enough"), told, "warning"
         )
     if off:
         return Box(

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic
@@ -13,8 +14,11 @@ from typing_extensions import TypeVar
 
 from cpfls_cli.artifacts.job import Job
 from cpfls_cli.artifacts.spec import Record
+from cpfls_cli.config.load import validate
 from cpfls_cli.config.study import ReportSettings, resolved
-from cpfls_cli.report.content import Block, Origin, Section
+from cpfls_cli.config.yaml_text import parse_yaml
+from cpfls_cli.errors import ConfigError
+from cpfls_cli.report.content import Block, Origin, Section, Text
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
@@ -148,3 +152,21 @@ def section_of_each(
         return None
     shown = [block for number, source in enumerate(sources, start=1) for block in blocks(source, number)]
     return Section(name, title, shown)
+
+
+def answer_again(page: str, record: Record, path: Path) -> Iterator[Block]:
+    """Give the answer of the command that made an artifact, or say why it cannot be worded.
+
+    Parameters
+    ----------
+    page : str
+        Module of `pages` that words it.
+    """
+    try:
+        study = validate(parse_yaml(record.origin.config, f"{path}: /config"), f"{path}: /config")
+    except ConfigError as error:
+        yield Text(f"what its command answered cannot be shown: {error}", "warning")
+        return
+    source: Source[Any] = Source(path.name, "", record, resolved(study), study.vehicle, 0)
+    answer = import_module(f"cpfls_cli.pages.{page}").answer
+    yield from answer(source.record.findings if record.FORMAT.name == "cpfls/prediction" else source)

@@ -59,7 +59,7 @@ def _runs_blocks(runs: RunsGroup) -> Iterator[Block]:
     between = runs.begin[1] - runs.end[0]
     yield Text(
         f"The path is flown {len(runs.begin)} times, each run the same from rest to rest: {plain(runs.end[0])} s each, "
-        f"{plain(between)} s between two to come back to the start and settle, {plain(runs.end[-1])} s "
+        f"{plain(between)} s between two runs to come back to the start and settle, {plain(runs.end[-1])} s "
         f"({runs.end[-1] / _MINUTE:.1f} min) in all. Runs begin at {_times(runs.begin)} s."
     )
     why = Text(

@@ -112,7 +112,7 @@ def seen_warnings(model: str, learned: Sequence[LearnedFlight], judged: KnownBy)
         flight = part_learned(learned, hashes)
         if flight is not None:
             what, it = ("it", "it") if flight.whole else (_part(flight), "that")
-            yield f"{name}: {model} has learned from {what}, so {it} shows nothing of flights not seen"
+            yield f"{name}: {model} has learned from {what}, so {it} says nothing about unseen flights"
 
 
 def _part(flight: LearnedFlight) -> str:

@@ -19,6 +19,7 @@ from cpfls_cli.artifacts.parameters import (
     OF_TURNING,
     THRUST,
     Parameter,
+    excess,
     is_learned,
     name_of,
     parameters_of,
@@ -26,7 +27,7 @@ from cpfls_cli.artifacts.parameters import (
     vehicle_section,
 )
 from cpfls_cli.artifacts.rebuilt import vehicle_model
-from cpfls_cli.artifacts.replay import HeldOutGroup, better_to
+from cpfls_cli.artifacts.replay import HeldOutGroup, better_to, played_row
 from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, ResponsesGroup, VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
@@ -108,7 +109,7 @@ def _as_forecast(record: VehicleRecord) -> str:
     if held is None:
         return "not judged as a forecast"
     if word is Trust.DO_NOT_USE:
-        return "predicts no better than what knows no model"
+        return "predicts no better than a baseline without a model"
     signals = ("body_rate", "velocity") if word is Trust.SIMULATION else ("body_rate",)
     far = min(better_to(held, name) for name in signals)
     what = "motion" if word is Trust.SIMULATION else "body rates"
@@ -120,7 +121,7 @@ def _against_control(record: VehicleRecord, held: HeldOutGroup) -> str:
     """Say why no control may rest on its forecast."""
     said = lost_words(held)
     if record.unreal:
-        said.append(f"rests on {joined(map(name_of, record.unreal))}, on a bound or of no body")
+        said.append(f"rests on {joined(map(name_of, record.unreal))}, which is on a bound or of no body")
     if record.responses is not None and record.responses.off:
         said.append("has a frequency response about roll or pitch that is off")
     return joined(said)
@@ -132,7 +133,7 @@ def _as_vehicle(record: VehicleRecord) -> str:
     if record.trust == Trust.LOOP:
         return "its constants are those of vehicle and autopilot together"
     if record.trust == Trust.LACKING:
-        return "beside its constants an effect is missing"
+        return "an effect is missing besides its constants"
     if record.trust == Trust.NOT_DETERMINED and too_heavy(record):
         return "inertia and drag factor are not the body's"
     open_ = dict.fromkeys((*record.untold, *record.unreal))
@@ -171,11 +172,15 @@ def _against(record: VehicleRecord) -> Iterator[str]:
         yield f"Inertia and drag factor: {heavy}."
     bound = [name_of(name) for name in record.on_bound]
     if bound:
-        yield f"{joined(bound)}: on a bound of what is tried, so the flights ask for more; no number of the vehicle."
-    told = {*record.on_bound, *(OF_TURNING if heavy else ())}
+        many = "they are no numbers" if len(bound) > 1 else "it is no number"
+        yield f"{joined(bound)}: on a bound of what is tried; the flights ask for more, so {many} of the vehicle."
+    too_much = {} if heavy else excess(record)
+    for name, why in too_much.items():
+        yield f"{name_of(name)}: {why}; a number that predicts, not the body's, and no config gets it."
+    told = {*record.on_bound, *(OF_TURNING if heavy else too_much)}
     open_ = [name_of(name) for name in record.untold if name not in told]
     if open_ and record.trust != Trust.LOOP:
-        yield f"Not determined, for the flights say too little of it: {joined(open_)}."
+        yield f"Not determined, because the flights say too little about it: {joined(open_)}."
 
 
 def _grounds_of_forecast(record: VehicleRecord) -> Iterator[str]:
@@ -189,8 +194,9 @@ def _grounds_of_forecast(record: VehicleRecord) -> Iterator[str]:
         yield from response_words(record.responses)
     if record.forecast is not None:
         yield (
-            "Beside its constants the file holds a forecast along logged rotor speeds, loop and all, which `cpfls "
-            "replay` plays: good for forecasts of such flights, and no vehicle. Errors are its."
+            "Besides its constants, the file holds a forecast along logged rotor speeds, loop included, which `cpfls "
+            "replay` plays: good for forecasting such flights, but not a model of the vehicle. The errors are those "
+            "of the forecast."
         )
     if record.held_out is not None:
         yield from beside_rivals(record.held_out)
@@ -198,7 +204,7 @@ def _grounds_of_forecast(record: VehicleRecord) -> Iterator[str]:
     errors = dict(zip(record.structure.name, record.structure.error, strict=True))
     alone = "the constants" if _guessed(record) else "the stated vehicle"
     yield (
-        f"On parts of the flights kept aside in turn its error is {number(errors['chosen'], 3)}; with all blocks "
+        f"On parts of the flights kept aside in turn, its error is {number(errors['chosen'], 3)}; with all blocks "
         f"{number(errors['everything'], 3)}, with blocks added one by one {number(errors['greedy'], 3)}, with "
         f"{'the constants alone' if _guessed(record) else alone} {number(errors['nothing'], 3)}; rates that stay have "
         "about 1.1."
@@ -247,9 +253,10 @@ def worth(record: VehicleRecord) -> Iterator[str]:
         yield next(instrument_words(record, record.instruments))
     held = record.held_out
     if held is not None:
-        last = {name: group.mae[0, -1] for name, group in held.errors.items() if group is not None}
+        last = {name: group.mae[played_row(held), -1] for name, group in held.errors.items() if group is not None}
         ends = joined(f"{number(last[name] * scale, 3)} {unit}" for name, unit, scale in _ENDS if name in last)
-        yield f"Held out, it ends {ends} off what was measured after {held.horizon_s[-1]:.3g} s, mean."
+        after = f"{held.horizon_s[-1]:.3g} s"
+        yield f"On held-out flights it ends {ends} off the measured motion after {after}, on average."
 
 
 def instrument_words(record: VehicleRecord, given: InstrumentsGroup) -> Iterator[str]:
@@ -267,8 +274,8 @@ def instrument_words(record: VehicleRecord, given: InstrumentsGroup) -> Iterator
     below = given.lacks_below
     if below is not None:
         yield (
-            f"Below {number(below, 2)} Hz they explain less, or the body would be another one: the vehicle does "
-            "something there that no constant may stand for; `cpfls response` shows it, `cpfls gap` looks for it."
+            f"Below {number(below, 2)} Hz they explain less, or would need a different body: the vehicle does "
+            f"something there that no constant can stand for; `cpfls response` shows it, `cpfls gap` looks for it."
         )
     if record.responses is not None:
         yield from response_words(record.responses)
@@ -290,7 +297,7 @@ def response_words(given: ResponsesGroup) -> Iterator[str]:
     ]
     if judged:
         off = "; it lacks an effect there, `cpfls response` shows where" if given.off else ""
-        yield f"Cost J of its frequency responses, {ACCEPTABLE:g} at most is acceptable: {', '.join(judged)}{off}."
+        yield f"Cost J of its frequency responses (up to {ACCEPTABLE:g} is acceptable): {', '.join(judged)}{off}."
 
 
 def _share_words(share: Array, error: Array) -> str:
@@ -317,8 +324,8 @@ def loop_words(record: VehicleRecord) -> str:
     )
     return (
         f"These flights show the loop, not the vehicle: torque explains {shares}. An autopilot that answers gusts, or "
-        f"an effect that is missing here, makes a body look heavier or lighter than it is: {times} what was found. Fly "
-        f"in still air, larger and faster turns, the same several times: {WHAT_TO_FLY}"
+        f"an effect that is missing here, makes a body look heavier or lighter than it is: {times} what was found. "
+        f"Fly in still air, with larger and faster turns, the same path several times: {WHAT_TO_FLY}"
     )
 
 
@@ -339,8 +346,8 @@ def warnings(record: VehicleRecord) -> list[str]:
     far = [name_of(row["name"]) for row in stated if not 1 / _FAR < row["value"] / row["stated"] < _FAR]
     if far:
         said.append(
-            f"{joined(far)}: more than {_FAR:g} times off what is stated; an effective number that predicts, not a "
-            "property of the part that it is named after"
+            f"{joined(far)}: more than {_FAR:g} times off the stated value: an effective number that predicts, not a "
+            f"property of the part that it is named after"
         )
     if _guessed(record) and record.held_out is not None:
         said.append("the stated vehicle has guesses where the config leaves constants open")
@@ -364,7 +371,7 @@ def _numbers_table(found: Source[VehicleRecord], index: int) -> Iterator[Table]:
         if row["name"] not in constants and not is_learned(row["name"])
     ]
     learned = sum(is_learned(row["name"]) for row in numbers)
-    more = f" {learned} more make the learned remainder; they stand in /found of the file." if learned else ""
+    more = f" {learned} more form the learned remainder; they are in /found of the file." if learned else ""
     caption = f"Other numbers of the vehicle with 95 % intervals from blocks of the flights.{more}"
     header = ("Number", "Unit", "Value", "From", "To")
     if rows or learned:
@@ -377,7 +384,7 @@ def _about_constants(record: VehicleRecord) -> Iterator[Block]:
     yield Text(" ".join(_scale(record, {each.key: each for each in listed})))
     idle = [each.name for each in listed if not each.needed]
     if idle:
-        yield Text(f"Left at 0, since no lower error comes with it: {joined(idle)}.")
+        yield Text(f"Left at 0, because freeing it does not lower the error: {joined(idle)}.")
     for reason, same in groupby(filter(_wanting, listed), key=lambda each: each.reason):
         yield Text(f"{joined(each.name for each in same)}: {reason}.")
     for flight, wanting in groupby(filter(_wanting, listed), key=_to_fly):
@@ -435,8 +442,8 @@ def _scale(record: VehicleRecord, known: dict[str, Parameter]) -> Iterator[str]:
     mass = number(record.vehicle.mass, 4)
     if known[THRUST].value is None:
         yield (
-            "The flights lack velocity, so nothing tells thrust from weight: of thrust, inertia and drag factor only "
-            "ratios are known."
+            "The flights lack velocity, so nothing separates thrust from weight: only ratios of thrust, inertia and "
+            "drag factor are known."
         )
         return
     if known[THRUST].low is not None:
@@ -449,7 +456,7 @@ def _scale(record: VehicleRecord, known: dict[str, Parameter]) -> Iterator[str]:
         if len(told) == len(yaw):
             yield "About yaw the gyroscopic torque tells the drag factor from Izz."
         else:
-            yield f"About yaw {joined(each.name for each in yaw)} are known as a ratio alone."
+            yield f"About yaw {joined(each.name for each in yaw)} are known only as a ratio."
 
 
 def found_vehicle_section(sources: Sources) -> Section | None:
@@ -564,8 +571,8 @@ def _remainder_figure(record: VehicleRecord, index: int) -> Plot:
 
     speed = number(record.airspeed, 2)
     caption = (
-        f"What has no name, by the direction in which the vehicle flies: level, at {speed} m/s, without turning, with "
-        "the rotors at the speed of hover. Grey: what the effects with a name add there."
+        f"The unnamed part, by direction of flight: level, at {speed} m/s, without turning, with "
+        "the rotors at the speed of hover. Grey: what the named effects add there."
     )
     return plot(f"vehicle-remainder-{index}", caption, caption, 5.2, draw)
 

@@ -284,25 +284,33 @@ def in_the_air(flight: PlaybackFlight, wind: tuple[float, float, float]) -> Play
     )
 
 
-def still_runs(flight: PlaybackFlight, starts: IntArray, horizon: int, *, rate_stays: bool) -> Runs:
-    """Predict that the whole state stays what it was, or that rates and velocity do and the vehicle goes on with them.
+def still_runs(
+    flight: PlaybackFlight, starts: IntArray, horizon: int, *, moves: bool, fading_s: float = np.inf
+) -> Runs:
+    """Predict that the whole state stays what it was, or that velocity does and rates stay or fade.
 
     Parameters
     ----------
     starts : array of int, shape (run,)
     horizon : int
         Samples.
-    rate_stays : bool
-        Whether attitude and position follow the rates and the velocity of the start.
+    moves : bool
+        Whether attitude and position follow the rates and the velocity.
+    fading_s : float, s
+        Time constant with which rates fade.
     """
-    motion, moves = flight.motion, float(rate_stays)
+    motion = flight.motion
     velocity, rate, held = motion.velocity[starts], motion.rate[starts], motion.rotation[starts]
-    turn = rotations.turns(moves * motion.period * rate)
     errors = np.empty((len(starts), horizon, 4, 3))
     for step in range(horizon):
-        held = held @ turn if rate_stays else held
-        position = motion.position[starts] + moves * (step + 1) * motion.period * velocity
-        errors[:, step] = less_measured(State(position, velocity, held, rate), motion, starts + step + 1)
+        elapsed = (step + 1) * motion.period
+        share = np.exp(-elapsed / fading_s)
+        if moves:
+            # How far it has turned: of one that fades, as far as the rate at the start does in a shorter time.
+            as_long = elapsed if np.isinf(fading_s) else fading_s * (1.0 - share)
+            held = motion.rotation[starts] @ rotations.turns(as_long * rate)
+        position = motion.position[starts] + (elapsed * velocity if moves else 0.0)
+        errors[:, step] = less_measured(State(position, velocity, held, share * rate), motion, starts + step + 1)
     return Runs(errors, np.full(len(starts), -1))
 
 

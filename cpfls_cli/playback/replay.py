@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.blocks import contiguous, half_width, jackknife_error
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.player import Player, Runs, free_runs, still_runs
 from cpfls_cli.playback.rotors import Hold
@@ -19,11 +20,26 @@ MODEL, NOTHING_MOVES, RATE_STAYS, STATED = "model", "nothing-moves", "rate-stays
 PREDICTIONS = (MODEL, NOTHING_MOVES, RATE_STAYS, STATED)
 """The model; the whole state stays; rates and velocity stay; the rigid body and the rotors that the config states."""
 
+RATE_FADES = "rate-fades"
+"""Where flights train: rates fade with one time constant of theirs, velocity stays. A body that forgets its turning."""
+
+WITHOUT_MODEL = (NOTHING_MOVES, RATE_STAYS, RATE_FADES)
+"""What knows no model, and is what a model has to beat."""
+
 WITH_PAST = "with-past"
 """Behind these: a model that is told of the flight before each start too, beside one that is not."""
 
+BEFORE, AFTER = "before", "after"
+"""A model as given and with the effects that were found, where these are what is compared."""
+
 _BATCH = 100_000
 """Steps of free runs at a time, which bounds the memory."""
+
+_FADING = (1e2, 1e-1, 2000)
+"""Time constants that are tried: the longest in horizons, the shortest in samples, and how many."""
+
+_BLOCKS, _FEWEST_BLOCKS, _HORIZONS = 20, 4, 2
+"""Blocks of windows that chance is told from, at most and at least, and how many horizons each is long at least."""
 
 
 @dataclass(frozen=True)
@@ -56,12 +72,15 @@ class Played:
     ----------
     with_past : Player or None
         A model that uses the past, beside one that does not.
+    fading_s : float or None, s
+        See `RATE_FADES`; None where no flights train.
     """
 
     flight: PlaybackFlight
     model: Player
     stated: Player
     with_past: Player | None = field(default=None, kw_only=True)
+    fading_s: float | None = field(default=None, kw_only=True)
 
     def runs(self, prediction: str, starts: IntArray, horizon: int) -> Runs:
         """Predict from samples of the flight.
@@ -69,14 +88,16 @@ class Played:
         Parameters
         ----------
         prediction : str
-            Of `PREDICTIONS`, or `WITH_PAST`.
+            Of `PREDICTIONS`, `WITH_PAST` or `RATE_FADES`.
         starts : array of int, shape (run,)
             Ascending.
         horizon : int
             Samples.
         """
-        if prediction in (NOTHING_MOVES, RATE_STAYS):
-            return still_runs(self.flight, starts, horizon, rate_stays=prediction == RATE_STAYS)
+        if prediction in WITHOUT_MODEL:
+            fading = self.fading_s if prediction == RATE_FADES else None
+            moves = prediction != NOTHING_MOVES
+            return still_runs(self.flight, starts, horizon, moves=moves, fading_s=np.inf if fading is None else fading)
         players = {MODEL: self.model, STATED: self.stated, WITH_PAST: self.with_past}
         player = players[prediction]
         assert player is not None, "asked for where all flights have one"
@@ -94,6 +115,33 @@ class Played:
         }
 
 
+def fading(flights: Sequence[PlaybackFlight], horizon: int) -> float:
+    """Fit the time constant with which body rates of flights fade, s, by least squares over a horizon.
+
+    Parameters
+    ----------
+    flights : sequence of PlaybackFlight
+        Of one sampling period.
+    horizon : int
+        Samples.
+
+    Returns
+    -------
+    float
+        The longest that is tried where they do not fade.
+    """
+    period = flights[0].motion.period
+    parts = [flight.motion.rate[part] for flight in flights for part in flight.stretches]
+    steps = np.arange(1, horizon + 1)
+    own = np.array([sum(float((part[:-step] ** 2).sum()) for part in parts) for step in steps])
+    kept = np.array([sum(float((part[:-step] * part[step:]).sum()) for part in parts) for step in steps])
+    longest, shortest, count = _FADING
+    tried = period * np.geomspace(longest * horizon, shortest, count)
+    share = np.exp(-period * steps / tried[:, None])
+    # Of squared errors, what depends on the time constant.
+    return float(tried[np.argmin((own * share**2 - 2.0 * kept * share).sum(axis=1))])
+
+
 @dataclass(frozen=True)
 class SignalErrors:
     """Errors of one signal over all windows of the flights that know it.
@@ -103,6 +151,7 @@ class SignalErrors:
 
     mae: Array
     rms: Array
+    chance: Array | None
 
 
 @dataclass(frozen=True)
@@ -181,7 +230,7 @@ class Replay:
     errors : mapping of str to SignalErrors or None
         By signal; None where no flight knows it.
     predictions : tuple of str
-        `PREDICTIONS`, and `WITH_PAST` where all flights have it.
+        `PREDICTIONS`, and `WITH_PAST` and `RATE_FADES` where all flights have them.
     """
 
     errors: Mapping[str, SignalErrors | None]
@@ -202,9 +251,10 @@ class Region:
     rate: Array
 
 
-def where_better(flights: Sequence[Played], windows: ReplayWindows) -> Region | None:
+def where_better(flights: Sequence[Played], replayed: Replay) -> Region | None:
     """Find the speeds and rates at which a model is better; None where it is nowhere."""
-    rivals = [PREDICTIONS.index(name) for name in (NOTHING_MOVES, RATE_STAYS)]
+    windows = replayed.windows
+    rivals = [row for row, name in enumerate(replayed.predictions) if name in WITHOUT_MODEL]
     better = windows.of_model < windows.size[rivals].min(axis=0)
     if not better.any():
         return None
@@ -222,34 +272,50 @@ def where_better(flights: Sequence[Played], windows: ReplayWindows) -> Region | 
 
 @dataclass
 class _Sums:
-    """Sums over the windows so far."""
+    """Sums over the windows so far, those of norms by block of windows."""
 
     horizon: int
     predictions: tuple[str, ...]
-    count: dict[str, int] = field(default_factory=lambda: dict.fromkeys(SIGNALS, 0))
+    block: IntArray
+    count: IntArray = field(init=False)
     norm: Array = field(init=False)
     square: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        self.norm = np.zeros((4, len(self.predictions), self.horizon))
-        self.square = np.zeros((4, len(self.predictions), self.horizon, 3))
+        blocks, shape = int(self.block.max()) + 1, (len(self.predictions), self.horizon)
+        self.count = np.zeros((4, blocks), dtype=np.int64)
+        self.norm = np.zeros((4, blocks, *shape))
+        self.square = np.zeros((4, *shape, 3))
 
-    def add(self, prediction: int, errors: Array, knows: Mapping[str, bool]) -> None:
-        """Add the errors of a batch, shape (run, horizon, 4, 3)."""
-        norms = np.sqrt(np.einsum("nhsa,nhsa->nhs", errors, errors)).sum(axis=0)
-        squares = np.einsum("nhsa,nhsa->hsa", errors, errors)
-        for row, signal in enumerate(SIGNALS):
-            if knows[signal]:
-                self.norm[row, prediction] += norms[:, row]
-                self.square[row, prediction] += squares[:, row]
-                self.count[signal] += len(errors) if prediction == 0 else 0
+    def add(self, prediction: int, windows: slice, errors: Array, knows: Mapping[str, bool]) -> None:
+        """Add the errors of a batch of windows by one of the predictions, shape (run, horizon, 4, 3)."""
+        norms = np.sqrt(np.einsum("nhsa,nhsa->nhs", errors, errors))
+        squares, block = np.einsum("nhsa,nhsa->hsa", errors, errors), self.block[windows]
+        known = [row for row, signal in enumerate(SIGNALS) if knows[signal]]
+        self.square[known, prediction] += squares.swapaxes(0, 1)[known]
+        for each in np.unique(block):
+            own = norms[block == each]
+            self.norm[known, each, prediction] += own.sum(axis=0).T[known]
+            self.count[known, each] += len(own) if prediction == self.predictions.index(MODEL) else 0
 
     def errors(self) -> dict[str, SignalErrors | None]:
         """Take the means."""
-        return {
-            signal: SignalErrors(self.norm[row] / count, np.sqrt(self.square[row] / count)) if count else None
-            for row, (signal, count) in enumerate(self.count.items())
-        }
+        return {signal: self._errors(row) if self.count[row].any() else None for row, signal in enumerate(SIGNALS)}
+
+    def _errors(self, row: int) -> SignalErrors:
+        total, norm = int(self.count[row].sum()), self.norm[row]
+        chance: Array | None = None
+        seen = np.flatnonzero(self.count[row])
+        if len(seen) >= _FEWEST_BLOCKS:
+            left_out = (norm.sum(axis=0) - norm[seen]) / (total - self.count[row, seen])[:, None, None]
+            apart = left_out - left_out[:, [self.predictions.index(MODEL)]]
+            chance = half_width(jackknife_error(apart), len(seen))
+        return SignalErrors(norm.sum(axis=0) / total, np.sqrt(self.square[row] / total), chance)
+
+
+def _blocks(windows: int, horizon: int, every: int) -> IntArray:
+    """Cut windows, one after another, into blocks that stand for independent ones: the number of the block of each."""
+    return contiguous(windows, max(min(_BLOCKS, windows * every // (_HORIZONS * horizon)), 1))
 
 
 def replay(
@@ -277,21 +343,25 @@ def replay(
     """
     starts = [played.flight.starts(horizon, every) for played in flights]
     past = all(played.with_past is not None for played in flights)
-    predictions = (*PREDICTIONS, WITH_PAST) if past else PREDICTIONS
-    sums, parts, done, total = _Sums(horizon, predictions), [], 0, sum(map(len, starts))
+    fades = all(played.fading_s is not None for played in flights)
+    predictions = (*PREDICTIONS, *([WITH_PAST] if past else []), *([RATE_FADES] if fades else []))
+    parts, done, total = [], 0, sum(map(len, starts))
+    sums = _Sums(horizon, predictions, _blocks(total, horizon, every))
     for index, played in enumerate(flights):
         size = max(1, _BATCH // horizon)
         for first in range(0, len(starts[index]), size):
             batch = starts[index][first : first + size]
-            parts.append(_added(sums, played, batch, index))
+            parts.append(_added(sums, played, batch, index, done))
             done += len(batch)
             progress(done / total)
     joined = [np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)]
     return Replay(sums.errors(), ReplayWindows(*joined), predictions)
 
 
-def _added(sums: _Sums, played: Played, starts: IntArray, flight: int) -> tuple[IntArray, IntArray, Array, IntArray]:
-    """Add a batch to the sums; give the columns of `ReplayWindows`."""
+def _added(
+    sums: _Sums, played: Played, starts: IntArray, flight: int, first: int
+) -> tuple[IntArray, IntArray, Array, IntArray]:
+    """Add a batch, from this window on, to the sums; give the columns of `ReplayWindows`."""
     size = np.empty((len(sums.predictions), len(starts)))
     diverged = np.empty(size.shape, dtype=np.int64)
     knows = played.knows
@@ -300,7 +370,7 @@ def _added(sums: _Sums, played: Played, starts: IntArray, flight: int) -> tuple[
         again = model if prediction == STATED and played.stated is played.model else None
         runs = again or played.runs(prediction, starts, sums.horizon)
         model = runs if prediction == MODEL else model
-        sums.add(row, runs.errors, knows)
+        sums.add(row, slice(first, first + len(starts)), runs.errors, knows)
         size[row] = np.linalg.norm(runs.errors[:, :, SIGNALS.index("body_rate")], axis=2).mean(axis=1)
         diverged[row] = runs.diverged
     return np.full(len(starts), flight), starts, size, diverged

@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width, jackknife_error
-from cpfls_cli.inertia import INERTIA_PARAMETERS, KNOWN, beyond_any_body
+from cpfls_cli.inertia import INERTIA_PARAMETERS, KNOWN, beyond_any_body, more_than_others
 from cpfls_cli.playback.constants import Constants, find_constants
 from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
 from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
@@ -314,7 +314,8 @@ def bodily(vehicle: VehicleSettings, numbers: Sequence[FoundNumber]) -> Iterator
     """Call inertia and drag factor not determined where a moment of inertia is larger than that of any such body.
 
     Speeds that are partly noise state torques that turn nothing, and those that answer a gust turn nothing either: a
-    fit then makes the body heavier, however narrow its intervals. All three moments and the drag factor share that.
+    fit then makes the body heavier, however narrow its intervals. All three moments and the drag factor share that. A
+    moment that is more than the other two together, stated ones included, is not determined itself.
 
     Parameters
     ----------
@@ -322,9 +323,13 @@ def bodily(vehicle: VehicleSettings, numbers: Sequence[FoundNumber]) -> Iterator
         Whose mass and rotors say what can be.
     """
     hubs = np.array([rotor.position_m for rotor in vehicle.rotors])
-    heavy = beyond_any_body(vehicle.mass_kg, hubs, {number.name: number.value for number in numbers})
+    values = {number.name: number.value for number in numbers}
+    heavy = beyond_any_body(vehicle.mass_kg, hubs, values)
+    pairs = zip(INERTIA_PARAMETERS[:3], vehicle.inertia_kg_m2, strict=False)
+    excess = more_than_others([values.get(f"inertia.{name}", stated) for name, stated in pairs])
     for number in numbers:
-        yield number._replace(determined=False) if heavy and number.name.startswith(_OF_TURNING) else number
+        wrong = (heavy and number.name.startswith(_OF_TURNING)) or number.name.removeprefix("inertia.") in excess
+        yield number._replace(determined=False) if wrong else number
 
 
 def beside_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterator[FoundNumber]:

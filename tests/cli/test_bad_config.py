@@ -144,7 +144,7 @@ ALIASES = "a0: &a0 [x]\n" + "".join(f"a{n}: &a{n} [{', '.join(10 * [f'*a{n - 1}'
         ("seed: !!int ''\n", "FILE: not valid YAML: string index out of range"),
         ('report: {title: "\\ud800"}\n', "FILE:1:17: not valid YAML: '\\ud800' holds half a character"),
         (ALIASES, "FILE:6:5: not valid YAML: more than 100000 values with every alias written out"),
-        (b"# " + b"x" * 1_000_000, "FILE: is larger than 1 MB, and no config is"),
+        (b"# " + b"x" * 1_000_000, "FILE: is larger than 1 MB, which no config is"),
     ],
 )
 def test_not_a_config(wrong, content, message):
@@ -163,7 +163,7 @@ def test_a_number_of_many_digits_and_a_deep_list(wrong):
 
 
 def test_what_has_no_end_is_not_read_to_its_end(refuse):
-    assert refuse("config", "/dev/zero") == ["/dev/zero: is larger than 1 MB, and no config is"]
+    assert refuse("config", "/dev/zero") == ["/dev/zero: is larger than 1 MB, which no config is"]
 
 
 def test_missing_config_and_folder_as_config(refuse, tmp_path):

@@ -157,14 +157,15 @@ def test_no_gap_is_told_from_an_inertia_of_no_body(refuse, command, vehicle):
     (line,) = refuse(*command("gap"), "--model", vehicle)
     assert line == (
         f"{vehicle}: no body has this inertia, its largest principal moment 0.05 is more than the other two together, "
-        f"0.0119, so no gap is told from it; --accept-guesses takes guesses from mass and arms, or fly what tells its "
+        f"0.0119, so no gap can be measured against it; --accept-guesses takes guesses from mass and arms, or fly "
+        f"what tells its "
         f"inertia: {WHAT_TO_FLY}"
     )
 
 
 def test_only_a_vehicle_that_was_found_has_numbers_to_take(refuse, command, flight):
     (line,) = refuse(*command("replay"), "--model", flight)
-    assert line == f"--model {flight}: is no vehicle that `cpfls vehicle` found"
+    assert line == f"--model {flight}: is not a vehicle that `cpfls vehicle` found"
 
 
 @pytest.mark.parametrize("form", FORMS)

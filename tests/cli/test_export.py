@@ -255,7 +255,7 @@ def test_an_empty_name_is_shown(refuse, pipeline, tmp_path):
 def test_a_name_goes_to_c_and_json_only(cpfls, refuse, pipeline, tmp_path):
     words = ("export", pipeline.model, "--name", "uav", "-o")
     (line,) = refuse(*words, tmp_path / "m.py")
-    assert line == "--name uav: a module of Python is called as its file is; leave --name out, or rename -o"
+    assert line == "--name uav: a Python module is named after its file; leave --name out, or rename -o"
     assert cpfls(*words, tmp_path / "m.json").exit_code == 0
     assert json.loads((tmp_path / "m.json").read_text())["name"] == "uav"
 
@@ -305,7 +305,7 @@ def test_a_model_without_verdict_is_told(cpfls, model, tmp_path, form):
     output = tmp_path / f"m.{ENDINGS[form]}"
     result = cpfls("export", model, "-o", output)
     assert result.exit_code == 0
-    assert result.stderr.startswith(f"cpfls: note: {model}: holds no verdict: ")
+    assert result.stderr.startswith(f"cpfls: note: {model}: holds no verdict (")
     assert len(result.stderr.splitlines()) == 1
     assert "\nVerdict: none; the model holds no validation.\n" in result.stdout
     if form == "c":
@@ -322,7 +322,7 @@ def test_a_model_that_was_judged_unfit_is_marked(cpfls, refuse, model, tmp_path)
         verdict__speaks=np.array([1, -1]),
     )
     (line,) = refuse("export", model, "-o", tmp_path / "m.c")
-    assert line == f"{model}: its verdict is do-not-use; --force exports it all the same, marked so"
+    assert line == f"{model}: its verdict is do-not-use; --force exports it anyway, marked as such"
     assert not (tmp_path / "m.c").exists()
     result = cpfls("export", model, "-o", tmp_path / "m.c", "--force")
     assert result.exit_code == 0

@@ -101,7 +101,7 @@ def test_people_read_verdict_and_numbers(cpfls, config, flights, found, tmp_path
     assert first.endswith(" s ahead; its constants are told.")
     assert len(lines) < 15, "verdicts, numbers, next commands"
     whole = cpfls("vehicle", config, flights[0], "--held-out", flights[1], "-o", output, "--force", "-v").stdout
-    for words in ("Body rate: better than “nothing moves” at every horizon", "linear damping d_x", "stated vehicle"):
+    for words in ("Body rate: better than “rate fades” at every horizon", "linear damping d_x", "stated vehicle"):
         assert words in whole
         assert words not in result.stdout
 
@@ -123,8 +123,8 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     assert worth[0].startswith("GOOD FOR SIMULATION AND CONTROL: predicts motion ")
     rate, horizon = model["body_rate"]["mae"][-1], json.loads(replayed.stdout)["horizon_s"]
     last = horizon[-1] if isinstance(horizon, list) else horizon
-    assert worth[1].startswith(f"Held out, it ends {rate:.3g} rad/s, ")
-    assert worth[1].endswith(f" m off what was measured after {last:.3g} s, mean.")
+    assert worth[1].startswith(f"On held-out flights it ends {rate:.3g} rad/s, ")
+    assert worth[1].endswith(f" m off the measured motion after {last:.3g} s, on average.")
     assert worth[2] == "JSON holds all of it."
     predicted = cpfls("predict", config, found.output, flights[1], "-o", tmp_path / "prediction.h5", "--json")
     assert predicted.exit_code == 0, predicted.stderr

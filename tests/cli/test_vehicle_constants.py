@@ -158,8 +158,8 @@ def test_an_added_mass_is_found_beside_what_is_shared(cpfls, flights, folder):
 @pytest.mark.parametrize(
     ("group", "said"),
     [
-        ({"name": "p", "flights": ["heavy*"]}, "no flight that trains is of p"),
-        ({"name": "p", "flights": ["*"]}, "every flight is of a group"),
+        ({"name": "p", "flights": ["heavy*"]}, "no training flight belongs to p"),
+        ({"name": "p", "flights": ["*"]}, "every flight belongs to a group"),
         ({"name": "p", "flights": ["loaded*"], "differs": ["inerta"]}, "did you mean inertia?"),
     ],
 )

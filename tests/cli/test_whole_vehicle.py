@@ -450,7 +450,7 @@ def test_a_replay_uses_the_past_where_a_vehicle_holds_an_observer(
     assert without["windows"] == known["windows"]
     assert known["models"]["model"] != without["models"]["model"]
     assert known["models"]["stated"] == without["models"]["stated"]
-    assert any("3 of" in each and "use the past that there is" in each for each in known["warnings"])
+    assert any("3 of" in each and "use what past there is" in each for each in known["warnings"])
     (message,) = refuse("replay", config, vehicle, noisy, "--history", "0.5", "-o", tmp_path / "x.h5")
     assert "vehicle.h5: holds no forecast that uses the past" in message
     (message,) = refuse("replay", config, model, noisy, "--history", "0.001", "-o", tmp_path / "x.h5")

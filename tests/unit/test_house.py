@@ -192,7 +192,6 @@ ONE_OF_A_KIND = ("commands/", "effects/catalogue/", "export/simulators/", "logs/
 SMALL_ALL_THE_SAME = {
     "cli/main.py": "runs before anything heavy is loaded",
     "gap/next_flight/search.py": "what the room is for",
-    "pages/answers.py": "`info` of what has no answer loads no pages",
     "regressor/table.py": "loads without compiled loops",
     "report/json_page.py": "a form",
     "report/markdown.py": "a form",

@@ -140,7 +140,7 @@ def test_people_read_the_verdict_first(again, shifted):
     )
     rows = [line for line in lines[6:16] if line.startswith(("gap, ", "playback, "))]
     assert re.match(r"gap, roll torque +N\sm +0\.\d+ +0\.0\d+ +0\.0\d+ +\d+ → [01]\.\d+ floors", rows[0])
-    assert re.match(r"playback, body rate +rad/s +0\.\d+ +0\.0\d+ +0\.\d+ +better than “nothing moves”", rows[2])
+    assert re.match(r"playback, body rate +rad/s +0\.\d+ +0\.0\d+ +0\.\d+ +better than “rate fades”", rows[2])
     assert any(line.startswith("The gap in the torque about y (pitch) follows thrust") for line in lines)
     assert any(line.endswith("extended.h5: the model with offset of the centre of mass.") for line in lines)
     folder, words = again.folder, lines[-1].split()
@@ -192,18 +192,19 @@ def test_playback_of_measured_rotors_gets_better(found):
     assert set(found.summary["playback"]["at_end"]) == {"body_rate"}
     rate = found.summary["playback"]["at_end"]["body_rate"]
     assert rate["after"] < 0.1 * rate["before"]
-    assert (rate["worse"], rate["rival"]) == (False, "nothing-moves")
+    assert (rate["worse"], rate["rival"]) == (False, "rate-fades")
+    assert found.summary["playback"]["fading_s"] > 0
     models = found.summary["playback"]["models"]
     assert len(models["after"]["body_rate"]) == 50
     assert rate["after"] == models["after"]["body_rate"][-1]
-    assert rate["without_model"] == models["nothing-moves"]["body_rate"][-1]
+    assert rate["without_model"] == models["rate-fades"]["body_rate"][-1]
 
 
 def test_playback_is_that_of_the_command_for_it(cpfls, gap_config, found, shifted, tmp_path):
     asked = ("replay", gap_config, found.folder / "extended.h5", shifted[2], "--every", "5", "--json")
     played = json.loads(cpfls(*asked, "-o", tmp_path / "replay.h5").stdout)["models"]
     ours = found.summary["playback"]["models"]
-    for name, again in {"after": "model", "before": "stated", "nothing-moves": "nothing-moves"}.items():
+    for name, again in {"after": "model", "before": "stated", "rate-fades": "rate-fades"}.items():
         # The extended model is refitted once more.
         assert ours[name]["body_rate"] == pytest.approx(played[again]["body_rate"]["mae"], rel=1e-3), name
 

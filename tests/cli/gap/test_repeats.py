@@ -66,7 +66,7 @@ def found(cpfls, tmp_path_factory):
 def test_what_comes_again_stands_behind_the_verdict(found):
     (said,) = (line for line in found.stdout.splitlines() if line.startswith("REPEATS: "))
     assert said.startswith("REPEATS: Of the gap in the force along")
-    assert "comes again: the model lacks an effect there." in said
+    assert "comes again: the model as given lacks an effect there." in said
     assert "Torque about x (roll): nothing comes again" in found.stdout
     assert "--repeat" not in found.stdout
 

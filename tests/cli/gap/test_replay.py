@@ -218,7 +218,9 @@ def test_people_read_to_which_horizon_it_is_better(cpfls, gap_config, extended, 
     assert result.stdout.startswith(
         "REPLAY: extended.h5 predicts better than what it has to beat, summed over all horizons to 0.5 s: body rate."
     )
-    assert "better than “nothing moves” at" in result.stdout
+    assert "better than “rate fades” at" in result.stdout
+    assert "Prediction" not in result.stdout
+    assert "more with -v: Errors by horizon; Where it is farthest off" in result.stdout
     assert "% smaller" in result.stdout
     assert "rotation alone is played back" in result.stderr
 

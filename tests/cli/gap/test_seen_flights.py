@@ -66,11 +66,11 @@ def test_replay_and_compare_warn_of_flights_seen(
 ):
     fast = ("--every", "400")
     result = cpfls("replay", gap_config, extended, shifted[1], shifted[2], "-o", tmp_path / "r.h5", *fast)
-    whole = "flight_2.csv: extended.h5 has learned from it, so it shows nothing of flights not seen"
+    whole = "flight_2.csv: extended.h5 has learned from it, so it says nothing about unseen flights"
     assert whole in result.stderr
     assert "flight_3.csv: extended.h5" not in result.stderr
     result = cpfls("compare", gap_config, *with_attitude, "--model", two_models, "-o", tmp_path / "d.h5", "--json")
-    part = "flight_4.csv: extended.h5 has learned from its first 1600 of 2400 samples, so that shows nothing"
+    part = "flight_4.csv: extended.h5 has learned from its first 1600 of 2400 samples, so that says nothing"
     assert part in result.stdout
     assert "flight_5.csv: extended.h5" not in result.stdout
 

@@ -56,7 +56,7 @@ def test_without_instruments_there_is_a_bound():
     assert bound.gusts is None
     words = said(record(bound))
     assert words.startswith("No gusts above 3.6 rad/s² about roll")
-    assert "nothing tells gusts from what it lacks" in words
+    assert "nothing separates gusts from what it lacks" in words
     assert "--gusts" not in words
 
 

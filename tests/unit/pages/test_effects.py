@@ -8,7 +8,7 @@ from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.results import Estimate, NamedEffect
-from cpfls_cli.pages.effects import closest_sentence, coefficients_table, effect_sentence, effect_title
+from cpfls_cli.pages.effects import closest_sentence, coefficients_table, effect_sentence, effect_title, named_sentences
 from tests.builders import gap_artifacts as made
 
 OFFSET = NamedEffect(
@@ -40,6 +40,13 @@ def test_ends_of_an_interval_can_be_told_apart_and_rounding_makes_no_certainty()
     )
     # Of an effect that is not the answer the share is none of the gap.
     assert closest_sentence(OFFSET).endswith("(p < 10⁻⁶, more than 99 % of what the fit explains).")
+
+
+def test_shares_of_effects_that_overlap_are_what_returns_without_each():
+    pair = [replace(OFFSET, share=0.7), replace(OFFSET, share=0.6)]
+    assert named_sentences(pair)[1].endswith("(p < 10⁻⁶, 60 % of the gap returns without it).")
+    apart = [replace(OFFSET, share=0.7), replace(OFFSET, share=0.3)]
+    assert named_sentences(apart)[1].endswith("(p < 10⁻⁶, 30 % of the gap).")
 
 
 def test_a_power_of_ten_that_all_three_have_stands_once():

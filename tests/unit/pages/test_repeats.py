@@ -36,7 +36,8 @@ def test_the_largest_share_that_comes_again_stands_first():
         "there."
     )
     assert box.sentences[1] == (
-        "Torque about y (pitch): 50 % comes again from 0.25 to 1.5 Hz (of the motion that does the model explains 85 % "
+        "Torque about y (pitch): 50 % comes again from 0.25 to 1.5 Hz (of the motion that comes again the model "
+        "explains 85 % "
         "to 90 %). The rest: gusts of about 3.3 rad/s², or noise that is not white."
     )
     assert len(box.sentences) == 6
@@ -52,7 +53,7 @@ def test_where_nothing_comes_again_no_effect_explains_the_gap():
 
 def test_what_runs_do_not_tell_is_open():
     box = again_box(made.comes_again(NOTHING, error=0.5))
-    assert box.title == "Whether the gap comes again these runs do not tell: up to 100 % of it may."
+    assert box.title == "These runs do not tell whether the gap comes again: up to 100 % of it may."
     assert "nothing surely comes again" in box.sentences[0]
 
 
@@ -67,19 +68,33 @@ def test_noise_that_is_larger_than_gusts_is_named():
 
 
 @pytest.mark.parametrize(
-    ("after", "words"),
+    ("after", "gap", "left", "words"),
     [
         (
             NOTHING,
+            4.0,
+            "0 %",
             "With damping, what is left does not come again (at most 4 % of it): gusts or noise, and no effect of",
         ),
-        (PITCH / 2, "With damping, part of what is left comes again, in the torque about y (pitch): more is missing."),
+        (
+            PITCH / 2,
+            4.0,
+            "50 %",
+            "With damping, part of what is left comes again, in the torque about y (pitch): more is missing.",
+        ),
+        # Squares: all of 1.2 of 4.0 is left.
+        (PITCH, 1.2, "9 %", "With damping, 9 % at most of what comes again is left: no further effect shows."),
+        (
+            PITCH + shares(yaw=[0.3, 0.0, 0.0, 0.4, 0.6, 0.0]),
+            1.2,
+            "9 %",
+            "With damping, part of what is left comes again, in the torque about z (yaw): more is missing.",
+        ),
     ],
 )
-def test_what_effects_leave_is_told(after, words):
-    box = again_box(made.comes_again(PITCH), made.comes_again(after), "with damping")
+def test_what_effects_leave_is_told_and_more_is_missing_only_where_that_is_visible(after, gap, left, words):
+    box = again_box(made.comes_again(PITCH), made.comes_again(after, gap=gap), "with damping")
     assert box.sentences[-1].startswith(words)
-    left = "50 %" if after.any() else "0 %"
     assert f"50 % comes again from 0.25 to 1.5 Hz, of which {left} is left" in box.sentences[1]
 
 

@@ -80,7 +80,7 @@ def test_without_instruments_nothing_is_judged():
 
 def test_what_no_model_says_is_told_by_its_lag():
     box = response_box(record_of(roll_rate=estimate(lag_s=0.05, model=False), pitch_rate=estimate(model=False)))
-    assert box.title == "vehicle.h5 cannot be judged: these flights excite nothing enough."
+    assert box.title == "vehicle.h5 cannot be judged: these flights excite no response enough."
     # A lag of 50 ms is 45 degrees behind at 1 / (2 pi 50 ms).
     assert box.sentences[0] == "Roll rate: 45° behind what is asked at 3.2 Hz, seen from 0.18 to 15 Hz."
     assert box.sentences[1] == "Pitch rate: follows what is asked less than 45° behind from 0.18 to 15 Hz."

@@ -54,7 +54,7 @@ def test_numbers_without_a_meaning_of_their_own_are_counted_and_not_listed():
     tables = [block for block in unfolded(answer(source_of_record(found(whole())))) if isinstance(block, Table)]
     (table,) = [table for table in tables if table.name.startswith("vehicle-numbers")]
     assert [row[0].text for row in table.cells] == ["rotor drag k_d"]
-    assert "3 more make the learned remainder" in table.caption
+    assert "3 more form the learned remainder" in table.caption
 
 
 def test_they_are_warned_of_only_where_they_stand_for_a_number_with_a_name():
@@ -100,6 +100,39 @@ def test_an_inertia_that_no_body_has_is_no_constant_however_narrow_its_interval(
     assert ("inertia and drag factor are not the body's" in title(record)) is told
     # What was stated stays where the flights do not tell better.
     assert vehicle_section(record)["inertia_kg_m2"][0] == pytest.approx(0.004 if told else record.vehicle.inertia[0])
+
+
+@pytest.mark.parametrize(
+    ("determined", "section"),
+    [
+        ([False, False], [0.004, 0.004, 0.005]),
+        ([False, True], [0.004, 0.004, 0.005]),
+        # What was stated does not go with what was found.
+        ([True, True], [0.03, 0.004, None]),
+    ],
+)
+def test_no_config_gets_a_moment_of_inertia_that_no_body_has(determined, section):
+    record = record_of(whole())
+    found = replace(
+        record.found,
+        name=("inertia.Ixx", "inertia.Iyy"),
+        value=np.array([0.03, 0.004]),
+        stated=np.full(2, 0.004),
+        determined=np.array(determined),
+        at_bound=np.array([False, False]),
+    )
+    moments = np.array([0.03, 0.004, 0.005, 0.0, 0.0, 0.0])
+    record = replace(record, found=found, vehicle=replace(record.vehicle, inertia=moments))
+    assert vehicle_section(record)["inertia_kg_m2"] == section
+
+
+def test_a_moment_that_no_body_has_is_said_with_its_reason():
+    record = _of_inertia(0.02, 0.004, 0.007)(record_of(whole()))
+    record = replace(record, found=replace(record.found, determined=np.array([False, True])))
+    (row,) = [each for each in parameters_of(record) if each.key == "inertia_kg_m2.0"]
+    assert row.reason.startswith("no body has it, for the other two are 0.011 kg m^2 together: a number that predicts")
+    assert "Ixx: no body has it" in " ".join(cautions(record))
+    assert "say too little about it: Ixx" not in " ".join(cautions(record))
 
 
 def test_flights_that_show_the_loop_are_said_first_and_leave_no_good_word():
@@ -167,7 +200,7 @@ def test_constants_that_repeats_tell_are_judged_by_what_comes_again_and_not_by_a
     first, cost, *_ = grounds(record)
     assert "3 runs that repeat each other (correlation 0.90 to 0.97)" in first
     assert "From 1.0 to 6.0 Hz they explain 98 % (± 1 %) of the roll" in first
-    assert cost.startswith("Cost J of its frequency responses, 100 at most is acceptable: roll 12")
+    assert cost.startswith("Cost J of its frequency responses (up to 100 is acceptable): roll 12")
     said = [block.text for block in unfolded(answer(source_of_record(record))) if isinstance(block, Text)]
     assert any("`cpfls replay` plays" in line for line in said)
     assert not any("loop, not the vehicle" in line for line in said)
@@ -240,9 +273,9 @@ def _off(record):
 @pytest.mark.parametrize(
     ("changed", "velocity", "why"),
     [
-        (_on_bound, 1.0, "rests on Ixx, on a bound or of no body"),
-        (_of_inertia(0.03, 0.02, 0.02), 1.0, "rests on Ixx, on a bound or of no body"),
-        (_of_inertia(0.02, 0.004, 0.007), 1.0, "rests on Ixx, on a bound or of no body"),
+        (_on_bound, 1.0, "rests on Ixx, which is on a bound or of no body"),
+        (_of_inertia(0.03, 0.02, 0.02), 1.0, "rests on Ixx, which is on a bound or of no body"),
+        (_of_inertia(0.02, 0.004, 0.007), 1.0, "rests on Ixx, which is on a bound or of no body"),
         (_off, 1.0, "has a frequency response about roll or pitch that is off"),
         (replace, 2.1, "is worse in velocity than “nothing moves” and “rate stays” both"),
     ],

@@ -13,7 +13,18 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.player import free_runs, player_of, rotation_vectors
-from cpfls_cli.playback.replay import MODEL, NOTHING_MOVES, RATE_STAYS, SIGNALS, STATED, Played, replay, where_better
+from cpfls_cli.playback.replay import (
+    MODEL,
+    NOTHING_MOVES,
+    RATE_FADES,
+    RATE_STAYS,
+    SIGNALS,
+    STATED,
+    Played,
+    fading,
+    replay,
+    where_better,
+)
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.rotations import cross, euler_angles
 from cpfls_cli.vehicle.rotors import body_wrench
@@ -141,24 +152,63 @@ def played(flight, model=None):
     return Played(flight, player_of(model or stated, flight), player_of(stated, flight))
 
 
-@pytest.mark.parametrize("prediction", [NOTHING_MOVES, RATE_STAYS])
+@pytest.mark.parametrize("prediction", [NOTHING_MOVES, RATE_STAYS, RATE_FADES])
 def test_baselines_are_their_formulas(prediction):
-    flight, horizon = flight_of(), 20
-    motion, goes_on = flight.motion, prediction == RATE_STAYS
-    runs = played(flight).runs(prediction, np.array([3, 11]), horizon)
+    flight, horizon, fades_s = flight_of(), 20, 0.3
+    motion, goes_on = flight.motion, prediction != NOTHING_MOVES
+    runs = replace(played(flight), fading_s=fades_s).runs(prediction, np.array([3, 11]), horizon)
     assert np.all(runs.diverged == -1)
     for run, start in enumerate((3, 11)):
         for step in range(1, horizon + 1):
             gone, at = goes_on * step * 0.01, start + step
-            turned = motion.rotation[start] @ Rotation.from_rotvec(gone * motion.rate[start]).as_matrix()
+            left = np.exp(-gone / fades_s) if prediction == RATE_FADES else 1.0
+            # The integral of the rate until then.
+            as_long = fades_s * (1 - left) if prediction == RATE_FADES else gone
+            turned = motion.rotation[start] @ Rotation.from_rotvec(as_long * motion.rate[start]).as_matrix()
             away = Rotation.from_matrix(motion.rotation[at].T @ turned).as_rotvec()
             wanted = [
                 motion.position[start] + gone * motion.velocity[start] - motion.position[at],
                 motion.velocity[start] - motion.velocity[at],
                 away,
-                motion.rate[start] - motion.rate[at],
+                left * motion.rate[start] - motion.rate[at],
             ]
             np.testing.assert_allclose(runs.errors[run, step - 1], wanted, atol=1e-12)
+
+
+def test_rates_fade_as_fast_as_those_of_the_flights_that_train():
+    flight = flight_of(samples=200)
+    kept = np.exp(-0.01 * np.arange(100) / 0.13)[:, None] * [3.0, -1.0, 0.5]
+    fades = replace(
+        flight,
+        motion=flight.motion._replace(rate=np.concatenate([kept, -2 * kept])),
+        stretches=(slice(0, 100), slice(100, 200)),
+    )
+    assert fading([fades], 20) == pytest.approx(0.13, rel=0.01)
+    stays = replace(flight, motion=flight.motion._replace(rate=np.ones((200, 3))))
+    assert fading([stays], 20) == pytest.approx(100 * 20 * 0.01)
+    # A stretch that is shorter than the horizon tells what it can.
+    short = replace(fades, stretches=(slice(0, 5), slice(100, 104)))
+    assert fading([short], 20) == pytest.approx(0.13, rel=0.01)
+
+
+def test_chance_is_what_blocks_of_windows_tell_of_the_difference_from_the_model():
+    flight = flight_of(samples=130)
+    found = replay([played(flight, VehicleModel(vehicle=VEHICLE, effects=EFFECTS))], 10, 1)
+    runs = [played(flight).runs(name, np.arange(120), 10).errors for name in (RATE_STAYS, NOTHING_MOVES)]
+    sizes = [np.linalg.norm(errors[:, :, 3], axis=2) for errors in runs]
+    model = found.predictions.index(MODEL)
+    assert np.all(found.errors["body_rate"].chance[model] == 0)
+    stated = np.linalg.norm(played(flight).runs(STATED, np.arange(120), 10).errors[:, :, 3], axis=2)
+    own = played(flight, VehicleModel(vehicle=VEHICLE, effects=EFFECTS)).runs(MODEL, np.arange(120), 10).errors
+    apart = stated - np.linalg.norm(own[:, :, 3], axis=2)
+    # Six blocks of two horizons; leaving out one of six is to leave the mean of five.
+    means = apart.reshape(6, 20, 10).mean(axis=1)
+    error = means.std(axis=0, ddof=1) / np.sqrt(6)
+    row = found.predictions.index(STATED)
+    np.testing.assert_allclose(found.errors["body_rate"].chance[row], 2.5706 * error, rtol=1e-4)
+    np.testing.assert_allclose(sizes[0], sizes[1])
+    few = replay([played(flight_of(samples=80))], 10, 1)
+    assert few.errors["body_rate"].chance is None
 
 
 def test_errors_by_horizon_are_means_over_all_windows_of_all_flights():
@@ -197,13 +247,13 @@ def test_a_model_is_better_where_it_was_played_along_what_it_flies():
     moving = replace(moving, motion=moving.motion._replace(rate=flown))
     still = replace(still, motion=still.motion._replace(rate=np.zeros((120, 3))))
     all_played = [played(moving), played(still)]
-    region = where_better(all_played, replay(all_played, 10, 1).windows)
+    region = where_better(all_played, replay(all_played, 10, 1))
     assert 0.3 < region.share <= 0.5
     sizes = np.linalg.norm(flown[:110], axis=1)
     assert sizes.min() <= region.rate[0] < region.rate[1] <= sizes.max()
     assert region.speed is not None
     alone = [played(replace(moving, has_velocity=False))]
-    assert where_better(alone, replay(alone, 10, 1).windows).speed is None
+    assert where_better(alone, replay(alone, 10, 1)).speed is None
 
 
 def test_a_signal_that_no_flight_knows_has_no_errors():

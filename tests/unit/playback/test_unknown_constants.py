@@ -133,6 +133,16 @@ def test_with_a_moment_of_inertia_that_no_body_has_nothing_that_turns_it_is_dete
     assert determined == [True, known, known, known, True]
 
 
+def test_a_moment_that_is_more_than_the_others_together_is_not_determined_and_they_are():
+    numbers = [
+        FoundNumber(f"inertia.{name}", "", value, 0.0, 1.0, np.nan, True, False)
+        for name, value in (("Ixx", 0.003), ("Izz", 0.009))
+    ]
+    vehicle = replace(TRUE.vehicle, inertia_kg_m2=(0.003, 0.004, 0.005))
+    assert [number.determined for number in bodily(vehicle, numbers)] == [True, False]
+    assert all(number.determined for number in bodily(replace(vehicle, inertia_kg_m2=(0.003, 0.006, 0.005)), numbers))
+
+
 LOOP = LoopBounds(np.array([0.8, 0.5, np.nan]), np.array([1.1, 1.6, np.nan]), np.array([0.95, 0.6, np.nan]))
 
 
