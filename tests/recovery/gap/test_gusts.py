@@ -1,4 +1,4 @@
-"""Gusts called gusts where instruments tell, effects named beside them, and their numbers, in flights of known truth."""
+"""Gusts called gusts where instruments tell, names and numbers beside them, in flights of known truth."""
 
 from dataclasses import replace
 
