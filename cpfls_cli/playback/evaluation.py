@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray, Numbers
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.polynomial import Probe
 from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, symmetric
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -30,12 +30,12 @@ from cpfls_cli.playback.parameters import (
     FreeNumbers,
     Physical,
 )
-from cpfls_cli.playback.rotors import RotorResponse, rotor_terms_by_step
+from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse, rotor_terms_slope
 from cpfls_cli.playback.table import body_of, effect_weights, rotor_weights, used_terms, weights_by_step
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_STEP = 1e-30
-"""Imaginary step of a derivative: so small that no digit is lost."""
+_TIMES: Mapping[str, TimeOfResponse] = {DELAY: "delay_s", LAG: "lag_s", SLOW: "slow_s"}
+"""Times of the response that numbers are."""
 
 
 @dataclass(frozen=True)
@@ -263,18 +263,15 @@ class Evaluated:
         array, shape (samples, 1 + 4 rotors)
         """
         response = self.at.response
-        delay: complex = response.delay_s + (1j * _STEP if by == DELAY else 0.0)
-        lag: complex = response.lag_s + (1j * _STEP if by == LAG else 0.0)
-        slow: complex = response.slow_s * (1 + 1j * _STEP if by == SLOW else 1.0)
-        given = (delay, lag, slow) if by else (response.delay_s, response.lag_s, response.slow_s)
-        parts: list[Numbers] = [
-            rotor_terms_by_step(flight.speed[part], flight.motion.period, flight.hold, *given)
+        if not by:
+            slow = response.slow_s if SLOW in self.at.free.index else None
+            return np.asarray(flight.rotor_terms(response.delay_s, response.lag_s, slow)[samples])
+        slopes = [
+            rotor_terms_slope(flight.speed[part], flight.motion.period, flight.hold, response, _TIMES[by])
             for part in flight.stretches
         ]
-        terms = np.zeros((len(flight), parts[0].shape[1]))
-        for part, found in zip(flight.stretches, parts, strict=True):
-            terms[part] = found.imag / _STEP if by else found.real
-        return terms[samples]
+        # The number is the logarithm of the slow time.
+        return np.concatenate(slopes)[samples] * (response.slow_s if by == SLOW else 1.0)
 
     def weights(self, terms: Array) -> Array:
         """Evaluate the weights over steps of given terms of the rotors, shape (samples, 6, active)."""
@@ -309,7 +306,7 @@ class Evaluated:
 
 def _weight_derivative(at: VehicleAt, name: str) -> Array | None:
     """Differentiate the weights of a vehicle by a number; None by one of the rotors' response in time."""
-    if name in (DELAY, LAG, SLOW):
+    if name in _TIMES:
         return None
     columns, coefficients = at.free.columns, at.coefficients
     if name in columns:

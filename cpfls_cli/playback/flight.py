@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -12,7 +13,10 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.kernels import MeasuredMotion
-from cpfls_cli.playback.rotors import Hold
+from cpfls_cli.playback.rotors import Hold, rotor_terms_by_step
+
+_REMEMBERED = 4
+"""Terms of rotors: derivatives follow the loss at the same numbers, and two threads ask."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +68,17 @@ class PlaybackFlight:
     def shown(self) -> BoolArray:
         """Whether runs tell position, velocity, attitude and rate, shape (4,)."""
         return np.array([self.translates, self.translates, self.has_attitude, True])
+
+    @cached_property
+    def rotor_terms(self) -> Callable[[float, float, float | None], Array]:
+        """Terms of the rotors over each step by the times of their response, of which the last few are remembered."""
+
+        def terms(delay_s: float, lag_s: float, slow_s: float | None) -> Array:
+            period, hold = self.motion.period, self.hold
+            found = [rotor_terms_by_step(self.speed[p], period, hold, delay_s, lag_s, slow_s) for p in self.stretches]
+            return np.concatenate(found)
+
+        return lru_cache(maxsize=_REMEMBERED)(terms)
 
     def starts(self, horizon: int, every: int) -> IntArray:
         """List every n-th sample from which a horizon fits into its stretch.

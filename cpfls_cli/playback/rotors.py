@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, Numbers
-from cpfls_cli.lag import delayed, lagged
+from cpfls_cli.arrays import Array
+from cpfls_cli.lag import Lagged, delayed, lagged
 
 Hold = Literal["linear", "previous"]
+TimeOfResponse = Literal["delay_s", "lag_s", "slow_s"]
+
+_STEP = 1e-30
+"""Imaginary step of a derivative: so small that no digit is lost."""
 
 _SHORTEST_S = 1e-5
 """Lag below which a held speed jumps: a hundredth of the shortest sample."""
@@ -40,8 +44,7 @@ class RotorResponse:
 
     def terms_by_step(self, speed: Array, period: float, hold: Hold) -> Array:
         """Evaluate the terms of the rotors over each step; parameters and shape as `rotor_terms_by_step`."""
-        terms = rotor_terms_by_step(speed, period, hold, self.delay_s, self.lag_s, self.slow_s)
-        return np.asarray(terms, dtype=float)
+        return rotor_terms_by_step(speed, period, hold, self.delay_s, self.lag_s, self.slow_s)
 
     def terms_at_samples(self, speed: Array, period: float, hold: Hold) -> Array:
         """Evaluate the terms of the rotors at the samples themselves, where torque and force are asked for.
@@ -59,7 +62,9 @@ class RotorResponse:
         return np.asarray(np.hstack([one, acting, acting**2, acceleration, slow - acting**2]), dtype=float)
 
 
-def rotor_terms_by_step(speed: Array, period: float, hold: Hold, delay_s: Any, lag_s: Any, slow_s: Any) -> Numbers:
+def rotor_terms_by_step(
+    speed: Array, period: float, hold: Hold, delay_s: float, lag_s: float, slow_s: float | None
+) -> Array:
     """Evaluate the terms of the rotors over each step: means of acting speeds, their squares, accelerations, slowness.
 
     Parameters
@@ -69,8 +74,8 @@ def rotor_terms_by_step(speed: Array, period: float, hold: Hold, delay_s: Any, l
     period : float, s
     hold : {"linear", "previous"}
         What a speed is between samples: a straight line, or what it was at the sample before.
-    delay_s, lag_s, slow_s : float or complex
-        As in `RotorResponse`; a complex one carries a derivative.
+    delay_s, lag_s, slow_s : float
+        As in `RotorResponse`; None for no slowness, which is left 0.
 
     Returns
     -------
@@ -79,9 +84,30 @@ def rotor_terms_by_step(speed: Array, period: float, hold: Hold, delay_s: Any, l
     """
     mean, end, start = lagged(delayed(speed, delay_s / period, hold), lag_s / period, hold)
     squared = mean**2
-    slow = lagged(squared, slow_s / period, "previous").mean
-    one = np.ones((len(speed), 1), dtype=mean.dtype)
-    return np.hstack([one, mean, squared, (end - start) / period, slow - squared])
+    slow = squared if slow_s is None else lagged(squared, slow_s / period, "previous").mean
+    return np.hstack([np.ones((len(speed), 1)), mean, squared, (end - start) / period, slow - squared])
+
+
+def rotor_terms_slope(
+    speed: Array, period: float, hold: Hold, response: RotorResponse, by: TimeOfResponse
+) -> Array:
+    """Differentiate `rotor_terms_by_step` by one of the times of the response.
+
+    Signals go through filters that are linear, so that a complex step is taken of their numbers alone.
+    """
+    delay, lag, slow = (time / period for time in (response.delay_s, response.lag_s, response.slow_s))
+    acting, step = delayed(speed, delay, hold), 1j * _STEP / period
+    mean, end, start = lagged(acting, lag, hold)
+    if by == "slow_s":
+        faster = lagged(mean**2, slow + step, "previous").mean.imag / _STEP
+        return np.hstack([np.zeros((len(speed), 1 + 3 * speed.shape[1])), faster])
+    if by == "delay_s":
+        moved = lagged(delayed(speed, delay + step, hold).imag / _STEP, lag, hold)
+    else:
+        moved = Lagged(*(each.imag / _STEP for each in lagged(acting, lag + step, hold)))
+    squared = 2.0 * mean * moved.mean
+    slowness = lagged(squared, slow, "previous").mean - squared
+    return np.hstack([np.zeros((len(speed), 1)), moved.mean, squared, (moved.end - moved.start) / period, slowness])
 
 
 def steady_terms(speed: Array) -> Array:
