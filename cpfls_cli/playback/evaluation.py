@@ -208,28 +208,34 @@ class VehicleAt:
 class Evaluated:
     """A vehicle at values with its derivatives by them, as the compiled loops take it.
 
-    Attributes
-    ----------
-    derivatives : list of array, shape (6, terms, 1 + 4 rotors), or None
-        Of the weights by each number; None by those of the rotors' response in time.
-    used : Terms
-        Terms of the motion that have weights, or derivatives.
+    What only derivatives take is evaluated when it is asked for.
     """
 
     at: VehicleAt
-    derivatives: list[Array | None]
-    used: Terms
 
     @classmethod
     def of(cls, free: FreeNumbers, values: Array) -> Evaluated:
         """Evaluate numbers at values, shape (number,)."""
-        at = VehicleAt(free, values)
-        derivatives = [_weight_derivative(at, number.name) for number in free.numbers]
-        touched = at.table != 0
-        for each in derivatives:
+        return cls(VehicleAt(free, values))
+
+    @cached_property
+    def derivatives(self) -> list[Array | None]:
+        """Of the weights by each number, shape (6, terms, 1 + 4 rotors); None by those of the rotors' response."""
+        return [_weight_derivative(self.at, number.name) for number in self.at.free.numbers]
+
+    @cached_property
+    def flown(self) -> Terms:
+        """Terms of the motion that have weights."""
+        return used_terms(self.at.table, self.at.free.used_airflow)
+
+    @cached_property
+    def used(self) -> Terms:
+        """Terms of the motion that have weights, or derivatives."""
+        touched = self.at.table != 0
+        for each in self.derivatives:
             if each is not None:
                 touched |= each != 0
-        return cls(at, derivatives, used_terms(touched, free.used_airflow))
+        return used_terms(touched, self.at.free.used_airflow)
 
     @cached_property
     def body(self) -> Body:
@@ -273,31 +279,33 @@ class Evaluated:
         # The number is the logarithm of the slow time.
         return np.concatenate(slopes)[samples] * (response.slow_s if by == SLOW else 1.0)
 
-    def weights(self, terms: Array) -> Array:
+    def weights(self, terms: Array, used: Terms) -> Array:
         """Evaluate the weights over steps of given terms of the rotors, shape (samples, 6, active)."""
-        return weights_by_step(self.at.table, self.used, terms)
+        return weights_by_step(self.at.table, used, terms)
+
+    @cached_property
+    def _entries(self) -> tuple[IntArray, Array, IntArray]:
+        """Weights of the used terms that change with each number: row and term, by terms of the rotors, first ones."""
+        places, weights = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((0, self.at.free.table_shape[2]))]
+        for derivative in self.derivatives:
+            own = (self.at.table if derivative is None else derivative)[:, self.used.active]
+            # The first term of the rotors is constant, so the response in time leaves it.
+            places.append(np.argwhere(own[:, :, 0 if derivative is not None else 1 :].any(axis=2)))
+            weights.append(own[places[-1][:, 0], places[-1][:, 1]])
+        first = np.cumsum([len(each) for each in places], dtype=np.int64)
+        return np.concatenate(places), np.concatenate(weights), first
 
     def parameters(self, flight: PlaybackFlight, samples: IntArray, terms: Array) -> Parameters:
         """Differentiate the weights over these steps, and the inertia, by each number."""
-        entries, weights, first = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((0, terms.shape[1]))], [0]
-        of_response: dict[str, slice] = {}
-        for number, derivative in zip(self.at.free.numbers, self.derivatives, strict=True):
-            own = (self.at.table if derivative is None else derivative)[:, self.used.active]
-            # The first term of the rotors is constant, so the response in time leaves it.
-            places = np.argwhere(np.any(own[:, :, 0 if derivative is not None else 1 :], axis=2))
-            entries.append(places)
-            weights.append(own[places[:, 0], places[:, 1]])
-            first.append(first[-1] + len(places))
-            if derivative is None:
-                of_response[number.name] = slice(*first[-2:])
-        joined, by_entry = np.concatenate(entries), np.concatenate(weights)
+        places, by_entry, first = self._entries
         values = terms @ by_entry.T
-        for name, part in of_response.items():
+        for name in _TIMES.keys() & self.at.free.index.keys():
+            part = slice(*first[self.at.free.index[name] :][:2])
             values[:, part] = self.rotor_terms(flight, samples, name) @ by_entry[part].T
         return Parameters(
-            np.ascontiguousarray(joined[:, 0]),
-            np.ascontiguousarray(joined[:, 1]),
-            np.array(first, dtype=np.int64),
+            np.ascontiguousarray(places[:, 0]),
+            np.ascontiguousarray(places[:, 1]),
+            first,
             values,
             self.inertia_derivatives,
             np.asarray(np.any(self.inertia_derivatives, axis=(1, 2))),

@@ -286,21 +286,24 @@ def fit_parts(
         own = [window for window, keep in zip(windows, kept, strict=True) if keep]
 
         def evaluated(values: Array) -> FitPoint:
-            return _Sums(free, own, values).mean()
+            sums = _Sums(free, own, values)
+            return sums.mean(sums.losses())
 
         return minimised(evaluated, point, free.scales, bounds, steps, tolerance)
 
-    start = _Sums(free, windows, np.clip(free.values(known), *bounds)).mean()
+    begun = _Sums(free, windows, np.clip(free.values(known), *bounds))
+    start = begun.mean(begun.losses())
     if not np.isfinite(start.objective):
         raise ComputationError("the prediction error is not finite at the stated numbers; look at the units of the log")
     sums = _Sums(free, windows, best(place >= 0, start, steps).values)
-    whole = sums.mean()
+    losses = sums.losses()
+    whole = sums.mean(losses)
     # The derivatives along all windows are taken here, before threads ask for parts of them.
     hessian = whole.hessian
 
     def without(part: int) -> FittedNumbers:
         kept = place != part
-        point = best(kept, sums.mean(kept), 1)
+        point = best(kept, sums.mean(losses, kept), 1)
         return FittedNumbers(free, point.values, point.loss)
 
     with ThreadPoolExecutor(2) as threads:
@@ -326,11 +329,6 @@ class _Sums:
                 found[window.flight.group] = Evaluated.of(own, self.values[places]), places
         return found
 
-    @cached_property
-    def losses(self) -> Array:
-        """Sums of the loss, shape (windows,)."""
-        return np.array([window_loss(self._of_groups[each.flight.group][0], each) for each in self.windows])
-
     def derivatives(self, groups: Sequence[IntArray]) -> list[tuple[Array, Array]]:
         """Sum gradient and Hessian by all numbers along each, shapes (group, number) and (group, number, number)."""
 
@@ -352,7 +350,15 @@ class _Sums:
         gradient, hessian = zip(*self.derivatives(none), strict=True)
         return np.concatenate(gradient), np.concatenate(hessian)
 
-    def mean(self, kept: BoolArray | slice = slice(None)) -> FitPoint:
+    def losses(self) -> Array:
+        """Sum the loss along each, shape (windows,)."""
+        with ThreadPoolExecutor(2) as threads:
+            return np.array(list(threads.map(self._loss, self.windows)))
+
+    def _loss(self, window: FitWindows) -> float:
+        return window_loss(self._of_groups[window.flight.group][0], window)
+
+    def mean(self, losses: Array, kept: BoolArray | slice = slice(None)) -> FitPoint:
         """Take the means over the runs of some of the windows."""
         count = np.array([len(window.starts) for window in self.windows])[kept].sum()
 
@@ -361,15 +367,15 @@ class _Sums:
             return gradient, hessian
 
         believed = Believed(self.free.starts, self.free.scales, self.free.spreads)
-        return FitPoint(self.values, float(self.losses[kept].sum() / count), derivatives, believed)
+        return FitPoint(self.values, float(losses[kept].sum() / count), derivatives, believed)
 
 
 def window_loss(evaluated: Evaluated, window: FitWindows) -> float:
     """Sum the loss over the windows of a flight."""
     flight = window.flight
     group, none = np.zeros(len(window.starts), dtype=np.int64), np.zeros((1, 0))
-    weights = evaluated.weights(evaluated.rotor_terms(flight, window.samples))
-    body, used, places, moves = evaluated.body, evaluated.used, window.places, flight.translates
+    body, used, places, moves = evaluated.body, evaluated.flown, window.places, flight.translates
+    weights = evaluated.weights(evaluated.rotor_terms(flight, window.samples), used)
     return float(
         sensitivities(
             window.motion, body, used, weights, NO_PARAMETERS, window.loss, places, moves, group, none, none[:, None]
@@ -398,7 +404,7 @@ def window_sums(evaluated: Evaluated, window: FitWindows, group: IntArray) -> tu
         window.motion,
         evaluated.body,
         evaluated.used,
-        evaluated.weights(terms),
+        evaluated.weights(terms, evaluated.used),
         evaluated.parameters(flight, window.samples, terms),
         window.loss,
         window.places,
@@ -473,8 +479,8 @@ def window_errors(fitted: FittedNumbers, window: FitWindows) -> Array:
     errors_of_runs(
         window.motion,
         evaluated.body,
-        evaluated.used,
-        evaluated.weights(evaluated.rotor_terms(flight, window.samples)),
+        evaluated.flown,
+        evaluated.weights(evaluated.rotor_terms(flight, window.samples), evaluated.flown),
         window.places,
         flight.translates,
         errors,

@@ -108,7 +108,7 @@ def errors_with_past(fitted: FittedNumbers, observer: Observer, windows: FitWind
         begun = _Begun.of(at, each, observer.past_s)
         errors = np.empty((len(each.starts), each.horizon, 4, 3))
         weights = begun.weights(at, begun.pushed(observer))
-        errors_of_runs(each.motion, at.body, at.used, weights, each.places, each.flight.translates, errors)
+        errors_of_runs(each.motion, at.body, at.flown, weights, each.places, each.flight.translates, errors)
         found.append(weighed(each.loss, errors))
     return np.concatenate(found)
 
@@ -134,9 +134,7 @@ def _chunks(windows: Sequence[FitWindows]) -> Iterator[FitWindows]:
 
 def _evaluated(fitted: FittedNumbers) -> Evaluated:
     """Evaluate a forecast with the constant among its terms: that is what pushes."""
-    at = Evaluated.of(fitted.free.base, fitted.values[: len(fitted.free.base.numbers)])
-    active = np.union1d([0], at.used.active).astype(np.int64)
-    return Evaluated(at.at, at.derivatives, at.used._replace(active=active))
+    return Evaluated.of(fitted.free.base, fitted.values[: len(fitted.free.base.numbers)])
 
 
 class _Begun(NamedTuple):
@@ -163,8 +161,8 @@ class _Begun(NamedTuple):
         errors = np.empty((len(samples) - 1, 1, 4, 3))
         position, velocity, rotation, rate = (np.ascontiguousarray(each[samples]) for each in flight.motion[:4])
         motion = MeasuredMotion(position, velocity, rotation, rate, flight.motion.period)
-        weights = at.weights(at.rotor_terms(flight, samples))
-        errors_of_runs(motion, at.body, at.used, weights, np.arange(len(errors)), flight.translates, errors)
+        weights = at.weights(at.rotor_terms(flight, samples), at.flown)
+        errors_of_runs(motion, at.body, at.flown, weights, np.arange(len(errors)), flight.translates, errors)
         missed = np.zeros((len(samples), 6))
         missed[:-1] = missed_wrench(flight, samples[:-1], errors[:, 0], at.body)
         terms = at.rotor_terms(flight, window.samples)
@@ -178,7 +176,7 @@ class _Begun(NamedTuple):
 
     def weights(self, at: Evaluated, pushed: Array) -> Array:
         """Evaluate the weights of the runs with what pushes them, shape (sample, 6, active)."""
-        weights = at.weights(self.terms)
+        weights = at.weights(self.terms, at.flown)
         weights[:, :, 0] += pushed
         return weights
 
@@ -194,7 +192,7 @@ def _point(at: Evaluated, begun: Sequence[_Begun], past_s: float, values: Array)
             sensitivities(
                 window.motion,
                 at.body,
-                at.used,
+                at.flown,
                 each.weights(at, pushed),
                 _pushing(np.hstack([(each.pushed(observer) - pushed) / _STEP for observer in moved])),
                 window.loss,

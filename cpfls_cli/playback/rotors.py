@@ -88,9 +88,7 @@ def rotor_terms_by_step(
     return np.hstack([np.ones((len(speed), 1)), mean, squared, (end - start) / period, slow - squared])
 
 
-def rotor_terms_slope(
-    speed: Array, period: float, hold: Hold, response: RotorResponse, by: TimeOfResponse
-) -> Array:
+def rotor_terms_slope(speed: Array, period: float, hold: Hold, response: RotorResponse, by: TimeOfResponse) -> Array:
     """Differentiate `rotor_terms_by_step` by one of the times of the response.
 
     Signals go through filters that are linear, so that a complex step is taken of their numbers alone.

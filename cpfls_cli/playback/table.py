@@ -89,7 +89,7 @@ class WrenchTable:
         return np.asarray(np.einsum("ta,kau->tku", self.terms(velocity, rate), self.weights, optimize=True))
 
     def by_step(self, rotor: Array) -> tuple[Terms, Array]:
-        """Evaluate the weights of the terms of the motion over each step, the constant among them always.
+        """Evaluate the weights of the terms of the motion over each step.
 
         Parameters
         ----------
@@ -102,8 +102,7 @@ class WrenchTable:
             Those in use.
         weights : array, shape (time, 6, active)
         """
-        found = used_terms(self.weights, self.airflow)
-        used = found._replace(active=np.union1d([0], found.active).astype(np.int64))
+        used = used_terms(self.weights, self.airflow)
         return used, weights_by_step(self.weights, used, rotor)
 
 
@@ -119,9 +118,10 @@ def body_of(vehicle: VehicleSettings, inertia: Array) -> Body:
 
 
 def used_terms(table: Array, airflow: Airflow) -> Terms:
-    """List the terms of the motion that have weights."""
-    active = np.flatnonzero(np.any(table, axis=(0, 2))).astype(np.int64)
-    return Terms(airflow, active, table.shape[1])
+    """List the terms of the motion that have weights, the constant among them always."""
+    active = np.any(table, axis=(0, 2))
+    active[0] = True
+    return Terms(airflow, np.flatnonzero(active).astype(np.int64), table.shape[1])
 
 
 def weights_by_step(table: Array, used: Terms, rotor: Array) -> Array:

@@ -75,7 +75,8 @@ def test_the_model_of_the_numbers_runs_as_they_do(flight, rules):
     runs, expected = (np.empty((len(starts), 30, 4, 3)) for _ in range(2))
     errors_of_runs(flight.motion, model.body, used, weights, starts, True, runs)
     terms = evaluated.rotor_terms(flight, np.arange(len(flight)))
-    errors_of_runs(flight.motion, evaluated.body, evaluated.used, evaluated.weights(terms), starts, True, expected)
+    used = evaluated.flown
+    errors_of_runs(flight.motion, evaluated.body, used, evaluated.weights(terms, used), starts, True, expected)
     assert runs == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.abs(expected).max())
 
 
