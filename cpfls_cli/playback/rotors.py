@@ -95,17 +95,17 @@ def rotor_terms_slope(speed: Array, period: float, hold: Hold, response: RotorRe
     """
     delay, lag, slow = (time / period for time in (response.delay_s, response.lag_s, response.slow_s))
     acting, step = delayed(speed, delay, hold), 1j * _STEP / period
-    mean, end, start = lagged(acting, lag, hold)
+    mean = lagged(acting, lag, hold).mean
     if by == "slow_s":
-        faster = lagged(mean**2, slow + step, "previous").mean.imag / _STEP
-        return np.hstack([np.zeros((len(speed), 1 + 3 * speed.shape[1])), faster])
+        slope = lagged(mean**2, slow + step, "previous").mean.imag / _STEP
+        return np.hstack([np.zeros((len(speed), 1 + 3 * speed.shape[1])), slope])
     if by == "delay_s":
         moved = lagged(delayed(speed, delay + step, hold).imag / _STEP, lag, hold)
     else:
         moved = Lagged(*(each.imag / _STEP for each in lagged(acting, lag + step, hold)))
-    squared = 2.0 * mean * moved.mean
-    slowness = lagged(squared, slow, "previous").mean - squared
-    return np.hstack([np.zeros((len(speed), 1)), moved.mean, squared, (moved.end - moved.start) / period, slowness])
+    square = 2.0 * mean * moved.mean
+    slope = lagged(square, slow, "previous").mean - square
+    return np.hstack([np.zeros((len(speed), 1)), moved.mean, square, (moved.end - moved.start) / period, slope])
 
 
 def steady_terms(speed: Array) -> Array:
