@@ -14,6 +14,8 @@ from .vehicles import GRAVITY, SIXKG
 MOTION = (
     "t", "phi", "theta", "psi", "wx", "wy", "wz", "x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az",
 )  # fmt: skip
+ASKED = ("xd", "yd", "zd", "vxd", "vyd", "vzd")
+"""Setpoints of position and velocity."""
 GROUPS = ("attitude", "gyro", "position", "velocity", "acceleration", "rotor", "volt")
 
 
@@ -162,9 +164,11 @@ def attacked(table, attack):
     return out
 
 
-def save(table, left_out, path):
-    """Write a log as CSV without the columns left out."""
+def save(table, left_out, path, asked=None):
+    """Write a log as CSV without the columns left out; with ``asked``, what was asked of the vehicle stands last."""
     names = columns((table.shape[1] - len(MOTION) - 1) // 2)
+    if asked is not None:
+        names, table = (*names, *ASKED), np.hstack([table, asked])
     kept = [i for i, name in enumerate(names) if name not in left_out]
     form = ",".join(["%.2f" if i == 0 else "%.8g" for i in kept])
     lines = "\n".join(form % tuple(row) for row in table[:, kept].tolist())

@@ -8,6 +8,7 @@ from pathlib import Path
 import yaml
 
 from benchmarks.blind.generator import DURATION, simulate_many, write, write_key
+from benchmarks.blind.measure import ASKED
 
 _COLUMNS_OF = Path(__file__).parents[2] / "configs" / "gap" / "sixkg.yaml"
 
@@ -33,7 +34,8 @@ def fly(group, folder, duration=DURATION):
         for each in own:
             logs = Path(folder) / "flights" / each.name
             write(flights, logs, each.level, each.kind, each.generator())
-            (logs / "study.yaml").write_text(config(logs / "vehicle.json"), encoding="utf-8")
+            asked = each.case.instruments == "setpoints"
+            (logs / "study.yaml").write_text(config(logs / "vehicle.json", asked), encoding="utf-8")
             _write_key(flights, each, Path(folder) / "keys" / each.name)
             written.append(logs)
     return written
@@ -54,12 +56,14 @@ def flown(each, folder):
     return all(told.get(name) == value for name, value in wanted.items())
 
 
-def config(vehicle_file):
+def config(vehicle_file, asked=False):
     """Describe a vehicle and the columns of its logs as a config.
 
     Parameters
     ----------
     vehicle_file : Path
+    asked : bool
+        Whether they hold what was asked of it.
 
     Returns
     -------
@@ -85,6 +89,9 @@ def config(vehicle_file):
     logged = yaml.safe_load(_COLUMNS_OF.read_text(encoding="utf-8"))["import"]
     for signal, prefix in (("rotor_speed", "om"), ("rotor_command", "omcmd")):
         logged["signals"][signal]["columns"] = [f"{prefix}{number + 1}" for number in range(len(told["spin"]))]
+    if asked:
+        for name, columns, unit in (("position", ASKED[:3], "m"), ("velocity", ASKED[3:], "m/s")):
+            logged["signals"][f"setpoint_{name}"] = {"columns": list(columns), "unit": unit}
     # PyYAML writes 1e-05, which a YAML parser of another make reads as text.
     return json.dumps({"seed": 1, "vehicle": vehicle, "import": logged}, indent=1)
 
