@@ -101,8 +101,13 @@ def make(name, group, vehicle, effects, rng, level=None, **options):
     )
 
 
-INSTRUMENTS = ("none", "setpoints", "repeats")
-"""Nothing; the position and velocity asked for in the log; or each path flown once more, in other gusts and noise."""
+INSTRUMENTS = {
+    "none": (),
+    "setpoints": ("setpoint_position", "setpoint_velocity"),
+    "sticks": ("setpoint_position", "setpoint_velocity", "sticks"),
+    "repeats": (),
+}
+"""What the log holds of what was asked for; with repeats each path is flown once more, in other gusts and noise."""
 
 
 def in_air(case, level, instruments, seed):

@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import oaconvolve
 
 from . import turning
-from .cases import Case, cases
+from .cases import INSTRUMENTS, Case, cases
 from .gusts import blown
 from .measure import KINDS, NOISE, attacked, columns, disturb, observe, save
 from .missions import MISSIONS, mission
@@ -41,14 +41,14 @@ _WINDOW = 40
 class Flight:
     """One flight: ``table`` is the noiseless log (time, columns), ``truth`` the motion as integrated.
 
-    ``asked`` is the position and velocity asked for (time, 6), ``gusts`` the torque and force of the air (time, 6).
+    ``asked`` maps what was asked to its columns (time, 3), ``gusts`` the torque and force of the air (time, 6).
     """
 
     role: str
     mission: str
     table: np.ndarray
     truth: dict
-    asked: np.ndarray
+    asked: dict
     gusts: np.ndarray
 
 
@@ -96,7 +96,7 @@ def _collect(case, plans, record, first):
     for number, plan in enumerate(plans):
         truth = {name: values[first + number] for name, values in record.items()}
         role, table = ROLES[number * len(ROLES) // len(plans)], observe(truth, case)
-        asked = np.hstack([plan.mission.position, plan.mission.velocity])[: len(table)]
+        asked = {name: values[: len(table)] for name, values in plan.mission.asked().items()}
         flights.append(Flight(role, plan.mission.name, table, truth, asked, blown(plan, len(table))))
     return Flights(case, plans[0].vehicle, tuple(flights))
 
@@ -162,7 +162,7 @@ def write(flights: Flights, folder, noise_level, kind, rng) -> list[Path]:
     for name, flight in flights.named().items():
         path = folder / f"{name}.csv"
         noisy = disturb(flight.table, flights.vehicle, noise_level, kind, rng)
-        asked = flight.asked if flights.case.instruments == "setpoints" else None
+        asked = {name: flight.asked[name] for name in INSTRUMENTS[flights.case.instruments]}
         save(attacked(noisy, flights.case.attack), flights.case.left_out, path, asked)
         paths.append(path)
     (folder / "vehicle.json").write_text(json.dumps(flights.vehicle.as_dict(), indent=1) + "\n", encoding="ascii")

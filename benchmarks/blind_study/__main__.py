@@ -76,7 +76,7 @@ def _arguments():
     parser.add_argument("--sets", type=int, help="largest number of cases of each group")
     parser.add_argument("--baselines", type=_list, default=("mid",), help="noise levels that simpler ways judge, too")
     parser.add_argument("--gusts", type=_levels, default=GUSTS[:1], help="levels of gusts: 0,1,2")
-    parser.add_argument("--instruments", type=_list, default=INSTRUMENTS[:1], help=",".join(INSTRUMENTS))
+    parser.add_argument("--instruments", type=_list, default=("none",), help=",".join(INSTRUMENTS))
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--keep", action="store_true", help="keep the logs, 4 MB for each set")
     return parser.parse_args()

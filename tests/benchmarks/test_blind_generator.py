@@ -146,29 +146,33 @@ def test_a_path_flown_again_meets_other_gusts(gusty):
     for first, again in ((0, 3), (2, 5), (6, 9)):
         one, other = gusty.flights[first], gusty.flights[again]
         assert one.role == other.role
-        np.testing.assert_array_equal(one.asked, other.asked)
+        np.testing.assert_array_equal(one.asked["sticks"], other.asked["sticks"])
         assert abs(np.corrcoef(one.gusts[:, 0], other.gusts[:, 0])[0, 1]) < 0.95
         assert np.abs(one.truth["x"] - other.truth["x"]).max() < 1.0
-    assert not np.array_equal(gusty.flights[0].asked, gusty.flights[6].asked)
+    assert not np.array_equal(gusty.flights[0].asked["sticks"], gusty.flights[6].asked["sticks"])
 
 
 def test_gusts_turn_a_craft_less_the_longer_its_arms_are():
+    small = replace(SIXKG, rotors=tuple((0.16 / 0.3 * x, 0.16 / 0.3 * y, z) for x, y, z in SIXKG.rotors))
     turned_by = [
         np.array(gusts(craft, level, np.random.default_rng(2))["size"][:3]) / craft.inertia
-        for craft, level in ((CRAZYFLIE, 1), (CRAZYFLIE, 2), (SIXKG, 1))
+        for craft, level in ((small, 1), (small, 2), (SIXKG, 1))
     ]
-    np.testing.assert_allclose(turned_by[0], [3.4, 5.1, 2.0], rtol=0.25)
+    np.testing.assert_allclose(turned_by[0], np.array([3.4, 5.1, 2.0]) * CRAZYFLIE.arm / 0.16, rtol=0.25)
     np.testing.assert_allclose(turned_by[1], 2 * turned_by[0])
-    np.testing.assert_allclose(turned_by[2], turned_by[0] * CRAZYFLIE.arm / SIXKG.arm)
+    np.testing.assert_allclose(turned_by[2], turned_by[0] * 0.16 / SIXKG.arm)
 
 
 def test_what_was_asked_stands_in_the_log_where_it_is_the_instrument(gusty, tmp_path):
-    for instruments in ("setpoints", "repeats"):
+    asked, there = gusty.flights[-1].asked, {"setpoints": {"zd"}, "sticks": {"zd", "pitch"}, "repeats": set()}
+    for instruments, columns in there.items():
         flights = replace(gusty, case=replace(gusty.case, instruments=instruments))
         *_, path = generator.write(flights, tmp_path / instruments, "low", "white", np.random.default_rng(1))
         heads, first, *_ = path.read_text().splitlines()
         row = dict(zip(heads.split(","), map(float, first.split(",")), strict=True))
-        assert row.get("zd") == (pytest.approx(gusty.flights[-1].asked[0, 2]) if instruments == "setpoints" else None)
+        assert {"zd", "pitch"} & {*row} == columns
+        assert row.get("zd", 0.0) in (0.0, pytest.approx(asked["setpoint_position"][0, 2]))
+        assert row.get("pitch", 0.0) in (0.0, pytest.approx(asked["sticks"][0, 1]))
     key = json.loads(generator.write_key(gusty, tmp_path / "keys").read_text())
     assert key["air"] == gusty.case.air
     assert max(key["residual_rms_n_m"]["train_1"]) < 0.2 * max(key["gusts_averaged_n_m"]["train_1"])
