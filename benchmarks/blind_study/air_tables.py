@@ -27,12 +27,13 @@ def air_totals(judged):
         ("outside the catalogue: NAMED", percent, _outside, "at most 2 %"),
         ("two or three effects: all named", percent, _several, "92 %"),
         ("95 % intervals that hold the hidden value", percent, _held, "90 to 98 %"),
-        ("channels in gusts: told", percent, _told, ""),
+        ("channels in gusts: told to be all that is left", percent, _told, ""),
+        ("channels in gusts: told how large", percent, _sized, ""),
         (f"of these: size within {100 * _SIZE:.0f} %", percent, lambda own: _near(own, "size"), "all"),
         (f"of these: memory within a factor of {_MEMORY:.0f}", percent, lambda own: _near(own, "memory"), "all"),
         ("of these: size in its interval", percent, lambda own: _within(own, ""), "90 to 98 %"),
         ("of these: memory in its interval", percent, lambda own: _within(own, "memory_"), "90 to 98 %"),
-        ("channels without gusts: gusts told", percent, _told_in_vain, "0"),
+        ("channels without gusts: told to be all that is left", percent, _told_in_vain, "0"),
     ]
     airs = _airs(judged)
     if all(each.usual for each in judged):
@@ -58,11 +59,11 @@ def air_by_channel(judged):
         for channel, told in enumerate(_CHANNELS):
             found = [one for one in _channels(own) if one[1] == channel]
             sizes, memories = (
-                [_ratio(*one, what, what) for one in found if _is_told(*one)] for what in ("size", "memory")
+                [_ratio(*one, what, what) for one in found if _is_sized(*one)] for what in ("size", "memory")
             )
             if sizes:
                 rows.append((name, told, f"{len(sizes)} of {len(found)}", _spread(sizes), _spread(memories)))
-    return table(("air", "channel", "told", "size, found over true", "memory, found over true"), rows)
+    return table(("air", "channel", "told how large", "size, found over true", "memory, found over true"), rows)
 
 
 def _airs(judged):
@@ -118,6 +119,14 @@ def _told(own):
     return [_is_told(*one) for one in _channels(own)]
 
 
+def _is_sized(each, channel):
+    return bool(each.said.get("air")) and each.said["air"]["size"][channel] is not None
+
+
+def _sized(own):
+    return [_is_sized(*one) for one in _channels(own)]
+
+
 def _told_in_vain(own):
     still = [each for each in own if not each.key.get("gusts") and not _AIR & {*each.key["hidden"]}]
     return [_is_told(each, channel) for each in still for channel in range(len(_CHANNELS))]
@@ -130,11 +139,11 @@ def _ratio(each, channel, said, what):
 
 def _near(own, what):
     low, high = (1 - _SIZE, 1 + _SIZE) if what == "size" else (1 / _MEMORY, _MEMORY)
-    return [low <= _ratio(*one, what, what) <= high for one in _channels(own) if _is_told(*one)]
+    return [low <= _ratio(*one, what, what) <= high for one in _channels(own) if _is_sized(*one)]
 
 
 def _within(own, prefix):
-    what, told = "memory" if prefix else "size", [one for one in _channels(own) if _is_told(*one)]
+    what, told = "memory" if prefix else "size", [one for one in _channels(own) if _is_sized(*one)]
     # What is told with no bound is infinite.
     return [_ratio(*one, f"{prefix}low", what) <= 1 <= _ratio(*one, f"{prefix}high", what) for one in told]
 
