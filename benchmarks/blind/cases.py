@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .gusts import gusts
 from .measure import ATTACKS, rotor_columns
 from .strengths import CATALOGUE, FORMS, OUTSIDE, strength
 from .vehicles import STUDIED, VEHICLES
@@ -24,7 +25,8 @@ class Case:
     ``outside`` what no catalogue lists, ``nearest`` the catalogue name of an effect whose form differs.
     ``esc_speed`` logs rotor speeds as a controller believes them, without the loss of voltage;
     ``ideal_command`` logs a command that the rotors follow exactly; ``attack`` is what the logger does to the log;
-    ``only`` the role of the flights that the effects are in, if not all.
+    ``only`` the role of the flights that the effects are in, if not all; ``gusts`` the level of the air, ``air`` its
+    numbers, and ``instruments`` what tells it from the vehicle.
     """
 
     name: str
@@ -41,10 +43,19 @@ class Case:
     ideal_command: bool = False
     attack: str = ""
     only: str = ""
+    gusts: int = 0
+    instruments: str = "none"
+    air: dict = field(default_factory=dict)
+
+    @property
+    def usual(self):
+        """Whether it flies in still air, each path once, and its log holds no setpoints."""
+        return not self.gusts and self.instruments == "none"
 
     def key(self):
         """Give what is hidden as plain data."""
-        return {
+        told = {} if self.usual else {"gusts": self.gusts, "instruments": self.instruments, "air": self.air}
+        return told | {
             "case": self.name,
             "group": self.group,
             "vehicle": self.vehicle,
@@ -88,6 +99,22 @@ def make(name, group, vehicle, effects, rng, level=None, **options):
     return Case(
         name, group, vehicle, hidden, tuple(truth), outside, nearest, left_out=tuple(dict.fromkeys(left_out)), **options
     )
+
+
+INSTRUMENTS = {
+    "none": (),
+    "setpoints": ("setpoint_position", "setpoint_velocity"),
+    "sticks": ("setpoint_position", "setpoint_velocity", "sticks"),
+    "repeats": (),
+}
+"""What the log holds of what was asked for; with repeats each path is flown once more, in other gusts and noise."""
+
+
+def in_air(case, level, instruments, seed):
+    """Give a case in gusts of a level; those of two levels, or with other instruments, differ in nothing else."""
+    rng = np.random.default_rng([seed, *case.name.encode(), *b"gusts"])
+    air = gusts(VEHICLES[case.vehicle], level, rng) if level else {}
+    return replace(case, gusts=level, instruments=instruments, air=air)
 
 
 NAMES = {

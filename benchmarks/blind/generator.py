@@ -9,13 +9,16 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.signal import oaconvolve
 
 from . import turning
-from .cases import Case, cases
+from .cases import INSTRUMENTS, Case, cases
+from .gusts import blown
 from .measure import KINDS, NOISE, attacked, columns, disturb, observe, save
 from .missions import MISSIONS, mission
 from .plant import ALTERATIONS, nominal
@@ -30,44 +33,61 @@ __all__ = [
 
 DURATION = 30.0
 ROLES = ("train", "held_out")
+_WINDOW = 40
+"""Samples of an average."""
 
 
 @dataclass(frozen=True)
 class Flight:
-    """One flight: ``table`` is the noiseless log (time, columns), ``truth`` the motion as integrated."""
+    """One flight: ``table`` is the noiseless log (time, columns), ``truth`` the motion as integrated.
+
+    ``asked`` maps what was asked to its columns (time, 3), ``gusts`` the torque and force of the air (time, 6).
+    """
 
     role: str
     mission: str
     table: np.ndarray
     truth: dict
+    asked: dict
+    gusts: np.ndarray
 
 
 @dataclass(frozen=True)
 class Flights:
-    """The six flights of a case."""
+    """The six flights of a case, or twelve if each path is flown once more."""
 
     case: Case
     vehicle: Vehicle
     flights: tuple[Flight, ...]
 
+    def named(self):
+        """Give each flight under its name, that of its role and its number therein."""
+        count = len(self.flights) // len(ROLES)
+        return {f"{flight.role}_{number % count + 1}": flight for number, flight in enumerate(self.flights)}
+
 
 def _plans(case, seed, duration):
     vehicle = VEHICLES[case.vehicle]
     plans = []
-    for number in range(2 * len(MISSIONS)):
-        hidden = case.hidden if case.only in ("", ROLES[number // len(MISSIONS)]) else {}
-        name = "hover" if case.hover_only else MISSIONS[number % len(MISSIONS)]
-        flight_seed = (seed, number, *case.name.encode())
+    times = range(2 if case.instruments == "repeats" else 1)
+    for role, again, place in product(range(len(ROLES)), times, range(len(MISSIONS))):
+        hidden = case.hidden if case.only in ("", ROLES[role]) else {}
+        name = "hover" if case.hover_only else MISSIONS[place]
+        flight_seed = (seed, role * len(MISSIONS) + place, *case.name.encode())
         plant = nominal(vehicle)
         rng = np.random.default_rng([*flight_seed, 1])
         # Each flight starts with another charge.
         charge = rng.uniform(0.0, 0.6)
+        if again:
+            charge = np.random.default_rng([*flight_seed, 1, again]).uniform(0.0, 0.6)
         for effect, parameters in hidden.items():
             if effect in ALTERATIONS:
                 ALTERATIONS[effect](plant, **parameters)
         plant.sag_start = charge
         wind = np.array(hidden.get("wind", {}).get("velocity", (0.0, 0.0, 0.0)))
-        plans.append(FlightPlan(vehicle, plant, mission(name, vehicle, duration, rng), hidden, wind, flight_seed))
+        path = mission(name, vehicle, duration, rng)
+        flown = hidden | {"gusts": case.air} if case.gusts else hidden
+        plans.append(FlightPlan(vehicle, plant, path, flown, wind, flight_seed, again))
     return plans
 
 
@@ -75,8 +95,9 @@ def _collect(case, plans, record, first):
     flights = []
     for number, plan in enumerate(plans):
         truth = {name: values[first + number] for name, values in record.items()}
-        role = ROLES[number // len(MISSIONS)]
-        flights.append(Flight(role, plan.mission.name, observe(truth, case), truth))
+        role, table = ROLES[number * len(ROLES) // len(plans)], observe(truth, case)
+        asked = {name: values[: len(table)] for name, values in plan.mission.asked().items()}
+        flights.append(Flight(role, plan.mission.name, table, truth, asked, blown(plan, len(table))))
     return Flights(case, plans[0].vehicle, tuple(flights))
 
 
@@ -87,23 +108,25 @@ def simulate_many(cases, seed, duration=DURATION, lead_in=LEAD_IN):
     ----------
     cases : sequence of Case
     seed : int
-        The flights of a case depend on this and on the name of the case, not on its company.
+        The flights of a case depend on this, on the name of the case and on its air, not on its company.
     duration, lead_in : float, s
         Length of the log, and of the flight before it.
 
     Returns
     -------
     list of Flights
-        In the order of the cases: three flights to train, then three held out.
+        In the order of the cases: flights to train, then as many held out.
     """
     flown = {}
     for rotors in {VEHICLES[case.vehicle].count: None for case in cases}:
-        alike = [case for case in cases if VEHICLES[case.vehicle].count == rotors]
-        plans = [_plans(case, seed, duration) for case in alike]
+        alike = [number for number, case in enumerate(cases) if VEHICLES[case.vehicle].count == rotors]
+        plans = [_plans(cases[number], seed, duration) for number in alike]
         record = simulate([plan for group in plans for plan in group], duration, lead_in)
-        for place, (case, group) in enumerate(zip(alike, plans, strict=True)):
-            flown[case.name] = _collect(case, group, record, place * 2 * len(MISSIONS))
-    return [flown[case.name] for case in cases]
+        first = 0
+        for number, group in zip(alike, plans, strict=True):
+            flown[number] = _collect(cases[number], group, record, first)
+            first += len(group)
+    return [flown[number] for number in range(len(cases))]
 
 
 def simulate_in_parts(cases, seed, duration=DURATION, part=60) -> Iterator[Flights]:
@@ -132,31 +155,47 @@ def residual(flight, case):
 
 
 def write(flights: Flights, folder, noise_level, kind, rng) -> list[Path]:
-    """Write the noisy logs ``train_1.csv`` to ``held_out_3.csv`` and the nominal craft ``vehicle.json``."""
+    """Write the noisy logs, ``train_1.csv`` and so on, and the nominal craft ``vehicle.json``."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
-    for number, flight in enumerate(flights.flights):
-        path = folder / f"{flight.role}_{number % len(MISSIONS) + 1}.csv"
+    for name, flight in flights.named().items():
+        path = folder / f"{name}.csv"
         noisy = disturb(flight.table, flights.vehicle, noise_level, kind, rng)
-        save(attacked(noisy, flights.case.attack), flights.case.left_out, path)
+        asked = {name: flight.asked[name] for name in INSTRUMENTS[flights.case.instruments]}
+        save(attacked(noisy, flights.case.attack), flights.case.left_out, path, asked)
         paths.append(path)
     (folder / "vehicle.json").write_text(json.dumps(flights.vehicle.as_dict(), indent=1) + "\n", encoding="ascii")
     return paths
 
 
 def write_key(flights: Flights, folder) -> Path:
-    """Write what is hidden, with the size of its residual torque, as ``key.json``."""
+    """Write what is hidden, with the size of its residual torque, as ``key.json``.
+
+    In gusts the residual torque is that without them; how large both are in averages over windows stands beside it.
+    """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     key = flights.case.key()
-    key["residual_rms_n_m"] = {
-        f"{flight.role}_{i % 3 + 1}": np.sqrt((residual(flight, flights.case) ** 2).mean(0)).tolist()
-        for i, flight in enumerate(flights.flights)
-    }
+    named = flights.named()
+    without = {name: residual(flight, flights.case) - flight.gusts[:, :3] for name, flight in named.items()}
+    key["residual_rms_n_m"] = {name: _rms(torque) for name, torque in without.items()}
+    if flights.case.gusts:
+        key["averaged_n_m"] = {name: _rms(_averaged(torque)) for name, torque in without.items()}
+        key["gusts_averaged_n_m"] = {name: _rms(_averaged(flight.gusts[:, :3])) for name, flight in named.items()}
     path = folder / "key.json"
     path.write_text(json.dumps(key, indent=1) + "\n", encoding="ascii")
     return path
+
+
+def _rms(values):
+    return np.sqrt((values**2).mean(0)).tolist()
+
+
+def _averaged(values):
+    """Average over windows as smooth as those of the judge, shape (time, 3)."""
+    shape = np.sin(np.pi * (np.arange(_WINDOW) + 0.5) / _WINDOW) ** 4
+    return oaconvolve(values, shape[:, None] / shape.sum(), mode="valid", axes=0)
 
 
 def bounds(flights: Flights):

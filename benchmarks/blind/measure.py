@@ -14,6 +14,12 @@ from .vehicles import GRAVITY, SIXKG
 MOTION = (
     "t", "phi", "theta", "psi", "wx", "wy", "wz", "x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az",
 )  # fmt: skip
+ASKED = {
+    "setpoint_position": (("xd", "yd", "zd"), "m"),
+    "setpoint_velocity": (("vxd", "vyd", "vzd"), "m/s"),
+    "sticks": (("roll", "pitch", "yaw"), "1"),
+}
+"""Columns and unit of what is asked of a vehicle: its path, and what it leans and turns by besides."""
 GROUPS = ("attitude", "gyro", "position", "velocity", "acceleration", "rotor", "volt")
 
 
@@ -162,9 +168,11 @@ def attacked(table, attack):
     return out
 
 
-def save(table, left_out, path):
-    """Write a log as CSV without the columns left out."""
+def save(table, left_out, path, asked):
+    """Write a log as CSV without the columns left out; last stands what was asked, by the names in ``ASKED``."""
     names = columns((table.shape[1] - len(MOTION) - 1) // 2)
+    names += tuple(column for name in asked for column in ASKED[name][0])
+    table = np.hstack([table, *asked.values()])
     kept = [i for i, name in enumerate(names) if name not in left_out]
     form = ",".join(["%.2f" if i == 0 else "%.8g" for i in kept])
     lines = "\n".join(form % tuple(row) for row in table[:, kept].tolist())

@@ -28,6 +28,11 @@ class Mission:
         parts = (self.position, self.velocity, self.acceleration, self.yaw[:, None], self.yaw_rate[:, None], self.tilt)
         return np.hstack(parts)
 
+    def asked(self):
+        """Give what a log may hold of it, by name, shape (time, 3) each."""
+        sticks = np.column_stack((self.tilt, self.yaw_rate))
+        return {"setpoint_position": self.position, "setpoint_velocity": self.velocity, "sticks": sticks}
+
 
 def legs(rng, time, draw, shortest, longest):
     """Hold values given by ``draw()`` for random spans of time."""

@@ -20,11 +20,13 @@ DT = 0.002
 CONTROL_EVERY = 2
 LEAD_HEIGHT = 0.8
 LOG_EVERY = round(STEP / DT)
+_COMES_AGAIN = frozenset({"gains", "gust_field"})
+"""What is drawn once for all flights of a path."""
 
 
 @dataclass(frozen=True)
 class FlightPlan:
-    """One flight to simulate: who flies what, and what is hidden in it."""
+    """One flight to simulate: who flies what, and what is hidden in it; ``again`` counts flights of the same path."""
 
     vehicle: Any
     plant: Any
@@ -32,10 +34,12 @@ class FlightPlan:
     hidden: dict
     wind: np.ndarray
     seed: tuple
+    again: int = 0
 
     def generator(self, purpose):
         """Give random numbers that depend on the flight and the purpose alone."""
-        return np.random.default_rng([*self.seed, *purpose.encode()])
+        again = [self.again] if self.again and purpose not in _COMES_AGAIN else []
+        return np.random.default_rng([*self.seed, *purpose.encode(), *again])
 
 
 class Fleet:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from . import body_terms as body
+from . import gusts
 from . import pybullet_terms as pybullet
 from . import rotor_terms as rotor
 from . import strange_terms as strange
@@ -45,6 +46,7 @@ TERMS = {
     "flexible_arm": strange.FlexibleArm,
     "drag_over_height": strange.DragOverHeight,
     "gust_field": strange.GustField,
+    "gusts": gusts.Gusts,
     "propeller_change": strange.PropellerChange,
     "bullet_damping": pybullet.BulletDamping,
     "bullet_drag": pybullet.BulletDrag,

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from benchmarks.blind.cases import INSTRUMENTS
+from benchmarks.blind.gusts import GUSTS
 from benchmarks.blind.vehicles import VEHICLES
 from benchmarks.blind_study.fly import flown, fly
 from benchmarks.blind_study.run import CASES_AT_ONCE, judge_all, run
@@ -18,12 +20,14 @@ _QUICK = {
     "no_velocity": 1, "no_force": 1, "lacking": 8, "drag_factor": 4, "attack": 12, "differing": 4, "pybullet": 4,
 }  # fmt: skip
 """Cases of each group in a quick study: about six minutes of one core."""
+_QUICK_IN_GUSTS = {"single": 8, "none": 2, "outside": 4}
+"""Cases of each group, in each air, in a quick study in gusts, which leaves out the other groups."""
 
 
 def main():
     """Fly, judge or score a study, or all of it."""
     told = _arguments()
-    size = Size(told.seed, told.draws, told.levels, told.kinds, told.groups, told.none, told.vehicles, _each(told, {}))
+    size = _size(told, {})
     if told.command == "fly":
         for own in sets(size):
             fly([own], told.out)
@@ -39,13 +43,16 @@ def main():
         print(text)
 
 
-def _each(told, usual):
-    return usual if told.sets is None else dict.fromkeys(told.groups, told.sets)
+def _size(told, usual, **fixed):
+    each = usual if told.sets is None else dict.fromkeys(told.groups, told.sets)
+    names = ("seed", "draws", "levels", "kinds", "groups", "none", "vehicles", "gusts", "instruments")
+    return Size(**{name: getattr(told, name) for name in names} | {"each": each} | fixed)
 
 
 def _quick(told):
     """Judge a few cases of each group with the code as it is; their flights are flown once and kept."""
-    chosen = sets(Size(told.seed, 2, ("mid",), ("white",), told.groups, None, told.vehicles, _each(told, _QUICK)))
+    usual = dict.fromkeys(told.groups, 0) | _QUICK_IN_GUSTS if any(told.gusts) else _QUICK
+    chosen = sets(_size(told, usual, draws=2, levels=("mid",), kinds=("white",), none=None))
     left = [own for own in chosen if not flown(own[0], told.out)]
     for start in range(0, len(left), CASES_AT_ONCE):
         fly(left[start : start + CASES_AT_ONCE], told.out)
@@ -68,6 +75,8 @@ def _arguments():
     parser.add_argument("--none", type=int, help="number of sets that hide nothing, over all vehicles and noises")
     parser.add_argument("--sets", type=int, help="largest number of cases of each group")
     parser.add_argument("--baselines", type=_list, default=("mid",), help="noise levels that simpler ways judge, too")
+    parser.add_argument("--gusts", type=_levels, default=GUSTS[:1], help="levels of gusts: 0,1,2")
+    parser.add_argument("--instruments", type=_list, default=("none",), help=",".join(INSTRUMENTS))
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--keep", action="store_true", help="keep the logs, 4 MB for each set")
     return parser.parse_args()
@@ -75,6 +84,10 @@ def _arguments():
 
 def _list(text):
     return tuple(part for part in text.split(",") if part)
+
+
+def _levels(text):
+    return tuple(int(part) for part in _list(text))
 
 
 if __name__ == "__main__":

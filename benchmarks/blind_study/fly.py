@@ -7,7 +7,9 @@ from pathlib import Path
 
 import yaml
 
+from benchmarks.blind.cases import INSTRUMENTS
 from benchmarks.blind.generator import DURATION, simulate_many, write, write_key
+from benchmarks.blind.measure import ASKED
 
 _COLUMNS_OF = Path(__file__).parents[2] / "configs" / "gap" / "sixkg.yaml"
 
@@ -33,7 +35,8 @@ def fly(group, folder, duration=DURATION):
         for each in own:
             logs = Path(folder) / "flights" / each.name
             write(flights, logs, each.level, each.kind, each.generator())
-            (logs / "study.yaml").write_text(config(logs / "vehicle.json"), encoding="utf-8")
+            asked = INSTRUMENTS[each.case.instruments]
+            (logs / "study.yaml").write_text(config(logs / "vehicle.json", asked), encoding="utf-8")
             _write_key(flights, each, Path(folder) / "keys" / each.name)
             written.append(logs)
     return written
@@ -54,12 +57,14 @@ def flown(each, folder):
     return all(told.get(name) == value for name, value in wanted.items())
 
 
-def config(vehicle_file):
+def config(vehicle_file, asked=()):
     """Describe a vehicle and the columns of its logs as a config.
 
     Parameters
     ----------
     vehicle_file : Path
+    asked : sequence of str
+        What they hold of what was asked of it.
 
     Returns
     -------
@@ -85,6 +90,9 @@ def config(vehicle_file):
     logged = yaml.safe_load(_COLUMNS_OF.read_text(encoding="utf-8"))["import"]
     for signal, prefix in (("rotor_speed", "om"), ("rotor_command", "omcmd")):
         logged["signals"][signal]["columns"] = [f"{prefix}{number + 1}" for number in range(len(told["spin"]))]
+    for name in asked:
+        columns, unit = ASKED[name]
+        logged["signals"][name] = {"columns": list(columns), "unit": unit}
     # PyYAML writes 1e-05, which a YAML parser of another make reads as text.
     return json.dumps({"seed": 1, "vehicle": vehicle, "import": logged}, indent=1)
 

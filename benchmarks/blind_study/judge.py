@@ -43,7 +43,8 @@ def _judged(folder, compared):
     logs = [sorted(folder.glob(f"{role}_*.csv")) for role in ("train", "held_out")]
     read = read_flights([*logs[0], *logs[1]], study).recordings
     training, held = read[: len(logs[0])], read[len(logs[0]) :]
-    found = diagnose(training, held, study.gap, generator(study, "diagnose")).diagnosis
+    run = diagnose(training, held, study.gap, generator(study, "diagnose"))
+    found = run.diagnosis
     simpler = {"baselines": baselines(training, study.gap)} if compared else {}
     return {
         "verdict": str(found.verdict),
@@ -57,8 +58,15 @@ def _judged(folder, compared):
         "gap_before": {"value": found.before.value.tolist(), "floors": found.before.floors.tolist()},
         "gap_after": {"value": found.after.value.tolist(), "floors": found.after.floors.tolist()},
         "floor": found.floor.tolist(),
+        "air": None if run.air is None else _air(run.air),
         **simpler,
     }
+
+
+def _air(air):
+    """Tell gusts by channel, N m, N and s, and of which channels they are all that is left."""
+    names = ("size", "low", "high", "memory", "memory_low", "memory_high")
+    return {"told": air.told.tolist()} | {name: getattr(air.found, name).tolist() for name in names}
 
 
 def _effect(effect):

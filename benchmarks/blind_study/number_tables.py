@@ -27,7 +27,7 @@ _EARLIER = {
 
 def number_totals(judged):
     """Give rows on coefficients for the table of targets."""
-    found = [number for number in _numbers(judged) if exact(number)]
+    found = [number for number in coefficients_of(judged) if exact(number)]
     close = [abs(number.error) <= _CLOSE for number in found if number.level == "mid"]
     inside = [number.inside for number in found]
     return [
@@ -44,7 +44,7 @@ def coefficient_table(judged):
     """
     rows = []
     by_name = defaultdict(list)
-    for number in _numbers(judged):
+    for number in coefficients_of(judged):
         by_name[number.effect, number.name].append(number)
     for (effect, name), own in sorted(by_name.items()):
         errors = {level: [n.error for n in own if n.level == level] for level in _LEVELS}
@@ -59,7 +59,7 @@ def coefficient_table(judged):
 def coverage_table(judged):
     """Write, effect by effect, how many coefficients lie in their intervals and within 15 %."""
     by_effect = defaultdict(list)
-    for number in _numbers(judged):
+    for number in coefficients_of(judged):
         by_effect[number.effect].append(number)
     rows = []
     for effect, own in sorted(by_effect.items()):
@@ -81,9 +81,15 @@ def gap_table(judged):
     return table(("effect", *(f"{level} noise" for level in _LEVELS), "earlier study, mid"), rows)
 
 
-def _numbers(judged):
+def coefficients_of(judged):
+    """List coefficients of single effects that were named exactly right."""
     single = [each for each in judged if each.key["group"] == "single" and each.outcome == RIGHT]
     return [number for each in single for number in numbers(each)]
+
+
+def inside(found, effect):
+    """Tell which coefficients of an effect lie in their intervals."""
+    return [number.inside for number in found if number.effect == effect]
 
 
 def _spread(errors):

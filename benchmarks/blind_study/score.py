@@ -115,6 +115,32 @@ class Scored:
         """Hidden torque in floors, on the axis where it is largest."""
         return visible(self.key, self.said)
 
+    @property
+    def usual(self):
+        """Whether it was flown in still air, each path once, and its log held no setpoints."""
+        return "instruments" not in self.key
+
+    @property
+    def air(self):
+        """The level of the gusts, and what tells them from the vehicle."""
+        return f"gusts {self.key.get('gusts', 0)}, {self.key.get('instruments', 'none')}"
+
+    @property
+    def noise(self):
+        """Size and kind of the noise, and the air unless it is still."""
+        told = f"{self.key['level']} {self.key['kind']}"
+        return told if self.usual else f"{told}, {self.air}"
+
+    @property
+    def over_air(self):
+        """Hidden torque over that of the gusts, both in averages over windows, on the axis where that is largest."""
+        if "averaged_n_m" not in self.key:
+            return float("nan")
+        own, gusts = (
+            _over_flights(self.key[name], self.key["only"]) for name in ("averaged_n_m", "gusts_averaged_n_m")
+        )
+        return float((own / gusts).max())
+
     def floors(self, when):
         """Give the held-out torque gap in floors, on the axis where it was largest before."""
         before = np.array(self.said["gap_before"]["floors"][:3], dtype=float)
@@ -174,10 +200,14 @@ def visible(key, said):
     """Give the hidden torque of the held-out flights in floors, on its largest axis."""
     if "floor" not in said:
         return float("nan")
-    role = key["only"] or "held_out"
-    own = [values for name, values in key["residual_rms_n_m"].items() if name.startswith(role)]
-    hidden = np.sqrt(np.mean(np.square(own), axis=0))
+    hidden = _over_flights(key["residual_rms_n_m"], key["only"])
     return float(np.nanmax(hidden / np.array(said["floor"][:3], dtype=float)))
+
+
+def _over_flights(sizes, only):
+    """Average root mean squares over the flights of a role, the held-out ones if all have it, shape (3,)."""
+    own = [values for name, values in sizes.items() if name.startswith(only or "held_out")]
+    return np.sqrt(np.mean(np.square(own), axis=0))
 
 
 def outcome(key, said):

@@ -5,11 +5,11 @@ from __future__ import annotations
 import hashlib
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from benchmarks.blind.cases import Case, cases, make
+from benchmarks.blind.cases import Case, cases, in_air, make
 from benchmarks.blind.measure import KINDS
 from benchmarks.blind.vehicles import STUDIED, VEHICLES
 
@@ -25,7 +25,8 @@ class Size:
     """How much of a study is flown.
 
     ``none`` is the number of sets that hide nothing, all of them if None; ``each`` the largest number of cases of some
-    groups, with as many different things hidden as the group has.
+    groups, with as many different things hidden as the group has. Each case is flown in gusts of each level with each
+    of the instruments.
     """
 
     seed: int
@@ -36,6 +37,8 @@ class Size:
     none: int | None = None
     vehicles: Sequence[str] = tuple(VEHICLES)
     each: Mapping[str, int] = field(default_factory=dict)
+    gusts: Sequence[int] = (0,)
+    instruments: Sequence[str] = ("none",)
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,8 @@ class Set:
     def name(self):
         """Name of its folder, from which nobody can guess what is hidden."""
         told = f"{self.seed} {self.case.name} {self.level} {self.kind}"
+        if not self.case.usual:
+            told += f" {self.case.gusts} {self.case.instruments}"
         return hashlib.sha256(told.encode()).hexdigest()[:16]
 
     def generator(self):
@@ -68,7 +73,7 @@ def sets(size):
     Returns
     -------
     list of list of Set
-        One list for each case.
+        One list for each case in each air.
     """
     own = [case for case in cases(size.seed, size.draws) if case.group in size.groups and case.vehicle in size.vehicles]
     noises = [(level, kind) for level in size.levels for kind in size.kinds]
@@ -77,7 +82,12 @@ def sets(size):
     out = [[Set(case, level, kind, size.seed) for level, kind in noises] for case in own]
     if size.none is not None and "none" in size.groups:
         out += [[Set(_empty(place, size.seed), *noises[place % len(noises)], size.seed)] for place in range(size.none)]
-    return _part(out, size)
+    return [
+        [replace(each, case=in_air(each.case, level, instruments, size.seed)) for each in own]
+        for own in _part(out, size)
+        for level in size.gusts
+        for instruments in size.instruments
+    ]
 
 
 def _part(groups, size):

@@ -6,6 +6,7 @@ from collections import Counter, defaultdict
 
 import numpy as np
 
+from benchmarks.blind_study.air_tables import air_by_channel, air_coverage, air_totals
 from benchmarks.blind_study.number_tables import coverage_table
 from benchmarks.blind_study.score import UNSEEN
 from benchmarks.blind_study.tables import misses, totals
@@ -16,7 +17,8 @@ def short(judged):
     """Write one page on a study."""
     seconds = [each.said["seconds"] for each in judged]
     took = f"{len(judged)} sets, {np.median(seconds):.1f} s a set (median), {sum(seconds):.0f} s in all"
-    parts = (took, totals(judged), _groups(judged), coverage_table(judged), misses(judged))
+    in_gusts = air_totals(judged), air_coverage(judged), air_by_channel(judged)
+    parts = (took, totals(judged), *in_gusts, _groups(judged), coverage_table(judged), misses(judged))
     return "\n\n".join(part for part in parts if part) + "\n"
 
 

@@ -6,6 +6,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable
 
 from benchmarks.blind_study import score
+from benchmarks.blind_study.air_tables import air_by_channel, air_coverage, air_totals
 from benchmarks.blind_study.number_tables import coefficient_table, gap_table, number_totals
 from benchmarks.blind_study.score import OUTCOMES, RIGHT
 from benchmarks.blind_study.text import NONE_TRIED, percent, table
@@ -28,6 +29,9 @@ def tables(judged):
     """Write all tables of a study."""
     parts = (
         ("Totals against the targets", totals(judged)),
+        ("In gusts", air_totals(judged)),
+        ("Intervals in gusts", air_coverage(judged)),
+        ("Gusts by channel", air_by_channel(judged)),
         ("Outcomes by group and noise", _outcomes(judged)),
         ("One effect hidden: what was named", _confusion(_of(judged, "single"))),
         ("One effect hidden: by vehicle", _vehicles(_of(judged, "single"))),
@@ -240,9 +244,8 @@ def _miss(each):
     gap, hidden = "", ""
     if "gap_before" in each.said:
         gap, hidden = f"{each.floors('before'):.2f} -> {each.floors('after'):.2f}", f"{each.visible:.2f}"
-    noise = f"{each.key['level']} {each.key['kind']}"
     told = each.said.get("error", named)
-    return each.key["set"], each.key["case"], noise, each.outcome, each.verdict, told, rivals, hidden, gap
+    return each.key["set"], each.key["case"], each.noise, each.outcome, each.verdict, told, rivals, hidden, gap
 
 
 def _often(judged):

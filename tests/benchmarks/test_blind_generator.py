@@ -3,6 +3,7 @@
 import ast
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +12,15 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from benchmarks.blind import generator
-from benchmarks.blind.cases import NAMES, cases, make
+from benchmarks.blind.cases import NAMES, cases, in_air, make
 from benchmarks.blind.drive import Notch
+from benchmarks.blind.gusts import gusts
 from benchmarks.blind.measure import ATTACKS, attacked, places
 from benchmarks.blind.missions import mission
 from benchmarks.blind.plant import nominal
 from benchmarks.blind.simulate import DT, Fleet, FlightPlan
 from benchmarks.blind.strengths import CATALOGUE, FORMS, OTHERS, OUTSIDE, strength
-from benchmarks.blind.vehicles import CF2X, SIXKG, VEHICLES
+from benchmarks.blind.vehicles import CF2X, CRAZYFLIE, SIXKG, VEHICLES
 from cpfls_cli.effects.registry import CATALOGUE as KNOWN
 
 EFFECTS = ("com_offset", "euler_axis_torque", "ground_effect", "wind", "payload", "battery_sag", "gyro_bias")
@@ -120,6 +122,60 @@ def test_rotor_torque_alone_turns_a_craft_that_hides_nothing(flown, name):
         turned_by = CubicSpline(time, torque / inertia).antiderivative()(time)
         # Rotors are told a new speed every 4 ms, so a spline through 100 Hz samples is good to about 1e-3 rad/s.
         np.testing.assert_allclose(rate - rate[0], turned_by, atol=2e-3)
+
+
+@pytest.fixture(scope="module")
+def gusty():
+    still = make("none-xquad-0", "none", "xquad", (), np.random.default_rng(4))
+    return generator.simulate_many([in_air(still, 2, "repeats", 7)], 7, duration=1.0, lead_in=0.5)[0]
+
+
+def test_gusts_are_all_that_is_left_of_a_craft_that_hides_nothing(gusty):
+    craft = gusty.vehicle
+    for flight in gusty.flights:
+        truth, gust = flight.truth, flight.gusts
+        left = generator.residual(flight, gusty.case)
+        assert gust[:, :3].std(axis=0) == pytest.approx(left.std(axis=0), rel=0.2)
+        np.testing.assert_allclose(left[5:-5], gust[5:-5, :3], atol=0.15 * np.abs(gust[:, :3]).max())
+        thrust = (truth["speed"] ** 2 @ craft.thrust_factors)[:, None] * [0.0, 0.0, 1.0]
+        force = Rotation.from_quat(truth["q"][:, [1, 2, 3, 0]]).inv().apply(truth["a"] + [0.0, 0.0, 9.81]) * craft.mass
+        np.testing.assert_allclose(force - thrust, gust[:, 3:], atol=1e-9)
+
+
+def test_a_path_flown_again_meets_other_gusts(gusty):
+    for first, again in ((0, 3), (2, 5), (6, 9)):
+        one, other = gusty.flights[first], gusty.flights[again]
+        assert one.role == other.role
+        np.testing.assert_array_equal(one.asked["sticks"], other.asked["sticks"])
+        assert abs(np.corrcoef(one.gusts[:, 0], other.gusts[:, 0])[0, 1]) < 0.95
+        assert np.abs(one.truth["x"] - other.truth["x"]).max() < 1.0
+    assert not np.array_equal(gusty.flights[0].asked["sticks"], gusty.flights[6].asked["sticks"])
+
+
+def test_gusts_turn_a_craft_less_the_longer_its_arms_are():
+    small = replace(SIXKG, rotors=tuple((0.16 / 0.3 * x, 0.16 / 0.3 * y, z) for x, y, z in SIXKG.rotors))
+    turned_by = [
+        np.array(gusts(craft, level, np.random.default_rng(2))["size"][:3]) / craft.inertia
+        for craft, level in ((small, 1), (small, 2), (SIXKG, 1))
+    ]
+    np.testing.assert_allclose(turned_by[0], np.array([3.4, 5.1, 2.0]) * CRAZYFLIE.arm / 0.16, rtol=0.25)
+    np.testing.assert_allclose(turned_by[1], 2 * turned_by[0])
+    np.testing.assert_allclose(turned_by[2], turned_by[0] * 0.16 / SIXKG.arm)
+
+
+def test_what_was_asked_stands_in_the_log_where_it_is_the_instrument(gusty, tmp_path):
+    asked, there = gusty.flights[-1].asked, {"setpoints": {"zd"}, "sticks": {"zd", "pitch"}, "repeats": set()}
+    for instruments, columns in there.items():
+        flights = replace(gusty, case=replace(gusty.case, instruments=instruments))
+        *_, path = generator.write(flights, tmp_path / instruments, "low", "white", np.random.default_rng(1))
+        heads, first, *_ = path.read_text().splitlines()
+        row = dict(zip(heads.split(","), map(float, first.split(",")), strict=True))
+        assert {"zd", "pitch"} & {*row} == columns
+        assert row.get("zd", 0.0) in (0.0, pytest.approx(asked["setpoint_position"][0, 2]))
+        assert row.get("pitch", 0.0) in (0.0, pytest.approx(asked["sticks"][0, 1]))
+    key = json.loads(generator.write_key(gusty, tmp_path / "keys").read_text())
+    assert key["air"] == gusty.case.air
+    assert max(key["residual_rms_n_m"]["train_1"]) < 0.2 * max(key["gusts_averaged_n_m"]["train_1"])
 
 
 def test_offset_centre_of_mass_leaves_the_torque_of_the_thrust(flown):

@@ -1,11 +1,13 @@
 """A small part of the blind study: right names, no names where nothing is hidden, and a gap that shrinks."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from benchmarks.blind.cases import LACKING
 from benchmarks.blind.measure import ATTACKS
+from benchmarks.blind_study.air_tables import air_by_channel, air_totals
 from benchmarks.blind_study.fly import fly
 from benchmarks.blind_study.judge import judge
 from benchmarks.blind_study.score import (
@@ -132,6 +134,20 @@ def test_a_part_of_a_study_holds_as_many_different_things_as_it_can():
     assert part == sets(Size(31, 2, ("mid",), ("white",), ("single", "none", "outside", "attack"), each=each))
 
 
+def test_each_case_is_flown_in_each_air_and_the_usual_study_stays_as_it_is():
+    usual = Size(31, 1, ("mid",), ("white",), ("single",), vehicles=("crazyflie",))
+    names = [own[0].name for own in sets(usual)]
+    study = sets(replace(usual, gusts=(0, 1), instruments=("none", "repeats")))
+    assert [own[0].name for own in study[::4]] == names
+    assert len({own[0].name for own in study}) == 4 * len(names)
+    assert "gusts" not in study[0][0].case.key()
+    assert study[3][0].case.key() == study[0][0].case.key() | {
+        "gusts": 1,
+        "instruments": "repeats",
+        "air": study[2][0].case.air,
+    }
+
+
 def said(verdict, *effects, rivals=()):
     told = [
         {"name": name, "share": share, "coefficients": {"c": {"value": value, "possible": possible}}}
@@ -199,3 +215,30 @@ def test_what_is_asked_for_depends_on_the_group(told, key, good):
 def test_numbers_that_nobody_believes_are_counted(effects, unphysical):
     assert answered(said("NAMED", *effects)).unphysical == unphysical
     assert not answered(said("UNEXPLAINED", *effects)).unphysical
+
+
+def in_gusts(group, level, verdict="UNEXPLAINED", **air):
+    """Judge a set that has gusts of size 2 N m and memory 0.5 s in all channels, or none."""
+    found = {"size": 2.2, "low": 1.8, "high": 2.5, "memory": 1.1, "memory_low": 0.4, "memory_high": None} | air
+    told = {"told": [True, *[False] * 5]} | {name: [value, *[None] * 5] for name, value in found.items()}
+    key = {"group": group, "gusts": level, "instruments": "setpoints", "level": "mid", "kind": "white"}
+    key["air"] = {"size": [2.0] * 6, "memory": [0.5] * 6} if level else {}
+    by_flight = {"held_out_1": [1.0, 0.1, 0.1]}
+    key |= {"averaged_n_m": by_flight, "gusts_averaged_n_m": {"held_out_1": [0.9] * 3}} if level else {}
+    return answered(said(verdict) | {"air": told}, **key)
+
+
+def test_what_was_said_in_gusts_is_counted_by_air():
+    text = air_totals([in_gusts("none", 0), in_gusts("single", 1), in_gusts("none", 1, low=2.1)])
+    rows = {row.split(" | ")[0].strip("| "): row.split(" | ")[1:] for row in text.splitlines()}
+    assert rows[""][:2] == ["gusts 0, setpoints", "gusts 1, setpoints"]
+    assert rows["one effect above the air's share: exactly right"][1] == "0 of 1 (0.0 %)"
+    assert rows["channels in gusts: told to be all that is left"][1] == "2 of 12 (16.7 %)"
+    assert rows["channels in gusts: told how large"][1] == "2 of 12 (16.7 %)"
+    assert rows["of these: size within 30 %"][1] == "2 of 2 (100.0 %)"
+    assert rows["of these: memory within a factor of 2"][1] == "0 of 2 (0.0 %)"
+    assert rows["of these: size in its interval"][1] == "1 of 2 (50.0 %)"
+    assert rows["of these: memory in its interval"][1] == "2 of 2 (100.0 %)"
+    assert rows["channels without gusts: told to be all that is left"][0] == "1 of 6 (16.7 %)"
+    assert "| torque x | 2 of 2 | 1.10, 1.10 to 1.10 |" in air_by_channel([in_gusts("none", 1), in_gusts("none", 1)])
+    assert not air_totals([answered(said("NO_GAP"))])
