@@ -286,13 +286,11 @@ def fit_parts(
         own = [window for window, keep in zip(windows, kept, strict=True) if keep]
 
         def evaluated(values: Array) -> FitPoint:
-            sums = _Sums(free, own, values)
-            return sums.mean(sums.losses())
+            return _Sums(free, own, values).mean()
 
         return minimised(evaluated, point, free.scales, bounds, steps, tolerance)
 
-    begun = _Sums(free, windows, np.clip(free.values(known), *bounds))
-    start = begun.mean(begun.losses())
+    start = _Sums(free, windows, np.clip(free.values(known), *bounds)).mean()
     if not np.isfinite(start.objective):
         raise ComputationError("the prediction error is not finite at the stated numbers; look at the units of the log")
     sums = _Sums(free, windows, best(place >= 0, start, steps).values)
@@ -358,16 +356,17 @@ class _Sums:
     def _loss(self, window: FitWindows) -> float:
         return window_loss(self._of_groups[window.flight.group][0], window)
 
-    def mean(self, losses: Array, kept: BoolArray | slice = slice(None)) -> FitPoint:
-        """Take the means over the runs of some of the windows."""
+    def mean(self, losses: Array | None = None, kept: BoolArray | slice = slice(None)) -> FitPoint:
+        """Take the means over the runs of some of the windows; their losses, where they are known."""
         count = np.array([len(window.starts) for window in self.windows])[kept].sum()
 
         def derivatives() -> tuple[Array, Array]:
             gradient, hessian = (each[kept].sum(axis=0) / count for each in self._by_window)
             return gradient, hessian
 
+        found = self.losses() if losses is None else losses
         believed = Believed(self.free.starts, self.free.scales, self.free.spreads)
-        return FitPoint(self.values, float(losses[kept].sum() / count), derivatives, believed)
+        return FitPoint(self.values, float(found[kept].sum() / count), derivatives, believed)
 
 
 def window_loss(evaluated: Evaluated, window: FitWindows) -> float:

@@ -1,5 +1,7 @@
 """Numbers of a vehicle: the model that they make, its derivatives, and what people read of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -101,7 +103,7 @@ def test_a_number_that_the_flight_does_not_show_is_not_determined(flight):
     free = numbers(STATED, ("rotor_gyroscopic", "linear_damping"), RULES["one rule"])
     # Without any yaw effort the rotors' spins cancel, and nothing gyroscopic is left.
     still = flight.speed.mean(axis=1, keepdims=True) * np.ones(4)
-    quiet = [FitWindows.of(type(flight)(**{**vars(flight), "speed": still}), 20, 20)]
+    quiet = [FitWindows.of(replace(flight, speed=still), 20, 20)]
     spread = uncertainty(fit(free, quiet, {}, 20, 1e-4), quiet)
     assert spread.determined.tolist() == [False, True, True, True]
 
