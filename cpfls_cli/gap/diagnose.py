@@ -28,7 +28,7 @@ from cpfls_cli.gap.naming.causes import (
     wrong_numbers,
 )
 from cpfls_cli.gap.naming.confirmed import Judge, Judgement, differences
-from cpfls_cli.gap.naming.earned import NamedFit, Refusal, earned
+from cpfls_cli.gap.naming.earned import NamedFit, Refusal, earned, fitted, nothing_by_size
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.naming.leftover import Leftover, beside_the_unnamed, not_excited, untried
@@ -103,12 +103,13 @@ def diagnose(
     audited = audit([recording.signals for recording in training], windows)
     prepared = Preparation(windows, model, settings, audited)
     flights = _Flights(prepared.repaired(training), prepared.logged(held), prepared.repaired(held))
-    named = quiet = _named(flights, settings, rng, progress)
-    gusts = _gusts(named, training, settings, rng)
-    if gusts is not None and gusts.told.any():
+    named = _named(flights, settings, rng, progress)
+    gusts, quiet, told = _gusts(named, training, settings, rng), named.judge.floor, 0
+    # Beside what is named then, more channels may turn out to be nothing but gusts.
+    while gusts is not None and gusts.told.sum() > told:
+        told, quiet = int(gusts.told.sum()), np.minimum(quiet, gusts.noise(windows))
         flights = flights.in_air(gusts)
-        named = _named(flights, settings, rng, progress)
-        named = named._replace(judgement=_by_instruments(named, training, settings))
+        named = _by_instruments(_named(flights, settings, rng, progress), training, settings)
         gusts = _gusts(named, training, settings, rng)
     weak, (effects, steps, judge, judgement, refusals, differ) = flights.training, named
     hypothesis, _, estimates = judgement.found
@@ -125,7 +126,7 @@ def diagnose(
     notes = [] if differ else [*_doubts(unnamed, judged, settings), *(refused.sentence for refused in refusals)]
     notes = [*not_judged(judgement.held_out), *notes]
     remainder = judge.remainder(judgement.found)
-    excited = _excited(hypothesis, quiet.judge.floor)
+    excited = _excited(hypothesis, quiet)
     diagnosis = _concluded(
         judged, faults, judgement, remainder, differ, notes, steps, excited, settings, torque_alone, audited
     )
@@ -178,10 +179,15 @@ def _gusts(named: _Named, training: Sequence[Recording], settings: GapSettings, 
     return air(found.hypothesis, found.estimates.linear, found.block, given, settings, rng)
 
 
-def _by_instruments(named: _Named, training: Sequence[Recording], settings: GapSettings) -> Judgement:
-    """Judge what was named with the numbers that instruments tell."""
-    given, judge = known_motion(training), named.judge
-    return judge.judge(by_instruments(named.judgement.found, given, judge.floor, settings))
+def _by_instruments(named: _Named, training: Sequence[Recording], settings: GapSettings) -> _Named:
+    """Judge what was named with the numbers that instruments tell, without what is 0 by them."""
+    given, judge, refusals = known_motion(training), named.judge, list(named.refusals)
+    found = by_instruments(named.judgement.found, given, judge.floor, settings)
+    while out := nothing_by_size(found):
+        refusals += [Refusal(name, "by what instruments tell it may be 0") for name in out]
+        kept = [each for each in found.hypothesis.chosen if each.effect.name not in out]
+        found = by_instruments(fitted(judge.training, kept, judge.floor, settings), given, judge.floor, settings)
+    return named._replace(judgement=judge.judge(found), refusals=refusals)
 
 
 def _excited(hypothesis: System, floor: Array) -> bool:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.effects.catalogue.parameter_error import coupling
+from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.refine import fit_within_bounds, shape_columns
 from cpfls_cli.gap.naming.earned import NamedFit
@@ -87,13 +87,13 @@ def by_instruments(found: NamedFit, given: Instruments, floor: Array, settings: 
 def _movable(hypothesis: System, floor: Array) -> BoolArray:
     """Mark numbers that are free, coefficients of the base and then shapes, shape (number,).
 
-    What couples the rates is in no config, and shows only where several axes turn at once, which instruments hardly
-    tell.
+    Of the vehicle only those of the config: where it is measured, and what couples the rates, shows where several axes
+    turn at once, which instruments hardly tell.
     """
     _, held = fit_within_bounds(hypothesis, np.tile(floor, (len(hypothesis.residual), 1)), of_vehicle=True)
     free = ~held & hypothesis.base.any(axis=(0, 1))
     of_vehicle = hypothesis.places[0][1]
-    free[of_vehicle] &= coupling(np.ones(of_vehicle.stop)) == 0
+    free[of_vehicle] &= np.isin([each.name for each in hypothesis.free[0].effect.coefficients], list(NUMBERS))
     return np.concatenate([free, np.ones(len(hypothesis.shapes), dtype=bool)])
 
 

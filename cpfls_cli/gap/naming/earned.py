@@ -76,8 +76,8 @@ def earned(
     """
     found, refusals = fitted(flights, chosen, floor, settings), []
     while found.hypothesis.chosen:
-        pairs = list(zip(found.hypothesis.chosen, found.estimates.effects, strict=True))
-        out = [candidate for candidate, numbers in pairs if not differs_from_zero(candidate.effect, numbers)]
+        nothing = nothing_by_size(found)
+        out = [candidate for candidate in found.hypothesis.chosen if candidate.effect.name in nothing]
         if not out:
             refused = on_bound(found, floor) or _cancelling(found, floor) or _filling_a_bend(found, settings)
             if refused is None:
@@ -87,6 +87,12 @@ def earned(
         kept = [candidate for candidate in found.hypothesis.chosen if candidate not in out]
         found = fitted(flights, kept, floor, settings)
     return found, refusals
+
+
+def nothing_by_size(found: NamedFit) -> list[str]:
+    """Name the effects whose size does not differ from zero."""
+    pairs = zip(found.hypothesis.chosen, found.estimates.effects, strict=True)
+    return [each.effect.name for each, numbers in pairs if not differs_from_zero(each.effect, numbers)]
 
 
 def on_bound(found: NamedFit, floor: Array) -> tuple[list[Candidate], Refusal] | None:

@@ -10,16 +10,20 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.gap.balance.balance_system import System, left_over
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
-from cpfls_cli.gap.residual.dependence import joined_states, rank_dependence, state_signals, without_actuation
+from cpfls_cli.gap.residual.dependence import rank_dependence, state_signals, without_actuation
 from cpfls_cli.gap.settings import ERRORS, GapSettings
 from cpfls_cli.playback.disturbance import ENDS, FoundGusts, gusts_in
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Instruments, foretold, instruments, late, late_by
+from cpfls_cli.weak_form.resampling import about_flight_mean
 from cpfls_cli.weak_form.windows import Recording, Windows
 
 _FORETOLD = {"repeats": 1 / 2, "setpoints": 1 / 3, "none": 0.0}
 """Share of what is left that instruments may foretell, at 95 %, where it is called the air: the smaller part of it.
 Other runs show all that the vehicle does again, and a linear answer to setpoints about two thirds of it."""
+
+_CHANCE = 0.05
+"""Probability of chance up to which what is left grows with how much the vehicle moves."""
 
 _TELLS = 0.05
 """Share that a curve of one signal has to explain to count, as of what follows a signal elsewhere."""
@@ -47,13 +51,18 @@ class Air:
         -------
         array, shape (6,), N m and N
         """
-        weight = windows.weight
+        weight, noise = windows.weight, self.noise(windows)
         apart = windows.period * np.abs(np.subtract.outer(np.arange(len(weight)), np.arange(len(weight))))
         total = np.zeros(6)
         for channel in np.flatnonzero(self.told):
             gusts = self.found.size[channel] ** 2 * (weight @ np.exp(-apart / self.found.memory[channel]) @ weight)
-            total[channel] = gusts + self.found.noise[channel] @ [(weight**2).sum(), (windows.slope**2).sum()]
+            total[channel] = gusts + noise[channel] ** 2
         return np.sqrt(total)
+
+    def noise(self, windows: Windows) -> Array:
+        """Compute what the noise beside them alone does, shape (6,); infinite where they are not told."""
+        alone = self.found.noise @ [(windows.weight**2).sum(), (windows.slope**2).sum()]
+        return np.where(self.told, np.sqrt(alone), np.inf)
 
 
 def known_motion(recordings: Sequence[Recording]) -> Instruments:
@@ -99,7 +108,7 @@ def air(
     known = np.all([flight.known for flight in hypothesis.flights], axis=0)
     told = known & np.isfinite(found.size) & (found.foretold + ERRORS * found.foretold_error < _FORETOLD[given.kind])
     if given.kind == "setpoints" and told.any():
-        told &= ~_follows_what_was_asked(hypothesis, linear, block, given, settings, rng)
+        told &= _like_air(hypothesis, linear, block, given, settings, rng, told)
     # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
     sized = told | (given.kind == "repeats")
     parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in ENDS}
@@ -136,24 +145,56 @@ def foretold_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) -
     return found
 
 
-def _follows_what_was_asked(
+def _like_air(
     hypothesis: System,
     linear: Array,
     block: IntArray,
     given: Instruments,
     settings: GapSettings,
     rng: np.random.Generator,
+    told: BoolArray,
 ) -> BoolArray:
-    """Mark channels that surely follow a curve of a signal, as far as what was asked foretells that signal."""
-    flights = hypothesis.flights
+    """Mark channels of which the air is believed where setpoints do not foretell them.
+
+    Setpoints foretell no effect that is not linear in what they ask for. So a channel may follow no curve of a signal,
+    as far as they foretell that; the air turns the vehicle about all axes; and it does so as much in gentle flight as
+    in fierce.
+    """
+    flights, residual = hypothesis.flights, hypothesis.left(linear)
     if [run.flight for run in given.runs] != list(range(len(flights))):
-        return np.ones(6, dtype=bool)
+        return np.zeros(6, dtype=bool)
     states = [without_actuation(state_signals(*pair)) for pair in zip(flights, hypothesis.signals, strict=True)]
     names = [name for name in states[0] if all(name in state for state in states)]
     flown = [np.stack([state[name] for name in names], axis=1) for state in states]
-    known = foretold_rows(given, flights[0].windows, flown)
-    asked = [dict(zip(names, rows.T, strict=True)) for rows in known]
-    state = joined_states([own | {"time": one["time"]} for own, one in zip(asked, states, strict=True)])
-    ranked = rank_dependence(hypothesis.left(linear), hypothesis.flight_index, block, state, settings.shifts, rng)
-    sure = [each for each in ranked if each.p_value <= settings.significance and each.r2 > _TELLS]
-    return np.isin(CHANNELS, [each.channel for each in sure])
+    asked = np.concatenate(foretold_rows(given, flights[0].windows, flown))
+    state = dict(zip(names, asked.T, strict=True)) | {"time": np.concatenate([each["time"] for each in states])}
+    index = hypothesis.flight_index
+    ranked = rank_dependence(residual, index, block, state, settings.shifts, rng)
+    follows = [each.channel for each in ranked if each.p_value <= settings.significance and each.r2 > _TELLS]
+    like = told & ~np.isin(CHANNELS, follows)
+    turning = residual[:, :3].any(axis=0)
+    if not like[:3][turning].all() or _grows(residual[:, like], asked, index, block, settings.shifts, rng):
+        return np.zeros(6, dtype=bool)
+    return like
+
+
+def _grows(
+    residual: Array, asked: Array, flight_index: IntArray, block: IntArray, shifts: int, rng: np.random.Generator
+) -> bool:
+    """Tell whether what is left surely grows with how much a signal moves, by ranks over blocks of time.
+
+    References
+    ----------
+    Winkler et al. 2014, permutation inference with the largest statistic.
+    """
+    rows = [about_flight_mean(values, flight_index) ** 2 for values in (residual, asked)]
+    sizes, moves = (_ranks(np.array([each[block == own].mean(axis=0) for own in np.unique(block)])) for each in rows)
+    alike = float((moves.T @ sizes).max(initial=0.0))
+    chance = [float((moves.T @ rng.permutation(sizes)).max(initial=0.0)) for _ in range(shifts)]
+    return sum(each >= alike for each in chance) < _CHANCE * (1 + shifts) - 1
+
+
+def _ranks(values: Array) -> Array:
+    """Rank the rows of each column, about their mean and brought to one length."""
+    ranks = np.argsort(np.argsort(values, axis=0), axis=0) - 0.5 * (len(values) - 1)
+    return np.asarray(ranks / max(float(np.linalg.norm(ranks[:, 0])), 1.0))
