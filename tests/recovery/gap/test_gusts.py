@@ -98,6 +98,13 @@ def test_gusts_about_axes_are_told_of_flights_without_velocity(flown, kind, setp
     assert np.isnan(found.found.size[3:]).all()
 
 
+def test_a_copy_of_a_flight_repeats_none(flown):
+    first, second, *_ = recorded(flown["asked"], TRUE.vehicle, setpoints=True)
+    assert known_motion([first, replace(first, name="copy"), second]).kind == "setpoints"
+    runs = recorded(flown["again"][:2], TRUE.vehicle, setpoints=False)
+    assert list(known_motion([*runs, replace(runs[0], name="copy")]).repeats.likeness) == [(0, 1)]
+
+
 @pytest.mark.parametrize(("kind", "turning"), [("calm", [False, False]), ("damped", [True, True])])
 def test_what_the_vehicle_does_is_not_called_gusts(flown, kind, turning):
     found = in_what_is_left(recorded(flown[kind], TRUE.vehicle, setpoints=True))
