@@ -246,6 +246,8 @@ def _share_foretold(powers: _Powers) -> tuple[Array, Array]:
     """Compute the shares of all that is left which instruments foretell, and their standard errors, shape (axis,)."""
     both = np.where(np.arange(powers.power.shape[2]) > 0, 2.0, 1.0)
     kept, whole = powers.power @ both, powers.whole @ both
+    # An axis that a flight does not know has nothing that could be foretold.
+    whole = np.where(whole.any(axis=0), whole, np.nan)
     without = 1 - (kept.sum(axis=0) - kept) / (whole.sum(axis=0) - whole)
     return 1 - kept.sum(axis=0) / whole.sum(axis=0), jackknife_error(without)
 
@@ -309,7 +311,9 @@ def _expected(given: Instruments, left: Sequence[Array], band: _Band) -> list[Ar
     own = np.concatenate([left[number] for number in numbers])
     expected, parts = np.zeros_like(own), contiguous(len(own), _FOLDS)
     for axis in range(own.shape[1]):
-        weight = 1 / np.maximum((np.abs(own[:, axis]) ** 2).mean(axis=0), np.finfo(float).tiny)
+        power = (np.abs(own[:, axis]) ** 2).mean(axis=0)
+        # Of an axis that a flight does not know all is 0, and so is what is expected.
+        weight = 1 / np.where(power > 0, power, 1.0)
         by_piece = np.einsum("pfc,f,pfd->pcd", np.conj(told), weight, told, optimize=True).real
         right = np.einsum("pfc,f,pf->pc", np.conj(told), weight, own[:, axis], optimize=True).real
         for fold in range(_FOLDS):

@@ -11,10 +11,11 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.gap.balance.balance_system import System, left_over
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.residual.dependence import rank_dependence, state_signals, without_actuation
+from cpfls_cli.gap.residual.repeated import without_copies
 from cpfls_cli.gap.settings import ERRORS, GapSettings
 from cpfls_cli.playback.disturbance import ENDS, FoundGusts, gusts_in
 from cpfls_cli.playback.flight import LoggedFlight
-from cpfls_cli.playback.instruments import Instruments, foretold, instruments, late, late_by
+from cpfls_cli.playback.instruments import Instruments, Repeats, foretold, instruments, late, late_by
 from cpfls_cli.weak_form.resampling import about_flight_mean
 from cpfls_cli.weak_form.windows import Recording, Windows
 
@@ -66,8 +67,16 @@ class Air:
 
 
 def known_motion(recordings: Sequence[Recording]) -> Instruments:
-    """Find what of flights was asked for from outside of their loops."""
-    return instruments([LoggedFlight.of(each.name, each.signals).playback for each in recordings])
+    """Find what of flights was asked for from outside of their loops; a copy of a flight repeats none."""
+    given = instruments([LoggedFlight.of(each.name, each.signals).playback for each in recordings])
+    different = set(without_copies(recordings))
+    copies = {number for number, run in enumerate(given.runs) if run.flight not in different}
+    beside = tuple(
+        {} if number in copies else {other: place for other, place in each.items() if other not in copies}
+        for number, each in enumerate(given.repeats.beside)
+    )
+    likeness = {pair: alike for pair, alike in given.repeats.likeness.items() if copies.isdisjoint(pair)}
+    return replace(given, repeats=Repeats(beside, likeness))
 
 
 def air(

@@ -107,7 +107,7 @@ class RepeatedRuns:
         RepeatedRuns or None
             None where no flight repeats another.
         """
-        different = list(_different(recordings))
+        different = list(without_copies(recordings))
         flights = [LoggedFlight.of(each.name, each.signals).playback for each in recordings]
         given = instruments(flights)
         runs = given.runs
@@ -228,7 +228,7 @@ def _ratio(above: Array, below: Array) -> Array:
     return np.divide(above, below, out=np.full_like(above, np.nan), where=below != 0)
 
 
-def _different(recordings: Sequence[Recording]) -> Iterator[int]:
+def without_copies(recordings: Sequence[Recording]) -> Iterator[int]:
     """Give the numbers of flights without those that are given once more: noise comes again in a copy, too."""
     for number, each in enumerate(recordings):
         if not any(np.array_equal(each.signals.body_rate, one.signals.body_rate) for one in recordings[:number]):

@@ -53,6 +53,15 @@ def tells_sizes(found):
     assert np.all((memories > 0.5) & (memories < 2.0))
 
 
+def in_what_is_left(recordings):
+    windows, model = common_windows(recordings, FEW), plain(None)
+    hypothesis = model.system([weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings])
+    block = block_index(hypothesis, FEW)
+    found = air(hypothesis, model.linear, block, known_motion(recordings), FEW, np.random.default_rng(1))
+    assert found is not None
+    return found
+
+
 @pytest.mark.parametrize(("kind", "setpoints"), [("asked", True), ("again", False)])
 def test_a_wrong_inertia_is_named_in_gusts_with_its_number(flown, kind, setpoints):
     run = diagnosed(recorded(flown[kind], heavier(TRUE.vehicle), setpoints=setpoints))
@@ -79,14 +88,26 @@ def test_gusts_alone_are_no_gap_where_instruments_tell_and_one_where_none_does(f
     assert np.all(untold.air.found.high[:3] > INERTIA * GUSTS)
 
 
+@pytest.mark.parametrize(("kind", "setpoints"), [("asked", True), ("again", False)])
+@pytest.mark.filterwarnings("error")
+def test_gusts_about_axes_are_told_of_flights_without_velocity(flown, kind, setpoints):
+    known = recorded(flown[kind], TRUE.vehicle, setpoints=setpoints)
+    found = in_what_is_left([replace(each, signals=replace(each.signals, velocity=None)) for each in known])
+    assert found.told.tolist() == [True] * 3 + [False] * 3
+    tells_sizes(found.found)
+    assert np.isnan(found.found.size[3:]).all()
+
+
+def test_a_copy_of_a_flight_repeats_none(flown):
+    first, second, *_ = recorded(flown["asked"], TRUE.vehicle, setpoints=True)
+    assert known_motion([first, replace(first, name="copy"), second]).kind == "setpoints"
+    runs = recorded(flown["again"][:2], TRUE.vehicle, setpoints=False)
+    assert list(known_motion([*runs, replace(runs[0], name="copy")]).repeats.likeness) == [(0, 1)]
+
+
 @pytest.mark.parametrize(("kind", "turning"), [("calm", [False, False]), ("damped", [True, True])])
 def test_what_the_vehicle_does_is_not_called_gusts(flown, kind, turning):
-    recordings = recorded(flown[kind], TRUE.vehicle, setpoints=True)
-    windows, model = common_windows(recordings, FEW), plain(None)
-    hypothesis = model.system([weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings])
-    block = block_index(hypothesis, FEW)
-    found = air(hypothesis, model.linear, block, known_motion(recordings), FEW, np.random.default_rng(1))
-    assert found is not None
+    found = in_what_is_left(recorded(flown[kind], TRUE.vehicle, setpoints=True))
     # In gusts four fifths of what is left are theirs.
     assert found.told[:2].tolist() == turning
     assert np.all(found.found.foretold[:2] > 3 * found.found.foretold_error[:2])
