@@ -136,6 +136,8 @@ def _headline(record: DiagnosisRecord) -> str:
             return f"Nothing is missing that these flights can show{' beside their gusts' if record.gusts else ''}."
         case GapVerdict.NOT_EXCITED:
             return "These flights move too little to show whether anything is missing."
+        case GapVerdict.UNEXPLAINED if record.gusts and not record.unexplained.axis:
+            return "There may be a gap beside the gusts of these flights; none that could be named."
         case GapVerdict.UNEXPLAINED:
             return "There is a gap that nothing in the catalogue explains."
         case GapVerdict.FLIGHTS_DIFFER:
@@ -291,7 +293,7 @@ def next_steps(record: DiagnosisRecord) -> list[str]:
     if record.contradiction:
         return ["Correct what is wrong, in the section `import` of the config or in `vehicle`, and run this again."]
     only_gusts = record.only_gusts and record.verdict == GapVerdict.UNEXPLAINED
-    only_gusts |= bool(record.gusts) and record.verdict == GapVerdict.NO_GAP
+    only_gusts |= bool(record.gusts) and not record.effects.names() and not record.unexplained.axis
     usual = _GUSTS if only_gusts else _NEXT.get(record.verdict)
     farther = [] if record.playback is None else _farther_off(record.playback)
     if usual and _USE in usual and farther:
