@@ -427,8 +427,8 @@ def _grave(channel: str, checks: Sequence[PairCheck]) -> bool:
 def _left_out(now: _Compared, name: str, witnesses: Sequence[str]) -> ChannelRepair:
     channel = CHANNELS[name]
     finding = Finding(
-        f"the {channel.words} contradicts the {joined(witnesses)}, and neither unit, gravity, axes nor delay "
-        "explains it",
+        f"the {channel.words} contradicts the {joined(witnesses)}, and no error of unit, gravity, axes or "
+        "delay explains it",
         f"check {channel.keys}",
         (channel.words, *witnesses),
         contradiction=_grave(name, now.checks),

@@ -250,7 +250,7 @@ def _estimate(name: str) -> object:
 
 def _gyroscope(flights: Sequence[Signals], windows: Windows) -> Gyroscope:
     if all(signals.attitude is None for signals in flights):
-        return Gyroscope.unjudged("there is no attitude to judge the gyroscope by")
+        return Gyroscope.unjudged("the log has no attitude to check the gyroscope against")
     cut = [motion for signals in flights if (motion := kinematics(signals, windows)) is not None]
     if not cut:
         return Gyroscope.unjudged("the flights are too short")

@@ -75,7 +75,7 @@ def _read(path: Path, reader: Reader, wanted: set[str] | None) -> LogContents:
                 known = ((name, unit) for name in columns for pattern, unit in _UNITS if pattern.search(name))
                 units |= {f"{topic}.{name}": unit for name, unit in known}
     if not topics:
-        listed = f": there is no fitting definition of {', '.join(unknown)}" if unknown else ""
+        listed = f": no definition fits {', '.join(unknown)}" if unknown else ""
         raise InputError(f"{path}: a ROS 2 bag without messages that can be read{listed}")
     warnings = (
         f"topics left out, as the file has no fitting definition of their messages: {', '.join(unknown)}",
