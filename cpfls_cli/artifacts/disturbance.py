@@ -53,7 +53,6 @@ class DisturbanceGroup:
     foretold: Array | None = dataset(
         "share of all that is left which repeats or setpoints foretell", "gust", gaps=True, default=None
     )
-
     alone: BoolArray | None = dataset("whether all that is left of a gap is gusts and noise", "gust", default=None)
 
     @classmethod
@@ -64,10 +63,7 @@ class DisturbanceGroup:
     @property
     def gusts(self) -> Gusts:
         """The gusts that are known; none on other axes."""
-        known = np.isfinite(self.size)
-        size, memory = np.zeros(len(GUST_AXES)), np.ones(len(GUST_AXES))
-        size[: len(known)][known], memory[: len(known)][known] = self.size[known], self.memory[known]
-        return Gusts(size, memory)
+        return Gusts.known(self.size, self.memory)
 
     def axes(self, inertia: Array, mass: float) -> Iterator[GustAxis]:
         """Give each axis as the acceleration of a body of these inertia parameters, kg m^2, and this mass, kg."""

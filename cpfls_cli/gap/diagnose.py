@@ -37,6 +37,7 @@ from cpfls_cli.gap.naming.results import Diagnosis, GapVerdict, NamedEffect, gap
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.residual.air import Air, air, in_air, known_motion
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.windows import Recording, common_windows
 
@@ -104,13 +105,16 @@ def diagnose(
     prepared = Preparation(windows, model, settings, audited)
     flights = _Flights(prepared.repaired(training), prepared.logged(held), prepared.repaired(held))
     named = _named(flights, settings, rng, progress)
-    gusts, quiet, told = _gusts(named, training, settings, rng), named.judge.floor, 0
-    # Beside what is named then, more channels may turn out to be nothing but gusts.
-    while gusts is not None and gusts.told.sum() > told:
-        told, quiet = int(gusts.told.sum()), np.minimum(quiet, gusts.noise(windows))
-        flights = flights.in_air(gusts)
-        named = _by_instruments(_named(flights, settings, rng, progress), training, settings)
-        gusts = _gusts(named, training, settings, rng)
+    gusts, quiet, told = None, named.judge.floor, 0
+    if named.judge.remainder(named.judgement.found).unexplained:
+        given = known_motion(training)
+        gusts = _gusts(named, given, settings, rng)
+        # Beside what is named then, more channels may turn out to be nothing but gusts.
+        while gusts is not None and gusts.told.sum() > told:
+            told, quiet = int(gusts.told.sum()), np.minimum(quiet, gusts.noise(windows))
+            flights = flights.in_air(gusts)
+            named = _by_instruments(_named(flights, settings, rng, progress), given, settings)
+            gusts = _gusts(named, given, settings, rng)
     weak, (effects, steps, judge, judgement, refusals, differ) = flights.training, named
     hypothesis, _, estimates = judgement.found
     progress(0.75, "rivals")
@@ -170,18 +174,15 @@ def _named(
     return _Named(effects, steps, judge, first if differ else judgement, [*refusals, *unconfirmed], differ)
 
 
-def _gusts(named: _Named, training: Sequence[Recording], settings: GapSettings, rng: np.random.Generator) -> Air | None:
-    """Find gusts in what is left of the flights, where they were found before or anything is left."""
-    found, judge = named.judgement.found, named.judge
-    if not any(flight.air.any() for flight in judge.training) and not judge.remainder(found).unexplained:
-        return None
-    given = known_motion(training)
-    return air(found.hypothesis, found.estimates.linear, found.block, given, settings, rng)
+def _gusts(named: _Named, given: Instruments, settings: GapSettings, rng: np.random.Generator) -> Air | None:
+    """Find gusts in what is left of the training flights."""
+    hypothesis, block, estimates = named.judgement.found
+    return air(hypothesis, estimates.linear, block, given, settings, rng)
 
 
-def _by_instruments(named: _Named, training: Sequence[Recording], settings: GapSettings) -> _Named:
+def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) -> _Named:
     """Judge what was named with the numbers that instruments tell, without what is 0 by them."""
-    given, judge, refusals = known_motion(training), named.judge, list(named.refusals)
+    judge, refusals = named.judge, list(named.refusals)
     found = by_instruments(named.judgement.found, given, judge.floor, settings)
     while out := nothing_by_size(found):
         refusals += [Refusal(name, "by what instruments tell it may be 0") for name in out]

@@ -83,11 +83,7 @@ class FoundGusts:
     @property
     def gusts(self) -> Gusts | None:
         """The gusts that are known, none on other axes; None where no size is."""
-        known = np.zeros(6, dtype=bool)
-        known[: len(self.size)] = np.isfinite(self.size)
-        size, memory = np.zeros(6), np.ones(6)
-        size[known], memory[known] = (each[known[: len(each)]] for each in (self.size, self.memory))
-        return Gusts(size, memory) if known.any() else None
+        return Gusts.known(self.size, self.memory) if np.isfinite(self.size).any() else None
 
 
 ENDS = ("size", "low", "high", "memory", "memory_low", "memory_high")

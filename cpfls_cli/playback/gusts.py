@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -26,6 +26,14 @@ class Gusts(NamedTuple):
 
     size: Array
     memory: Array
+
+    @classmethod
+    def known(cls, size: Array, memory: Array) -> Self:
+        """Take sizes and memories of the first axes as far as they are known, and none elsewhere."""
+        there = np.flatnonzero(np.isfinite(size))
+        sizes, memories = np.zeros(len(GUST_AXES)), np.ones(len(GUST_AXES))
+        sizes[there], memories[there] = size[there], memory[there]
+        return cls(sizes, memories)
 
     def drawn(self, rng: np.random.Generator, step: float, count: int) -> Array:
         """Draw torque and force at instants a step apart, exactly, from the first on as large as at any.

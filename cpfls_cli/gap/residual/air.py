@@ -16,6 +16,7 @@ from cpfls_cli.gap.settings import ERRORS, GapSettings
 from cpfls_cli.playback.disturbance import ENDS, FoundGusts, gusts_in
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Instruments, Repeats, foretold, instruments, late, late_by
+from cpfls_cli.rounding import levelled
 from cpfls_cli.weak_form.resampling import about_flight_mean
 from cpfls_cli.weak_form.windows import Recording, Windows
 
@@ -204,6 +205,6 @@ def _grows(
 
 
 def _ranks(values: Array) -> Array:
-    """Rank the rows of each column, about their mean and brought to one length."""
-    ranks = np.argsort(np.argsort(values, axis=0), axis=0) - 0.5 * (len(values) - 1)
-    return np.asarray(ranks / max(float(np.linalg.norm(ranks[:, 0])), 1.0))
+    """Rank the rows of each column, equal ones alike, doubled and about their mean, so that products are exact."""
+    ranks = [np.unique(levelled(column), return_inverse=True)[1] for column in values.T]
+    return np.array([2.0 * each - each.max(initial=0) for each in ranks]).T
