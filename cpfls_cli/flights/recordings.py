@@ -78,6 +78,14 @@ def read_flights(paths: Sequence[Path], study: Study) -> Recordings:
     return Recordings(tuple(recordings), (*warnings, *notes))
 
 
+def read_alone(path: Path, study: Study) -> tuple[Recording, float, tuple[str, ...]]:
+    """Read one flight: with it the voltage that its voltages are shares of, 1 where it states shares, and warnings."""
+    flight = read_flight(path, study)
+    recording, about = _recording(flight, study)
+    volts = _largest_volts(recording.signals, flight)
+    return (_share(recording, volts) if volts else recording), volts or 1.0, about
+
+
 def read_flight(path: Path, study: Study) -> ReadFlight:
     """Read a flight, or import it if it is a log."""
     if is_log(path):

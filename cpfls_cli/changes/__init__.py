@@ -1,0 +1,1 @@
+"""What has changed about a vehicle between flights."""

@@ -1,0 +1,297 @@
+"""Whether flights of today are those of an unchanged vehicle, and which change they tell of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.changes.causes import Cause, causes
+from cpfls_cli.changes.numbers import FlightNumbers
+from cpfls_cli.changes.reference import Reference, common_numbers
+from cpfls_cli.errors import InputError
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+FALSE_ALARM = 0.01
+"""Probability at which flights of an unchanged vehicle are said to have changed."""
+
+NAMED = 0.9
+"""Share of the belief from which on a change is named; below, it is one of several that look alike."""
+
+LISTED = 0.03
+"""Share of the belief from which on a change is told to look alike."""
+
+_MOST = 3
+"""Changes at once."""
+
+_LOSES = 0.95
+"""Probability that what is damaged pulls less, and not more."""
+
+_DRAWS, _POWER = 2000, 0.9
+_QUANTILES = (np.arange(12) + 0.5) / 12
+_HALF_WIDTH = 1.96
+_NONE = slice(0, 0)
+
+
+class Size(NamedTuple):
+    """A size with its 95 % interval, in the unit of its cause."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Found:
+    """A change that was found.
+
+    Attributes
+    ----------
+    sizes : tuple of Size
+        Of each direction that has the unit of the cause: one, but for two rotors or axes.
+    belief : float
+        Share beside all others in its place; of one rotor with that of pairs it is one of.
+    alike : tuple of (str, float)
+        Others in its place, and their share.
+    """
+
+    cause: Cause
+    sizes: tuple[Size, ...]
+    belief: float
+    alike: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class Change:
+    """What today's flights say beside the reference.
+
+    Attributes
+    ----------
+    apart : array, shape (flight, number)
+        Numbers of each of today's flights less those of the reference, loads at its voltage.
+    deviation : array, shape (number,)
+        What flights of one day differ by where nothing changed.
+    p_value : float
+        Probability that an unchanged vehicle looks as much like any change; the smallest that can be told is one over
+        the number of draws.
+    by_flight : array, shape (flight,)
+        The same of each flight alone.
+    found : tuple of Found
+        Empty where nothing changed.
+    shows : mapping of str to float
+        Smallest size of each change that shows with 90 %, in its unit; infinite where none does.
+    """
+
+    names: tuple[str, ...]
+    reference: Reference
+    apart: Array
+    deviation: Array
+    p_value: float
+    by_flight: Array
+    found: tuple[Found, ...]
+    shows: dict[str, float]
+
+
+def changed(
+    today: Sequence[FlightNumbers],
+    before: Sequence[FlightNumbers],
+    vehicle: VehicleSettings,
+    rng: np.random.Generator,
+) -> Change:
+    """Hold flights of today against reference flights.
+
+    Each change that is possible is a normal distribution of its sizes beside that of unchanged flights, a multivariate
+    t; its evidence is the ratio of both densities. The largest evidence counts, against the largest that unchanged
+    flights have: the only threshold is the rate of false alarms.
+
+    Parameters
+    ----------
+    today, before : sequence of FlightNumbers
+        At least one each; today's of one day.
+
+    Raises
+    ------
+    InputError
+        If the flights have no number in common.
+    """
+    names = common_numbers([*before, *today])
+    if not names:
+        raise InputError("flights of today and of the reference tell no number in common; import the same signals")
+    if {flight.commanded for flight in [*before, *today]} == {True, False}:
+        names = tuple(name for name in names if not name.startswith("load "))
+    reference = Reference.of(before, names, vehicle)
+    apart, covariance = reference.apart(today)
+    listed = causes(names, vehicle)
+    space = _Space(covariance, reference.freedom, listed)
+    chance = np.sort(space.evidence(space.drawn(rng)).max(axis=0))
+    evidence = space.evidence(np.vstack([apart.mean(axis=0), apart]))
+    p_value, *by_flight = (_beyond(chance, each) for each in evidence.max(axis=0))
+    found = _found(space, apart.mean(axis=0), chance) if p_value <= FALSE_ALARM else ()
+    threshold = float(np.quantile(chance, 1 - FALSE_ALARM))
+    shows = {cause.name: space.shows(index, threshold, rng) for index, cause in enumerate(listed)}
+    deviation = np.sqrt(np.diag(covariance))
+    return Change(names, reference, apart, deviation, p_value, np.array(by_flight), found, shows)
+
+
+def _beyond(chance: Array, value: float) -> float:
+    return float((1 + (chance >= value).sum()) / (1 + len(chance)))
+
+
+class _Space:
+    """Densities of numbers under no change and under each one, as mixtures of normal ones."""
+
+    def __init__(self, covariance: Array, freedom: float, listed: Sequence[Cause]) -> None:
+        # Slow to load, and who reads a record computes nothing.
+        from scipy.special import chdtri
+
+        self.listed, self.freedom = listed, freedom
+        self.root = np.linalg.cholesky(covariance)
+        self.scales = freedom / chdtri(freedom, 1 - _QUANTILES)
+        self.white = [np.linalg.solve(self.root, cause.directions) for cause in listed]
+        self.prior = np.log([cause.prior for cause in listed])
+
+    def drawn(self, rng: np.random.Generator, count: int = _DRAWS) -> Array:
+        """Draw numbers of unchanged flights, shape (draw, number)."""
+        scale = self.freedom / rng.chisquare(self.freedom, count)
+        return np.asarray(np.sqrt(scale)[:, None] * (rng.normal(size=(count, len(self.root))) @ self.root.T))
+
+    def evidence(self, apart: Array, beside: Array | None = None) -> Array:
+        """Compute the logarithm of the evidence of each change, shape (cause, row).
+
+        Parameters
+        ----------
+        apart : array, shape (row, number)
+        beside : array, shape (number, size), or None
+            Whitened directions of changes that are there anyway.
+        """
+        rows = np.linalg.solve(self.root, apart.T)
+        base = rows[:, :0] if beside is None else beside
+        without = self._density(rows, base)
+        known = base.shape[1]
+        each = [
+            self._density(rows, np.hstack([base, own]), slice(known, known + cause.losses))
+            for own, cause in zip(self.white, self.listed, strict=True)
+        ]
+        return np.array(each) - without + self.prior[:, None]
+
+    def _density(self, rows: Array, directions: Array, losses: slice = _NONE) -> Array:
+        """Compute the logarithm of the density of whitened rows, but for what all have in common, shape (row,).
+
+        Parameters
+        ----------
+        losses : slice
+            Directions whose sizes are nearly always above 0.
+        """
+        left, sizes, _ = np.linalg.svd(directions, full_matrices=False)
+        along, square = (left.T @ rows) ** 2, (rows**2).sum(axis=0)
+        parts = []
+        for scale in self.scales:
+            grown = scale + sizes**2
+            inside = (along * (1 / scale - 1 / grown)[:, None]).sum(axis=0)
+            weight = len(rows) * np.log(scale) + np.log(grown / scale).sum()
+            parts.append(-0.5 * (square / scale - inside + weight) + self._losing(rows, directions, scale, losses))
+        most = np.max(parts, axis=0)
+        return np.asarray(most + np.log(np.mean(np.exp(np.array(parts) - most), axis=0)))
+
+    def _losing(self, rows: Array, directions: Array, scale: float, losses: slice) -> Array:
+        """Compute the logarithm of what the sign of losses adds to a density, shape (row,).
+
+        Of two losses as if neither told of the other.
+        """
+        if losses == _NONE:
+            return np.zeros(rows.shape[1])
+        from scipy.special import ndtr
+
+        inverse = np.linalg.inv(directions.T @ directions / scale + np.eye(directions.shape[1]))[losses]
+        mean, error = inverse @ (directions.T @ rows) / scale, np.sqrt(np.diag(inverse[:, losses]))
+        above = ndtr(mean / error[:, None])
+        return np.asarray(np.log(2 * (_LOSES * above + (1 - _LOSES) * (1 - above))).sum(axis=0))
+
+    def sizes(self, apart: Array, chosen: Sequence[int], of: int) -> tuple[Size, ...]:
+        """Estimate the sizes of one of several changes that are there, in its unit."""
+        directions = np.hstack([self.white[index] for index in chosen])
+        row = np.linalg.solve(self.root, apart)
+        weights, means, variances = [], [], []
+        for scale in self.scales:
+            precision = directions.T @ directions / scale + np.eye(directions.shape[1])
+            inverse = np.linalg.inv(precision)
+            covariance = scale * np.eye(len(row)) + directions @ directions.T
+            _, determinant = np.linalg.slogdet(covariance)
+            weights.append(-0.5 * (row @ np.linalg.solve(covariance, row) + determinant))
+            means.append(inverse @ directions.T @ row / scale)
+            variances.append(np.diag(inverse))
+        share = np.exp(np.array(weights) - max(weights))[:, None] / np.exp(np.array(weights) - max(weights)).sum()
+        mean = (share * means).sum(axis=0)
+        error = np.sqrt((share * (np.array(variances) + (np.array(means) - mean) ** 2)).sum(axis=0))
+        first = sum(self.white[index].shape[1] for index in chosen[: chosen.index(of)])
+        usual = self.listed[of].usual
+        told = range(first, first + _told(self.listed[of]))
+        return tuple(
+            Size(
+                float(usual * mean[at]),
+                float(usual * (mean[at] - _HALF_WIDTH * error[at])),
+                float(usual * (mean[at] + _HALF_WIDTH * error[at])),
+            )
+            for at in told
+        )
+
+    def shows(self, index: int, threshold: float, rng: np.random.Generator) -> float:
+        """Find the smallest size of a change that shows with 90 %, in its unit; infinite beyond eight times usual."""
+        noise = np.linalg.solve(self.root, self.drawn(rng, 200).T)
+        own = self.white[index]
+        cause = self.listed[index]
+
+        def power(size: float) -> float:
+            rows = noise + size * own[:, :1]
+            there = self._density(rows, own, slice(0, cause.losses))
+            evidence = there - self._density(rows, rows[:, :0]) + self.prior[index]
+            return float((evidence >= threshold).mean())
+
+        low, high = 0.0, 8.0
+        if power(high) < _POWER:
+            return float("inf")
+        for _ in range(10):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if power(middle) >= _POWER else (middle, high)
+        return float(high * cause.usual)
+
+
+def _told(cause: Cause) -> int:
+    """Count the sizes of a change that are told."""
+    if cause.name.startswith("rotors ") or cause.name == "centre of mass":
+        return 2
+    return cause.directions.shape[1] if cause.name in ("late", "gusts", "lean", "drift") else 1
+
+
+def _found(space: _Space, apart: Array, chance: Array) -> tuple[Found, ...]:
+    """Name one change after another while each explains more than chance beside the others."""
+    chosen: list[int] = []
+    while len(chosen) < _MOST:
+        beside = np.hstack([space.white[index] for index in chosen]) if chosen else None
+        evidence = space.evidence(apart[None], beside)[:, 0]
+        evidence[chosen] = -np.inf
+        best = int(np.argmax(evidence))
+        if _beyond(chance, float(evidence[best])) > FALSE_ALARM:
+            break
+        chosen.append(best)
+    found = []
+    for index in chosen:
+        others = [other for other in chosen if other != index]
+        beside = np.hstack([space.white[other] for other in others]) if others else None
+        evidence = space.evidence(apart[None], beside)[:, 0]
+        evidence[others] = -np.inf
+        share = np.exp(evidence - evidence.max())
+        share /= share.sum()
+        order = np.argsort(-share, kind="stable")
+        alike = tuple(
+            (space.listed[other].name, float(share[other]))
+            for other in order
+            if other != index and share[other] >= LISTED
+        )
+        own = space.listed[index]
+        belief = sum(share[at] for at, other in enumerate(space.listed) if at == index or own.holds(other))
+        found.append(Found(own, space.sizes(apart, chosen, index), float(belief), alike))
+    return tuple(found)

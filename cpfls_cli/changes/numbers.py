@@ -1,0 +1,275 @@
+"""What one flight tells of its vehicle in numbers that another flight of the same vehicle tells alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import binary_erosion
+
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.blocks import contiguous, jackknife_error
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.errors import InputError
+from cpfls_cli.filters import parabolas
+from cpfls_cli.inertia import symmetric
+from cpfls_cli.lag import delayed
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, FEWEST_WINDOWS, Recording, windows
+
+AXES, ROTATIONS = ("x", "y", "z"), ("roll", "pitch", "yaw")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of numbers.
+
+    Attributes
+    ----------
+    unit : str
+        Of a number; 1 for logarithms of ratios.
+    apart, together : float
+        Standard deviations from day to day of a vehicle that nobody changed: of each number by itself, and of all
+        numbers of the kind alike. What is usual where reference flights are too few to tell it themselves.
+    words : str
+        What it is.
+    """
+
+    unit: str
+    apart: float
+    together: float
+    words: str
+
+
+KINDS: dict[str, Kind] = {
+    "load": Kind("1", 0.02, 0.02, "thrust that a rotor is asked for over its share of the weight, logarithm"),
+    "turn": Kind("1", 0.02, 0.02, "squared speed of a rotor over what it is commanded, logarithm"),
+    "vibration": Kind("1", 0.1, 0.25, "root mean square above 20 Hz, logarithm"),
+    "follow": Kind("1", 0.05, 0.03, "angular acceleration over that of the rotors' torque, logarithm"),
+    "late": Kind("s", 0.002, 0.003, "time by which the body's rotation follows the rotors"),
+    "gusts": Kind("1", 0.1, 0.4, "angular acceleration that the rotors do not explain, root mean square, logarithm"),
+    "lean": Kind("m/s^2", 0.15, 0.0, "mean horizontal thrust over mass, world axes"),
+    "drift": Kind("rad/s", 0.01, 0.0, "mean rate of the gyroscope beside the attitude's"),
+    "battery": Kind("1", 0.02, 0.0, "voltage that flight draws from the battery, share of a full one"),
+}
+"""Of each number the first word of its name."""
+
+_FLIES, _MARGIN_S = 0.6, 0.5
+"""Share of the usual thrust above which it flies, and what is left out at either end."""
+
+_SHORTEST_S = 4.0
+"""Of flight, below which it tells nothing."""
+
+_BLOCKS = 8
+"""That errors are told by."""
+
+_ABOVE_HZ = 20.0
+"""Where vibration begins: above what a vehicle flies."""
+
+_WINDOW_S = 0.4
+_LATEST_S = 0.12
+"""Of rotors and autopilot."""
+
+_STEP_S = 0.002
+
+
+@dataclass(frozen=True)
+class FlightNumbers:
+    """What one flight tells.
+
+    Attributes
+    ----------
+    values, errors : mapping of str to float
+        By name, a kind of `KINDS` and what it is of; standard errors over blocks of the flight.
+    voltage : float
+        Mean, in V, or a share of a full battery where the log has that; NaN where it has none.
+    duration_s : float
+        Of what flies.
+    commanded : bool
+        Whether loads are of commands, and not of speeds that were measured.
+    """
+
+    name: str
+    values: Mapping[str, float]
+    errors: Mapping[str, float]
+    voltage: float
+    duration_s: float
+    commanded: bool
+
+
+def flight_numbers(recording: Recording, full_voltage: float = 1.0) -> FlightNumbers:
+    """Tell the numbers of a flight.
+
+    Parameters
+    ----------
+    full_voltage : float
+        What its voltage is a share of, V; 1 for shares.
+
+    Raises
+    ------
+    InputError
+        If the flight has no speeds or commands of single rotors, or flies for less than four seconds.
+    """
+    signals, name = recording.signals, recording.name
+    if signals.rotor_speed is None:
+        raise InputError(
+            f"{name}: has no rotor_speed or rotor_command, and what a rotor does shows nowhere else; name their columns"
+            " in import.signals"
+        )
+    flies = in_flight(signals)
+    duration = float(flies.sum() * signals.period)
+    if duration < _SHORTEST_S:
+        raise InputError(
+            f"{name}: flies for {duration:.2g} s, and {_SHORTEST_S:g} s are the least that tell anything; leave it out,"
+            " or check import.crop_s and the unit of the rotors' signal"
+        )
+    values: dict[str, float] = {}
+    errors: dict[str, float] = {}
+    for names, told, error in _told(signals, flies):
+        for each, value, apart in zip(names, told, error, strict=True):
+            if np.isfinite(value) and np.isfinite(apart):
+                values[each], errors[each] = float(value), float(apart)
+    voltage = np.nan if signals.voltage is None else full_voltage * float(signals.voltage[flies].mean())
+    return FlightNumbers(name, values, errors, voltage, duration, signals.commanded)
+
+
+def in_flight(signals: Signals) -> BoolArray:
+    """Mark the samples at which a vehicle flies, away from take-off and landing, shape (time,)."""
+    thrust = signals.thrust
+    assert thrust is not None, "rotor speeds are there"
+    level = _FLIES * np.median(thrust[thrust > 0.5 * np.quantile(thrust, 0.95)])
+    margin = round(_MARGIN_S / signals.period)
+    return np.asarray(binary_erosion(thrust > level, iterations=max(margin, 1), border_value=1))
+
+
+_Numbers = tuple[list[str], Array, Array]
+
+
+def _told(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
+    rotors = [f"M{index + 1}" for index in range(len(signals.vehicle.rotors))]
+    yield _averaged([f"load {name}" for name in rotors], _loads(signals), flies, np.log)
+    if signals.rotor_command is not None:
+        # Squares, as thrust and drag are.
+        both = np.stack([signals.speed**2, signals.rotor_command**2], axis=2)
+        yield _averaged(
+            [f"turn {name}" for name in rotors], both, flies, lambda means: np.log(means[:, 0] / means[:, 1])
+        )
+    turns, feels = bool(signals.body_rate.any()), _felt(signals)
+    for sensor, values in (("gyroscope", signals.body_rate if turns else None), ("accelerometer", feels)):
+        if values is not None and (squares := _above(values, signals.period)) is not None:
+            names = [f"vibration {sensor} {axis}" for axis in AXES]
+            yield _averaged(names, squares, flies, lambda means: 0.5 * np.log(means))
+    if signals.attitude is not None:
+        assert signals.thrust is not None, "rotor speeds are there"
+        leans = signals.rotation[:, :2, 2] * (signals.thrust / signals.vehicle.mass_kg)[:, None]
+        yield _averaged(["lean x", "lean y"], leans, flies, lambda means: means)
+    if turns:
+        yield from _rotation(signals, flies)
+    if signals.voltage is not None and signals.voltage[~flies].size:
+        yield _drawn(signals, flies)
+
+
+def _averaged(names: list[str], values: Array, flies: BoolArray, of: Callable[[Array], Array]) -> _Numbers:
+    """Compute numbers of means over a flight, with their errors by blocks of it left out."""
+    flown = values[flies]
+    block = contiguous(len(flown), _BLOCKS)
+    sums = np.array([flown[block == number].sum(axis=0) for number in range(_BLOCKS)])
+    count = np.bincount(block, minlength=_BLOCKS).reshape(-1, *(1,) * (flown.ndim - 1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        left_out = np.array([of(mean) for mean in (sums.sum(axis=0) - sums) / (count.sum() - count)])
+        return names, of(flown.mean(axis=0)), jackknife_error(left_out)
+
+
+def _loads(signals: Signals) -> Array:
+    """Give what each rotor is asked for over its share of what carries the vehicle, shape (time, rotor)."""
+    vehicle = signals.vehicle
+    factors = np.array([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors])
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    carried = np.full(len(signals), weight)
+    if signals.specific_force is not None or (signals.attitude is not None and signals.acceleration is not None):
+        # Its mean over the flight: sample by sample it holds vibration.
+        carried[:] = max(float(signals.force[in_flight(signals), 2].mean()), 0.2 * weight)
+    elif signals.attitude is not None:
+        carried /= np.maximum(signals.rotation[:, 2, 2], 0.2)
+    return np.asarray(signals.speed**2 * factors * len(factors) / carried[:, None])
+
+
+def _felt(signals: Signals) -> Array | None:
+    return signals.acceleration if signals.specific_force is None else signals.specific_force
+
+
+def _above(values: Array, period: float) -> Array | None:
+    """Square what is above 20 Hz, shape (time, 3); None where the log is too slow to hold it."""
+    half = max(1, round(0.5 / (_ABOVE_HZ * period)))
+    if 0.5 / period < 1.5 * _ABOVE_HZ or len(values) < 4 * half + 4:
+        return None
+    return np.asarray((values - parabolas(values, half, 0)) ** 2)
+
+
+def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
+    """Tell how rotation follows the rotors' torque: how much, how late, and what is left of it."""
+    own = windows(signals.period, max(_WINDOW_S, FEWEST_SAMPLES * signals.period), 0.5)
+    inside = own.average(flies.astype(float)) > 1 - 1e-9 if own.count(len(signals)) else np.zeros(0, dtype=bool)
+    if inside.sum() < FEWEST_WINDOWS:
+        return
+    inertia = symmetric(signals.vehicle.inertia_kg_m2)
+    momentum = signals.body_rate @ inertia
+    turned = (own.derivative(momentum) + own.average(np.cross(signals.body_rate, momentum)))[inside]
+    torque = signals.torque
+    assert torque is not None, "rotor speeds are there"
+    late = np.arange(0.0, _LATEST_S, _STEP_S)
+    driven = np.array([own.average(delayed(torque, each / signals.period))[inside] for each in late])
+    block = contiguous(len(turned), _BLOCKS)
+    kept = [block >= 0, *(block != number for number in range(_BLOCKS))]
+    found = np.array([_fit(turned[rows], driven[:, rows]) for rows in kept])
+    moments = np.diag(inertia)
+    told = np.stack([np.log(found[:, 0]), late[0] + _STEP_S * found[:, 1], np.log(found[:, 2] / moments)], axis=1)
+    for kind, values in zip(("follow", "late", "gusts"), told.transpose(1, 0, 2), strict=True):
+        yield [f"{kind} {axis}" for axis in ROTATIONS], values[0], jackknife_error(values[1:])
+    if signals.attitude is not None:
+        yield _drift(signals, flies)
+
+
+def _fit(turned: Array, driven: Array) -> Array:
+    """Fit what turns the body to what drives it at each delay: gain, best delay in steps, what is left, (3, axis).
+
+    Parameters
+    ----------
+    turned : array, shape (window, 3), N m
+    driven : array, shape (delay, window, 3), N m
+    """
+    y, x = turned - turned.mean(axis=0), driven - driven.mean(axis=1, keepdims=True)
+    cross, power = (x * y).sum(axis=1), np.maximum((x**2).sum(axis=1), 1e-300)
+    left = np.maximum((y**2).sum(axis=0) - cross**2 / power, 0.0)
+    best = np.argmin(left, axis=0)
+    axis = np.arange(left.shape[1])
+    inner = np.clip(best, 1, len(left) - 2)
+    before, there, after = (left[inner + step, axis] for step in (-1, 0, 1))
+    bend = before - 2 * there + after
+    step = np.where((bend > 0) & (inner == best), 0.5 * (before - after) / np.where(bend > 0, bend, 1.0), 0.0)
+    gain = cross[best, axis] / power[best, axis]
+    return np.array([np.where(gain > 0, gain, np.nan), best + step, np.sqrt(left[best, axis] / len(y))])
+
+
+def _drift(signals: Signals, flies: BoolArray) -> _Numbers:
+    """Compare the gyroscope's rate with that of the attitude, which turns by the body rate."""
+    rotation = signals.rotation
+    turned = np.einsum("tji,tjk->tik", rotation[:-1], rotation[1:])
+    vector = 0.5 * np.stack(
+        [turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[:, 2, 0], turned[:, 1, 0] - turned[:, 0, 1]],
+        axis=1,
+    )
+    middle = 0.5 * (signals.body_rate[:-1] + signals.body_rate[1:])
+    apart = middle - vector / signals.period
+    return _averaged([f"drift {axis}" for axis in AXES], apart, flies[1:] & flies[:-1], lambda means: means)
+
+
+def _drawn(signals: Signals, flies: BoolArray) -> _Numbers:
+    """Compare the voltage at rest, where the log has it, with that in flight."""
+    assert signals.voltage is not None, "asked for"
+    assert signals.thrust is not None, "rotor speeds are there"
+    rests = signals.thrust < 0.05 * signals.thrust[flies].mean()
+    if rests.sum() * signals.period < 1.0:
+        return [], np.zeros(0), np.zeros(0)
+    rest = float(np.median(signals.voltage[rests]))
+    return _averaged(["battery sag"], signals.voltage[:, None], flies, lambda means: rest - means)
