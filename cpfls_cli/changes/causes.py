@@ -30,6 +30,8 @@ class Cause:
         Beside the others.
     losses : int
         Of the first so many sizes: nearly always above 0, for what is damaged pulls less.
+    told : int
+        Of the first so many sizes: they have the unit of the cause.
     """
 
     name: str
@@ -38,11 +40,17 @@ class Cause:
     unit: str
     prior: float = 1.0
     losses: int = 0
+    told: int = 1
+
+    @property
+    def rotors(self) -> frozenset[str]:
+        """Rotors that changed, by name."""
+        first, *rest = self.name.split()
+        return frozenset(rest) - {"and"} if first in ("rotor", "rotors") else frozenset()
 
     def holds(self, other: Cause) -> bool:
         """Tell whether another change is this one with something more: a rotor and a second one."""
-        one = self.name.startswith("rotor ") and other.name.startswith("rotors ")
-        return one and self.name.split()[-1] in other.name.split()
+        return bool(self.rotors) and self.rotors < other.rotors
 
 
 _LOSS = 0.15
@@ -72,7 +80,10 @@ _ALONE = {
 }
 """Of kinds of which each number stands for itself: how much it changes where it does, and its unit."""
 
-_TOGETHER = ("late", "gusts", "lean", "drift")
+_ALIKE = {"late": 0.3, "gusts": 0.5}
+"""Kinds of which all numbers change at once, and the share of that by which each does so by itself."""
+
+_AT_ONCE = ("lean", "drift")
 """Kinds of which all numbers change at once, each by itself."""
 
 
@@ -115,18 +126,23 @@ def _causes(names: Sequence[str], vehicle: VehicleSettings) -> Iterator[Cause]:
         pairs = list(combinations(range(len(single)), 2))
         for one, other in pairs:
             columns = [single[one], single[other], _LOSS * _OF_YAW / len(arms) * yaw, shakes]
-            yield Cause(f"rotors M{one + 1} and M{other + 1}", np.stack(columns, axis=1), _LOSS, "1", _RARER, losses=2)
+            yield Cause(
+                f"rotors M{one + 1} and M{other + 1}", np.stack(columns, axis=1), _LOSS, "1", _RARER, losses=2, told=2
+            )
         moved = [_OFF_CENTRE * arm * loads(each) for each in own.offset]
         yield Cause("mass", np.stack([_HEAVIER * loads(own.mass), *moved], axis=1), _HEAVIER, "1")
-        yield Cause("centre of mass", np.stack(moved, axis=1), _OFF_CENTRE * arm, "m")
+        yield Cause("centre of mass", np.stack(moved, axis=1), _OFF_CENTRE * arm, "m", told=2)
         yield Cause("all rotors", _HEAVIER * loads(own.mass)[:, None], _HEAVIER, "1")
         yield Cause("torque about z", _OF_YAW * yaw[:, None], _OF_YAW, "1")
     if shakes.any():
         yield Cause("vibration", shakes[:, None], _SHAKES, "1")
     for kind, (usual, unit) in _ALONE.items():
-        known = of_kind(kind)
-        if known and kind in _TOGETHER:
-            yield Cause(kind, usual * np.stack([direction({name: 1.0}) for name in known], axis=1), usual, unit)
+        each = [usual * direction({name: 1.0}) for name in of_kind(kind)]
+        if each and kind in _ALIKE:
+            columns = [np.sum(each, axis=0), *(_ALIKE[kind] * column for column in each)]
+            yield Cause(kind, np.stack(columns, axis=1), usual, unit)
+        elif each and kind in _AT_ONCE:
+            yield Cause(kind, np.stack(each, axis=1), usual, unit, told=len(each))
         else:
-            for name in known:
-                yield Cause(name, usual * direction({name: 1.0})[:, None], usual, unit)
+            for name, column in zip(of_kind(kind), each, strict=True):
+                yield Cause(name, column[:, None], usual, unit)

@@ -30,6 +30,9 @@ _MOST = 3
 _LOSES = 0.95
 """Probability that what is damaged pulls less, and not more."""
 
+_ANY = 10.0
+"""Times what is usual: a prior so wide says nothing of a size."""
+
 _DRAWS, _POWER = 2000, 0.9
 _QUANTILES = (np.arange(12) + 0.5) / 12
 _HALF_WIDTH = 1.96
@@ -211,31 +214,31 @@ class _Space:
         return np.asarray(np.log(2 * (_LOSES * above + (1 - _LOSES) * (1 - above))).sum(axis=0))
 
     def sizes(self, apart: Array, chosen: Sequence[int], of: int) -> tuple[Size, ...]:
-        """Estimate the sizes of one of several changes that are there, in its unit."""
+        """Estimate the sizes of one of several changes that are there, in its unit.
+
+        What is told of any size counts as as likely; a prior of what is usual would draw large ones in.
+        """
+        first = sum(self.white[index].shape[1] for index in chosen[: chosen.index(of)])
+        told = np.arange(first, first + self.listed[of].told)
         directions = np.hstack([self.white[index] for index in chosen])
+        directions[:, told] *= _ANY
         row = np.linalg.solve(self.root, apart)
-        weights, means, variances = [], [], []
+        logarithms, means, variances = [], [], []
         for scale in self.scales:
-            precision = directions.T @ directions / scale + np.eye(directions.shape[1])
-            inverse = np.linalg.inv(precision)
+            inverse = np.linalg.inv(directions.T @ directions / scale + np.eye(directions.shape[1]))
             covariance = scale * np.eye(len(row)) + directions @ directions.T
             _, determinant = np.linalg.slogdet(covariance)
-            weights.append(-0.5 * (row @ np.linalg.solve(covariance, row) + determinant))
-            means.append(inverse @ directions.T @ row / scale)
-            variances.append(np.diag(inverse))
-        share = np.exp(np.array(weights) - max(weights))[:, None] / np.exp(np.array(weights) - max(weights)).sum()
+            logarithms.append(-0.5 * (row @ np.linalg.solve(covariance, row) + determinant))
+            means.append((inverse @ directions.T @ row / scale)[told])
+            variances.append(np.diag(inverse)[told])
+        share = np.exp(np.array(logarithms) - max(logarithms))[:, None]
+        share /= share.sum()
         mean = (share * means).sum(axis=0)
         error = np.sqrt((share * (np.array(variances) + (np.array(means) - mean) ** 2)).sum(axis=0))
-        first = sum(self.white[index].shape[1] for index in chosen[: chosen.index(of)])
-        usual = self.listed[of].usual
-        told = range(first, first + _told(self.listed[of]))
+        unit = _ANY * self.listed[of].usual
         return tuple(
-            Size(
-                float(usual * mean[at]),
-                float(usual * (mean[at] - _HALF_WIDTH * error[at])),
-                float(usual * (mean[at] + _HALF_WIDTH * error[at])),
-            )
-            for at in told
+            Size(float(unit * value), float(unit * (value - half)), float(unit * (value + half)))
+            for value, half in zip(mean, _HALF_WIDTH * error, strict=True)
         )
 
     def shows(self, index: int, threshold: float, rng: np.random.Generator) -> float:
@@ -259,30 +262,22 @@ class _Space:
         return float(high * cause.usual)
 
 
-def _told(cause: Cause) -> int:
-    """Count the sizes of a change that are told."""
-    if cause.name.startswith("rotors ") or cause.name == "centre of mass":
-        return 2
-    return cause.directions.shape[1] if cause.name in ("late", "gusts", "lean", "drift") else 1
-
-
 def _found(space: _Space, apart: Array, chance: Array) -> tuple[Found, ...]:
     """Name one change after another while each explains more than chance beside the others."""
     chosen: list[int] = []
     while len(chosen) < _MOST:
-        beside = np.hstack([space.white[index] for index in chosen]) if chosen else None
-        evidence = space.evidence(apart[None], beside)[:, 0]
-        evidence[chosen] = -np.inf
+        evidence = _beside(space, apart, chosen)
         best = int(np.argmax(evidence))
         if _beyond(chance, float(evidence[best])) > FALSE_ALARM:
             break
         chosen.append(best)
+        # What came first was chosen for what the others do too.
+        for index in [*chosen] * 2:
+            others = [other for other in chosen if other != index]
+            chosen = [*others, int(np.argmax(_beside(space, apart, others)))]
     found = []
     for index in chosen:
-        others = [other for other in chosen if other != index]
-        beside = np.hstack([space.white[other] for other in others]) if others else None
-        evidence = space.evidence(apart[None], beside)[:, 0]
-        evidence[others] = -np.inf
+        evidence = _beside(space, apart, [other for other in chosen if other != index])
         share = np.exp(evidence - evidence.max())
         share /= share.sum()
         order = np.argsort(-share, kind="stable")
@@ -295,3 +290,14 @@ def _found(space: _Space, apart: Array, chance: Array) -> tuple[Found, ...]:
         belief = sum(share[at] for at, other in enumerate(space.listed) if at == index or own.holds(other))
         found.append(Found(own, space.sizes(apart, chosen, index), float(belief), alike))
     return tuple(found)
+
+
+def _beside(space: _Space, apart: Array, there: Sequence[int]) -> Array:
+    """Compute the logarithm of the evidence of each change beside those that are there, shape (cause,)."""
+    beside = np.hstack([space.white[index] for index in there]) if there else None
+    evidence = space.evidence(apart[None], beside)[:, 0]
+    rotors = frozenset[str]().union(*(space.listed[index].rotors for index in there))
+    for index, cause in enumerate(space.listed):
+        if index in there or cause.rotors & rotors:
+            evidence[index] = -np.inf
+    return evidence

@@ -1,0 +1,171 @@
+"""The statistic of changes beside other formulas: densities by quadrature and by SciPy, a hover solved for loads."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import multivariate_t, norm
+
+from cpfls_cli.changes.causes import Cause, causes
+from cpfls_cli.changes.judge import FALSE_ALARM, _Space, changed
+from cpfls_cli.changes.numbers import FlightNumbers
+from cpfls_cli.changes.reference import Reference, load_directions, usual_covariance
+from cpfls_cli.vehicle.rotors import allocation_matrix
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+
+ARM = 0.2
+QUAD = VehicleSettings(
+    mass_kg=1.2,
+    inertia_kg_m2=(0.01, 0.012, 0.02),
+    rotors=tuple(
+        RotorSettings(position_m=(x * ARM, y * ARM, 0.0), spin=spin, thrust_factor_n_s2=1e-5, drag_factor_n_m_s2=2e-7)
+        for x, y, spin in ((1, -1, 1), (-1, -1, -1), (-1, 1, 1), (1, 1, -1))
+    ),
+)
+LOADS = [f"load M{index}" for index in range(1, 5)]
+NAMES = [*LOADS, *(f"vibration gyroscope {axis}" for axis in "xyz"), "late roll", "late pitch", "late yaw"]
+
+
+def hover(vehicle, weight, torque=(0.0, 0.0, 0.0), effective=1.0):
+    """Squared speeds that balance a vehicle of which rotors have lost some of what they do."""
+    return np.linalg.solve(allocation_matrix(vehicle) * effective, [weight, *torque])
+
+
+@pytest.mark.parametrize("what", ["rotor", "mass", "x", "y", "yaw"])
+def test_directions_of_loads(what):
+    """A hover of the changed vehicle, solved, against the first order of its loads."""
+    directions, weight, size = load_directions(QUAD), 1.2 * 9.81, 1e-5
+    before = hover(QUAD, weight)
+    if what == "rotor":
+        after, expected = hover(QUAD, weight, effective=[1.0, 1.0, 1.0 - size, 1.0]), directions.rotor[2]
+    elif what == "mass":
+        after, expected = hover(QUAD, weight * (1 + size)), directions.mass
+    elif what == "yaw":
+        drag = 2e-7 * before.sum()
+        after, expected = hover(QUAD, weight, (0.0, 0.0, size * drag)), directions.yaw
+    else:
+        # Hubs move against the centre of mass.
+        moved = np.array([size, 0.0, 0.0] if what == "x" else [0.0, size, 0.0])
+        rotors = [replace(rotor, position_m=tuple(rotor.position_m - moved)) for rotor in QUAD.rotors]
+        after, expected = hover(replace(QUAD, rotors=tuple(rotors)), weight), directions.offset["xy".index(what)]
+    assert np.log(after / before) / size == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())
+
+
+def space(listed, freedom=6.0, size=3):
+    rng = np.random.default_rng(2)
+    root = rng.normal(size=(size, size))
+    return _Space(root @ root.T + np.eye(size), freedom, listed), root @ root.T + np.eye(size)
+
+
+def test_density_of_no_change_is_a_multivariate_t():
+    own, covariance = space([])
+    rows = np.random.default_rng(1).normal(size=(5, 3))
+    told = own._density(np.linalg.solve(own.root, rows.T), np.zeros((3, 0)))
+    expected = multivariate_t(shape=covariance, df=6.0).logpdf(rows)
+    # The quadrature has twelve points; what all have in common is left out.
+    assert told - told[0] == pytest.approx(expected - expected[0], abs=0.15)
+
+
+@pytest.mark.parametrize("losses", [0, 1])
+def test_evidence_by_quadrature(losses):
+    """One direction, sizes integrated one by one; of a loss those above 0 count nineteen times as much."""
+    direction = np.array([0.8, -0.3, 1.5])
+    own, covariance = space([Cause("rotor M1", direction[:, None], 0.1, "1", losses=losses)], freedom=1e9)
+    row = np.array([1.2, 0.4, 2.0])
+    precision = np.linalg.inv(covariance)
+
+    def density(size):
+        apart = row - size * direction
+        sign = 1.0 if not losses else 2 * (0.95 if size > 0 else 0.05)
+        return np.exp(-0.5 * apart @ precision @ apart) * norm.pdf(size) * sign
+
+    expected = np.log(quad(density, -9, 9, points=[0.0])[0]) + 0.5 * row @ precision @ row
+    assert own.evidence(row[None])[0, 0] == pytest.approx(expected, abs=1e-6)
+
+
+def flights(count, rng, change=None, names=NAMES, voltage=np.nan):
+    usual = np.linalg.cholesky(usual_covariance(names, QUAD))
+    drawn = rng.normal(size=(count, len(names))) @ usual.T
+    if change is not None:
+        drawn = drawn + change
+    return [
+        FlightNumbers(
+            f"flight {index}", dict(zip(names, row, strict=True)), dict.fromkeys(names, 0.0), voltage, 20.0, True
+        )
+        for index, row in enumerate(drawn)
+    ]
+
+
+def test_unchanged_flights_seldom_look_changed():
+    """Of the predictive distribution itself: a share of 0.01 within what 2000 draws tell."""
+    rng = np.random.default_rng(5)
+    reference = Reference.of(flights(6, rng), NAMES, QUAD)
+    own = _Space(reference.covariance, reference.freedom, causes(NAMES, QUAD))
+    chance, again = (np.sort(own.evidence(own.drawn(rng)).max(axis=0)) for _ in range(2))
+    assert 0.002 < np.mean(again > np.quantile(chance, 1 - FALSE_ALARM)) < 0.025
+
+
+@pytest.mark.parametrize(
+    ("cause", "change", "size"),
+    [
+        ("rotor M3", 0.3 * np.eye(10)[2], 0.3),
+        ("all rotors", 0.3 * (np.arange(10) < 4), 0.3),
+        ("late", 0.04 * (np.arange(10) > 6), 0.04),
+        ("vibration", 2.5 * ((np.arange(10) > 3) & (np.arange(10) < 7)), 2.5),
+    ],
+)
+def test_a_change_is_found(cause, change, size):
+    rng = np.random.default_rng(3)
+    found = changed(flights(2, rng, change), flights(6, rng), QUAD, rng)
+    assert found.p_value <= FALSE_ALARM
+    (first, *more), (told, *_) = found.found, found.found[0].sizes
+    assert not more
+    alike = {first.cause.name, *(name for name, _ in first.alike)}
+    assert cause in alike
+    if cause == "rotor M3":
+        assert first.cause.name == cause
+        assert first.belief > 0.9
+    if first.cause.name == cause:
+        assert told.low < size < told.high
+
+
+def test_two_rotors_at_once_are_no_third_change():
+    rng = np.random.default_rng(4)
+    found = changed(flights(3, rng, 0.4 * (np.arange(10) < 2)), flights(8, rng), QUAD, rng)
+    assert [each.cause.name for each in found.found] in (["rotors M1 and M2"], ["mass"])
+
+
+def test_what_shows_does():
+    """A rotor that lost as much as is said to show is found in most of many draws."""
+    rng = np.random.default_rng(7)
+    before = flights(8, rng)
+    size = changed(before[:1], before[1:], QUAD, rng).shows["rotor M3"]
+    reference = Reference.of(before[1:], NAMES, QUAD)
+    own = _Space(reference.covariance, reference.freedom, causes(NAMES, QUAD))
+    threshold = np.quantile(own.evidence(own.drawn(rng)).max(axis=0), 1 - FALSE_ALARM)
+    rows = own.drawn(rng, 400) + size * np.eye(10)[2]
+    assert np.mean(own.evidence(rows).max(axis=0) >= threshold) > 0.8
+
+
+def test_less_voltage_asks_for_more():
+    """Where commands of the reference go with the battery, an emptier one today is no change."""
+    rng = np.random.default_rng(8)
+
+    def empties(count, voltages):
+        made = flights(count, rng, names=LOADS)
+        return [
+            replace(flight, voltage=v, values={n: x - 2 * np.log(v) for n, x in flight.values.items()})
+            for flight, v in zip(made, voltages, strict=True)
+        ]
+
+    before, today = empties(6, np.linspace(0.8, 1.0, 6)), empties(1, [0.7])
+    blind = [replace(flight, voltage=np.nan) for flight in [*before, *today]]
+    assert changed(today, before, QUAD, rng).p_value > 0.05
+    assert changed(blind[6:], blind[:6], QUAD, rng).p_value < changed(today, before, QUAD, rng).p_value
+
+
+def test_speeds_and_commands_are_not_compared():
+    rng = np.random.default_rng(9)
+    before, today = flights(4, rng), [replace(flight, commanded=False) for flight in flights(1, rng)]
+    assert not [name for name in changed(today, before, QUAD, rng).names if name.startswith("load ")]
