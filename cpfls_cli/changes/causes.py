@@ -29,7 +29,7 @@ class Cause:
     prior : float
         Beside the others.
     losses : int
-        Of the first so many sizes: nearly always above 0, for what is damaged pulls less.
+        Of the first so many sizes: nearly always above 0. What is damaged pulls less, and no load is lighter than none.
     told : int
         Of the first so many sizes: they have the unit of the cause.
     """
@@ -131,6 +131,9 @@ def _causes(names: Sequence[str], vehicle: VehicleSettings) -> Iterator[Cause]:
             )
         moved = [_OFF_CENTRE * arm * loads(each) for each in own.offset]
         yield Cause("mass", np.stack([_HEAVIER * loads(own.mass), *moved], axis=1), _HEAVIER, "1")
+        if of_kind("swing"):
+            hangs = _HEAVIER * (loads(own.mass) + direction({"swing": 1.0}))
+            yield Cause("load on a cable", np.stack([hangs, *moved], axis=1), _HEAVIER, "1", losses=1)
         yield Cause("centre of mass", np.stack(moved, axis=1), _OFF_CENTRE * arm, "m", told=2)
         yield Cause("all rotors", _HEAVIER * loads(own.mass)[:, None], _HEAVIER, "1")
         yield Cause("torque about z", _OF_YAW * yaw[:, None], _OF_YAW, "1")

@@ -4,18 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import binary_erosion
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.blocks import contiguous, jackknife_error
+from cpfls_cli.effects.catalogue.payload import EFFECT
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.filters import parabolas
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.lag import delayed
-from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, FEWEST_WINDOWS, Recording, windows
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, FEWEST_WINDOWS, Recording, Windows, windows
+
+_SHAPES = {shape.name: shape for shape in EFFECT.shapes}
+CABLES = _SHAPES["length_m"].grid
+_MASS = [each.name for each in EFFECT.coefficients].index("mass")
+(_USUAL_DAMPING,) = _SHAPES["damping_1_s"].tried
+"""Of a load on a cable: lengths that are tried, m, and a damping, 1/s."""
 
 AXES, ROTATIONS = ("x", "y", "z"), ("roll", "pitch", "yaw")
 
@@ -50,6 +58,7 @@ KINDS: dict[str, Kind] = {
     "gusts": Kind("1", 0.1, 0.4, "angular acceleration that the rotors do not explain, root mean square, logarithm"),
     "lean": Kind("m/s^2", 0.15, 0.0, "mean horizontal thrust over mass, world axes"),
     "drift": Kind("rad/s", 0.01, 0.0, "mean rate of the gyroscope beside the attitude's"),
+    "swing": Kind("1", 0.02, 0.0, "mass that swings on a cable over that of the vehicle"),
     "battery": Kind("1", 0.02, 0.0, "voltage that flight draws from the battery, share of a full one"),
 }
 """Of each number the first word of its name."""
@@ -87,6 +96,8 @@ class FlightNumbers:
         Of what flies.
     commanded : bool
         Whether loads are of commands, and not of speeds that were measured.
+    cable_m : float
+        Length of the cable that fits best what swings, if anything does; NaN where the log does not hold it.
     """
 
     name: str
@@ -95,6 +106,7 @@ class FlightNumbers:
     voltage: float
     duration_s: float
     commanded: bool
+    cable_m: float = float("nan")
 
 
 def flight_numbers(recording: Recording, full_voltage: float = 1.0) -> FlightNumbers:
@@ -125,12 +137,13 @@ def flight_numbers(recording: Recording, full_voltage: float = 1.0) -> FlightNum
         )
     values: dict[str, float] = {}
     errors: dict[str, float] = {}
-    for names, told, error in _told(signals, flies):
+    cable, swing = _swing(signals, flies)
+    for names, told, error in (*_told(signals, flies), swing):
         for each, value, apart in zip(names, told, error, strict=True):
             if np.isfinite(value) and np.isfinite(apart):
                 values[each], errors[each] = float(value), float(apart)
     voltage = np.nan if signals.voltage is None else full_voltage * float(signals.voltage[flies].mean())
-    return FlightNumbers(name, values, errors, voltage, duration, signals.commanded)
+    return FlightNumbers(name, values, errors, voltage, duration, signals.commanded, cable)
 
 
 def in_flight(signals: Signals) -> BoolArray:
@@ -206,10 +219,16 @@ def _above(values: Array, period: float) -> Array | None:
     return np.asarray((values - parabolas(values, half, 0)) ** 2)
 
 
+def _windows(signals: Signals, flies: BoolArray) -> tuple[Windows, BoolArray]:
+    """Lay windows over a flight, and mark those in which it flies throughout."""
+    own = windows(signals.period, max(_WINDOW_S, FEWEST_SAMPLES * signals.period), 0.5)
+    known = own.average(flies.astype(float)) > 1 - 1e-9 if own.count(len(signals)) else np.zeros(0, dtype=bool)
+    return own, known
+
+
 def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
     """Tell how rotation follows the rotors' torque: how much, how late, and what is left of it."""
-    own = windows(signals.period, max(_WINDOW_S, FEWEST_SAMPLES * signals.period), 0.5)
-    inside = own.average(flies.astype(float)) > 1 - 1e-9 if own.count(len(signals)) else np.zeros(0, dtype=bool)
+    own, inside = _windows(signals, flies)
     if inside.sum() < FEWEST_WINDOWS:
         return
     inertia = symmetric(signals.vehicle.inertia_kg_m2)
@@ -262,6 +281,65 @@ def _drift(signals: Signals, flies: BoolArray) -> _Numbers:
     middle = 0.5 * (signals.body_rate[:-1] + signals.body_rate[1:])
     apart = middle - vector / signals.period
     return _averaged([f"drift {axis}" for axis in AXES], apart, flies[1:] & flies[:-1], lambda means: means)
+
+
+def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
+    """Regress the horizontal force on the pull of a load that swings under the vehicle, on the cable that fits best.
+
+    Beside a constant force and a drag. What drives the swing is the vehicle's own motion, so a load shows by what comes
+    a period later. The length of the cable, m, comes with it.
+    """
+    # Slow to load, and who reads a record computes nothing.
+    from scipy.optimize import minimize
+
+    vehicle = signals.vehicle
+    own, inside = _windows(signals, flies)
+    if signals.attitude is None or signals.velocity is None or inside.sum() < FEWEST_WINDOWS:
+        return float("nan"), ([], np.zeros(0), np.zeros(0))
+    assert signals.thrust is not None, "rotor speeds are there"
+    drives = signals.rotation[:, :2, 2] * (signals.thrust / vehicle.mass_kg)[:, None]
+    left = (own.derivative(signals.velocity[:, :2]) - own.average(drives))[inside]
+    drag = own.average(signals.velocity[:, :2])[inside]
+    block = contiguous(len(left), _BLOCKS)
+    kept = [block >= 0, *(block != number for number in range(_BLOCKS))]
+
+    columns = EFFECT.columns
+    assert columns is not None, "the load pulls"
+
+    def pull(length: float, damping: float) -> Array:
+        """Give the horizontal pull of a unit mass, shape (window, 2), m/s^2."""
+        along = columns(signals, {"length_m": length, "damping_1_s": damping, "depth_m": 0.0}).direct[:, 3:, _MASS]
+        return own.average(np.einsum("tij,tj->ti", signals.rotation, along)[:, :2])[inside]
+
+    def unexplained(place: Array) -> Any:
+        return -_pulled(left, drag, pull(*np.exp(place)))[1]
+
+    start = min((np.log([length, _USUAL_DAMPING]) for length in CABLES), key=unexplained)
+    possible = [_SHAPES[name].bounds(vehicle) for name in ("length_m", "damping_1_s")]
+    bounds = [(float(np.log(low)), float(np.log(high))) for low, high in possible]
+    found = minimize(
+        unexplained,
+        start,
+        method="Nelder-Mead",
+        bounds=bounds,
+        options={"xatol": 1e-3, "fatol": 0.0, "maxfev": 60},
+    )
+    length, damping = np.exp(found.x)
+    pulls = pull(length, damping)
+    share = np.array([_pulled(left[rows], drag[rows], pulls[rows])[0] for rows in kept])
+    return float(length), (["swing"], share[:1], jackknife_error(share[1:, None]))
+
+
+def _pulled(left: Array, drag: Array, pull: Array) -> tuple[float, float]:
+    """Fit a pull beside a constant and a drag along each axis: its size, and the squares that it explains."""
+    sides = []
+    for axis in range(2):
+        known = np.column_stack([np.ones(len(left)), drag[:, axis]])
+        both = np.column_stack([left[:, axis], pull[:, axis]])
+        sides.append(both - known @ np.linalg.lstsq(known, both, rcond=None)[0])
+    y, x = np.concatenate(sides).T
+    size = float(x @ y / max(x @ x, 1e-300))
+    return size, size * float(x @ y) * np.sign(size)
 
 
 def _drawn(signals: Signals, flies: BoolArray) -> _Numbers:

@@ -39,14 +39,19 @@ class Reference:
         Of the mean of flights of one other day beside that of the reference.
     freedom : float
         Degrees of freedom of the covariance.
-    moved : array, shape (rotor direction, number)
-        Unit directions in the loads; see `load_directions`.
+    measured : array, shape (number,)
+        Mean variance by which a number of one flight is off, by its blocks; it is in the covariance.
+    by_voltage, voltage_error : float
+        Power of the voltage that loads go with, and its error; 0 where they need no voltage.
+    voltage : float
+        Of the mean; NaN where it does not count.
     """
 
     names: tuple[str, ...]
     mean: Array
     covariance: Array
     freedom: float
+    measured: Array
     by_voltage: float
     voltage_error: float
     voltage: float
@@ -77,12 +82,12 @@ class Reference:
         apart = values - mean
         kinds = np.array([name.split()[0] for name in names])
         seen = (apart.T @ apart) * (kinds[:, None] == kinds)
-        measured = np.array([[flight.errors[name] for name in names] for flight in flights])
+        measured = _measured(flights, names)
         freedom = _DAYS + len(flights) - 1
         # Scatter of flights holds the error of each; what is usual from day to day comes beside that.
-        expected = usual + np.diag((measured**2).mean(axis=0))
+        expected = usual + np.diag(measured)
         covariance = (_DAYS * expected + seen) / freedom * (1 + 1 / len(flights))
-        return cls(tuple(names), mean, covariance, freedom, power, error, voltage)
+        return cls(tuple(names), mean, covariance, freedom, measured, power, error, voltage)
 
     def apart(self, flights: Sequence[FlightNumbers]) -> tuple[Array, Array]:
         """Compute how far flights of a day are from the reference, shape (flight, number), and the covariance.
@@ -92,13 +97,20 @@ class Reference:
         """
         values = np.array([[flight.values[name] for name in self.names] for flight in flights])
         loads = np.array([name.startswith("load ") for name in self.names])
-        covariance = self.covariance.copy()
+        # Flights that tell a number worse than those of the reference do.
+        beside = _measured(flights, self.names) / len(flights) - self.measured
+        covariance = self.covariance + np.diag(np.maximum(beside, 0.0))
         voltage = np.array([flight.voltage for flight in flights])
         if loads.any() and np.isfinite(self.voltage) and np.isfinite(voltage).all():
             lower = np.log(voltage / self.voltage)
             values[:, loads] -= self.by_voltage * lower[:, None]
             covariance += (self.voltage_error * lower.mean()) ** 2 * np.outer(loads, loads)
         return values - self.mean, covariance
+
+
+def _measured(flights: Sequence[FlightNumbers], names: Sequence[str]) -> Array:
+    """Average the variances of numbers over flights, shape (number,)."""
+    return np.asarray(np.mean([[flight.errors[name] ** 2 for name in names] for flight in flights], axis=0))
 
 
 def common_numbers(flights: Sequence[FlightNumbers]) -> tuple[str, ...]:

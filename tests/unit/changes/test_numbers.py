@@ -1,0 +1,105 @@
+"""Numbers of a flight in closed loop beside the truth it was flown with."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.changes.judge import FALSE_ALARM, changed
+from cpfls_cli.changes.numbers import KINDS, flight_numbers, in_flight
+from cpfls_cli.errors import InputError
+from cpfls_cli.weak_form.windows import Recording
+from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, signals_of
+
+NOISE = {"body_rate": 0.01, "attitude": 0.003, "velocity": 0.01, "acceleration": 0.1}
+LOAD = {
+    "mass": 0.6,
+    "mass_times_depth": 0.0,
+    "mass_times_right": 0.0,
+    "mass_times_behind": 0.0,
+    "length_m": 1.0,
+    "damping_1_s": 0.1,
+    "depth_m": 0.0,
+}
+
+
+def recorded(vehicle=VEHICLE, seed=1, **closed_loop):
+    return Recording(
+        "flight.h5", signals_of(flown(duration=12.0, seed=seed, vehicle=vehicle, noise=NOISE, **closed_loop))
+    )
+
+
+def weaker(rotor, share):
+    rotors = list(VEHICLE.rotors)
+    rotors[rotor] = replace(rotors[rotor], thrust_factor_n_s2=(1 - share) * rotors[rotor].thrust_factor_n_s2)
+    return replace(VEHICLE, rotors=tuple(rotors))
+
+
+@pytest.fixture(scope="module")
+def usual():
+    return flight_numbers(recorded())
+
+
+def test_names_and_noise(usual):
+    assert {name.split()[0] for name in usual.values} <= set(KINDS)
+    assert usual.values.keys() == usual.errors.keys()
+    # Of white noise a parabola through five samples leaves the same share each time.
+    of_gyroscope = np.exp([usual.values[f"vibration gyroscope {axis}"] for axis in "xyz"])
+    assert of_gyroscope == pytest.approx(np.full(3, 0.01 * np.sqrt(18 / 35)), rel=0.1)
+    assert usual.values["follow roll"] == pytest.approx(0.0, abs=0.05)
+    assert usual.values["late roll"] == pytest.approx(0.0, abs=0.002)
+    assert abs(usual.values["swing"]) < 0.01
+    assert np.isnan(usual.voltage)
+
+
+def test_a_weak_rotor_is_asked_for_more(usual):
+    """Of a cross each rotor carries its share alone, but for what its drag turns about z."""
+    told = flight_numbers(recorded(weaker(2, 0.2)))
+    more = [told.values[f"load M{index}"] - usual.values[f"load M{index}"] for index in range(1, 5)]
+    # The drag factor stayed: M3 turns faster, so that all others have to hold it.
+    assert more[2] > 0.1
+    assert int(np.argmax(more)) == 2
+
+
+def test_a_load_on_a_cable():
+    """Mass and length of a load, beside five flights without, each of a day of its own."""
+    rng = np.random.default_rng(4)
+
+    def of_a_day(seed, **closed_loop):
+        trim = [
+            replace(rotor, thrust_factor_n_s2=rotor.thrust_factor_n_s2 * (1 + 0.01 * rng.normal()))
+            for rotor in VEHICLE.rotors
+        ]
+        return recorded(replace(VEHICLE, rotors=tuple(trim)), seed, **closed_loop)
+
+    before = [flight_numbers(of_a_day(seed)) for seed in range(10, 13)]
+    flight = of_a_day(20, effects={"payload": LOAD})
+    today = flight_numbers(flight)
+    found = changed([today], before, VEHICLE, rng)
+    assert found.p_value <= FALSE_ALARM
+    (load,) = found.found
+    assert load.cause.name == "load on a cable"
+    assert load.belief > 0.9
+    assert load.sizes[0].low < 0.1 < load.sizes[0].high
+    assert today.cable_m == pytest.approx(1.0, rel=0.05)
+
+
+def test_too_short_and_without_rotors():
+    flight = recorded()
+    few = round(3.0 / PERIOD)
+    parts = {name: getattr(flight.signals, name)[:few] for name in ("time", "body_rate", "attitude", "rotor_speed")}
+    short = replace(flight.signals, **parts, velocity=None, position=None, acceleration=None)
+    with pytest.raises(InputError, match="flies for 3 s"):
+        flight_numbers(Recording("short.csv", short))
+    with pytest.raises(InputError, match="has no rotor_speed or rotor_command"):
+        flight_numbers(Recording("none.csv", replace(flight.signals, rotor_speed=None)))
+
+
+def test_the_ground_is_no_flight():
+    """Five seconds of idling before: not flown, nor half a second beside it."""
+    signals = recorded().signals
+    idle = signals.rotor_speed.copy()
+    idle[:500] *= 0.2
+    flies = in_flight(replace(signals, rotor_speed=idle))
+    assert not flies[:549].any()
+    assert flies[560:].all()
