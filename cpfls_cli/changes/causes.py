@@ -71,6 +71,7 @@ _OFF_CENTRE = 0.1
 
 _ALONE = {
     "turn": (0.1, "1"),
+    "unbalance": (1.0, "1"),
     "follow": (0.2, "1"),
     "late": (0.01, "s"),
     "gusts": (0.7, "1"),

@@ -53,6 +53,7 @@ KINDS: dict[str, Kind] = {
     "load": Kind("1", 0.02, 0.02, "thrust that a rotor is asked for over its share of the weight, logarithm"),
     "turn": Kind("1", 0.02, 0.02, "squared speed of a rotor over what it is commanded, logarithm"),
     "vibration": Kind("1", 0.1, 0.25, "root mean square above 20 Hz, logarithm"),
+    "unbalance": Kind("1", 0.3, 0.2, "acceleration that turns with a rotor, amplitude, logarithm"),
     "follow": Kind("1", 0.05, 0.03, "angular acceleration over that of the rotors' torque, logarithm"),
     "late": Kind("s", 0.002, 0.003, "time by which the body's rotation follows the rotors"),
     "gusts": Kind("1", 0.1, 0.4, "angular acceleration that the rotors do not explain, root mean square, logarithm"),
@@ -74,6 +75,9 @@ _BLOCKS = 8
 
 _ABOVE_HZ = 20.0
 """Where vibration begins: above what a vehicle flies."""
+
+_TURNS_S = 0.5
+"""Stretches over which what turns with a rotor adds up: rotors 2 Hz apart are told apart."""
 
 _WINDOW_S = 0.4
 _LATEST_S = 0.12
@@ -172,6 +176,8 @@ def _told(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
         if values is not None and (squares := _above(values, signals.period)) is not None:
             names = [f"vibration {sensor} {axis}" for axis in AXES]
             yield _averaged(names, squares, flies, lambda means: 0.5 * np.log(means))
+    if feels is not None and not signals.commanded:
+        yield _unbalance(signals, feels, flies)
     if signals.attitude is not None:
         assert signals.thrust is not None, "rotor speeds are there"
         leans = signals.rotation[:, :2, 2] * (signals.thrust / signals.vehicle.mass_kg)[:, None]
@@ -217,6 +223,29 @@ def _above(values: Array, period: float) -> Array | None:
     if 0.5 / period < 1.5 * _ABOVE_HZ or len(values) < 4 * half + 4:
         return None
     return np.asarray((values - parabolas(values, half, 0)) ** 2)
+
+
+def _unbalance(signals: Signals, feels: Array, flies: BoolArray) -> _Numbers:
+    """Tell the amplitude of what turns with each rotor, m/s^2, whatever the log's rate makes of its frequency.
+
+    An unbalanced rotor pulls once a turn. Between samples it turns many times, but by its measured speed it is known
+    where it stands at each sample (synchronous averaging).
+    """
+    length = max(round(_TURNS_S / signals.period), FEWEST_SAMPLES)
+    count = len(signals) // length
+    whole = slice(0, count * length)
+    speed = signals.speed[whole]
+    turned = np.exp(-1j * signals.period * (np.cumsum(speed, axis=0) - 0.5 * speed))
+    # What moves slowly is seen by the edges of a stretch alone, which this window takes away.
+    weight = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
+    apart = (feels[whole] - feels[flies].mean(axis=0)).reshape(count, length, 3) * (weight / weight.sum())[:, None]
+    parts = np.einsum("btr,bta->bra", turned.reshape(count, length, -1), apart)
+    flown = np.asarray(flies[whole].reshape(count, length).all(axis=1))
+    names = [f"unbalance M{index + 1}" for index in range(signals.speed.shape[1])]
+    if flown.sum() < 2 * _BLOCKS:
+        return [], np.zeros(0), np.zeros(0)
+    power = 4 * (np.abs(parts) ** 2).sum(axis=2)
+    return _averaged(names, power, flown, lambda means: 0.5 * np.log(means))
 
 
 def _windows(signals: Signals, flies: BoolArray) -> tuple[Windows, BoolArray]:

@@ -84,6 +84,24 @@ def test_a_load_on_a_cable():
     assert today.cable_m == pytest.approx(1.0, rel=0.05)
 
 
+def test_an_unbalanced_rotor_above_half_of_the_rate():
+    """It turns 55 times a second in a log of 100 Hz: by its speed it is known where it stands."""
+    flight = recorded()
+    signals = flight.signals
+    assert signals.rotor_speed.mean() / (2 * np.pi) > 0.5 / PERIOD
+    speed = signals.rotor_speed * [1.0, 1.1, 0.95, 1.05]
+    turns = PERIOD * (np.cumsum(speed[:, 1]) - 0.5 * speed[:, 1])
+    pull = 0.5 * np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1)
+    still, shaken = (
+        np.exp([flight_numbers(Recording("flight.h5", each)).values[f"unbalance M{index}"] for index in range(1, 5)])
+        for each in (replace(signals, rotor_speed=speed, acceleration=signals.acceleration + x * pull) for x in (0, 1))
+    )
+    assert still.max() < 0.1
+    assert shaken[1] == pytest.approx(0.5 * np.sqrt(2), rel=0.05)
+    # Speeds of two rotors cross now and then.
+    assert shaken[[0, 2, 3]].max() < 0.5 * shaken[1]
+
+
 def test_too_short_and_without_rotors():
     flight = recorded()
     few = round(3.0 / PERIOD)
