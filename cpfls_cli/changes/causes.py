@@ -65,6 +65,9 @@ _RARER = 0.5
 _SHAKES = 0.5
 """Logarithm of vibration beside the reference, of something that came loose or out of balance."""
 
+_OF_AXIS = 0.5
+"""Of that, by how much each axis differs from the others."""
+
 _HEAVIER = 0.1
 _OFF_CENTRE = 0.1
 """Of the arm: by how much a centre of mass moves."""
@@ -109,7 +112,12 @@ def _causes(names: Sequence[str], vehicle: VehicleSettings) -> Iterator[Cause]:
     def of_kind(kind: str) -> list[str]:
         return [name for name in names if name.split()[0] == kind]
 
-    shakes = direction(dict.fromkeys(of_kind("vibration"), _SHAKES))
+    vibrations = of_kind("vibration")
+    # All axes alike, and each by itself.
+    shakes = [
+        _SHAKES * direction(dict.fromkeys(vibrations, 1.0)),
+        *(_SHAKES * _OF_AXIS * direction({name: 1.0}) for name in vibrations),
+    ]
     if of_kind("load"):
         own = load_directions(vehicle)
         arms = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
@@ -122,11 +130,11 @@ def _causes(names: Sequence[str], vehicle: VehicleSettings) -> Iterator[Cause]:
             weaker = direction({"follow roll": -lever[index, 0], "follow pitch": -lever[index, 1]})
             loss = _LOSS * (loads(own.rotor[index]) + weaker)
             single.append(loss)
-            beside = [_LOSS * _OF_YAW / len(arms) * yaw, shakes]
+            beside = [_LOSS * _OF_YAW / len(arms) * yaw, *shakes]
             yield Cause(f"rotor M{index + 1}", np.stack([loss, *beside], axis=1), _LOSS, "1", losses=1)
         pairs = list(combinations(range(len(single)), 2))
         for one, other in pairs:
-            columns = [single[one], single[other], _LOSS * _OF_YAW / len(arms) * yaw, shakes]
+            columns = [single[one], single[other], _LOSS * _OF_YAW / len(arms) * yaw, *shakes]
             yield Cause(
                 f"rotors M{one + 1} and M{other + 1}", np.stack(columns, axis=1), _LOSS, "1", _RARER, losses=2, told=2
             )
@@ -138,8 +146,8 @@ def _causes(names: Sequence[str], vehicle: VehicleSettings) -> Iterator[Cause]:
         yield Cause("centre of mass", np.stack(moved, axis=1), _OFF_CENTRE * arm, "m", told=2)
         yield Cause("all rotors", _HEAVIER * loads(own.mass)[:, None], _HEAVIER, "1")
         yield Cause("torque about z", _OF_YAW * yaw[:, None], _OF_YAW, "1")
-    if shakes.any():
-        yield Cause("vibration", shakes[:, None], _SHAKES, "1")
+    if vibrations:
+        yield Cause("vibration", np.stack(shakes, axis=1), _SHAKES, "1")
     for kind, (usual, unit) in _ALONE.items():
         each = [usual * direction({name: 1.0}) for name in of_kind(kind)]
         if each and kind in _ALIKE:
