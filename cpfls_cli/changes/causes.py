@@ -77,6 +77,8 @@ _ALONE = {
     "unbalance": (1.0, "1"),
     "follow": (0.2, "1"),
     "late": (0.01, "s"),
+    "answer": (0.01, "s"),
+    "felt": (0.5, "m/s^2"),
     "gusts": (0.7, "1"),
     "lean": (0.7, "m/s^2"),
     "drift": (0.05, "rad/s"),
@@ -84,7 +86,7 @@ _ALONE = {
 }
 """Of kinds of which each number stands for itself: how much it changes where it does, and its unit."""
 
-_ALIKE = {"late": 0.3, "gusts": 0.5}
+_ALIKE = {"late": 0.3, "answer": 0.5, "gusts": 0.5}
 """Kinds of which all numbers change at once, and the share of that by which each does so by itself."""
 
 _AT_ONCE = ("lean", "drift")
@@ -144,7 +146,11 @@ def _causes(names: Sequence[str], vehicle: VehicleSettings) -> Iterator[Cause]:
             hangs = _HEAVIER * (loads(own.mass) + direction({"swing": 1.0}))
             yield Cause("load on a cable", np.stack([hangs, *moved], axis=1), _HEAVIER, "1", losses=1)
         yield Cause("centre of mass", np.stack(moved, axis=1), _OFF_CENTRE * arm, "m", told=2)
-        yield Cause("all rotors", _HEAVIER * loads(own.mass)[:, None], _HEAVIER, "1")
+        yield Cause("hover", _HEAVIER * loads(own.mass)[:, None], _HEAVIER, "1")
+        for index, (x, y) in enumerate(arms):
+            # In hover hardly another thing than a rotor that pulls less.
+            hangs = _HEAVIER * loads(own.mass + x * own.offset[0] + y * own.offset[1])
+            yield Cause(f"weight near M{index + 1}", hangs[:, None], _HEAVIER, "1", 1 / len(arms), losses=1)
         yield Cause("torque about z", _OF_YAW * yaw[:, None], _OF_YAW, "1")
     if vibrations:
         yield Cause("vibration", np.stack(shakes, axis=1), _SHAKES, "1")
@@ -158,3 +164,5 @@ def _causes(names: Sequence[str], vehicle: VehicleSettings) -> Iterator[Cause]:
         else:
             for name, column in zip(of_kind(kind), each, strict=True):
                 yield Cause(name, column[:, None], usual, unit)
+            if each and kind == "turn":
+                yield Cause("all motors", np.sum(each, axis=0)[:, None], usual, unit)

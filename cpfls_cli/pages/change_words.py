@@ -17,9 +17,11 @@ Sizes = Sequence[Size]
 _NAMES = {
     "mass": "another weight",
     "centre of mass": "a centre of mass elsewhere",
-    "all rotors": "another thrust of all rotors",
+    "hover": "another weight, or rotors that all pull otherwise",
+    "all motors": "the speed of all rotors",
     "torque about z": "a torque about z",
     "late": "another delay",
+    "answer": "rotors that follow their commands otherwise",
     "gusts": "gusts",
     "lean": "steady wind or a tilted sensor",
     "drift": "an offset of the gyroscope",
@@ -32,9 +34,15 @@ _CHECKS = {
     "rotors": "look at both propellers for cuts, chips or bends; change them for new ones; turn the motors by hand",
     "mass": "weigh it, with battery and load",
     "centre of mass": "see where the battery sits, and what else can be put elsewhere",
-    "all rotors": "weigh it; see whether all propellers are of the usual kind; charge the battery",
+    "hover": "weigh it; see whether all propellers are of the usual kind; charge the battery",
+    "all": "charge the battery; see whether the speed controllers' settings were changed",
+    "weight": "look for a load there, and at that rotor's propeller: in hover they look alike",
+    "load": "see what hangs under it; measure its cable",
     "torque about z": "see whether a motor stands askew: its screws, its arm, a twisted frame",
     "vibration": "balance the propellers; tighten the screws of motors and autopilot; look for tape and chips",
+    "unbalance": "balance its propeller; look for tape and chips; tighten its screws",
+    "answer": "see whether motors, propellers or the speed controllers' settings were changed",
+    "felt": "calibrate the accelerometer; see how the autopilot is mounted",
     "turn": "turn the motor by hand: its bearing, its cable, its speed controller",
     "follow": "see whether something sits further out or in than before, and whether all propellers are of one kind",
     "late": "see whether filters, speed controllers or the autopilot's settings were changed",
@@ -53,6 +61,12 @@ def cause_name(cause: str) -> str:
         return f"the speed of rotor {of}"
     if kind == "follow":
         return f"{of} that follows otherwise"
+    if kind == "unbalance":
+        return f"an unbalanced rotor {of}"
+    if kind == "felt":
+        return f"an offset of the accelerometer along {of}"
+    if cause.startswith(("weight ", "load ")):
+        return f"a {cause}"
     return _NAMES.get(cause, cause)
 
 
@@ -75,12 +89,22 @@ def change_words(cause: str, sizes: Sizes, vehicle: VehicleSettings, axes: Seque
         "rotor": lambda: f"rotor {of} pulls {_percent(size, ('less', 'more'))}",
         "rotors": lambda: f"rotors {of} pull {joined(_percent(each, ('less', 'more')) for each in sizes)}",
         "mass": lambda: f"it is {_amount(size, 1e3 * vehicle.mass_kg, ' g', ('heavier', 'lighter'))}",
-        "all": lambda: f"all rotors are asked for {_percent(size, ('more', 'less'))} thrust",
+        "hover": lambda: (
+            f"hover needs {_percent(size, ('more', 'less'))} thrust: "
+            f"{number(abs(1e3 * vehicle.mass_kg * size[0]), 2)} g {'heavier' if size[0] > 0 else 'lighter'}, or all rotors "
+            f"pull {'less' if size[0] > 0 else 'more'}"
+        ),
+        "all": lambda: f"all rotors turn {_percent(_less_one(0.5, size), ('faster', 'slower'))} than they are told",
+        "weight": lambda: f"{_amount(size, 1e3 * vehicle.mass_kg, ' g', ('hang', 'lack'))} {of}",
+        "load": lambda: f"{_amount(size, 1e3 * vehicle.mass_kg, ' g', ('swing', 'lack'))} {of}",
         "centre": lambda: f"the centre of mass lies {_off_centre(sizes)}",
         "torque": lambda: f"a torque about z takes {_percent(size)} of the rotors' drag",
         "vibration": lambda: f"it vibrates {_times(size)}",
         "turn": lambda: f"rotor {of} turns {_percent(_less_one(0.5, size), ('faster', 'slower'))} than it is told",
         "follow": lambda: f"{of} follows the rotors' torque {_percent(_less_one(1.0, size), ('more', 'less'))}",
+        "unbalance": lambda: f"what turns with rotor {of} shakes it {_times(size)}",
+        "answer": lambda: f"rotors follow their commands {_amount(size, 1e3, ' ms', ('later', 'earlier'))}",
+        "felt": lambda: f"the accelerometer is off by {number(size[0], 2)} m/s² along {of}",
         "late": lambda: f"rotation follows the rotors {_amount(size, 1e3, ' ms', ('later', 'earlier'))}",
         "gusts": lambda: f"what turns it beside the rotors, gusts, is {_times(size)}",
         "lean": lambda: f"it leans with {_each(sizes, axes, 'm/s²', 'along')} of the world, as against wind",
@@ -97,7 +121,13 @@ def smallest_words(cause: str, size: float, vehicle: VehicleSettings) -> str:
         "rotor": f"a rotor that pulls {number(100 * size, 2)} % less",
         "rotors": f"two rotors that pull {number(100 * size, 2)} % less",
         "mass": f"{number(1e3 * vehicle.mass_kg * size, 2)} g",
-        "all": f"{number(100 * size, 2)} % of the thrust of all rotors",
+        "hover": f"{number(100 * size, 2)} % of the thrust in hover",
+        "all": f"{number(50 * size, 2)} % of the speed of all rotors",
+        "weight": f"{number(1e3 * vehicle.mass_kg * size, 2)} g {of}",
+        "load": f"{number(1e3 * vehicle.mass_kg * size, 2)} g {of}",
+        "unbalance": f"{number(math.exp(size), 2)} times what turns with rotor {of}",
+        "answer": f"{number(1e3 * size, 2)} ms of the rotors' answer",
+        "felt": f"{number(size, 2)} m/s² of the accelerometer along {of}",
         "centre": f"{number(1e3 * size, 2)} mm of the centre of mass",
         "torque": f"{number(100 * size, 2)} % of the rotors' drag in yaw",
         "vibration": f"{number(math.exp(size), 2)} times the vibration",

@@ -20,7 +20,7 @@ from cpfls_cli.words import joined
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_SHARES = {"mass", "all rotors"}
+_SHARES = {"mass", "hover"}
 """Causes of which hover tells first, and nothing tells apart."""
 
 _NATURAL = {
@@ -28,13 +28,14 @@ _NATURAL = {
     "turn": "",
     "vibration gyroscope": "rad/s",
     "vibration accelerometer": "m/s²",
+    "unbalance": "m/s²",
     "follow": "",
     "gusts": "rad/s²",
 }
 """Units of numbers that are logarithms, without their axis: of what they are the logarithm of."""
 
 _UNITS = {"m/s^2": "m/s²", "1": ""}
-_SHOWN_FIRST = ("rotor M1", "mass", "centre of mass", "vibration", "late", "gusts")
+_SHOWN_FIRST = ("rotor M1", "hover", "centre of mass", "vibration", "late", "gusts")
 """Of what would have shown, as much as a first screen has room for; of rotors the one that shows least."""
 
 _ALIKE = 3
