@@ -89,11 +89,7 @@ def change_words(cause: str, sizes: Sizes, vehicle: VehicleSettings, axes: Seque
         "rotor": lambda: f"rotor {of} pulls {_percent(size, ('less', 'more'))}",
         "rotors": lambda: f"rotors {of} pull {joined(_percent(each, ('less', 'more')) for each in sizes)}",
         "mass": lambda: f"it is {_amount(size, 1e3 * vehicle.mass_kg, ' g', ('heavier', 'lighter'))}",
-        "hover": lambda: (
-            f"hover needs {_percent(size, ('more', 'less'))} thrust: "
-            f"{number(abs(1e3 * vehicle.mass_kg * size[0]), 2)} g {'heavier' if size[0] > 0 else 'lighter'}, or all rotors "
-            f"pull {'less' if size[0] > 0 else 'more'}"
-        ),
+        "hover": lambda: f"hover needs {_percent(size, ('more', 'less'))} thrust: {_either(size, vehicle)}",
         "all": lambda: f"all rotors turn {_percent(_less_one(0.5, size), ('faster', 'slower'))} than they are told",
         "weight": lambda: f"{_amount(size, 1e3 * vehicle.mass_kg, ' g', ('hang', 'lack'))} {of}",
         "load": lambda: f"{_amount(size, 1e3 * vehicle.mass_kg, ' g', ('swing', 'lack'))} {of}",
@@ -112,6 +108,12 @@ def change_words(cause: str, sizes: Sizes, vehicle: VehicleSettings, axes: Seque
         "battery": lambda: f"the battery falls {_percent(size, ('further', 'less far'))}",
     }
     return words[kind]() if kind in words else f"{cause}: {number(size[0], 2)}"
+
+
+def _either(size: Size, vehicle: VehicleSettings) -> str:
+    """Say what another thrust in hover can be."""
+    grams = number(abs(1e3 * vehicle.mass_kg * size[0]), 2)
+    return f"{grams} g heavier, or all rotors pull less" if size[0] > 0 else f"{grams} g lighter, or they all pull more"
 
 
 def smallest_words(cause: str, size: float, vehicle: VehicleSettings) -> str:
