@@ -238,7 +238,7 @@ def test_selection_with_wrong_indices(refuse, changed, pipeline, study, tmp_path
     selection = changed("selection", change)
     words = ("identify", study, pipeline.flight, "--selection", selection, "-o", tmp_path / "out.h5")
     (line,) = refuse(*words)
-    assert line.startswith(f"{selection}: indices is empty, negative or repeats itself")
+    assert line.startswith(f"{selection}: indices is empty, negative or has repeats")
 
 
 @pytest.mark.parametrize("stage", ["flight", "model"])

@@ -129,8 +129,8 @@ ALIASES = "a0: &a0 [x]\n" + "".join(f"a{n}: &a{n} [{', '.join(10 * [f'*a{n - 1}'
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("vehicle: {mass_kg: 1, mass_kg: 2}", "FILE:1:23: not valid YAML: key 'mass_kg' stands twice"),
-        ("seed: 1\nseed: 2\n", "FILE:2:1: not valid YAML: key 'seed' stands twice"),
+        ("vehicle: {mass_kg: 1, mass_kg: 2}", "FILE:1:23: not valid YAML: key 'mass_kg' appears twice"),
+        ("seed: 1\nseed: 2\n", "FILE:2:1: not valid YAML: key 'seed' appears twice"),
         ("vehicle:\n\tmass_kg: 1\n", "FILE:2:1: not valid YAML: found character '\\t' that cannot start any token"),
         ("seed: [1\nb: }", "FILE:2:2: not valid YAML: expected ',' or ']', but got ':'"),
         ("seed: 1\n---\nseed: 2\n", "FILE:2:1: not valid YAML: but found another document"),

@@ -103,7 +103,7 @@ def test_a_log_of_another_tool_is_listed_once_and_shortened(wrong):
         ("", "LOG: is empty; a log starts with a line of column names"),
         ("\n\n", "LOG: is empty; a log starts with a line of column names"),
         (",".join(NAMES) + "\n", "LOG: holds column names but no samples"),
-        ("t,t,pitch\n0,1,2\n", "LOG: column 't' stands twice"),
+        ("t,t,pitch\n0,1,2\n", "LOG: column 't' appears twice"),
         (",".join(NAMES) + "\n0,0,0,0,0,0,0\n1,0,0\n", "LOG:3: 3 fields, but 7 column names"),
         (",".join(NAMES) + "\n0,0,0,0,0,0,0,0\n", "LOG:2: 8 fields, but 7 column names"),
         (",".join(NAMES) + "\n0,0,up,0,0,0,0\n", "LOG:2: column 'pitch' = 'up': not a number"),
@@ -233,4 +233,4 @@ def test_a_key_that_does_not_suit_the_log_is_named(wrong, key, value, message, d
 
 def test_a_header_without_an_end(wrong):
     (line,) = wrong(gzip.compress(b"a" * (1 << 21)), "log.csv.gz")
-    assert line == "LOG: not a CSV file: its first line, of column names, does not end"
+    assert line == "LOG: not a CSV file: its first line, the column names, does not end"

@@ -160,7 +160,7 @@ def test_bytes_that_are_broken_are_warned_of(flown):
     place = content.find(data(*rows()[300]))
     content[place + 3 : place + 5] = b"\xff\xff"
     _, _, stderr = flown(bytes(content))
-    assert "the file is broken in places" in " ".join(stderr.split())
+    assert "the file is damaged in places" in " ".join(stderr.split())
 
 
 def test_other_topics_are_not_in_the_way(flown):
@@ -208,15 +208,15 @@ def test_a_slow_topic_is_named(wrong):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "LOG: not a ULog file: it does not begin as one"),
-        (b"t,roll\n0,1\n", "LOG: seems to hold CSV, not what its name ends in; rename it to end in .csv"),
+        (b"", "LOG: not a ULog file: it does not start like one"),
+        (b"t,roll\n0,1\n", "LOG: seems to hold CSV, unlike the ending of its name; rename it to end in .csv"),
         (header()[:10], "LOG: a broken ULog file: "),
         (header(), "LOG: a ULog file without samples: was the logger stopped at once, or the file cut off?"),
         (header() + definitions(FIELDS), "LOG: a ULog file without samples: "),
         (header() + message("B", bytes(8) + b"\x80" + bytes(31)), "LOG: a broken ULog file: "),
         (
             header() + definitions({"wheel": "uint64_t timestamp;wheel inner;float x"}) + data(0, 0, [1.0]),
-            "LOG: a broken ULog file: a message of it contains itself",
+            "LOG: a broken ULog file: one of its messages contains itself",
         ),
     ],
     ids=["empty", "text", "header-cut", "header-only", "no-data", "unknown-flag", "wheel"],

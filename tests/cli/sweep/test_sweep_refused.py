@@ -114,7 +114,7 @@ def test_samples_that_cannot_be_chosen_name_the_setting(refuse, words, tmp_path)
 
 def test_a_flight_that_trains_cannot_judge(refuse, words, sweep_flight, tmp_path):
     (line,) = refuse(*words, "-o", tmp_path / "x.h5", "--validate", sweep_flight)
-    assert "is the flight that trains" in line
+    assert "is the training flight" in line
 
 
 MISFIT = ("--set", "identification.subpopulations=5")
