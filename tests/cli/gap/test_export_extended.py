@@ -56,7 +56,7 @@ def test_what_a_table_does_not_hold_is_told_with_numbers_and_size(cpfls, extende
     sizes = LeftOutGroup(name=("battery_sag",), wrench=size, ends=ends)
     write_record(path, replace(record, vehicle=outside, left_out=sizes))
     said = cpfls("export", path, "-o", output).stdout.splitlines()[-1]
-    assert said.startswith("Not held, or not whole: battery sag (")
+    assert said.startswith("Not held, or only in part: battery sag (")
     floors = 0.4 / record.gap.floor[1]
     assert said.endswith(
         f"; exponent = 1.5): 0.4 N m and 0 N along its held-out flights, {floors:.3g} noise floors; half a second "
