@@ -276,7 +276,7 @@ def test_what_cannot_be_resumed_is_refused(cpfls, refuse, config, flights, tmp_p
         ((flights[0], "--set", "seed=2"), "seed = 1 there, 2 here"),
     ):
         (message,) = refuse("vehicle", config, *words, "-o", output, "--resume")
-        assert message.startswith(f"{output}.checkpoint: is of another search: ")
+        assert message.startswith(f"{output}.checkpoint: belongs to another search: ")
         assert named in message
     checkpoint = tmp_path / "v.h5.checkpoint"
     content = bytearray(checkpoint.read_bytes())

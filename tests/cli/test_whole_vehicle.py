@@ -346,7 +346,7 @@ def test_what_a_config_leaves_open_is_no_fact_for_another_model(refuse, open_con
     left_open, log = open_config
     words = {"predict": (log, log), "replay": ("vehicle", log)}.get(command, (log,))
     (line,) = refuse(command, left_open, *words, "-o", tmp_path / "x.h5")
-    assert f"not known in this config, and `cpfls {command}` needs what is null there" in line
+    assert f"not known in this config, but `cpfls {command}` needs what is null there" in line
 
 
 def test_an_exported_vehicle_is_flown_back(cpfls, refuse, vehicle, flight, noisy, monkeypatch):
