@@ -167,7 +167,7 @@ def test_not_a_good_model(refuse, pipeline, model, study, tmp_path):
         file.attrs["schema_version"] = 1
         file.attrs["format"] = "cpfls/extended"
     (line,) = refuse("export", model, *words)
-    assert line.startswith(f"{model}: a model that an earlier cpfls wrote, before all models had one format; ")
+    assert line.startswith(f"{model}: a model written by an earlier cpfls, before all models shared one format; ")
 
 
 @pytest.mark.parametrize(

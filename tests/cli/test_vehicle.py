@@ -283,7 +283,7 @@ def test_what_cannot_be_resumed_is_refused(cpfls, refuse, config, flights, tmp_p
     content[len(content) // 2] ^= 1
     checkpoint.write_bytes(content)
     (message,) = refuse("vehicle", config, flights[0], "-o", output, "--resume")
-    assert "damaged: its content does not fit the checksum at its end" in message
+    assert "damaged: its content does not match the checksum at its end" in message
 
 
 @pytest.fixture

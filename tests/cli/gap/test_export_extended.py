@@ -87,7 +87,7 @@ def test_one_of_before_is_refused(refuse, extended, tmp_path, name, command):
         file.attrs["schema_version"] = 1
     (line,) = refuse("export", old, "-o", tmp_path / "m.c")
     assert line == (
-        f"{old}: a model that an earlier cpfls wrote, before all models had one format; make it again with "
+        f"{old}: a model written by an earlier cpfls, before all models shared one format; make it again with "
         f"`cpfls {command}`"
     )
 

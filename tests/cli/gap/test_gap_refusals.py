@@ -41,7 +41,7 @@ def test_output_that_is_a_file(refuse, gap_config, shifted, tmp_path):
 def test_a_folder_in_the_place_of_a_file(refuse, gap_config, shifted, tmp_path):
     (tmp_path / "out" / "report.html").mkdir(parents=True)
     (message,) = refuse("gap", gap_config, *shifted, "-o", tmp_path / "out", "--force")
-    assert message.endswith("report.html: is a folder, and a file of this name is to be written; move it away")
+    assert message.endswith("report.html: is a folder, but a file of this name must be written; move it away")
 
 
 @pytest.mark.parametrize("made", [True, False])
