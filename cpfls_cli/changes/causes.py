@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -77,6 +77,8 @@ _ALONE = {
     "unbalance": (1.0, "1"),
     "follow": (0.2, "1"),
     "late": (0.01, "s"),
+    "answer": (0.01, "s"),
+    "felt": (0.5, "m/s^2"),
     "gusts": (0.7, "1"),
     "lean": (0.7, "m/s^2"),
     "drift": (0.05, "rad/s"),
@@ -84,7 +86,7 @@ _ALONE = {
 }
 """Of kinds of which each number stands for itself: how much it changes where it does, and its unit."""
 
-_ALIKE = {"late": 0.3, "gusts": 0.5}
+_ALIKE = {"late": 0.3, "answer": 0.5, "gusts": 0.5}
 """Kinds of which all numbers change at once, and the share of that by which each does so by itself."""
 
 _AT_ONCE = ("lean", "drift")
@@ -93,68 +95,82 @@ _AT_ONCE = ("lean", "drift")
 
 def causes(names: Sequence[str], vehicle: VehicleSettings) -> list[Cause]:
     """List what can have changed, as far as the numbers show it."""
-    return list(_causes(names, vehicle))
+    numbers = _Numbers(names)
+    found = [*_of_loads(numbers, vehicle)] if numbers.of_kind("load") else []
+    if numbers.of_kind("vibration"):
+        found.append(Cause("vibration", np.stack(numbers.shakes, axis=1), _SHAKES, "1"))
+    return [*found, *(cause for kind in _ALONE for cause in _of_kind(numbers, kind))]
 
 
-def _causes(names: Sequence[str], vehicle: VehicleSettings) -> Iterator[Cause]:
-    place = {name: index for index, name in enumerate(names)}
+class _Numbers:
+    """Directions in numbers by their names."""
 
-    def direction(changes: dict[str, float]) -> Array:
-        column = np.zeros(len(names))
-        for name, value in changes.items():
-            if name in place:
-                column[place[name]] = value
-        return column
+    def __init__(self, names: Sequence[str]) -> None:
+        self.names = list(names)
+        vibrations = self.of_kind("vibration")
+        # All axes alike, and each by itself.
+        self.shakes = [
+            _SHAKES * self.direction(dict.fromkeys(vibrations, 1.0)),
+            *(_SHAKES * _OF_AXIS * self.direction({name: 1.0}) for name in vibrations),
+        ]
 
-    def loads(of: Array) -> Array:
-        return direction({f"load M{index + 1}": value for index, value in enumerate(of)})
+    def of_kind(self, kind: str) -> list[str]:
+        """List the numbers of a kind."""
+        return [name for name in self.names if name.split()[0] == kind]
 
-    def of_kind(kind: str) -> list[str]:
-        return [name for name in names if name.split()[0] == kind]
+    def direction(self, changes: Mapping[str, float]) -> Array:
+        """Give what changes, shape (number,); what is not told is left out."""
+        return np.array([changes.get(name, 0.0) for name in self.names])
 
-    vibrations = of_kind("vibration")
-    # All axes alike, and each by itself.
-    shakes = [
-        _SHAKES * direction(dict.fromkeys(vibrations, 1.0)),
-        *(_SHAKES * _OF_AXIS * direction({name: 1.0}) for name in vibrations),
-    ]
-    if of_kind("load"):
-        own = load_directions(vehicle)
-        arms = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
-        arm = float(np.linalg.norm(arms, axis=1).mean())
-        yaw = loads(own.yaw)
-        lever = arms[:, ::-1] ** 2 / np.maximum((arms**2).sum(axis=0)[::-1], 1e-12)
-        single = []
-        for index in range(len(vehicle.rotors)):
-            # It turns the body less too, as far as it drives roll and pitch.
-            weaker = direction({"follow roll": -lever[index, 0], "follow pitch": -lever[index, 1]})
-            loss = _LOSS * (loads(own.rotor[index]) + weaker)
-            single.append(loss)
-            beside = [_LOSS * _OF_YAW / len(arms) * yaw, *shakes]
-            yield Cause(f"rotor M{index + 1}", np.stack([loss, *beside], axis=1), _LOSS, "1", losses=1)
-        pairs = list(combinations(range(len(single)), 2))
-        for one, other in pairs:
-            columns = [single[one], single[other], _LOSS * _OF_YAW / len(arms) * yaw, *shakes]
-            yield Cause(
-                f"rotors M{one + 1} and M{other + 1}", np.stack(columns, axis=1), _LOSS, "1", _RARER, losses=2, told=2
-            )
-        moved = [_OFF_CENTRE * arm * loads(each) for each in own.offset]
-        yield Cause("mass", np.stack([_HEAVIER * loads(own.mass), *moved], axis=1), _HEAVIER, "1")
-        if of_kind("swing"):
-            hangs = _HEAVIER * (loads(own.mass) + direction({"swing": 1.0}))
-            yield Cause("load on a cable", np.stack([hangs, *moved], axis=1), _HEAVIER, "1", losses=1)
-        yield Cause("centre of mass", np.stack(moved, axis=1), _OFF_CENTRE * arm, "m", told=2)
-        yield Cause("all rotors", _HEAVIER * loads(own.mass)[:, None], _HEAVIER, "1")
-        yield Cause("torque about z", _OF_YAW * yaw[:, None], _OF_YAW, "1")
-    if vibrations:
-        yield Cause("vibration", np.stack(shakes, axis=1), _SHAKES, "1")
-    for kind, (usual, unit) in _ALONE.items():
-        each = [usual * direction({name: 1.0}) for name in of_kind(kind)]
-        if each and kind in _ALIKE:
-            columns = [np.sum(each, axis=0), *(_ALIKE[kind] * column for column in each)]
-            yield Cause(kind, np.stack(columns, axis=1), usual, unit)
-        elif each and kind in _AT_ONCE:
-            yield Cause(kind, np.stack(each, axis=1), usual, unit, told=len(each))
-        else:
-            for name, column in zip(of_kind(kind), each, strict=True):
-                yield Cause(name, column[:, None], usual, unit)
+    def loads(self, of: Array) -> Array:
+        """Give the loads of all rotors."""
+        return self.direction({f"load M{index + 1}": value for index, value in enumerate(of)})
+
+
+def _of_loads(numbers: _Numbers, vehicle: VehicleSettings) -> Iterator[Cause]:
+    """List what the loads of the rotors in hover tell."""
+    own, loads = load_directions(vehicle), numbers.loads
+    arms = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
+    arm = float(np.linalg.norm(arms, axis=1).mean())
+    lever = arms[:, ::-1] ** 2 / np.maximum((arms**2).sum(axis=0)[::-1], 1e-12)
+    beside = [_LOSS * _OF_YAW / len(arms) * loads(own.yaw), *numbers.shakes]
+    single = []
+    for index, (roll, pitch) in enumerate(lever):
+        # It turns the body less too, as far as it drives roll and pitch.
+        weaker = numbers.direction({"follow roll": -roll, "follow pitch": -pitch})
+        single.append(_LOSS * (loads(own.rotor[index]) + weaker))
+        yield Cause(f"rotor M{index + 1}", np.stack([single[-1], *beside], axis=1), _LOSS, "1", losses=1)
+    for one, other in combinations(range(len(single)), 2):
+        columns = np.stack([single[one], single[other], *beside], axis=1)
+        yield Cause(f"rotors M{one + 1} and M{other + 1}", columns, _LOSS, "1", _RARER, losses=2, told=2)
+    moved, heavier = [_OFF_CENTRE * arm * loads(each) for each in own.offset], _HEAVIER * loads(own.mass)
+    yield Cause("mass", np.stack([heavier, *moved], axis=1), _HEAVIER, "1")
+    if numbers.of_kind("swing"):
+        hangs = heavier + _HEAVIER * numbers.direction({"swing": 1.0})
+        yield Cause("load on a cable", np.stack([hangs, *moved], axis=1), _HEAVIER, "1", losses=1)
+    yield Cause("centre of mass", np.stack(moved, axis=1), _OFF_CENTRE * arm, "m", told=2)
+    yield Cause("hover", heavier[:, None], _HEAVIER, "1")
+    for index, (x, y) in enumerate(arms):
+        # In hover hardly another thing than a rotor that pulls less.
+        hangs = heavier + _HEAVIER * loads(x * own.offset[0] + y * own.offset[1])
+        yield Cause(f"weight near M{index + 1}", hangs[:, None], _HEAVIER, "1", 1 / len(arms), losses=1)
+    yield Cause("torque about z", _OF_YAW * loads(own.yaw)[:, None], _OF_YAW, "1")
+
+
+def _of_kind(numbers: _Numbers, kind: str) -> Iterator[Cause]:
+    """List what numbers of a kind tell by themselves."""
+    usual, unit = _ALONE[kind]
+    each = [usual * numbers.direction({name: 1.0}) for name in numbers.of_kind(kind)]
+    if not each:
+        return
+    together = np.sum(each, axis=0)
+    if kind in _ALIKE:
+        columns = [together, *(_ALIKE[kind] * column for column in each)]
+        yield Cause(kind, np.stack(columns, axis=1), usual, unit)
+    elif kind in _AT_ONCE:
+        yield Cause(kind, np.stack(each, axis=1), usual, unit, told=len(each))
+    else:
+        for name, column in zip(numbers.of_kind(kind), each, strict=True):
+            yield Cause(name, column[:, None], usual, unit)
+        if kind == "turn":
+            yield Cause("all motors", together[:, None], usual, unit)

@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.changes.causes import Cause, causes
 from cpfls_cli.changes.numbers import FlightNumbers
-from cpfls_cli.changes.reference import Reference, common_numbers
+from cpfls_cli.changes.reference import Reference, common_numbers, kinds_of
 from cpfls_cli.errors import InputError
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -34,6 +34,9 @@ _ANY = 10.0
 """Times what is usual: a prior so wide says nothing of a size."""
 
 _DRAWS, _POWER = 2000, 0.9
+_SHOWN, _SIZES = 200, np.geomspace(0.05, 8.0, 48)
+"""Draws and sizes, in what is usual of a change, that tell which one shows: neighbours differ by a tenth."""
+
 _QUANTILES = (np.arange(12) + 0.5) / 12
 _HALF_WIDTH = 1.96
 _NONE = slice(0, 0)
@@ -128,13 +131,14 @@ def changed(
     reference = Reference.of(before, names, vehicle)
     apart, covariance = reference.apart(today)
     listed = causes(names, vehicle)
-    space = _Space(covariance, reference.freedom, listed)
+    space = _Space(covariance, reference.freedom, kinds_of(names), listed)
     chance = np.sort(space.evidence(space.drawn(rng)).max(axis=0))
     evidence = space.evidence(np.vstack([apart.mean(axis=0), apart]))
     p_value, *by_flight = (_beyond(chance, each) for each in evidence.max(axis=0))
     found = _found(space, apart.mean(axis=0), chance) if p_value <= FALSE_ALARM else ()
     threshold = float(np.quantile(chance, 1 - FALSE_ALARM))
-    shows = {cause.name: space.shows(index, threshold, rng) for index, cause in enumerate(listed)}
+    drawn = np.linalg.solve(space.root, space.drawn(rng, _SHOWN).T)
+    shows = {cause.name: space.shows(index, threshold, drawn) for index, cause in enumerate(listed)}
     deviation = np.sqrt(np.diag(covariance))
     return Change(names, reference, apart, deviation, p_value, np.array(by_flight), found, shows)
 
@@ -146,20 +150,21 @@ def _beyond(chance: Array, value: float) -> float:
 class _Space:
     """Densities of numbers under no change and under each one, as mixtures of normal ones."""
 
-    def __init__(self, covariance: Array, freedom: float, listed: Sequence[Cause]) -> None:
+    def __init__(self, covariance: Array, freedom: float, kinds: Sequence[str], listed: Sequence[Cause]) -> None:
         # Slow to load, and who reads a record computes nothing.
         from scipy.special import chdtri
 
         self.listed, self.freedom = listed, freedom
+        self.kind = np.unique(kinds, return_inverse=True)[1]
         self.root = np.linalg.cholesky(covariance)
         self.scales = freedom / chdtri(freedom, 1 - _QUANTILES)
         self.white = [np.linalg.solve(self.root, cause.directions) for cause in listed]
         self.prior = np.log([cause.prior for cause in listed])
 
     def drawn(self, rng: np.random.Generator, count: int = _DRAWS) -> Array:
-        """Draw numbers of unchanged flights, shape (draw, number)."""
-        scale = self.freedom / rng.chisquare(self.freedom, count)
-        return np.asarray(np.sqrt(scale)[:, None] * (rng.normal(size=(count, len(self.root))) @ self.root.T))
+        """Draw numbers of unchanged flights, shape (draw, number): each kind has a scatter of its own to be off by."""
+        scale = self.freedom / rng.chisquare(self.freedom, (count, self.kind.max() + 1))
+        return np.asarray(np.sqrt(scale)[:, self.kind] * (rng.normal(size=(count, len(self.root))) @ self.root.T))
 
     def evidence(self, apart: Array, beside: Array | None = None) -> Array:
         """Compute the logarithm of the evidence of each change, shape (cause, row).
@@ -241,25 +246,14 @@ class _Space:
             for value, half in zip(mean, _HALF_WIDTH * error, strict=True)
         )
 
-    def shows(self, index: int, threshold: float, rng: np.random.Generator) -> float:
+    def shows(self, index: int, threshold: float, drawn: Array) -> float:
         """Find the smallest size of a change that shows with 90 %, in its unit; infinite beyond eight times usual."""
-        noise = np.linalg.solve(self.root, self.drawn(rng, 200).T)
-        own = self.white[index]
-        cause = self.listed[index]
-
-        def power(size: float) -> float:
-            rows = noise + size * own[:, :1]
-            there = self._density(rows, own, slice(0, cause.losses))
-            evidence = there - self._density(rows, rows[:, :0]) + self.prior[index]
-            return float((evidence >= threshold).mean())
-
-        low, high = 0.0, 8.0
-        if power(high) < _POWER:
-            return float("inf")
-        for _ in range(10):
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if power(middle) >= _POWER else (middle, high)
-        return float(high * cause.usual)
+        own, cause = self.white[index], self.listed[index]
+        rows = (drawn[:, None] + _SIZES[:, None] * own[:, :1, None]).reshape(len(own), -1)
+        evidence = self._density(rows, own, slice(0, cause.losses)) - self._density(rows, own[:, :0])
+        power = (evidence + self.prior[index] >= threshold).reshape(len(_SIZES), -1).mean(axis=1)
+        enough = np.flatnonzero(power >= _POWER)
+        return float(_SIZES[enough[0]] * cause.usual) if len(enough) else float("inf")
 
 
 def _found(space: _Space, apart: Array, chance: Array) -> tuple[Found, ...]:

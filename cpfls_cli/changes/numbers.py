@@ -52,12 +52,14 @@ class Kind:
 KINDS: dict[str, Kind] = {
     "load": Kind("1", 0.02, 0.02, "thrust that a rotor is asked for over its share of the weight, logarithm"),
     "turn": Kind("1", 0.02, 0.02, "squared speed of a rotor over what it is commanded, logarithm"),
+    "answer": Kind("s", 0.002, 0.002, "time by which a rotor's speed follows its command"),
     "vibration": Kind("1", 0.1, 0.25, "root mean square above 20 Hz, logarithm"),
     "unbalance": Kind("1", 0.3, 0.2, "acceleration that turns with a rotor, amplitude, logarithm"),
     "follow": Kind("1", 0.05, 0.03, "angular acceleration over that of the rotors' torque, logarithm"),
     "late": Kind("s", 0.002, 0.003, "time by which the body's rotation follows the rotors"),
-    "gusts": Kind("1", 0.1, 0.4, "angular acceleration that the rotors do not explain, root mean square, logarithm"),
-    "lean": Kind("m/s^2", 0.15, 0.0, "mean horizontal thrust over mass, world axes"),
+    "gusts": Kind("1", 0.2, 0.6, "angular acceleration that the rotors do not explain, root mean square, logarithm"),
+    "lean": Kind("m/s^2", 0.3, 0.0, "mean horizontal thrust over mass, world axes"),
+    "felt": Kind("m/s^2", 0.05, 0.0, "mean of the accelerometer, along z less gravity"),
     "drift": Kind("rad/s", 0.01, 0.0, "mean rate of the gyroscope beside the attitude's"),
     "swing": Kind("1", 0.02, 0.0, "mass that swings on a cable over that of the vehicle"),
     "battery": Kind("1", 0.02, 0.0, "voltage that flight draws from the battery, share of a full one"),
@@ -79,11 +81,15 @@ _ABOVE_HZ = 20.0
 _TURNS_S = 0.5
 """Stretches over which what turns with a rotor adds up: rotors 2 Hz apart are told apart."""
 
-_WINDOW_S = 0.4
+_WINDOW_S, _SWING_S = 0.12, 0.4
+"""Length of windows over which rotation is averaged, and a swing. Below its bandwidth, 2 Hz or so, the loop's torque
+answers gusts, and only above it does torque drive the body."""
+
 _LATEST_S = 0.12
 """Of rotors and autopilot."""
 
 _STEP_S = 0.002
+_DELAYS = np.arange(0.0, _LATEST_S, _STEP_S)
 
 
 @dataclass(frozen=True)
@@ -154,7 +160,10 @@ def in_flight(signals: Signals) -> BoolArray:
     """Mark the samples at which a vehicle flies, away from take-off and landing, shape (time,)."""
     thrust = signals.thrust
     assert thrust is not None, "rotor speeds are there"
-    level = _FLIES * np.median(thrust[thrust > 0.5 * np.quantile(thrust, 0.95)])
+    carries = thrust[thrust > 0.5 * np.quantile(thrust, 0.95)]
+    if not len(carries):
+        return np.zeros(len(signals), dtype=bool)
+    level = _FLIES * np.median(carries)
     margin = round(_MARGIN_S / signals.period)
     return np.asarray(binary_erosion(thrust > level, iterations=max(margin, 1), border_value=1))
 
@@ -176,6 +185,8 @@ def _told(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
         if values is not None and (squares := _above(values, signals.period)) is not None:
             names = [f"vibration {sensor} {axis}" for axis in AXES]
             yield _averaged(names, squares, flies, lambda means: 0.5 * np.log(means))
+    if signals.specific_force is not None:
+        yield _averaged([f"felt {axis}" for axis in AXES], _beside_gravity(signals), flies, lambda means: means)
     if feels is not None and not signals.commanded:
         yield _unbalance(signals, feels, flies)
     if signals.attitude is not None:
@@ -205,10 +216,7 @@ def _loads(signals: Signals) -> Array:
     factors = np.array([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors])
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
     carried = np.full(len(signals), weight)
-    if signals.specific_force is not None or (signals.attitude is not None and signals.acceleration is not None):
-        # Its mean over the flight: sample by sample it holds vibration.
-        carried[:] = max(float(signals.force[in_flight(signals), 2].mean()), 0.2 * weight)
-    elif signals.attitude is not None:
+    if signals.attitude is not None:
         carried /= np.maximum(signals.rotation[:, 2, 2], 0.2)
     return np.asarray(signals.speed**2 * factors * len(factors) / carried[:, None])
 
@@ -248,43 +256,71 @@ def _unbalance(signals: Signals, feels: Array, flies: BoolArray) -> _Numbers:
     return _averaged(names, power, flown, lambda means: 0.5 * np.log(means))
 
 
-def _windows(signals: Signals, flies: BoolArray) -> tuple[Windows, BoolArray]:
+def _beside_gravity(signals: Signals) -> Array:
+    """Take gravity from what the accelerometer feels along z, or along the vertical: what a hover feels on average."""
+    assert signals.specific_force is not None, "asked for"
+    felt, gravity = signals.specific_force.copy(), signals.vehicle.gravity_m_s2
+    if signals.attitude is not None:
+        felt[:, 2] = np.einsum("tj,tj->t", signals.rotation[:, 2], felt)
+    felt[:, 2] -= gravity
+    return felt
+
+
+def _answer(signals: Signals, flies: BoolArray, rotors: list[str]) -> _Numbers:
+    """Tell how late each rotor's speed follows its command, which no gust disturbs."""
+    own, inside = _windows(signals, flies, _WINDOW_S)
+    if inside.sum() < FEWEST_WINDOWS:
+        return [], np.zeros(0), np.zeros(0)
+    assert signals.rotor_command is not None, "asked for"
+    found = _followed(own, inside, own.average(signals.speed), signals.rotor_command, signals.period)
+    told = _STEP_S * found[:, 1]
+    return [f"answer {name}" for name in rotors], told[0], jackknife_error(told[1:])
+
+
+def _windows(signals: Signals, flies: BoolArray, length_s: float) -> tuple[Windows, BoolArray]:
     """Lay windows over a flight, and mark those in which it flies throughout."""
-    own = windows(signals.period, max(_WINDOW_S, FEWEST_SAMPLES * signals.period), 0.5)
+    own = windows(signals.period, max(length_s, FEWEST_SAMPLES * signals.period), 0.5)
     known = own.average(flies.astype(float)) > 1 - 1e-9 if own.count(len(signals)) else np.zeros(0, dtype=bool)
     return own, known
 
 
 def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
     """Tell how rotation follows the rotors' torque: how much, how late, and what is left of it."""
-    own, inside = _windows(signals, flies)
+    own, inside = _windows(signals, flies, _WINDOW_S)
     if inside.sum() < FEWEST_WINDOWS:
         return
     inertia = symmetric(signals.vehicle.inertia_kg_m2)
     momentum = signals.body_rate @ inertia
-    turned = (own.derivative(momentum) + own.average(np.cross(signals.body_rate, momentum)))[inside]
+    turned = own.derivative(momentum) + own.average(np.cross(signals.body_rate, momentum))
     torque = signals.torque
     assert torque is not None, "rotor speeds are there"
-    late = np.arange(0.0, _LATEST_S, _STEP_S)
-    driven = np.array([own.average(delayed(torque, each / signals.period))[inside] for each in late])
-    block = contiguous(len(turned), _BLOCKS)
-    kept = [block >= 0, *(block != number for number in range(_BLOCKS))]
-    found = np.array([_fit(turned[rows], driven[:, rows]) for rows in kept])
+    found = _followed(own, inside, turned, torque, signals.period)
     moments = np.diag(inertia)
-    told = np.stack([np.log(found[:, 0]), late[0] + _STEP_S * found[:, 1], np.log(found[:, 2] / moments)], axis=1)
+    told = np.stack([np.log(found[:, 0]), _STEP_S * found[:, 1], np.log(found[:, 2] / moments)], axis=1)
     for kind, values in zip(("follow", "late", "gusts"), told.transpose(1, 0, 2), strict=True):
         yield [f"{kind} {axis}" for axis in ROTATIONS], values[0], jackknife_error(values[1:])
     if signals.attitude is not None:
         yield _drift(signals, flies)
 
 
+def _followed(own: Windows, inside: BoolArray, turned: Array, drives: Array, period: float) -> Array:
+    """Fit what follows, averaged over windows, to what drives it, of all and without each block; see `_fit`."""
+    driven = np.array([own.average(delayed(drives, each / period))[inside] for each in _DELAYS])
+    there = turned[inside]
+    block = contiguous(len(there), _BLOCKS)
+    kept = [block >= 0, *(block != number for number in range(_BLOCKS))]
+    return np.array([_fit(there[rows], driven[:, rows]) for rows in kept])
+
+
 def _fit(turned: Array, driven: Array) -> Array:
-    """Fit what turns the body to what drives it at each delay: gain, best delay in steps, what is left, (3, axis).
+    """Fit what follows to what drives it at each delay: gain, best delay in steps, what is left, shape (3, column).
+
+    A delay at the end of what is tried is not known.
 
     Parameters
     ----------
-    turned : array, shape (window, 3), N m
-    driven : array, shape (delay, window, 3), N m
+    turned : array, shape (window, column)
+    driven : array, shape (delay, window, column)
     """
     y, x = turned - turned.mean(axis=0), driven - driven.mean(axis=1, keepdims=True)
     cross, power = (x * y).sum(axis=1), np.maximum((x**2).sum(axis=1), 1e-300)
@@ -296,7 +332,8 @@ def _fit(turned: Array, driven: Array) -> Array:
     bend = before - 2 * there + after
     step = np.where((bend > 0) & (inner == best), 0.5 * (before - after) / np.where(bend > 0, bend, 1.0), 0.0)
     gain = cross[best, axis] / power[best, axis]
-    return np.array([np.where(gain > 0, gain, np.nan), best + step, np.sqrt(left[best, axis] / len(y))])
+    late = np.where(best < len(left) - 1, best + step, np.nan)
+    return np.array([np.where(gain > 0, gain, np.nan), late, np.sqrt(left[best, axis] / len(y))])
 
 
 def _drift(signals: Signals, flies: BoolArray) -> _Numbers:
@@ -322,7 +359,7 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     from scipy.optimize import minimize
 
     vehicle = signals.vehicle
-    own, inside = _windows(signals, flies)
+    own, inside = _windows(signals, flies, _SWING_S)
     if signals.attitude is None or signals.velocity is None or inside.sum() < FEWEST_WINDOWS:
         return float("nan"), ([], np.zeros(0), np.zeros(0))
     assert signals.thrust is not None, "rotor speeds are there"

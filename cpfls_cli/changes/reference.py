@@ -21,8 +21,8 @@ _DAYS = 3.0
 _OFFSET_M = 0.0005
 """By which the centre of mass lies elsewhere from day to day: a battery put back."""
 
-_BY_VOLTAGE, _VOLTAGE_ERROR = -1.0, 1.0
-"""Power of the voltage that a command of hover goes with, and how far that is off, before any flight tells: none where
+_BY_VOLTAGE, _VOLTAGE_ERROR = {"load": -1.0, "turn": 1.0}, 1.0
+"""Power of the voltage that numbers of commands go with, and how far that is off, before any flight tells: none where
 the autopilot makes up for the battery, the square where it does not."""
 
 
@@ -41,8 +41,9 @@ class Reference:
         Degrees of freedom of the covariance.
     measured : array, shape (number,)
         Mean variance by which a number of one flight is off, by its blocks; it is in the covariance.
-    by_voltage, voltage_error : float
-        Power of the voltage that loads go with, and its error; 0 where they need no voltage.
+    by_voltage, voltage_error : array, shape (number,)
+        Power of the voltage that a number goes with, and its error, which all of a kind have in common; 0 where it goes
+        with none.
     voltage : float
         Of the mean; NaN where it does not count.
     """
@@ -52,8 +53,8 @@ class Reference:
     covariance: Array
     freedom: float
     measured: Array
-    by_voltage: float
-    voltage_error: float
+    by_voltage: Array
+    voltage_error: Array
     voltage: float
 
     @classmethod
@@ -73,15 +74,12 @@ class Reference:
         Gelman et al. 2013, Bayesian Data Analysis, section 3.6.
         """
         values = np.array([[flight.values[name] for name in names] for flight in flights])
-        loads = np.array([name.startswith("load ") for name in names])
-        power, error, voltage = _by_voltage(flights, values, loads)
-        if loads.any() and np.isfinite(voltage):
-            own = np.array([flight.voltage for flight in flights])
-            values[:, loads] -= power * np.log(own / voltage)[:, None]
+        power, error, voltage = _by_voltage(flights, names, values)
+        if np.isfinite(voltage):
+            values -= np.outer(np.log([flight.voltage / voltage for flight in flights]), power)
         usual, mean = usual_covariance(names, vehicle), values.mean(axis=0)
         apart = values - mean
-        kinds = np.array([name.split()[0] for name in names])
-        seen = (apart.T @ apart) * (kinds[:, None] == kinds)
+        seen = (apart.T @ apart) * _alike(names)
         measured = _measured(flights, names)
         freedom = _DAYS + len(flights) - 1
         # Scatter of flights holds the error of each; what is usual from day to day comes beside that.
@@ -92,19 +90,19 @@ class Reference:
     def apart(self, flights: Sequence[FlightNumbers]) -> tuple[Array, Array]:
         """Compute how far flights of a day are from the reference, shape (flight, number), and the covariance.
 
-        Loads are those at the reference's voltage; how sure that is is in the covariance, which is that of their mean:
-        flights of a day have their day in common.
+        What goes with the voltage is that at the reference's; how sure that is counts in the covariance. It is that of
+        their mean: flights of a day have their day in common.
         """
         values = np.array([[flight.values[name] for name in self.names] for flight in flights])
-        loads = np.array([name.startswith("load ") for name in self.names])
         # Flights that tell a number worse than those of the reference do.
         beside = _measured(flights, self.names) / len(flights) - self.measured
         covariance = self.covariance + np.diag(np.maximum(beside, 0.0))
         voltage = np.array([flight.voltage for flight in flights])
-        if loads.any() and np.isfinite(self.voltage) and np.isfinite(voltage).all():
+        if np.isfinite(self.voltage) and np.isfinite(voltage).all():
             lower = np.log(voltage / self.voltage)
-            values[:, loads] -= self.by_voltage * lower[:, None]
-            covariance += (self.voltage_error * lower.mean()) ** 2 * np.outer(loads, loads)
+            values -= np.outer(lower, self.by_voltage)
+            unsure = lower.mean() * self.voltage_error
+            covariance += np.outer(unsure, unsure) * _alike(self.names)
         return values - self.mean, covariance
 
 
@@ -179,17 +177,34 @@ def _placed(names: Sequence[str], loads: BoolArray) -> list[int]:
     return [int(name.split("M")[-1]) - 1 for name, load in zip(names, loads, strict=True) if load]
 
 
-def _by_voltage(flights: Sequence[FlightNumbers], values: Array, loads: BoolArray) -> tuple[float, float, float]:
-    """Regress the mean load on the logarithm of the voltage: the power, its error, and the voltage of the reference.
+def kinds_of(names: Sequence[str]) -> list[str]:
+    """Give the kind of each number."""
+    return [name.split()[0] for name in names]
+
+
+def _alike(names: Sequence[str]) -> BoolArray:
+    """Mark the pairs of numbers of one kind, shape (number, number)."""
+    kinds = np.array(kinds_of(names))
+    return np.asarray(kinds[:, None] == kinds)
+
+
+def _by_voltage(flights: Sequence[FlightNumbers], names: Sequence[str], values: Array) -> tuple[Array, Array, float]:
+    """Regress numbers of commands on the logarithm of the voltage: powers, their errors, the reference's voltage.
 
     Loads of speeds that were measured need no voltage.
     """
-    voltage = np.array([flight.voltage for flight in flights])
-    if not loads.any() or not np.isfinite(voltage).all() or not all(flight.commanded for flight in flights):
-        return 0.0, 0.0, float("nan")
+    voltage, kinds = np.array([flight.voltage for flight in flights]), np.array(kinds_of(names))
+    power, error = np.zeros(len(names)), np.zeros(len(names))
+    if not np.isfinite(voltage).all():
+        return power, error, float("nan")
     usual = float(np.exp(np.log(voltage).mean()))
-    lower, mean = np.log(voltage / usual), values[:, loads].mean(axis=1)
-    noise = KINDS["load"].together ** 2 + KINDS["load"].apart ** 2 / loads.sum()
-    information = (lower**2).sum() / noise + 1 / _VOLTAGE_ERROR**2
-    power = ((lower * (mean - mean.mean())).sum() / noise + _BY_VOLTAGE / _VOLTAGE_ERROR**2) / information
-    return float(power), float(information**-0.5), usual
+    lower = np.log(voltage / usual)
+    for kind, before in _BY_VOLTAGE.items():
+        own = kinds == kind
+        if own.any() and (kind != "load" or all(flight.commanded for flight in flights)):
+            mean = values[:, own].mean(axis=1)
+            noise = KINDS[kind].together ** 2 + KINDS[kind].apart ** 2 / own.sum()
+            information = (lower**2).sum() / noise + 1 / _VOLTAGE_ERROR**2
+            power[own] = ((lower * (mean - mean.mean())).sum() / noise + before / _VOLTAGE_ERROR**2) / information
+            error[own] = information**-0.5
+    return power, error, usual

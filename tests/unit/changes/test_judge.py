@@ -10,7 +10,7 @@ from scipy.stats import multivariate_t, norm
 from cpfls_cli.changes.causes import Cause, causes
 from cpfls_cli.changes.judge import FALSE_ALARM, _Space, changed
 from cpfls_cli.changes.numbers import FlightNumbers
-from cpfls_cli.changes.reference import Reference, load_directions, usual_covariance
+from cpfls_cli.changes.reference import Reference, kinds_of, load_directions, usual_covariance
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
@@ -55,7 +55,7 @@ def test_directions_of_loads(what):
 def space(listed, freedom=6.0, size=3):
     rng = np.random.default_rng(2)
     root = rng.normal(size=(size, size))
-    return _Space(root @ root.T + np.eye(size), freedom, listed), root @ root.T + np.eye(size)
+    return _Space(root @ root.T + np.eye(size), freedom, ["load"] * size, listed), root @ root.T + np.eye(size)
 
 
 def test_density_of_no_change_is_a_multivariate_t():
@@ -101,7 +101,7 @@ def test_unchanged_flights_seldom_look_changed():
     """Of the predictive distribution itself: a share of 0.01 within what 2000 draws tell."""
     rng = np.random.default_rng(5)
     reference = Reference.of(flights(6, rng), NAMES, QUAD)
-    own = _Space(reference.covariance, reference.freedom, causes(NAMES, QUAD))
+    own = _Space(reference.covariance, reference.freedom, kinds_of(NAMES), causes(NAMES, QUAD))
     chance, again = (np.sort(own.evidence(own.drawn(rng)).max(axis=0)) for _ in range(2))
     assert 0.002 < np.mean(again > np.quantile(chance, 1 - FALSE_ALARM)) < 0.025
 
@@ -110,7 +110,7 @@ def test_unchanged_flights_seldom_look_changed():
     ("cause", "change", "size"),
     [
         ("rotor M3", 0.3 * np.eye(10)[2], 0.3),
-        ("all rotors", 0.3 * (np.arange(10) < 4), 0.3),
+        ("hover", 0.3 * (np.arange(10) < 4), 0.3),
         ("late", 0.04 * (np.arange(10) > 6), 0.04),
         ("vibration", 2.5 * ((np.arange(10) > 3) & (np.arange(10) < 7)), 2.5),
     ],
@@ -142,7 +142,7 @@ def test_what_shows_does():
     before = flights(8, rng)
     size = changed(before[:1], before[1:], QUAD, rng).shows["rotor M3"]
     reference = Reference.of(before[1:], NAMES, QUAD)
-    own = _Space(reference.covariance, reference.freedom, causes(NAMES, QUAD))
+    own = _Space(reference.covariance, reference.freedom, kinds_of(NAMES), causes(NAMES, QUAD))
     threshold = np.quantile(own.evidence(own.drawn(rng)).max(axis=0), 1 - FALSE_ALARM)
     rows = own.drawn(rng, 400) + size * np.eye(10)[2]
     assert np.mean(own.evidence(rows).max(axis=0) >= threshold) > 0.8
