@@ -42,7 +42,7 @@ from tests.builders.vehicle_search import CONFIG, TRIED, left_out
 
 PATIENCE_S = 60.0
 LIMIT_BYTES = 6 << 30
-TOLD, NO_END = "case ", "HDF5 does not come to an end"
+TOLD, NO_END = "case ", "HDF5 did not finish reading"
 PREPARING_S = 600.0
 LONGER = ("--set", "identification.population=40", "--set", "identification.generations=6")
 VEHICLE_STUDY = {"search_windows": 20, "folds": 2, "generations": 0, "population": 2, "leave_out": left_out(TRIED)}

@@ -260,7 +260,7 @@ REFUSED = {
     "sample.ulg": "the rotors",
     "sample_appended_multiple.ulg": "the rotors",
     "sample_logging_tagged_and_default_params.ulg": "the rotors",
-    "sample_log_small.ulg": "is no multirotor",
+    "sample_log_small.ulg": "is not a multirotor",
 }
 """Logs of pyulog in which no multirotor flies, and a part of what has to be said."""
 

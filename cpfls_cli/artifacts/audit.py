@@ -26,7 +26,7 @@ class AuditCoefficientGroup:
     value: Array = dataset("estimate", "audit_number", units="SI")
     low: Array = dataset("lower end of the 95 % interval", "audit_number", units="SI", gaps=True)
     high: Array = dataset("upper end of the 95 % interval", "audit_number", units="SI", gaps=True)
-    named: Array = dataset("1 where it is sure and of practical size", "audit_number")
+    named: Array = dataset("1 where it is certain and of practical size", "audit_number")
 
     @classmethod
     def of(cls, findings: Sequence[AuditFinding]) -> Self:
@@ -44,13 +44,13 @@ class AuditCoefficientGroup:
 class AuditRepairGroup:
     """Channels that contradict the others, and how they are set right."""
 
-    channel: tuple[str, ...] = dataset("channels that are set right or left out, in that order", "repair")
+    channel: tuple[str, ...] = dataset("channels that are corrected or left out, in that order", "repair")
     dropped: Array = dataset("1 where it is left out, and nothing else counts", "repair")
     delay_s: Array = dataset("how late it is", "repair", path="delay", units="s")
     in_body: Array = dataset("1 where world axes were logged in body axes", "repair")
     matrix: Array = dataset("unit and axes, after the turn to world axes", "repair", "axis", "axis")
     gravity_m_s2: Array = dataset("added along the vertical, last", "repair", path="gravity", units="m/s^2")
-    sentence: tuple[str, ...] = dataset("what is wrong, who says so, and what to mend", "repair")
+    sentence: tuple[str, ...] = dataset("what is wrong, what shows it, and what to correct", "repair")
 
     @classmethod
     def of(cls, repairs: Sequence[ChannelRepair]) -> Self | None:
@@ -63,7 +63,7 @@ class AuditGroup:
     """What the sensors say about each other."""
 
     finding: tuple[str, ...] = dataset("faults of sensors that were tested", "finding", path="audit/finding")
-    named: Array = dataset("1 where the fault is sure and matters", "finding", path="audit/named")
+    named: Array = dataset("1 where the fault is certain and matters", "finding", path="audit/named")
     p_value: Array = dataset("probability that chance shows as much", "finding", path="audit/p_value")
     sentence: tuple[str, ...] = dataset("what was found, in words", "finding", path="audit/sentence")
     coefficient: AuditCoefficientGroup = group("audit_coefficient")
@@ -76,7 +76,7 @@ class AuditGroup:
     note: tuple[str, ...] = dataset("for information", "audit_note", path="audit/note")
     repair: AuditRepairGroup | None = group("audit_repair", default=None)
     contradiction: tuple[str, ...] | None = dataset(
-        "what no verdict can stand beside; nothing repairs it",
+        "contradictions that rule out a verdict; nothing repairs them",
         "contradiction",
         path="audit/contradiction",
         default=None,

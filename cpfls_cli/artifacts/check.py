@@ -113,7 +113,7 @@ def _time_ascends(artifact: Checkable) -> Iterator[str]:
     if time is None or time.ndim != 1 or time.dtype.kind not in "iuf":
         return
     if len(time) < 2:
-        yield f"time: holds {len(time)} samples, and two are the least"
+        yield f"time: holds {len(time)} samples; at least two are needed"
     for start, block in _blocks(time):
         falling = np.diff(block.astype(float), prepend=last) <= 0
         if falling.any():
@@ -222,7 +222,7 @@ def _require_sealed(path: Path) -> None:
             "changed by another program, or not made by cpfls; docs/format.md says how to add one",
         )
     if not read_content(path).intact:
-        raise InputError(f"{path}: damaged: its content does not fit the checksum at its end; copy or make it again")
+        raise InputError(f"{path}: damaged: its content does not match the checksum at its end; copy or make it again")
 
 
 def _refuse_links(file: h5py.File) -> None:
@@ -235,7 +235,7 @@ def _refuse_links(file: h5py.File) -> None:
     found = file.id.links.visit(elsewhere, info=True)
     if found is not None:
         kind = {h5py.h5l.TYPE_SOFT: "SoftLink", h5py.h5l.TYPE_EXTERNAL: "ExternalLink"}.get(found[1], "link")
-        raise ValueError(f"{found[0]} is a {kind}; an artifact holds all that it names")
+        raise ValueError(f"{found[0]} is a {kind}; an artifact must hold all that it refers to")
 
 
 def _dataset(file: h5py.File, path: str) -> h5py.Dataset | None:
@@ -243,7 +243,7 @@ def _dataset(file: h5py.File, path: str) -> h5py.Dataset | None:
     if not isinstance(found, h5py.Dataset):
         return None
     if found.external or found.is_virtual:
-        raise ValueError(f"{path} lies in another file; an artifact holds all that it names")
+        raise ValueError(f"{path} lies in another file; an artifact must hold all that it refers to")
     if found.shape is None:
         raise ValueError(f"{path} holds nothing, not even a shape")
     return found
@@ -264,12 +264,12 @@ def _identify(path: Path, file: h5py.File) -> Format:
         )
     if name in _FORMER or (name == _MODEL and version < _MODELS_SINCE):
         raise InputError(
-            f"{path}: a model that an earlier cpfls wrote, before all models had one format; make it again with "
+            f"{path}: a model written by an earlier cpfls, before all models shared one format; make it again with "
             f"`cpfls {_FORMER.get(name, 'identify')}`"
         )
     known = record_of_format(name, _text_attribute(file, "kind") or "")
     if known is None:
-        raise InputError(f"{path}: format = '{name}': this cpfls does not know it")
+        raise InputError(f"{path}: format = '{name}': not known to this cpfls")
     return known.spec()
 
 

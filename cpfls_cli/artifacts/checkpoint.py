@@ -66,7 +66,7 @@ class UnfinishedGroup:
     """What was evaluated of the next generation, where the search was stopped within it."""
 
     submitted: Any = dataset(
-        "chromosomes of the next generation that are evaluated, where the search was stopped within it",
+        "chromosomes of the next generation that were evaluated, if the search was stopped within it",
         "unfinished",
         "gene",
     )
@@ -86,7 +86,7 @@ class CheckpointRecord(Record):
 
     FORMAT: ClassVar = Format(
         "cpfls/checkpoint",
-        "a search that has not come to its end: all that its next generation depends on",
+        "an unfinished search: everything that its next generation depends on",
         "identify, sweep",
         ("flight", "selection", "validate", "choose-on"),
     )
@@ -159,7 +159,7 @@ class VehicleCheckpointRecord(Record):
 
     FORMAT: ClassVar = Format(
         "cpfls/vehicle-checkpoint",
-        "a search for the structure of a vehicle that has not come to its end: what was fitted so far",
+        "an unfinished search for the structure of a vehicle: what was fitted so far",
         "vehicle",
         ("flight-1", "held-out-1"),
     )

@@ -80,7 +80,7 @@ class ComesAgainGroup:
     )
     resists: Array = dataset("moments of inertia, kg m^2, and mass, kg", "channel", units="SI", frame=BODY)
     flights: tuple[str, ...] = dataset("flights that repeat each other", "repeating", path="flight")
-    runs: int = dataset("runs that are held against others")
+    runs: int = dataset("runs that are compared with others")
     paths: int = dataset("different paths among them")
     blocks: IntArray = dataset("blocks of the paths that tell the errors", "band")
 

@@ -232,7 +232,7 @@ class DiagnosisRecord(Record):
 
     verdict: str = dataset("NAMED, PARTIAL, AMBIGUOUS, UNEXPLAINED, FLIGHTS_DIFFER, NO_GAP or NOT_EXCITED")
     share: float = dataset("part of the held-out gap above the floor that the effects take off")
-    split: str = dataset("which flights trained and which were held out, and why")
+    split: str = dataset("which flights were for training and which were held out, and why")
     effects: NamedEffectsGroup = group("")
     alternative: AlternativeGroup = group()
     unexplained: UnexplainedGroup = group()
@@ -248,7 +248,7 @@ class DiagnosisRecord(Record):
     audit: AuditGroup = group("")
     note: tuple[str, ...] = dataset("what a reader should know", "note")
     contradiction: tuple[str, ...] = dataset(
-        "what of the log contradicts itself or its vehicle, numbers that no vehicle has among it",
+        "contradictions within the log or with its vehicle, including numbers that no vehicle has",
         "impossible",
         path="impossible",
         default=(),
@@ -257,7 +257,7 @@ class DiagnosisRecord(Record):
     base: VehicleGroup = group()
     flights: FlightsGroup = group("")
     difference: tuple[str, ...] | None = dataset(
-        "what differs between the flights that trained and those held out", "difference", default=None
+        "what differs between the training and the held-out flights", "difference", default=None
     )
     shares: Array | None = dataset(
         "the share of torque and of force; NaN where there is no gap, or no name",

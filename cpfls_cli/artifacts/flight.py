@@ -33,7 +33,7 @@ class QualityGroup:
     count: IntArray | None = dataset("rows, gaps or values by reason", "reason", default=None)
     warning: tuple[str, ...] | None = dataset("what to know about the log", "warning", default=None)
     filtered: tuple[str, ...] | None = dataset(
-        "signals of the log that were low-passed before it was logged", "filtered", default=None
+        "signals that were low-passed before they were logged", "filtered", default=None
     )
     cut_off: Array | None = dataset(
         "where that filter halves the amplitude, seen in the spectrum", "filtered", units="Hz", default=None
@@ -148,7 +148,7 @@ class TrackingGroup:
     lost_at: Array = dataset("time of a loss; not finite where none", "controller", units="s", gaps=True)
     control_rate: float = dataset("commands in a second", units="1/s")
     outside: BoolArray = dataset("1 where the flight leaves what the model's training visited", "time")
-    not_positive_definite: int = dataset("samples of the flight where no body has the D(q)")
+    not_positive_definite: int = dataset("samples of the flight where D(q) is not that of any body")
 
     @classmethod
     def of(
@@ -260,7 +260,7 @@ class FlightRecord(Record):
         default=None,
     )
     setpoint_position: Array | None = dataset(
-        "position that was asked for; not finite where none was",
+        "position setpoint; not finite where there is none",
         "time",
         "axis",
         units="m",
@@ -269,16 +269,16 @@ class FlightRecord(Record):
         default=None,
     )
     setpoint_velocity: Array | None = dataset(
-        "velocity that was asked for", "time", "axis", units="m/s", frame=WORLD, gaps=True, default=None
+        "velocity setpoint", "time", "axis", units="m/s", frame=WORLD, gaps=True, default=None
     )
     setpoint_attitude: Array | None = dataset(
-        "roll, pitch, yaw that were asked for", "time", "axis", units="rad", frame=EULER, gaps=True, default=None
+        "roll, pitch, yaw setpoints", "time", "axis", units="rad", frame=EULER, gaps=True, default=None
     )
     setpoint_body_rate: Array | None = dataset(
-        "body rates that were asked for", "time", "axis", units="rad/s", frame=BODY, gaps=True, default=None
+        "body rate setpoints", "time", "axis", units="rad/s", frame=BODY, gaps=True, default=None
     )
     setpoint_thrust: Array | None = dataset(
-        "thrust that was asked for: N, or share of the largest where import.signals.setpoint_thrust.unit is 1",
+        "thrust setpoint: N, or share of the largest where import.signals.setpoint_thrust.unit is 1",
         "time",
         units="SI",
         frame=BODY,

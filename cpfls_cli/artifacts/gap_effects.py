@@ -83,7 +83,7 @@ class EffectGroup:
     p_value: Array = dataset("probability that chance explains as much, over the whole catalogue", "effect")
     share: Array = dataset("part of the gap above the floor that comes back without it", "effect")
     selection_frequency: Array = dataset("share of the blocks without which it is still the first choice", "effect")
-    sentence: tuple[str, ...] = dataset("what a pilot understands", "effect")
+    sentence: tuple[str, ...] = dataset("what it means, in plain words", "effect")
 
     @classmethod
     def of(cls, effects: Sequence[NamedEffect], named: bool) -> Self:

@@ -55,7 +55,7 @@ class FlightGroup:
     name: tuple[str, ...] = dataset("file name, with the part of it where one flight was split", "flight")
     role: tuple[str, ...] = dataset("given, training or held-out", "flight")
     first: IntArray = dataset("index of the first sample of each flight", "flight")
-    commanded: IntArray = dataset("1 where actuation is what was asked for, not what was measured", "flight")
+    commanded: IntArray = dataset("1 where actuation is commanded, not measured", "flight")
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], roles: Sequence[str]) -> Self:
@@ -98,7 +98,7 @@ class SignalsGroup:
     )
     voltage: Array | None = dataset("of the battery, as a share of the full one", "sample", gaps=True, default=None)
     setpoint_position: Array | None = dataset(
-        "position that was asked for, by which runs in one flight are found",
+        "position setpoint, by which runs in one flight are found",
         "sample",
         "axis",
         units="m",

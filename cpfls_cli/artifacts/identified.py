@@ -95,7 +95,7 @@ class SearchGroup:
     """How the search ended."""
 
     stop_reason: str | None = dataset("generations, converged, time-limit or interrupted", default=None)
-    complete: bool | None = dataset("1 where the search came to its end, 0 where `--resume` goes on", default=None)
+    complete: bool | None = dataset("1 where the search ran to the end, 0 where `--resume` continues it", default=None)
 
 
 @record

@@ -118,7 +118,7 @@ def _refuse_appeared(paths: Iterable[Path]) -> None:
     for path in paths:
         if os.path.abspath(path) in _NEW and os.path.lexists(path):
             raise OutputError(
-                f"{path}: was not there when the command began, and is kept; move it away and run the command again"
+                f"{path}: appeared while the command was running, and is kept; move it away and run the command again"
             )
 
 
@@ -289,7 +289,7 @@ def check_folder(folder: Path, force: bool, names: Sequence[str], kept: str = ""
         raise InputError(f"{folder}: cannot be made: there is no folder {folder.parent}")
     for name in names:
         if (folder / name).is_dir():
-            raise InputError(f"{folder / name}: is a folder, and a file of this name is to be written; move it away")
+            raise InputError(f"{folder / name}: is a folder, but a file of this name must be written; move it away")
     for place in (folder.resolve().parent, folder.resolve()):
         if place.is_dir() and not os.access(place, os.W_OK | os.X_OK):
             raise InputError(f"{folder}: cannot write into the folder {place}; change its permissions")

@@ -166,7 +166,7 @@ def too_heavy(record: VehicleRecord) -> str:
     if not limits:
         return ""
     told = " and ".join(
-        f"{name_of(name)} {moments[name]:.3g} where {limit:.3g} can be" for name, limit in limits.items()
+        f"{name_of(name)} {moments[name]:.3g} where at most {limit:.3g} is possible" for name, limit in limits.items()
     )
     return (
         f"too heavy for {vehicle.mass:.3g} kg between these rotors ({told}, kg m^2): numbers that predict, not the "

@@ -44,7 +44,7 @@ while True:
     for line in lines:
         seconds, _, name = line.decode("utf-8", "surrogateescape").partition(" ")
         wait, path = float(seconds) or None, name
-        why = f"damaged: HDF5 does not come to an end with it within {seconds} s"
+        why = f"damaged: HDF5 did not finish reading it within {seconds} s"
     if stopped and wait:
         wait, why = GRACE, "interrupted while HDF5 was reading it"
 os.write(2, f"cpfls: error: {path}: {why}\\n".encode("utf-8", "surrogateescape"))

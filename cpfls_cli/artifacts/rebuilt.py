@@ -82,7 +82,7 @@ def inertia_functions(group: InertiaFunctionsGroup) -> InertiaFunctions:
     if peaks != wanted or len(group.coefficients) != structure.parameters:
         raise InputError(
             f"vehicle/inertia_functions holds {peaks} breakpoints and {len(group.coefficients)} coefficients; its "
-            f"structure asks for {wanted} and {structure.parameters}"
+            f"structure needs {wanted} and {structure.parameters}"
         )
     roll, pitch = (InputRange(*map(float, row)) for row in group.input_range)
     return InertiaFunctions(

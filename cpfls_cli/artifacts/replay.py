@@ -171,7 +171,7 @@ class RegionGroup:
     """Where a model predicts body rates better than what knows no model."""
 
     share: float = dataset("of the windows")
-    rate: Array = dataset("body rate at the begin of nine tenths of these windows: least, most", "2", units="rad/s")
+    rate: Array = dataset("body rate at the start of nine tenths of these windows: least, most", "2", units="rad/s")
     speed: Array | None = dataset("the same of the speed of the flight", "2", units="m/s", default=None)
 
     @property
@@ -395,7 +395,7 @@ class WindowGroup:
         "mean norm of the error of the body rate over the horizon", "prediction", "window", units="rad/s"
     )
     diverged: Array = dataset(
-        "when the model ran away, after the begin; not finite where not", "window", units="s", gaps=True
+        "when the model ran away, after the start; not finite where it did not", "window", units="s", gaps=True
     )
 
     @classmethod
@@ -490,7 +490,7 @@ class ReplayRecord(Record):
     drawn: DrawnGroup = group()
     warning: tuple[str, ...] = dataset("what to know about flights and model", "warning")
     contradiction: tuple[str, ...] | None = dataset(
-        "what of the flights contradicts itself or the vehicle", "contradiction", default=None
+        "contradictions within the flights or with the vehicle", "contradiction", default=None
     )
 
     @classmethod

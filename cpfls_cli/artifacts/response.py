@@ -106,7 +106,7 @@ class ResponseRecord(Record):
     deviation: DeviationGroup = group()
     warning: tuple[str, ...] = dataset("what to know about flights and model", "warning")
     contradiction: tuple[str, ...] | None = dataset(
-        "what of the flights contradicts itself or the vehicle", "contradiction", default=None
+        "contradictions within the flights or with the vehicle", "contradiction", default=None
     )
 
     @classmethod

@@ -42,7 +42,7 @@ class FoundNumbersGroup:
     high: Array = dataset("upper end of the 95 % interval", "found", units="SI")
     stated: Array = dataset("in /config; not finite where no config does", "found", units="SI", gaps=True)
     determined: BoolArray = dataset("1 where the flights say more than what was believed before", "found")
-    at_bound: BoolArray = dataset("1 where it lies on a bound, so that the interval says little", "found")
+    at_bound: BoolArray = dataset("1 where it lies on a bound, so the interval says little", "found")
 
 
 @record
@@ -284,11 +284,11 @@ class VehicleRecord(ModelRecord):
     share: SharesGroup = group()
     airspeed: float = dataset("speed in the rotor plane that 95 % of the training samples stay below", units="m/s")
     evaluated: int = dataset("structures that were judged")
-    complete: bool = dataset("1 where the search came to its end")
+    complete: bool = dataset("1 where the search ran to the end")
     blocks: int = dataset("blocks of windows that the intervals come from")
     warning: tuple[str, ...] = dataset("what to know about the flights", "warning")
     guess: tuple[str, ...] | None = dataset(
-        "numbers of /vehicle that are guesses still: no flight tells them", "guess", default=None
+        "numbers of /vehicle that are still guesses: no flight determines them", "guess", default=None
     )
     full_speed: float | None = dataset(
         "largest speed of a rotor, assumed, where commands are shares of it; thrust and drag factor go with it",
@@ -297,7 +297,7 @@ class VehicleRecord(ModelRecord):
     )
     difference: DifferencesGroup | None = group(default=None)
     contradiction: tuple[str, ...] | None = dataset(
-        "what of the flights contradicts itself or the vehicle", "contradiction", default=None
+        "contradictions within the flights or with the vehicle", "contradiction", default=None
     )
     disturbance: DisturbanceGroup | None = group(default=None)
 

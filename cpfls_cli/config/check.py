@@ -93,7 +93,7 @@ def _no_body(study: Study) -> Iterator[str]:
     why = why_no_body(study.vehicle)
     if why and "inertia" not in study.vehicle.unknown:
         yield (
-            f"vehicle.inertia_kg_m2 = {json.dumps(study.vehicle.inertia_kg_m2)}: {why}; look at the units and the "
+            f"vehicle.inertia_kg_m2 = {json.dumps(study.vehicle.inertia_kg_m2)}: {why}; check the units and the "
             "order Ixx, Iyy, Izz, Ixy, Ixz, Iyz"
         )
 
@@ -104,7 +104,7 @@ def why_no_body(vehicle: VehicleSettings) -> str:
     if largest <= (smallest + middle) * MEASURED:
         return ""
     return (
-        f"no body has this inertia, its largest principal moment {largest:.4g} is more than the other two together, "
+        f"no body has this inertia: its largest principal moment, {largest:.4g}, exceeds the sum of the other two, "
         f"{smallest + middle:.4g}"
     )
 
@@ -130,7 +130,7 @@ def _no_vehicle(vehicle: VehicleSettings) -> Iterator[tuple[Location, str]]:
 
 
 def _missing_line(source: str, key: str) -> str:
-    remedy = "state it, or null if nobody knows it" if key.rsplit(".", 1)[-1] in KEYS.values() else "state it"
+    remedy = "state it, or null if it is not known" if key.rsplit(".", 1)[-1] in KEYS.values() else "state it"
     return f"{source}: {key}: is missing; a vehicle has no defaults: {remedy} (`cpfls init` writes the section)"
 
 

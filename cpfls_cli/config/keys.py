@@ -156,7 +156,7 @@ def _comment(key: Key) -> Iterator[str]:
         yield f"  {below.name}: {below.doc}"
         yield from (f"    {line}" for line in _listed("one of", below.choices))
     if key.name in _EXAMPLES:
-        yield "example, to stand below the key instead of {}:"
+        yield "example, to write below the key instead of {}:"
         yield from (f"  {line}" for line in _EXAMPLES[key.name])
 
 

@@ -58,7 +58,7 @@ def _enter(node: Any, name: str, default: Any, key: str) -> Any:
     if isinstance(node, list):
         return node[_index(node, name, key)]
     if not isinstance(node, dict):
-        raise SettingError(key, f"'{name}' lies below a single value")
+        raise SettingError(key, f"'{name}' is below a single value")
     if node.get(name) is None:
         node[name] = copy.deepcopy(default) if isinstance(default, list) else {}
     return node[name]
@@ -66,7 +66,7 @@ def _enter(node: Any, name: str, default: Any, key: str) -> Any:
 
 def _index(entries: list[Any], name: str, key: str) -> int:
     if not name.isdecimal() or int(name) >= len(entries):
-        raise SettingError(key, f"'{name}' is not an index of a list of {len(entries)}, which count from 0")
+        raise SettingError(key, f"'{name}' is not an index of a list of {len(entries)}; indices count from 0")
     return int(name)
 
 
@@ -142,7 +142,7 @@ def _overridden(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> tuple[
         if key in _OVERRIDABLE:
             raise SettingError(key, f"is a section; name its keys one by one, with a dot: {key}.KEY")
         if key == _PRESET:
-            raise SettingError(key, "speaks for keys that the config leaves out; name the keys that differ")
+            raise SettingError(key, "stands for keys that the config leaves out; name the keys that differ")
         _override_key(result, key, value)
     reduction = result.get("reduction")
     if not isinstance(reduction, dict) or reduction.get("size", 0) is not None or reduction.get("condition_number"):

@@ -36,7 +36,7 @@ _OFF: Final[dict[Unknown, str]] = {
 """How many times a guess real vehicles have: by the ranges above, and hover at 0.4 to 0.8 of the largest speed."""
 
 _TAKEN = frozenset({"import", "vehicle", "report", "export", "predict", "trajectory", "changed"})
-_GUESSED: Final = "guesses from mass and arms stand for what the config leaves open (--accept-guesses)"
+_GUESSED: Final = "guesses from mass and arms are used for what the config leaves open (--accept-guesses)"
 
 _OF_MODELS = frozenset({"replay", "response", "compare", "simulate", "gap", "extend"})
 _TAKEN |= _OF_MODELS
@@ -130,9 +130,8 @@ def require_known(study: Study, command: str, *, whole: bool = True, accept: boo
     if accept:
         off = ", ".join(f"{name.replace('_', ' ')} {_OFF[name]}" for name in unknown)
         return (
-            f"{_GUESSED}; as multiples of these guesses, real vehicles have {off}; torques, rates and gains that "
-            f"follow are off by "
-            "as much",
+            f"{_GUESSED}; as multiples of these guesses, real vehicles have {off}; the resulting torques, rates and "
+            "gains are off by as much",
         )
     keys = ", ".join(f"vehicle.{'' if name == 'inertia' else 'rotors.'}{KEYS[name]}" for name in unknown)
     ways = "--model VEHICLE.h5 takes the numbers that `cpfls vehicle` found, --accept-guesses those from mass and arms"
@@ -141,7 +140,7 @@ def require_known(study: Study, command: str, *, whole: bool = True, accept: boo
             f"import.torque_source = {torque}: needs {keys}, not known in this config; set it to null: `cpfls vehicle` "
             f"needs no torque; {ways}"
         )
-    raise ConfigError(f"{keys}: not known in this config, and `cpfls {command}` needs what is null there; {ways}")
+    raise ConfigError(f"{keys}: not known in this config, but `cpfls {command}` needs what is null there; {ways}")
 
 
 def _inertia(mass: float, positions: Sequence[Sequence[float]]) -> tuple[float, float, float]:

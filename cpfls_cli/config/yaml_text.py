@@ -45,7 +45,7 @@ def _mapping_without_duplicates(loader: _StudyLoader, node: yaml.MappingNode) ->
         if not isinstance(key, str):
             raise yaml.constructor.ConstructorError(None, None, f"key {key!r} is not text", key_node.start_mark)
         if key in mapping:
-            raise yaml.constructor.ConstructorError(None, None, f"key '{key}' stands twice", key_node.start_mark)
+            raise yaml.constructor.ConstructorError(None, None, f"key '{key}' appears twice", key_node.start_mark)
         mapping[key] = loader.construct_object(value_node, deep=True)
     return mapping
 
@@ -69,7 +69,7 @@ def parse_yaml(text: str, source: str) -> Any:
         where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
         raise ConfigError(f"{source}{where}: not valid YAML: {error.problem}") from None
     except RecursionError:
-        raise ConfigError(f"{source}: lists or mappings are nested deeper than those of any config") from None
+        raise ConfigError(f"{source}: lists or mappings are nested deeper than in any config") from None
     except (yaml.YAMLError, ValueError, LookupError, TypeError, ArithmeticError) as error:
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise ConfigError(f"{source}: not valid YAML: {reason}") from None

@@ -143,8 +143,8 @@ def _gyro_notes(fit: GyroFit) -> tuple[str, ...]:
     notes = []
     if apart.any():
         between = np.ptp(fit.flight_bias, axis=0).max()
-        notes.append(f"The gyroscope's constant error differs between flights by {between:.4f} rad/s.")
+        notes.append(f"The gyroscope's constant error differs by {between:.4f} rad/s between flights.")
     if cross.any():
         square = np.abs(fit.value[9:12])[cross].max()
-        notes.append(f"The axes of gyroscope or attitude are not square to each other, by {square:.3f}.")
+        notes.append(f"The axes of the gyroscope or the attitude are not orthogonal, by {square:.3f}.")
     return tuple(notes)

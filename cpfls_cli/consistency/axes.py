@@ -76,9 +76,9 @@ def axes_apart(words: str, first: Array, second: Array, floor: float) -> Iterato
         if same < -SAME:
             yield f"{words} have opposite signs along {AXES[axis]}", same
         elif abs(same) < _OTHER and instead is not None:
-            yield f"{AXES[axis]} of the one is {AXES[instead]} of the other in {words}: axes are swapped", same
+            yield f"in {words}, {AXES[axis]} of one is {AXES[instead]} of the other: axes are swapped", same
         elif abs(same) < _OTHER and alike[axis]:
-            yield f"{words} do not belong together along {AXES[axis]}: their correlation is {same:.2f}", same
+            yield f"{words} do not match along {AXES[axis]}: their correlation is {same:.2f}", same
 
 
 def gyroscope_apart(seen: Array, read: Array) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
@@ -127,8 +127,8 @@ def _one_axis_apart(axis: int, correlation: Array) -> Finding:
     if same < -SAME:
         more = ", opposite signs"
     elif instead is not None:
-        more = f", and {correlation[axis, instead]:.2f} with that about {AXES[instead]}: axes are swapped"
-    what = f"about body {_BODY_AXES[axis]} the attitude's derivative and the body rate hardly agree"
+        more = f", but {correlation[axis, instead]:.2f} with that about {AXES[instead]}: axes are swapped"
+    what = f"about body {_BODY_AXES[axis]} the attitude's derivative and the body rate barely agree"
     remedy = "check columns, signs and frames of import.signals.attitude (or quaternion) and import.signals.body_rate"
     return Finding(f"{what} (correlation {same:.2f}{more})", remedy, _SENSORS, same)
 
@@ -142,7 +142,7 @@ def _unit_of_gain(gain: float, tolerance: float) -> tuple[str, str]:
         if abs(log(gain / factor)) < log(tolerance):
             return (
                 f", about {name}",
-                f"does the log hold rates in {rate} (import.signals.body_rate.unit, attitude_rate.unit), or angles in "
+                f"does the log give rates in {rate} (import.signals.body_rate.unit, attitude_rate.unit), or angles in "
                 f"{angle} (import.signals.attitude.unit)?",
             )
     return "", "check the units of import.signals.body_rate (or attitude_rate) and attitude, and import.time_unit"

@@ -93,14 +93,14 @@ def filter_warnings(flights: Sequence[Signals]) -> tuple[str, ...]:
     if most:
         edges = ", ".join(f"{_CHANNEL_WORDS[name]} at about {edge:.2g} Hz" for name, edge in most.items())
         return (
-            f"The log is low-passed, by import.lowpass_hz or before: {edges}. The noise above that is gone, so the "
-            "floors come from the noise below it and are less certain. Feed raw logs.",
+            f"The log is low-passed, by import.lowpass_hz or earlier: {edges}. The noise above that is gone, so the "
+            "floors come from the noise below it and are less certain. Use raw logs.",
         )
     gyros = [signals.body_rate for signals in flights if "body_rate" in signals.available]
     if gyros and max(least_noise([rate]) for rate in gyros) < _NO_NOISE_RAD_S:
         return (
-            "The gyroscope shows less noise than any has: the log is simulated or was smoothed. The noise floor is not "
-            "known; 0.3 % of torque and force stand for it. Feed raw logs.",
+            "The gyroscope shows less noise than any real one: the log is simulated or was smoothed. The noise floor "
+            "is not known; 0.3 % of torque and force is used instead. Use raw logs.",
         )
     return ()
 

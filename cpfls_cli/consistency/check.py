@@ -70,7 +70,7 @@ def _upside_down(parts: Sequence[Signals]) -> Finding | None:
     if upright >= _HANGS:
         return None
     return Finding(
-        "by its attitude the vehicle hangs upside down on average",
+        "according to its attitude, the vehicle is upside down on average",
         "check import.world_frame, import.body_frame and the order of the quaternion",
         ("attitude",),
         upright,

@@ -38,8 +38,8 @@ _SCATTER_S, _SCATTER = 0.004, 0.2
 _FEWEST_SHIFTS = 4
 # Share of the torque that is left where no shift can do better, and share of that which a shift has to leave at most.
 _NEXT_TO_NOTHING, _HALF = 0.01, 0.5
-_DONE = "set right before the balance"
-_UNDECIDED = "Whether gyroscope or attitude is late these flights do not tell; the gyroscope is shifted."
+_DONE = "corrected before the balance"
+_UNDECIDED = "These flights do not show whether the gyroscope or the attitude is late; the gyroscope is shifted."
 
 
 def actuation_delay(flights: Sequence[Signals]) -> tuple[str, ...]:
@@ -95,8 +95,8 @@ def attitude_on_clock(
         return (), ()
     if abs(delay) + unsure >= 0.5 * abs(gyro_delay):
         return (), (_UNDECIDED,)
-    what = f"the attitude is {off_clock(-gyro_delay)}, judged by gyroscope and rotors, which keep one time"
-    finding = _late(what, "mend its clock in the log", ("attitude", "gyroscope", "rotors"), -gyro_delay)
+    what = f"the attitude is {off_clock(-gyro_delay)}, judged by the gyroscope and the rotors, whose clocks agree"
+    finding = _late(what, "correct its clock in the log", ("attitude", "gyroscope", "rotors"), -gyro_delay)
     return (ChannelRepair("attitude", delay_s=-gyro_delay).told(finding, f"It is {_DONE}"),), ()
 
 
@@ -119,7 +119,7 @@ def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepa
     if abs(delay) < _ROTORS_OFF_S or np.abs(np.array(told) - delay).max() > max(_SCATTER_S, _SCATTER * abs(delay)):
         return None
     what = f"the rotor speeds are {off_clock(delay)}, judged by the gyroscope"
-    finding = _late(what, "mend their clock in the log", ("rotors", "gyroscope"), delay)
+    finding = _late(what, "correct their clock in the log", ("rotors", "gyroscope"), delay)
     return ChannelRepair("rotor_speed", delay_s=delay).told(finding, f"They are {_DONE}")
 
 

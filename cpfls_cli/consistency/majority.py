@@ -38,7 +38,7 @@ _EXPLAINED = 0.8
 # Growth of what is left between two channels from which on a repair sets them apart; noise and a shift make less.
 _APART = 1.2
 _FORWARD_LEFT_UP = np.diag([1.0, -1.0, -1.0])
-_DONE = "It is set right before the balance"
+_DONE = "It is corrected before the balance"
 
 _Read = tuple[ChannelRepair, tuple[str, ...]]
 """A way to read a channel, and the mistakes that it takes."""
@@ -135,13 +135,14 @@ def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:
     moved = [CHANNELS[check.pair.second].words for check in against]
     who, held = " and ".join(moved), ("thrust of the rotors", "attitude", *moved)
     if all(_reversed_along_z(check) for check in against):
-        what = f"along z the thrust of the rotors is opposite to {who}"
+        what = f"along z, the thrust of the rotors is opposite to {who}"
         return Finding(what, "check import.world_frame and import.body_frame", held)
     turned, mirrored = zip(*(_about_the_vertical(check) for check in against), strict=True)
     if all(abs(turn) > _ONE_PLANE and abs(np.angle(turn)) > ANOTHER_NORTH for turn in turned):
         angle = float(np.angle(turned[0]))
         return Finding(
-            f"by thrust and attitude {who} lie turned by {np.degrees(angle):.0f} deg about the vertical",
+            f"judged by thrust and attitude, the axes of {who} are rotated by {np.degrees(angle):.0f} deg about the "
+            "vertical",
             "check the yaw of import.signals.attitude (or quaternion), the order of x and y, and import.world_frame",
             held,
             angle,
@@ -150,8 +151,8 @@ def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:
     pairs = zip(turned, mirrored, strict=True)
     if all(abs(turn) < _NOT_ONE_PLANE and abs(mirror) > _ONE_PLANE for turn, mirror in pairs):
         return Finding(
-            f"by thrust and attitude {who} lie mirrored",
-            "check order and signs of their x and y, import.world_frame and import.body_frame",
+            f"judged by thrust and attitude, the axes of {who} are mirrored",
+            "check the order and signs of x and y, import.world_frame and import.body_frame",
             held,
         )
     return None
@@ -297,11 +298,11 @@ def _readings(channel: str) -> Iterator[_Read]:
                 yield replace(plain, matrix=matrix, gravity_m_s2=added), what
         return
     if channel == "acceleration":
-        yield replace(plain, gravity_m_s2=-gravity), ("holds gravity",)
-        yield replace(plain, gravity_m_s2=gravity), ("holds gravity, pointing down",)
+        yield replace(plain, gravity_m_s2=-gravity), ("includes gravity",)
+        yield replace(plain, gravity_m_s2=gravity), ("includes gravity, pointing down",)
     yield replace(plain, in_body=True), ("is in body axes",)
     if channel == "acceleration":
-        yield replace(plain, in_body=True, gravity_m_s2=-gravity), ("is in body axes and holds gravity",)
+        yield replace(plain, in_body=True, gravity_m_s2=-gravity), ("is in body axes and includes gravity",)
 
 
 def _tuned(now: _Compared, repair: ChannelRepair, what: tuple[str, ...]) -> _Read | None:
@@ -375,7 +376,7 @@ def _with_turn(repair: ChannelRepair, check: PairCheck) -> _Read:
         return repair, ()
     cos, sin = np.cos(angle), np.sin(angle)
     matrix = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ repair.matrix
-    return replace(repair, matrix=matrix), (f"is turned by {np.degrees(angle):.0f} deg about the vertical",)
+    return replace(repair, matrix=matrix), (f"is rotated by {np.degrees(angle):.0f} deg about the vertical",)
 
 
 def _with_delay(repair: ChannelRepair, check: PairCheck) -> _Read:
@@ -392,7 +393,7 @@ def _told(
     who = "the world of velocity and position" if others else f"the {channel.words}"
     finding = Finding(
         f"{who} {joined([*what, *clock])}, judged by the {joined(witnesses)}",
-        f"mend the log, or {channel.keys}",
+        f"correct the log, or {channel.keys}",
         (channel.words, *witnesses),
         contradiction=bool(what) and _grave(repair.channel, now.checks),
         repairable=True,
@@ -412,7 +413,7 @@ def _contradicted(
     verb = "contradicts" if len(opposed) == 1 else "contradict"
     return Finding(
         f"the {channel.words} {joined([*what, *clock])}, judged by the {joined(witnesses)}, which the "
-        f"{joined(opposed)} {verb}, so nothing is set right",
+        f"{joined(opposed)} {verb}, so nothing is corrected",
         f"check {channel.keys}",
         (channel.words, *witnesses, *opposed),
         contradiction=bool(what) and _grave(repair.channel, now.checks),

@@ -61,7 +61,7 @@ _ACCELERATIONS = {
     "mm/s^2": 0.001,
     "mg": STANDARD_GRAVITY / 1000,
 }
-_NO_FORCE = "the force comes from other channels, if there are any"
+_NO_FORCE = "the force is taken from other channels, if there are any"
 CHANNELS = {
     "position": MotionChannel("position", "import.signals.position", {"mm": 0.001, "cm": 0.01, "ft": 0.3048}),
     "velocity": MotionChannel(
@@ -275,14 +275,14 @@ def _problems(check: PairCheck) -> Iterator[Finding]:
     offset = check.second.mean(axis=0) - check.first.mean(axis=0)
     for axis, own in zip(AXES, offset.tolist(), strict=True):
         if pair.first != "position" and abs(own) > _GRAVITY_OFF_M_S2:
-            what = f"{pair.words} differ by {own:.1f} m/s^2 along {axis}, as gravity would make them"
+            what = f"{pair.words} differ by {own:.1f} m/s^2 along {axis}, as if one included gravity"
             yield pair.finding(what, own, "m/s^2")
     if pair.exact and check.delay.beyond(_DELAY_OFF_S):
         late = check.delay.value
         yield pair.finding(f"in {pair.words}, the second is {off_clock(late)}", late, "s", contradiction=False)
     if pair.exact and pair.second != "specific_force" and check.turn.beyond(TURNED_RAD):
         angle = float(np.arctan(check.turn.value))
-        what = f"{pair.words} are turned against each other by {abs(np.degrees(angle)):.0f} deg about the vertical"
+        what = f"{pair.words} are rotated relative to each other by {abs(np.degrees(angle)):.0f} deg about the vertical"
         yield pair.finding(what, angle, "rad", contradiction=abs(angle) > ANOTHER_NORTH)
 
 

@@ -30,7 +30,7 @@ def beyond_belief(vehicle: VehicleSettings) -> tuple[Finding, ...]:
     return tuple(
         Finding(
             f"vehicle.inertia_kg_m2: {name.removeprefix('inertia.')} is {stated[name]:.3g} kg m^2, and a body of "
-            f"{vehicle.mass_kg:.3g} kg between these rotors has hardly {limit / _TOO_WIDE:.2g}",
+            f"{vehicle.mass_kg:.3g} kg between these rotors barely reaches {limit / _TOO_WIDE:.2g}",
             "check it, vehicle.mass_kg and position_m of vehicle.rotors",
             ("vehicle",),
             stated[name] * _TOO_WIDE / limit,
@@ -69,8 +69,8 @@ def _suspect(off: Mapping[str, float]) -> str:
         if off.keys() == {"inertia_z"}:
             return "x and y fit, so check spin of vehicle.rotors, the order of the rotors' columns and the sign of yaw"
         if off.keys() == {"thrust_scale"}:
-            return "check the sign and the frame of the acceleration, and thrust_factor_n_s2 of vehicle.rotors"
-        return "check signs and order of the gyroscope's and the rotors' columns"
+            return "check the sign and frame of the acceleration, and thrust_factor_n_s2 of vehicle.rotors"
+        return "check the signs and order of the gyroscope's and the rotors' columns"
     if thrust is not None and off.keys() == {"thrust_scale", "inertia_z"} and _alike(thrust * off["inertia_z"], 1.0):
         return f"the rotor speeds look {_times(1 / np.sqrt(thrust))}: check the unit of their columns (rpm for rad/s?)"
     if off.keys() == {"thrust_scale"} and thrust is not None:
@@ -84,8 +84,8 @@ def _suspect(off: Mapping[str, float]) -> str:
     if off.keys() == set(_INERTIAS) and all(_alike(each, inertias[0]) for each in inertias):
         return f"all axes alike, so the gyroscope looks {_times(1 / inertias[0])}: check its unit (deg/s for rad/s?)"
     if off.keys() <= {"inertia_x", "inertia_y"}:
-        return "z fits, so the suspects are inertia_kg_m2 about it and position_m of vehicle.rotors"
-    return "check signs, units and order of the gyroscope's and the rotors' columns"
+        return "z fits, so suspect inertia_kg_m2 about this axis and position_m of vehicle.rotors"
+    return "check the signs, units and order of the gyroscope's and the rotors' columns"
 
 
 def _alike(one: float, other: float) -> bool:

@@ -54,7 +54,7 @@ def too_fast(parts: Sequence[Signals]) -> Finding | None:
     if fastest <= _ABOVE_THE_LIMIT * limit:
         return None
     return Finding(
-        f"the rotors turn at up to {fastest:.4g} rad/s, and vehicle.rotor_speed_max_rad_s is {limit:.4g}",
+        f"the rotors turn at up to {fastest:.4g} rad/s, but vehicle.rotor_speed_max_rad_s is {limit:.4g}",
         "check the unit of import.signals.rotor_speed (rpm?), or the limit",
         ("rotors", "vehicle.rotor_speed_max_rad_s"),
         fastest / limit,
@@ -87,7 +87,7 @@ def beyond_propellers(parts: Sequence[Signals]) -> Finding | None:
         f"propellers that fit between the hubs lift about {size:.0f} times {'less' if slow else 'more'} than the "
         f"weight of {vehicle.mass_kg:g} kg at {np.sqrt((speed[turning] ** 2).mean()):.3g} rad/s",
         "check the unit of import.signals.rotor_speed (rad/s, rpm or Hz), vehicle.mass_kg (kg) and position_m of "
-        f"vehicle.rotors (m){', or whether it took off' if slow else ''}",
+        f"vehicle.rotors (m){', or whether it took off at all' if slow else ''}",
         ("rotors", "vehicle"),
         number,
         contradiction=leans if slow else len(vehicle.rotors) >= _FEWEST_ROTORS,
@@ -161,7 +161,7 @@ def thrust_beside_weight(parts: Sequence[Signals]) -> Finding | None:
     # A log may hold a long rest on the ground, so that its mean says nothing of too little.
     mean, most = (float(thrust.mean()), float(thrust.max())) if len(thrust) else (1.0, 1.0)
     if mean > _THRUST_TO_WEIGHT:
-        size, words = mean, "times the weight on average, which no flight keeps up"
+        size, words = mean, "times the weight on average, which no flight sustains"
     elif most < 1 / _THRUST_TO_WEIGHT:
         size, words = most, "times the weight at most, which lifts no vehicle"
     else:
@@ -200,7 +200,7 @@ def lift(checks: Sequence[PairCheck], vehicle: VehicleSettings) -> Finding | Non
     share = float(given[flown].mean() / taken[flown].mean())
     if 1 / _LIFTS < share < _LIFTS:
         return None
-    what = f"the thrust of the rotors is {share:.2f} times what the motion takes along the vertical"
+    what = f"the thrust of the rotors is {share:.2f} times what the motion requires along the vertical"
     return Finding(what, _REMEDY, ("rotors", "vehicle"), share, contradiction=False, repairable=True)
 
 
@@ -219,9 +219,9 @@ def misplaced(part: Signals) -> Finding | None:
     places = "; ".join(f"{name}, {'counter-clockwise' if spin > 0 else 'clockwise'}" for name, spin in told)
     shares = ", ".join(f"{100 * share:.0f} %" for share in moved.explained)
     return Finding(
-        f"by the motion the rotors are, in the order of their columns: {places} (which explains {shares} of the "
-        "acceleration about roll, pitch and yaw). vehicle.rotors says otherwise",
-        "check position_m and spin there, the order of the columns, the axes of gyroscope (or attitude), and "
+        f"judged by the motion, the rotors are, in the order of their columns: {places} (which explains {shares} of "
+        "the acceleration about roll, pitch and yaw). vehicle.rotors says otherwise",
+        "check its position_m and spin, the order of the columns, the axes of the gyroscope (or attitude), and "
         "import.body_frame",
         ("rotors", "gyroscope", "vehicle.rotors"),
         # In a hover the axes may say it and single rotors not: enough for a word, not for a verdict.

@@ -214,7 +214,7 @@ def _uncontradicted(
     apart = set_apart(flights, repaired, windows)
     if not apart:
         return clocks, repaired, ()
-    why = f", which {joined(apart)} contradict, so nothing is set right"
+    why = f", which {joined(apart)} contradict, so nothing is corrected"
     told = (repair.finding for repair in clocks if repair.finding is not None)
     dropped = (
         replace(each, what=f"{each.what}{why}", remedy=f"check the clocks of {joined(each.channels)}", repairable=False)
@@ -258,7 +258,7 @@ def _gyroscope(flights: Sequence[Signals], windows: Windows) -> Gyroscope:
     unlike, scaled = gyroscope_apart(scanned.seen, scanned.read)
     apart = (*unlike, *scaled)
     if unlike:
-        return Gyroscope.unjudged("the axes of gyroscope and attitude do not belong together", apart)
+        return Gyroscope.unjudged("the axes of the gyroscope and the attitude do not match", apart)
     raw = scanned.seen - np.concatenate([flight.gyro_rate(0.0) for flight in cut])
     if np.sqrt((raw**2).mean()) < _ROUNDING:
         return Gyroscope.unjudged(
@@ -268,11 +268,11 @@ def _gyroscope(flights: Sequence[Signals], windows: Windows) -> Gyroscope:
     if fit is None:
         return Gyroscope.unjudged("the flights are too short", apart)
     fits = {name: fit.of(str(test.estimate)) for name, test in _of_gyroscope().items()}
-    still = "the flights hardly turn, so it would not show"
+    still = "the flights barely rotate, so it would not show"
     untested = {name: still for name, numbers in fits.items() if not numbers.known.any()}
     noise = least_noise([signals.body_rate for signals in flights]) * np.sqrt((windows.weight**2).sum())
     if np.sqrt(fit.variance.max()) < _SHARE_OF_NOISE * noise:
-        derived = "the attitude contains the gyroscope's own noise, so it is integrated from it and would not show it"
+        derived = "the attitude contains the gyroscope's own noise, so it was integrated from it and would not show it"
         untested |= {name: derived for name, test in _of_gyroscope().items() if test.integrated}
     faults = (CheckedFault(CATALOGUE[name], numbers) for name, numbers in fits.items() if name not in untested)
     return Gyroscope(tuple(faults), untested, fit, apart)

@@ -38,9 +38,9 @@ _NOTHING, _ROUNDING = 1e-9, 1e-12
 _LAG, _DELAY, _SLOW = "lag of the rotors", "delay of the rotors", "slow actuation"
 _LINEAR = "part of the thrust that is linear in the speed"
 _ROTORS = "what differs between rotors, and their places"
-_LEARNED = "what is learned, without a name"
-_NO_BODY = "inertia with a moment larger than the sum of the others, which no body has: the nearest that one has"
-_WIND = "wind of its flights, {:.3g} and {:.3g} m/s along x and y of the world, which its world has to blow"
+_LEARNED = "the learned part, without a name"
+_NO_BODY = "inertia with a moment larger than the sum of the others, which no body has: the nearest possible is used"
+_WIND = "wind of its flights, {:.3g} and {:.3g} m/s along x and y of the world, which the simulated world must provide"
 FUZZY = "inertia that depends on the attitude"
 
 Holds = Callable[[Array], Array]
@@ -99,13 +99,13 @@ class Missing:
     def sentence(self) -> str:
         """What is missing, and its size."""
         if self.off is None:
-            return f"Not held: {self.title}; its size depends on the flight, and was not measured along one."
+            return f"Not held: {self.title}; its size depends on the flight and was not measured along one."
         if not (self.torque or self.force):
-            return f"Not held, or not whole: {self.title}; half a second without it ends {self.off.sentence} off."
+            return f"Not held, or only in part: {self.title}; half a second without it ends {self.off.sentence} off."
         floors = "" if np.isnan(self.floors) else f", {self.floors:.3g} noise floors"
         return (
-            f"Not held, or not whole: {self.title}: {self.torque:.3g} N m and {self.force:.3g} N {self.where}{floors}; "
-            f"half a second without it ends {self.off.sentence} off."
+            f"Not held, or only in part: {self.title}: {self.torque:.3g} N m and {self.force:.3g} N {self.where}"
+            f"{floors}; half a second without it ends {self.off.sentence} off."
         )
 
 
@@ -168,7 +168,7 @@ def constant_body(model: VehicleModel) -> Body:
     _, tensors = body_inertia(model.fuzzy, attitude[~vertical(attitude)])
     mean = tensors.mean(axis=0) if len(tensors) else np.zeros((3, 3))
     if not np.linalg.eigvalsh(mean).min() > 0:
-        raise InputError("its inertia, averaged where training went, is that of no body; identify it again")
+        raise InputError("its inertia, averaged where training went, is not that of any body; identify it again")
     return body_of(model.vehicle, mean)
 
 

@@ -122,13 +122,13 @@ def qgc_plan(record: TrajectoryRecord, home: Home) -> str:
 def _refuse_no_points(record: TrajectoryRecord, home: Home) -> None:
     assert record.position is not None, "a path in space"
     if record.excited is not None:
-        raise InputError("--format px4: a mission of waypoints holds no excitation; leave --excite out, or take csv")
+        raise InputError("--format px4: a mission of waypoints holds no excitation; leave out --excite, or use csv")
     if record.leg is None and float(np.ptp(record.position, axis=0).max()):
-        raise InputError("--format px4: this path is a curve, and a mission flies from point to point; take csv")
+        raise InputError("--format px4: this path is a curve, but a mission flies from point to point; use csv")
     lowest = home.height + float(record.position[:, 2].min())
     if lowest <= 0:
         raise InputError(
-            f"--home: {home.height:g} m above the take-off is too low: the path comes down to {lowest:g} m; raise the "
+            f"--home: {home.height:g} m above take-off is too low: the path descends to {lowest:g} m; raise the "
             "third number"
         )
 
@@ -206,8 +206,8 @@ def system_id_lines(excited: ExcitedGroup, axis: str, run: float, hover: float) 
         f"# ArduPilot System ID mode (25): a logarithmic sweep of {axis}, {low:g} to {high:g} Hz.",
         f"# SID_MAGNITUDE: {'share of the thrust' if thrust else 'deg/s, body rate'}; times: s.",
         "# SID_T_REC and the others exist once SID_AXIS is not 0: load, read all parameters again, load again.",
-        "# Hover high and in still air, log at full rate (LOG_BITMASK, fast attitude), switch to the mode: it begins",
-        "# after 1 s and stops by itself. Switch away at once if it drifts. Each switch to the mode is one more run.",
+        "# Hover high and in still air, log at full rate (LOG_BITMASK, fast attitude), switch to the mode: it starts",
+        "# after 1 s and stops by itself. Switch away at once if it drifts. Each switch to the mode is another run.",
     )
     return "\n".join([*head, *(f"{name},{value:.6g}" for name, value in values.items())]) + "\n"
 
@@ -215,7 +215,7 @@ def system_id_lines(excited: ExcitedGroup, axis: str, run: float, hover: float) 
 def _refuse_record(length: float, low: float, high: float) -> None:
     if length > _LONGEST_RECORD_S:
         raise InputError(
-            f"--format ardupilot: a sweep of {length:g} s; SID_T_REC takes {_LONGEST_RECORD_S:g} at most: lower "
+            f"--format ardupilot: a sweep of {length:g} s; SID_T_REC allows {_LONGEST_RECORD_S:g} at most: lower "
             "--duration"
         )
     if length <= _STEADY_PERIODS / low:
@@ -225,4 +225,4 @@ def _refuse_record(length: float, low: float, high: float) -> None:
         )
     least, most = _SID_FREQUENCIES
     if low < least or high > most:
-        raise InputError(f"--format ardupilot: --band {low:g},{high:g}: SID_F_* take {least:g} to {most:g} Hz")
+        raise InputError(f"--format ardupilot: --band {low:g},{high:g}: SID_F_* allow {least:g} to {most:g} Hz")

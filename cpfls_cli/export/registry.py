@@ -141,7 +141,7 @@ def _left(sheet: Sheet, held: Held, holds: Holds, title: str) -> tuple[tuple[Mis
     told = tuple(each.sentence for each in left)
     if len(about_hover) - any(sheet.wind) > 1:
         off = together(sheet.model, held).sentence
-        told = (*told, f"{title} ends {off} off in all after half a second about hover.")
+        told = (*told, f"In all, {title} ends {off} off after half a second about hover.")
     return left, told or (f"{title} holds all of it.",)
 
 
@@ -152,5 +152,5 @@ def require_package(form: str) -> None:
         import_module(package or "cpfls_cli")
     except ImportError:
         raise InputError(
-            f"--format {form}: flying it needs the package {package}; {install_command('simulators')}"
+            f"--format {form}: flying the file needs the package {package}; {install_command('simulators')}"
         ) from None

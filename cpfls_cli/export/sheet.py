@@ -26,11 +26,11 @@ from cpfls_cli.version import __version__
 EXPORTER = __version__
 """Version of the program that exports."""
 
-DO_NOT_USE = "DO NOT USE: this is the verdict on the model, which was exported all the same."
+DO_NOT_USE = "DO NOT USE: this is the verdict on the model, which was exported nevertheless."
 
 GUST_RECIPE = (
-    "Torque and force of gusts act on the body beside those of the model, about and along its axes. Each is x, at "
-    "first size * n, and after every step h: x = k x + size sqrt(1 - k^2) n, k = exp(-h / memory), n a new normal "
+    "Torque and force of gusts act on the body in addition to those of the model, about and along its axes. Each is x, "
+    "at first size * n, and after every step h: x = k x + size sqrt(1 - k^2) n, k = exp(-h / memory), n a new normal "
     "number."
 )
 """How to play gusts, which no equation of an export holds."""
@@ -192,7 +192,7 @@ class Sheet:
     def _marks(self) -> Iterator[str]:
         if self.stopped is not None:
             why = f" ({self.stopped})" if self.stopped else ""
-            yield f"INCOMPLETE MODEL: its search did not come to its end{why}. Do not fly with it."
+            yield f"INCOMPLETE MODEL: its search did not run to the end{why}. Do not fly with it."
         if self.verdict == "do-not-use":
             yield DO_NOT_USE
 

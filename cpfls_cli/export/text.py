@@ -60,7 +60,7 @@ def checked_identifier(name: str) -> str:
     """Refuse a prefix that is no identifier."""
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         raise InputError(
-            f"--name {name or repr(name)}: is no identifier; use letters, digits and underscores, a letter first"
+            f"--name {name or repr(name)}: not an identifier; use letters, digits and underscores, a letter first"
         )
     if len(name) > _LONGEST_NAME:
         raise InputError(f"--name {name[:8]}...: has {len(name)} letters; at most {_LONGEST_NAME}")

@@ -110,11 +110,11 @@ def _still(course: Course) -> Array:
 def _require(flight: PlaybackFlight, held: Held) -> None:
     if flight.wrench is not None:
         raise InputError(
-            f"{flight.name}: has no rotor speeds, by which an exported vehicle flies; verify along one that has"
+            f"{flight.name}: has no rotor speeds, which drive an exported vehicle; verify along a flight that has them"
         )
     if not flight.translates and held.table.feels_air:
         raise InputError(
-            f"{flight.name}: lacks attitude or velocity, and the vehicle depends on its velocity through the air; "
+            f"{flight.name}: lacks attitude or velocity, but the vehicle depends on its velocity through the air; "
             "verify along a flight that has both"
         )
 

@@ -185,7 +185,7 @@ def usual_airframe(kind: str) -> Airframe | None:
     rotors = tuple(
         RotorPlace(name, (corner * _CORNERS[name][0], corner * _CORNERS[name][1]), spin) for name, spin in USUAL[kind]
     )
-    return Airframe(rotors, False, f"the numbers that {kind} gives the motors of an X, if nobody changed them", "named")
+    return Airframe(rotors, False, f"the numbers that {kind} gives the motors of an X unless changed", "named")
 
 
 def _require_control(airframe: Airframe) -> None:
@@ -308,7 +308,7 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
         return None
     words = ", ".join(f"{100 * share:.0f} % of {axis}" for share, axis in zip(explained, _TURNS, strict=True))
     form = "an X" if layout.form == "X" else "a plus"
-    reason = f"the motion: as {form} in this order the rotors explain {words} acceleration"
+    reason = f"the motion: as {form} in this order, the rotors explain {words} acceleration"
     return MovedBy(Airframe(layout.rotors, False, reason, "data" if clear else "guess"), explained, by_axes, clear)
 
 

@@ -79,9 +79,9 @@ def _warnings(estimate: DelayEstimate) -> tuple[str, ...]:
     if estimate.at_bound:
         sentences.append("the estimated delay is the longest one tried; raise import.delay_max_s")
     if estimate.pooled_r2 < _POOR_R2:
-        sentences.append(f"at the estimated delay a rigid body explains only {estimate.pooled_r2:.2f} of the torque")
+        sentences.append(f"at the estimated delay, a rigid body explains only {estimate.pooled_r2:.2f} of the torque")
     if (estimate.inertia[:3] < 0).any():
-        sentences.append("at the estimated delay a moment of inertia is negative; check signs and axes")
+        sentences.append("at the estimated delay, a moment of inertia is negative; check signs and axes")
     return tuple(sentences)
 
 
@@ -199,7 +199,7 @@ def _prepare(
     time: Array, body_rate: Array, body_torque: Array, delay_max_s: float, lowpass_hz: float | None, order: int
 ) -> _Fit:
     if len(time) < 2:
-        raise ComputationError("the delay cannot be estimated: fewer than two samples are in the share to look at")
+        raise ComputationError("the delay cannot be estimated: fewer than two samples are in the part used for it")
     rate_hz = 1 / (time[1] - time[0])
     smooth_rate = low_pass(body_rate, rate_hz, lowpass_hz, order)
     smooth_torque = low_pass(body_torque, rate_hz, lowpass_hz, order)
@@ -221,7 +221,7 @@ def _window(time: Array, delay_max_s: float, lowpass_hz: float | None) -> slice:
         raise SettingError(
             "delay_max_s",
             f"too long to estimate a delay on {time[-1] - time[0]:.3g} s of flight: {max(last - first, 0)} samples"
-            f" remain, and at least {_SMALLEST_WINDOW} must",
+            f" remain, and at least {_SMALLEST_WINDOW} are needed",
         )
     return slice(int(first), int(last))
 

@@ -26,7 +26,7 @@ _SIGNALS_OF: Final[Mapping[str, tuple[SignalName, ...]]] = {
     "body_rate": ("body_rate",),
     "position": ("position", "velocity"),
 }
-_DECIDES = "a flight of which one lean, turn or climb is known, or the documentation of the log, decides"
+_DECIDES = "a flight with one known lean, turn or climb, or the documentation of the log, decides"
 
 
 def read_attitude(seen: Seen) -> TakenReading | None:
@@ -87,8 +87,8 @@ def _read_euler(seen: Seen, named: Named) -> TakenReading:
         elif named.unit is None or decided == unit or best.place_share < GOOD:
             break
         else:
-            seen.warnings.append(f"{named.group.pattern} is said to be in {unit}; by the lean it is in {decided}")
-            reason, sure = f"{reason}, and by what the lean explains in {decided}", "data"
+            seen.warnings.append(f"{named.group.pattern} is said to be in {unit}; by the lean, it is in {decided}")
+            reason, sure = f"{reason}; judged by what the lean explains, in {decided}", "data"
         if decided == unit:
             break
         unit = decided
@@ -110,14 +110,14 @@ def _angle_unit(named: Named, values: Array) -> tuple[UnitName, str, Sure, tuple
     largest = np.quantile(np.abs(values), 0.999, axis=0)
     tilt, turn = float(largest[:2].max()), float(largest[2])
     if named.unit == "rad" and tilt > _LARGEST_ANGLE:
-        return "deg", f"{called(named)}, which would be rad, and reaches {tilt:.3g}, so these are degrees", "data", ()
+        return "deg", f"{called(named)}, which would be rad, but reaches {tilt:.3g}, so these are degrees", "data", ()
     if named.unit is not None:
         return named.unit, f"{called(named)}, which is in {named.unit}", "named", ()
     if tilt > _LARGEST_TILT or turn > 20 * _LARGEST_ANGLE:
         return "deg", f"{called(named)}; reaches {max(tilt, turn):.3g}, so these are degrees", "data", ()
-    rival = Rival("unit: deg", f"a flight that never leans by more than {tilt:.2g} degrees would read the same")
+    rival = Rival("unit: deg", f"a flight that never leans more than {tilt:.2g} degrees would look the same")
     rivals = () if turn > 1.0 and turn <= _LARGEST_ANGLE and tilt > 0.1 else (rival,)
-    return "rad", f"{called(named)}; leans by {tilt:.2g} at most", "data" if not rivals else "guess", rivals
+    return "rad", f"{called(named)}; leans {tilt:.2g} at most", "data" if not rivals else "guess", rivals
 
 
 def _tell_quaternion(seen: Seen, named: Named, verdict: TakenReading) -> None:
@@ -129,31 +129,31 @@ def _tell_quaternion(seen: Seen, named: Named, verdict: TakenReading) -> None:
     reason = f"of length 1; {called(named)}" + (f"; {data}{turned}" if told else "")
     if own.order != (0, 1, 2, 3):
         held = ", ".join(named.group.columns[index] for index in own.order)
-        reason += f"; by what they do {held} are w, x, y, z"
+        reason += f"; judged by their values, {held} are w, x, y, z"
     seen.tell(named, "1", reason, "data" if told else "named", order=own.order, sign=own.sign)
     others = [other for other in verdict.others if other.attitude.scalar_last != own.scalar_last]
     if named.group.kind == "wxyz":
         seen.choose("quaternion_order", order, "the columns are named by w, x, y, z", "named")
         return
     if not others:
-        seen.choose("quaternion_order", order, "in the other order the vehicle would not stay level", "data")
+        seen.choose("quaternion_order", order, "in the other order, the vehicle would not stay level", "data")
         return
     share = max(other.explained for other in others)
     lean = max(other.place_share for other in others)
     if told and share < best.explained - 0.05:
-        seen.choose("quaternion_order", order, f"{data}, in the other order {100 * share:.0f} %", "data")
+        seen.choose("quaternion_order", order, f"{data}; in the other order, {100 * share:.0f} %", "data")
     elif best.lean is not None and lean < best.place_share - 0.2:
         share_of_lean = f"({100 * best.place_share:.0f} %)"
-        words = f"in this order alone the lean explains the acceleration {share_of_lean}"
+        words = f"only in this order does the lean explain the acceleration {share_of_lean}"
         seen.choose("quaternion_order", order, words, "data")
     elif named.known:
         seen.choose("quaternion_order", order, f"a log of {named.known}", "named")
     elif not verdict.tied and min(other.price for other in others) > best.price:
-        words = "in the other order more columns would have to be other than named"
+        words = "in the other order, more columns would have to differ from their names"
         seen.choose("quaternion_order", order, words, "data")
     else:
         rival = "xyzw" if order == "wxyz" else "wxyz"
-        why = "in both the vehicle stays level, and no gyroscope parts them"
+        why = "the vehicle stays level in both, and no gyroscope tells them apart"
         seen.choose("quaternion_order", order, "the more usual one", "guess", Rival(f"quaternion_order: {rival}", why))
 
 
@@ -164,7 +164,7 @@ def doubt_reading(seen: Seen, verdict: TakenReading) -> None:
         signal: SignalName = "quaternion" if "quaternion" in seen.guesses else "attitude"
         words = "w, x, y, z" if signal == "quaternion" else "roll, pitch, yaw"
         held = ", ".join(seen.guesses[signal].columns.columns)
-        agrees = "so the log agrees with itself, and as named it does not"
+        agrees = "this way the log agrees with itself; as named it does not"
         seen.warnings.append(f"{held} are taken for {words}: {agrees}")
     doubted: set[str] = set()
     for other in verdict.tied:
@@ -177,7 +177,7 @@ def doubt_reading(seen: Seen, verdict: TakenReading) -> None:
                     columns = [seen.candidates[signal][0].group.columns[index] for index in order]
                     signs = f", sign: {[int(own) for own in sign]}" if min(sign) < 0 else ""
                     text = f"columns: [{', '.join(columns)}]{signs}"
-                    seen.doubt(signal, Rival(text, f"the log agrees as well, with other columns turned; {_DECIDES}"))
+                    seen.doubt(signal, Rival(text, f"the log agrees as well with other columns turned; {_DECIDES}"))
         if other.body != best.body and "body_frame" not in doubted:
             doubted.add("body_frame")
             for key, readings in (("body_frame", (other.body, best.body)), ("world_frame", (other.world, best.world))):

@@ -133,11 +133,11 @@ def warn_of_slow(slow: tuple[SlowSignal, ...], rate_hz: float) -> Iterator[str]:
             continue
         between, cost = {
             "repeated": ("repeat the last value", f"is {500 / signal.rate_hz:.3g} ms late on average, and knows"),
-            "interpolated": ("lie on a straight line between two", "knows"),
+            "interpolated": ("lie on a straight line between two updates", "knows"),
         }[signal.between]
         yield (
-            f"{signal.name} is updated {signal.rate_hz:.3g} times a second and the log has {rate_hz:.4g} rows a second;"
-            f" the rows between {between}: it {cost} nothing of motion above {signal.rate_hz / 2:.3g} Hz; log it"
+            f"{signal.name} is updated {signal.rate_hz:.3g} times a second, but the log has {rate_hz:.4g} rows a second"
+            f": the rows between {between}: it {cost} nothing of motion above {signal.rate_hz / 2:.3g} Hz; log it"
             " faster, or expect a model of slow motion only"
         )
 
@@ -230,7 +230,7 @@ def warn_of_cut_offs(found: Mapping[str, float], settings: ImportSettings) -> It
         return
     named = ", ".join(f"{name} at about {cut_off:.2g} Hz" for name, cut_off in found.items())
     yield (
-        f"the spectrum falls off a cliff in {named}: low-passed before it was logged (or simulated without noise)."
-        " Nothing above is known, and noise looks smaller than it was; signals that were filtered unlike each other"
-        f" no longer fit together: log them unfiltered, or set import.lowpass_hz to {min(found.values()):.2g} or less"
+        f"the spectrum drops sharply: {named}; low-passed before logging (or simulated without noise)."
+        " Nothing above that is known, and noise looks smaller than it was; signals that were filtered differently"
+        f" no longer match: log them unfiltered, or set import.lowpass_hz to {min(found.values()):.2g} or less"
     )

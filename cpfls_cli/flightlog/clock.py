@@ -73,20 +73,20 @@ def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -
     first_full = int(np.argmax(present, axis=0).max())
     last_full = len(present) - 1 - int(np.argmax(present[::-1], axis=0).max())
     if first_full >= last_full:
-        raise InputError("the mapped columns of the log have no stretch of time in common")
+        raise InputError("the mapped columns of the log have no period of time in common")
     gaps = _gap_steps(time, present, settings.gap_s)[first_full:last_full]
     if gaps.any() and settings.gap_rule == "stop":
         begin, end = (time[first_full + row] for row in runs(gaps)[0])
         raise InputError(
             _slow_log(time, present, settings)
             or f"the log has a gap of {end - begin:.3g} s at {begin:.3f} s, longer than import.gap_s ="
-            f" {settings.gap_s:g}: raise it, cut with import.crop_s, or set import.gap_rule to longest-part"
+            f" {settings.gap_s:g}: raise it, crop with import.crop_s, or set import.gap_rule to longest-part"
         )
     stretches = [(first_full + begin, first_full + end) for begin, end in runs(~gaps)]
     if not stretches:
         raise InputError(
             _slow_log(time, present, settings)
-            or "no stretch of the log has values in all mapped columns; see import.signals, import.gap_s"
+            or "no part of the log has values in all mapped columns; check import.signals and import.gap_s"
         )
     first, last = max(stretches, key=lambda run: float(time[run[1]] - time[run[0]]))
     incomplete = first_full + len(time) - 1 - last_full
@@ -98,8 +98,8 @@ def _slow_log(time: Array, present: BoolArray, settings: ImportSettings) -> str 
     step = float(np.median(np.diff(time)))
     if step > settings.gap_s:
         return (
-            f"the median step is {step:.3g} s, longer than import.gap_s = {settings.gap_s:g}: is import.time_unit ="
-            f" {settings.time_unit} right, or raise import.gap_s"
+            f"the median step is {step:.3g} s, longer than import.gap_s = {settings.gap_s:g}: check import.time_unit ="
+            f" {settings.time_unit}, or raise import.gap_s"
         )
     slowest = max(float(np.median(np.diff(time[column]))) for column in present.T)
     if slowest > settings.gap_s:

@@ -139,7 +139,7 @@ def _require_present(columns: Mapping[str, Array], settings: ImportSettings) -> 
         for column in signal.columns
     ]
     tried = {
-        f"import.signals.{name}.columns": ", nor all columns of an entry of otherwise"
+        f"import.signals.{name}.columns": ", nor all columns of any entry of otherwise"
         for name, signal in settings.signals.items()
         if signal.otherwise
     }
@@ -178,7 +178,7 @@ def columns_in_words(columns: Mapping[str, Array]) -> str:
     more = f" and {len(names) - _MOST_LISTED} more" if len(names) > _MOST_LISTED else ""
     what = "topics" if of_topics else "columns"
     shown = ", ".join(names[:_MOST_LISTED]) or "none"
-    return f"the log has the {what} {shown}{more}; `cpfls init LOG` proposes what maps to what"
+    return f"the log has the {what} {shown}{more}; `cpfls init LOG` proposes the mapping"
 
 
 def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) -> dict[str, Array]:

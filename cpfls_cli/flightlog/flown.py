@@ -78,9 +78,9 @@ def find_flown(time: Array, level: Array | None, height: Array | None, rate: Arr
     if active is None:
         return FlownPart(None, (told,), flies=False)
     if not active.any():
-        return FlownPart(None, (f"nothing flies in it: {told} all the time",), flies=False)
+        return FlownPart(None, (f"no flight in it: {told} throughout",), flies=False)
     if _still(active, height, rate):
-        return FlownPart(None, ("nothing flies in it: the vehicle neither turns nor moves",), flies=False)
+        return FlownPart(None, ("no flight in it: the vehicle neither turns nor moves",), flies=False)
     return _longest(time, active, told, level)
 
 
@@ -92,10 +92,10 @@ def _active(
         level = np.nan_to_num(level)
         largest = float(np.quantile(level, 0.98))
         if largest < _ALIVE:
-            return None, "nothing flies in it: the rotors stand all the time"
+            return None, "no flight in it: the rotors stand still throughout"
         hover = float(np.median(level[level > _OF_LARGEST * largest]))
         carrying = level > _OF_HOVER * hover
-        told = f"the rotors below {100 * _OF_HOVER:.0f} % of their level at hover"
+        told = f"the rotors are below {100 * _OF_HOVER:.0f} % of their hover level"
         if rate is not None and carrying.any():
             # In free fall and in flips rotors idle too, but then the vehicle turns.
             window = max(1, round(_SHORT_S / period))
@@ -103,23 +103,23 @@ def _active(
             lively = turns > max(_TURNS_RAD_S, _OF_TURNING * float(np.median(turns[carrying])))
             first, last = np.flatnonzero(carrying)[[0, -1]]
             carrying[first:last] |= ((level > _ALIVE) & lively)[first:last]
-            told += ", and hardly any turning"
+            told += ", with hardly any rotation"
         turning = _smoothed(carrying, period)
         if height is None or not turning.any() or turning.all():
             return turning, told
-        return _off_the_ground(turning, height, period), told + ", or no height"
+        return _off_the_ground(turning, height, period), told + ", or it is on the ground"
     if height is not None and float(np.ptp(height)) > 2 * _LEAST_HEIGHT:
         ground = float(np.quantile(height, 0.02))
         above = height - ground > max(_LEAST_HEIGHT, _OF_HEIGHT * float(np.ptp(height)))
         starts_there = abs(float(np.median(height[: max(1, round(_SHORT_S / period))])) - ground) < _LEAST_HEIGHT
-        return (_smoothed(above, period) if starts_there else np.ones(len(height), dtype=bool)), "no height"
+        return (_smoothed(above, period) if starts_there else np.ones(len(height), dtype=bool)), "it is on the ground"
     if rate is None:
         return (
             None,
-            f"no rotors, no height and no rates are recognised, so no flight can be told from a stand: {BY_HAND}",
+            f"no rotors, no height and no rates are recognised, so flight cannot be told from standing: {BY_HAND}",
         )
     quiet = _quiet(rate, period)
-    return ~quiet, "no turning at all"
+    return ~quiet, "it does not turn at all"
 
 
 def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArray:
@@ -181,7 +181,7 @@ def _longest(time: Array, active: BoolArray, told: str, level: Array | None) -> 
     others = [(float(time[part[0]]), float(time[part[-1]])) for part in stretches if part is not longest]
     if others:
         words = ", ".join(f"{a:.1f} to {b:.1f} s" for a, b in others)
-        reasons.append(f"it flies again at {words}; import.crop_s takes one stretch, the longest")
+        reasons.append(f"it also flies at {words}; import.crop_s takes one stretch, the longest")
     whole = not reasons or (longest[0] == 0 and longest[-1] == len(time) - 1)
     return FlownPart(None if whole else (round(begin, 2), round(end, 2)), tuple(reasons))
 
@@ -189,4 +189,4 @@ def _longest(time: Array, active: BoolArray, told: str, level: Array | None) -> 
 def _how(level: Array | None, part: slice, told: str) -> str:
     if level is None:
         return told
-    return "the rotors stand" if float(np.quantile(np.nan_to_num(level)[part], 0.9)) < _ALIVE else told
+    return "the rotors stand still" if float(np.quantile(np.nan_to_num(level)[part], 0.9)) < _ALIVE else told

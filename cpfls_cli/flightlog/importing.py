@@ -181,9 +181,7 @@ def _setpoints(asked: SignalTable, clock: Array, settings: ImportSettings) -> tu
         for name, values in asked.signals.items()
     }
     known = {name: values for name, values in held.items() if np.isfinite(values).all(axis=1).any()}
-    left = [
-        f"signal {name} is left out: nothing was asked for in the part that is kept" for name in held.keys() - known
-    ]
+    left = [f"signal {name} is left out: it holds no setpoint in the part that is kept" for name in held.keys() - known]
     return setpoints_to_program_frames(known, settings), left
 
 
@@ -192,7 +190,7 @@ def _uniform_clock(time: Array) -> tuple[Array, float]:
     if period < _SHORTEST_PERIOD_S or (time[-1] - time[0]) / period > _LARGEST_REFINEMENT * len(time):
         raise InputError(
             f"import.time_column: the median step is {period:.3g} s in {time[-1] - time[0]:.3g} s of {len(time)} rows,"
-            " which is no clock of a log; look at import.time_unit and import.time_column"
+            " which no log has; check import.time_unit and import.time_column"
         )
     # A whole number of periods that rounding made a little short must not lose its last sample.
     samples = int((time[-1] - time[0]) / period * (1 + 1e-9) + 1e-6) + 1
@@ -261,7 +259,7 @@ def _clock(time: Array, rate_hz: float, log_rate_hz: float) -> Array:
         raise SettingError(
             "rate_hz",
             f"does not suit {time[-1]:.4g} s of flight at {log_rate_hz:.4g} Hz; at most {_LARGEST_REFINEMENT} times the"
-            f" log's rate, and {_FEWEST_SAMPLES} samples at least",
+            f" log's rate and at least {_FEWEST_SAMPLES} samples are possible",
         )
     return np.arange(samples) / rate_hz
 
@@ -276,7 +274,7 @@ def _derived(signals: LogSignals) -> dict[str, Array]:
     steep = np.flatnonzero(np.abs(signals.attitude[:, 1]) > _STEEPEST_PITCH)
     if len(steep):
         raise ComputationError(
-            f"the pitch comes within a degree of +-90 degrees at {signals.time[steep[0]]:.3f} s of the flight, where"
+            f"pitch comes within a degree of +-90 degrees at {signals.time[steep[0]]:.3f} s of the flight, where"
             " Euler rates are not defined: cut that part off with import.crop_s"
         )
     attitude_rate = rotations.attitude_rate(signals.attitude, body_rate)
@@ -290,4 +288,4 @@ def _warn_of_aliasing(settings: ImportSettings, log_rate_hz: float) -> tuple[str
     rate, cutoff = settings.rate_hz, settings.lowpass_hz
     if rate is None or rate >= log_rate_hz * 0.99 or (cutoff is not None and cutoff < rate / 2):
         return ()
-    return ("the log is thinned without import.lowpass_hz below half of the new rate: noise is folded into the flight",)
+    return ("the log is downsampled without import.lowpass_hz below half the new rate: noise aliases into the flight",)

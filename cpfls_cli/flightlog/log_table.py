@@ -137,7 +137,7 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
     if clock is not None:
         return clock, "s", None
     raise InputError(
-        "no column of time stamps is recognised: one that rises from row to row and is called t, time or timestamp;"
+        "no column of time stamps is recognised: it has to rise from row to row and be called t, time or timestamp;"
         " rename it, or write the config by hand (`cpfls config` prints every key)"
     )
 
@@ -145,7 +145,7 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
 def _doubt_of_time(name: str, unit: str, fitting: Sequence[str], step: float) -> str | None:
     """Say what speaks against the unit of stamps; None where nothing does."""
     if fitting and unit not in fitting:
-        return f"{name} is said to be in {unit}, and its steps of {step:.3g} are those of a flight in {fitting[0]}"
+        return f"{name} is said to be in {unit}, but steps of {step:.3g} are those of a flight in {fitting[0]}"
     return f"{name} rises by 1 from row to row, so it may count rows: is import.time_unit right?" if step == 1 else None
 
 
@@ -191,7 +191,7 @@ def refuse_dead_rotors(log: LogTable, named: Sequence[Named], candidates: Mappin
         return
     dead = next((n for n in named if n.signal in ROTORS and len(log.values(n.group.columns[:1])[0])), None)
     if dead is not None:
-        raise InputError(f"nothing flies in it: the rotors ({dead.group.pattern}) never change")
+        raise InputError(f"no flight in it: the rotors ({dead.group.pattern}) never change")
 
 
 def make_grid(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) -> None:
@@ -203,12 +203,12 @@ def make_grid(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) -
     rate = min(_GRID_HZ, max(1 / float(np.median(np.diff(clock))) for clock in clocks))
     begin, end = min(float(clock[0]) for clock in clocks), max(float(clock[-1]) for clock in clocks)
     if end - begin < 2.0:
-        raise InputError(f"holds only {end - begin:.2g} s; a flight to learn from has ten or more")
+        raise InputError(f"holds only {end - begin:.2g} s; a flight to learn from has at least ten")
     rows = max(map(len, clocks))
     if (end - begin) * rate > _LARGEST_SPAN * rows:
         raise InputError(
-            f"its stamps span {end - begin:.3g} s, and {rows} rows at {rate:.3g} Hz are {rows / rate:.3g} s: damaged,"
-            " or no clock; cut out the part that flies"
+            f"its stamps span {end - begin:.3g} s, but {rows} rows at {rate:.3g} Hz are {rows / rate:.3g} s: damaged,"
+            " or not a clock; cut out the part that flies"
         )
     log.grid = np.arange(begin, end, 1 / rate)
 

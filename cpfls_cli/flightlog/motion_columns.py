@@ -73,7 +73,7 @@ def tell_body_rate(seen: Seen, reading: Reading | None) -> None:
         if not agrees:
             seen.warnings.append(
                 f"{named.group.pattern} is {fit.gain:.3g} times as large as the attitude's derivative, which no unit"
-                " makes: is the unit of the stamps right?"
+                " explains: is the unit of the stamps right?"
             )
         seen.tell(
             named,
@@ -90,14 +90,14 @@ def tell_body_rate(seen: Seen, reading: Reading | None) -> None:
     spread = float(np.sqrt(values.var(axis=0).sum()))
     between = _RADIANS_UP_TO <= spread <= _DEGREES_FROM
     unit = stated or ("deg/s" if spread > _DEGREES_FROM else "rad/s")
-    rivals = (Rival("unit: deg/s", f"a spread of {spread:.2g} is possible in both"),) if between and not stated else ()
+    rivals = (Rival("unit: deg/s", f"a spread of {spread:.2g} fits both"),) if between and not stated else ()
     size_in_words = f"a spread of {spread:.2g} in flight" if stated is None else f"which is in {stated}"
-    turned = "" if named.sign is None else "; signs as that log has them"
-    against = "no attitude that turns is there to hold it against"
+    turned = "" if named.sign is None else "; signs as in such logs"
+    against = "there is no changing attitude to compare it with"
     if fit is not None:
         against = f"the derivative of the attitude explains only {100 * fit.explained:.0f} % of it"
         seen.warnings.append(
-            f"{named.group.pattern}: {against}; one of the two is late, of other axes, or full of noise, and the axes"
+            f"{named.group.pattern}: {against}; one of the two is late, noisy or in other axes; the axes"
             " are taken as named"
         )
     sure: Sure = "guess" if rivals or fit is not None else "named"
@@ -120,8 +120,8 @@ def _doubt_rates(seen: Seen, named: Named, fit: AxisFit) -> None:
     seen.warn_of_mirrored(named, fit.order, fit.sign, "the attitude")
     loose = [c for c, own in zip(columns, fit.along, strict=True) if not own > _ALONG]
     if loose and max(fit.along) > GOOD:
-        seen.warnings.append(f"{', '.join(loose)}: does not follow the attitude's derivative as the other axes do")
-        seen.doubt("body_rate", Rival("leave body_rate out", f"{', '.join(loose)} follows nothing that is logged"))
+        seen.warnings.append(f"{', '.join(loose)}: does not follow the attitude's derivative, unlike the other axes")
+        seen.doubt("body_rate", Rival("leave body_rate out", f"{', '.join(loose)} follows nothing in the log"))
 
 
 # Position and velocity.
@@ -143,8 +143,8 @@ def position_by_velocity(seen: Seen) -> None:
         others = [own for own in positions if own is not chosen]
         seen.candidates = {**seen.candidates, "position": (chosen, *others)}
         seen.left_out.append(
-            f"{', '.join(first.group.columns)}: also a position, whose derivative explains {100 * (1 - left[0]):.0f} %"
-            f" of the velocity, and that of {', '.join(chosen.group.columns)} {100 * (1 - left[best]):.0f} %"
+            f"{', '.join(first.group.columns)}: also a position; its derivative explains {100 * (1 - left[0]):.0f} %"
+            f" of the velocity, that of {', '.join(chosen.group.columns)} {100 * (1 - left[best]):.0f} %"
         )
 
 
@@ -163,7 +163,7 @@ def tell_places(seen: Seen, reading: Reading | None) -> None:
                 seen.left_out.append(
                     f"{velocity.group.pattern}: a velocity in body axes (the position's derivative explains"
                     f" {100 * body.explained:.0f} % there, {100 * relative.explained:.0f} % in the world);"
-                    " import.signals takes velocities of the world"
+                    " import.signals takes velocities in world axes"
                 )
                 velocity = None
     tilt = None if reading is None or reading.lean is None else reading
@@ -201,7 +201,7 @@ def _tell_place(
         spread = float(np.ptp(seen.grid(named), axis=0).max())
         sure = "data" if spread < 50 else "guess"
         reason += f"; ranges over {spread:.3g}"
-        rivals = () if sure == "data" else (Rival(f"unit: {units[1]}", "no attitude that leans speaks against it"),)
+        rivals = () if sure == "data" else (Rival(f"unit: {units[1]}", "no leaning attitude speaks against it"),)
     else:
         reason += f", which is in {stated}"
         # The lean was held against the velocity only where there is no position.
@@ -209,13 +209,13 @@ def _tell_place(
         if leans and tilt is not None and not 1 / _TEN < gain * known_unit(stated).factor < _TEN:
             unit, sure = units[gain > 100], "data" if gain > 100 else "guess"
             reason += f"; tilt and gravity explain {100 * tilt.place_share:.0f} % of the acceleration in {unit}"
-            seen.disagree(named, unit, "by tilt and gravity it is in")
+            seen.disagree(named, unit, "judged by tilt and gravity, it is in")
     order, sign = AS_NAMED if tilt is None else (tilt.place_order, tilt.place_sign)
     if named.signal == "velocity" and follows and relative is not None:
         reason += f"; the position's derivative explains {100 * relative.explained:.0f} % of it"
         order, sign = _behind(relative, order, sign)
     if (order, sign) != AS_NAMED:
-        reason += "; turned into the axes of the attitude, as the tilt asks for"
+        reason += "; rotated into the axes of the attitude, as the tilt requires"
     seen.tell(named, unit, reason, sure, order=order, sign=sign, rivals=rivals)
     seen.warn_of_mirrored(named, order, sign, "the rest of the log")
 
@@ -260,30 +260,30 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
         of_body = named.frame in ("FLU", "FRD")
         if along_world is not None and along_world.as_named > GOOD and along_world.gain > 0.5 and not of_body:
             seen.left_out.append(
-                f"{named.group.pattern}: an acceleration of the world with gravity in it (the motion explains"
-                f" {100 * along_world.as_named:.0f} %), which import.signals has no word for"
+                f"{named.group.pattern}: an acceleration in world axes that includes gravity (the motion explains"
+                f" {100 * along_world.as_named:.0f} %), which import.signals cannot express"
             )
             return False
         _tell_sensed(seen, named, vertical, carried, sensed, reading)
         if at_hover and sensed not in at_hover:
             other = at_hover[0][1]
             seen.doubt(
-                "acceleration", Rival(f"unit: {other}", f"at hover it would be {other}; are stamps in their unit?")
+                "acceleration", Rival(f"unit: {other}", f"at hover it would be {other}; is import.time_unit right?")
             )
         return True
     if along_world is None or along_world.explained < CLEAR:
         seen.left_out.append(
-            f"{named.group.pattern}: no gravity is in it (z has a median of {vertical:.3g}), and the motion over"
-            " ground does not explain it"
+            f"{named.group.pattern}: it does not include gravity (z has a median of {vertical:.3g}), and the motion"
+            " over ground does not explain it"
         )
         return False
     unit: UnitName = "g" if abs(np.log(along_world.gain * STANDARD_GRAVITY)) < np.log(2) else "m/s^2"
     reason = (
         f"{called(named)}; the motion over ground explains {100 * along_world.explained:.0f} %, in"
-        f" {stated or unit}, and no gravity is in it"
+        f" {stated or unit}, and it does not include gravity"
     )
     seen.tell(named, stated or unit, reason, "data")
-    words = "the acceleration has no gravity in it and follows the motion"
+    words = "the acceleration does not include gravity and follows the motion"
     seen.choose("acceleration_frame", "world", words, "data")
     return True
 
@@ -313,10 +313,10 @@ def _tell_sensed(
     if body is None or body == up:
         seen.tell(named, unit, reason, "data", scale=scale)
     else:
-        reason += f", and points the wrong way for {body}, so it is gravity that is logged, not what carries it"
+        reason += f", and points the wrong way for {body}, so gravity is logged, not the force that carries it"
         others = (
-            Rival("sign: [1, -1, -1]", "where its y and z point the other way than those of all others"),
-            Rival("sign: [1, 1, -1]", "where its z alone does; a push or a lean on the ground along x and y decides"),
+            Rival("sign: [1, -1, -1]", "if its y and z are opposite to those of all others"),
+            Rival("sign: [1, 1, -1]", "if only its z is; a push, or a lean on the ground, along x and y decides"),
         )
         seen.tell(named, unit, reason, "guess", scale=scale, sign=(-1.0, -1.0, -1.0), rivals=others)
     words = f"gravity stays in z (median {vertical:.3g}) in flight"
@@ -325,5 +325,5 @@ def _tell_sensed(
         points = "up" if up == "FLU" else "down"
         words = f"the accelerometer reads {vertical:.3g} along z, so z points {points}"
         # Some log gravity itself, which points down.
-        other = Rival("body_frame: FLU", "where the accelerometer logs gravity, not what carries the vehicle")
+        other = Rival("body_frame: FLU", "if the accelerometer logs gravity, not the force that carries the vehicle")
         seen.choose("body_frame", up, words, *(("data",) if up == "FLU" else ("guess", other)))

@@ -121,7 +121,7 @@ class Named:
     sign: tuple[float, ...] | None = None
 
 
-BY_HAND: Final = "rename them as many logs do (gyro_x, roll, rpm_1), or write import.signals of a config by hand"
+BY_HAND: Final = "use common names (gyro_x, roll, rpm_1), or write import.signals of a config by hand"
 """What to do where names do not tell what columns hold."""
 
 _FAMILIES: Final[tuple[tuple[Kind, tuple[str, ...]], ...]] = (

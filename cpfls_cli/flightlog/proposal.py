@@ -32,7 +32,7 @@ _LEAST_GAP_S, _SLOWEST_VOLTAGE_S = 0.1, 0.5
 _ROOM = 1.2
 """By which a limit of the rotor speeds lies above the fastest one that is logged."""
 
-DECIDES_ROTORS: Final = "a log with more motion beside this one, or a look at the vehicle, decides"
+DECIDES_ROTORS: Final = "a log with more motion, or a look at the vehicle, decides"
 _ALIKE: Final = {True: 1.06, False: 1.12}
 """Ratio of loads up to which two flights may be of one mass: by rotor speeds and an accelerometer; otherwise, since
 batteries empty, and who leans looks heavier. By commands three flights of one Crazyflie differ by 1.06."""
@@ -160,7 +160,7 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
     for one in logs:
         kind = one.parameters.get("MAV_TYPE")
         if kind is not None and int(float(kind)) not in _MULTIROTORS:
-            raise InputError(f"{one.name}: MAV_TYPE = {int(float(kind))} in its parameters is no multirotor")
+            raise InputError(f"{one.name}: MAV_TYPE = {int(float(kind))} in its parameters is not a multirotor")
     for other in logs[1:]:
         _require_same_vehicle(logs[0], other)
     signals, slowest = _without_slow_voltage(logs, _merged_signals(logs))
@@ -209,11 +209,11 @@ def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
     if all(found is not None and found.clear for found in moved):
         orders = [[(r.name, r.spin) for r in found.airframe.rotors] for found in moved if found is not None]
         if orders[0] != orders[1]:
-            differing.append("by their motion the rotors are numbered or turn differently")
+            differing.append("judged by the motion, the rotors are numbered or turn differently")
     if differing:
         shown = "; ".join(differing[:3])
         raise InputError(
-            f"{first.name} and {other.name} are of two vehicles ({shown}): run cpfls init for each of them"
+            f"{first.name} and {other.name} are of different vehicles ({shown}): run cpfls init for each of them"
         )
 
 
@@ -277,7 +277,7 @@ def _standing_in(guess: Guess, others: Mapping[SignalMap, str], lacking: Sequenc
     maps = tuple(ColumnMap(**{each.name: getattr(own, each.name) for each in fields(ColumnMap)}) for own in others)
     without = [name for name in lacking if name not in others.values()]
     columns = replace(guess.columns, otherwise=maps, required=guess.columns.required and not without)
-    reason = f"{guess.reason}; {', '.join(lacking)} lacks these columns"
+    reason = f"{guess.reason}; these columns are missing in {', '.join(lacking)}"
     return replace(guess, columns=columns, reason=reason)
 
 
@@ -310,8 +310,8 @@ def _way_on(read: Sequence[tuple[KnownLog, object]]) -> str:
     odd = [one for own in others for one in own]
     reads, them = ("reads", "it") if len(odd) == 1 else ("read", "them")
     return (
-        f"{joined([one.name for one in odd])} {reads} otherwise than {joined([one.name for one in most])}: leave {them}"
-        f" out, or run cpfls init for {them} apart"
+        f"{joined([one.name for one in odd])} {reads} differently from {joined([one.name for one in most])}: leave"
+        f" {them} out, or run cpfls init for {them} separately"
     )
 
 
@@ -324,7 +324,7 @@ def _merged_choices(logs: Sequence[KnownLog]) -> tuple[KeyChoice, ...]:
             if choice.value != kept.value and "guess" not in (choice.sure, kept.sure):
                 read = [(log, own.value) for log, own in found if own.sure != "guess"]
                 raise InputError(
-                    f"{first.name} and {one.name}: import.{key} would be {kept.value} for the one and {choice.value}"
+                    f"{first.name} and {one.name}: import.{key} would be {kept.value} for one and {choice.value}"
                     f" for the other: {_way_on(read)}"
                 )
         merged.append(kept)
@@ -351,7 +351,7 @@ def _by_weight(guess: Guess, speeds: Array | None, mass_kg: float, arm_m: float)
     if len(fitting) != 1:
         return guess
     columns = replace(guess.columns, unit=fitting[0])
-    reason = f"{guess.reason}; in {fitting[0]} propellers that fit the arms carry the mass at hover"
+    reason = f"{guess.reason}; in {fitting[0]}, propellers that fit between the arms carry the mass at hover"
     return replace(guess, columns=columns, reason=reason, sure="data", rivals=())
 
 
@@ -368,12 +368,12 @@ def _two_masses(logs: Sequence[KnownLog], mass_kg: float | None) -> list[str]:
     if ratio <= _ALIKE[measured[0] and light.sensed and heavy.sensed]:
         return []
     more = f"{100 * (ratio - 1):.0f} %"
-    masses = "" if mass_kg is None else f", {mass_kg * ratio:.3g} kg if the other has {mass_kg:.3g} kg"
-    battery = "" if measured[0] else ", or its battery is emptier"
+    masses = "" if mass_kg is None else f", {mass_kg * ratio:.3g} kg if the other weighs {mass_kg:.3g} kg"
+    battery = "" if measured[0] else ", or its battery is lower"
     what = "squared speeds" if measured[0] else "squared commands"
     return [
         f"{lighter} and {heavier}: in flight the {what} of the rotors are {more} higher in {heavier}, so with equal"
-        f" propellers it weighs {more} more{masses}{battery}: one vehicle.mass_kg does not suit both; run cpfls init"
+        f" propellers it weighs {more} more{masses}{battery}: one vehicle.mass_kg cannot suit both; run cpfls init"
         " for each of them with its own --mass"
     ]
 
@@ -394,10 +394,10 @@ def _airframe(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
         return taken, []
     says = f"{best.airframe.reason}: {', '.join(f'{r.name} {_WAY[r.spin]}' for r in best.airframe.rotors)}"
     if taken is None:
-        return best.airframe, [f"where the rotors are and how they turn is a guess from {says}; {DECIDES_ROTORS}"]
+        return best.airframe, [f"the positions and spins of the rotors are a guess from {says}; {DECIDES_ROTORS}"]
     orders = [[(rotor.name, rotor.spin) for rotor in found.rotors] for found in (taken, best.airframe)]
     differ = best.clear and orders[0] != orders[1] and all(rotor.name for rotor in taken.rotors)
-    return taken, [f"the rotors are taken as in {taken.reason}, and others are told by {says}"] if differ else []
+    return taken, [f"the rotors are taken from {taken.reason}, which contradicts {says}"] if differ else []
 
 
 def _crops(

@@ -204,8 +204,8 @@ class Seen:
         if handed(order, sign) > 0:
             return
         columns = [named.group.columns[index] for index, own in zip(order, sign, strict=True) if own < 0]
-        what = f"{columns[0]} runs against all others" if len(columns) == 1 else "its axes are left-handed"
-        self.warnings.append(f"{named.group.pattern}: {what}, and is taken as {whose} has it")
+        what = f"{columns[0]} is opposite to all others" if len(columns) == 1 else "its axes are left-handed"
+        self.warnings.append(f"{named.group.pattern}: {what}; taken as in {whose}")
 
 
 def called(named: Named) -> str:

@@ -156,19 +156,19 @@ def _tell_frames(seen: Seen, reading: Reading | None) -> None:
         seen.choose("body_frame", reading.body, f"{share} with body z {_UP[reading.body]}", "data")
         if bodies and reading.body not in bodies:
             words = ", ".join(map(str, bodies))
-            seen.warnings.append(f"a log of {known} is in {words}, and its motion says {reading.body}")
+            seen.warnings.append(f"a log of {known} is in {words}, but its motion says {reading.body}")
     elif bodies:
         seen.choose("body_frame", min(map(str, bodies)), f"a log of {known}", "named")
     elif "body_frame" not in seen.choices and seen.guesses.keys() & _WITH_BODY:
-        rival = Rival("body_frame: FRD", "nothing in the log tells y left, z up from y right, z down")
+        rival = Rival("body_frame: FRD", "nothing in the log distinguishes y left, z up from y right, z down")
         seen.choose("body_frame", "FLU", "taken as the usual one", "guess", rival)
     if not seen.guesses.keys() & {"position", "velocity", "attitude", "quaternion"}:
         return
     body = seen.choices.get("body_frame")
     world = {"FLU": "ENU", "FRD": "NED"}["FLU" if body is None else body.value]
-    reason = "z of the world points where z of the level body does; x and y of it matter to no model"
+    reason = "z of the world points the same way as z of the level body; its x and y matter to no model"
     if reading is not None and reading.lean is not None and reading.world != world:
-        world, reason = reading.world, "z of the world points the other way than z of the level body"
+        world, reason = reading.world, "z of the world is opposite to z of the level body"
     seen.choose("world_frame", world, reason, "guess" if body is None else body.sure)
 
 
@@ -181,23 +181,23 @@ def _tell_wrench(seen: Seen) -> None:
     if torque is None:
         return
     if seen.guesses.keys() & set(ROTORS) or rate is None:
-        seen.left_out.append(f"{torque.group.pattern}: looks like a torque that is asked for; the rotors say more")
+        seen.left_out.append(f"{torque.group.pattern}: looks like a commanded torque; the rotors say more")
         return
     turning = first_derivative(seen.log.on_grid(rate.columns.columns)[seen.part], seen.rate_hz)
     shares = [_follows(turning, seen.grid(torque), late, seen.rate_hz) for late in _LATE_S]
     share = largest(shares, min)
     if not min(share) > _FOLLOWS:
-        seen.left_out.append(f"{torque.group.pattern}: looks like a torque, and the motion does not follow it")
+        seen.left_out.append(f"{torque.group.pattern}: looks like a torque, but the motion does not follow it")
         return
     reason = (
         f"{called(torque)}; the angular acceleration follows it (correlation {share[0]:.2f} about roll,"
-        f" {share[1]:.2f} about pitch); a commanded one is what a controller asked for"
+        f" {share[1]:.2f} about pitch); a commanded torque is only what a controller asked for"
     )
-    scale = () if torque.unit else (Rival("unit: N mm", "inertia, which no log states, makes the scale"),)
+    scale = () if torque.unit else (Rival("unit: N mm", "the scale follows from the inertia, which no log states"),)
     seen.tell(torque, torque.unit or "N m", reason, "named" if torque.unit else "guess", rivals=scale)
     if thrust is not None:
         level = f"{float(np.median(seen.grid(thrust))):.3g}"
-        seen.tell(thrust, "N", f"{called(thrust)}; {level} in flight, which has to be the weight in N", "guess")
+        seen.tell(thrust, "N", f"{called(thrust)}; {level} in flight, which must be the weight in N", "guess")
 
 
 def _follows(turning: Array, torque: Array, late_s: float, rate_hz: float) -> list[float]:
@@ -264,7 +264,7 @@ def _doubt_columns(seen: Seen) -> None:
             for other in list(values)[index + 1 :]
             if one not in still and np.array_equal(values[one], values[other])
         ]
-        odd = [*(f"{column} never changes" for column in still), *(f"{pair} hold the same numbers" for pair in twice)]
+        odd = [*(f"{column} never changes" for column in still), *(f"{pair} have the same values" for pair in twice)]
         if odd:
             seen.warnings.append(f"{name}: {'; '.join(odd)}")
             seen.doubt(name)
@@ -281,7 +281,7 @@ def _list_unused(seen: Seen) -> None:
         groups = [words for group in unused if (words := ", ".join(group.columns)) not in said]
         if groups:
             more = f" and {len(groups) - _SHOWN} more" if len(groups) > _SHOWN else ""
-            seen.left_out.append(f"{'; '.join(groups[:_SHOWN])}{more}: also {name} by name, not used")
+            seen.left_out.append(f"{'; '.join(groups[:_SHOWN])}{more}: also {name} by name; not used")
 
 
 def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy | None, kind: str) -> Recognition:

@@ -88,13 +88,13 @@ def crop_and_order(table: SignalTable, settings: ImportSettings) -> tuple[Signal
     if settings.crop_s is not None and inside.sum() < 2:
         raise SettingError(
             "crop_s",
-            f"leaves {inside.sum()} rows of a log of {np.nanmax(table.time):.6g} s; see import.time_unit",
+            f"leaves {inside.sum()} rows of a log of {np.nanmax(table.time):.6g} s; check import.time_unit",
         )
     table = table.rows(~outside)
     refuse_restart(table.time, np.flatnonzero(~outside) + 1)
     kept, dropped = increasing_rows(table.time)
     if len(kept) < 2:
-        raise InputError("the log has fewer than two rows of increasing time stamps; see import.time_column")
+        raise InputError("the log has fewer than two rows with increasing time stamps; check import.time_column")
     ordered = table.rows(kept)
     _require_values(ordered, settings)
     return ordered, dropped | {"crop": int(outside.sum())}
@@ -141,7 +141,7 @@ def mask_impossible(table: SignalTable, settings: ImportSettings) -> tuple[Signa
             without = ~np.any(values, axis=1, keepdims=True)
             broken = broken | without
             rows = int(without.sum())
-            warnings += [f"quaternion: {rows} rows are 0 0 0 0, which is no attitude: taken as missing"] if rows else []
+            warnings += [f"quaternion: {rows} rows are 0 0 0 0, not an attitude: taken as missing"] if rows else []
         signals[name] = np.where(broken, np.nan, values)
     return SignalTable(table.time, signals), tuple(warnings)
 
@@ -153,7 +153,7 @@ def _broken(name: str, column: str, unit: str, values: Array, marked: BoolArray)
         f" {values[first]:.3g} in row {first + 1} (beyond {_LARGEST[unit]:g}{'' if unit == '1' else f' {unit}'})"
     )
     if marked.mean() > _LARGEST_SHARE_BROKEN:
-        raise InputError(f"import.signals.{name}: {text}: look at its unit, scale and offset, or leave it out")
+        raise InputError(f"import.signals.{name}: {text}: check its unit, scale and offset, or leave it out")
     return f"{name}: {text}: taken as missing"
 
 

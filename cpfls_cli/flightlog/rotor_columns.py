@@ -112,13 +112,13 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
         counts = [len(guess.columns.columns) for guess in (speed, command)]
         if speed.rate_hz * _MUCH_FASTER < command.rate_hz:
             left_out.append(
-                f"{speed.columns.columns[0]} and those beside it: rotor speeds at {speed.rate_hz:.3g} Hz, and the"
+                f"{speed.columns.columns[0]} and the columns with it: rotor speeds at {speed.rate_hz:.3g} Hz; the"
                 f" commands come at {command.rate_hz:.3g} Hz"
             )
             speed = None
         elif counts[0] != counts[1]:
             left_out.append(
-                f"{command.columns.columns[0]} and those beside it: {counts[1]} commands, {counts[0]} rotors"
+                f"{command.columns.columns[0]} and the columns with it: {counts[1]} commands, {counts[0]} rotors"
             )
             command = None
     warnings = [warning for guess in (speed, command) if guess is not None for warning in _too_slow(guess)]
@@ -151,13 +151,13 @@ def find_mixed(log: LogTable) -> RotorColumns | None:
     if len(time) < _FEWEST_SAMPLES or not np.ptp(values, axis=0).max() > 0:
         return None
     reason = (
-        "what goes into the mixer of a Crazyflie, 16 bits; the firmware makes each motor's command of it: thrust, half"
-        " of roll and pitch, and yaw, with the signs of its place"
+        "the input of a Crazyflie's mixer, 16 bits; the firmware makes each motor's command from it: thrust, half of"
+        " roll and pitch, and yaw, with the signs of its place"
     )
     mapped = SignalMap(columns=columns, unit="1", scale=1 / 65536, mixer=_CRAZYFLIE_MIXER)
     guess = Guess(signal="rotor_command", columns=mapped, reason=reason, sure="named")
-    older = Rival("rotor_command_is: speed", "before 2022 the firmware handed to the motors what it had mixed")
-    said = "what a Crazyflie mixes are thrusts, before the battery is compensated"
+    older = Rival("rotor_command_is: speed", "before 2022 the firmware passed what it had mixed to the motors")
+    said = "a Crazyflie mixes thrusts, before it compensates for the battery"
     command = RotorGuess(guess, 1 / float(np.median(np.diff(time))), "Crazyflie")
     command_is = KeyChoice("rotor_command_is", "thrust", said, "named", (older,))
     return RotorColumns(speed=None, command=command, command_is=command_is, warnings=tuple(_too_slow(command)))
@@ -167,7 +167,7 @@ def _too_slow(guess: RotorGuess) -> Iterator[str]:
     if guess.rate_hz < _SLOW_HZ:
         yield (
             f"the rotors are logged at {guess.rate_hz:.3g} Hz ({guess.columns.columns[0]}): too slow for motors that"
-            " follow within some 50 ms; log them at 100 Hz or more"
+            " respond within some 50 ms; log them at 100 Hz or more"
         )
 
 
@@ -181,7 +181,7 @@ def _beyond_commands(found: Found, parameters: Parameters) -> Iterator[str]:
     row = int(np.argmin(kept))
     index = int(np.argmax(np.abs(values).max(axis=0)))
     yield (
-        f"{', '.join(named.group.columns)} look like commands of rotors but for {named.group.columns[index]}, which"
+        f"{', '.join(named.group.columns)} look like commands of rotors except {named.group.columns[index]}, which"
         f" reaches {values[np.argmax(np.abs(values[:, index])), index]:.3g}: no command is that large, from"
         f" {time[row] - time[0]:.4g} s after the first stamp on; cut the log there, and run cpfls init again"
     )
@@ -250,16 +250,16 @@ def _speed_unit(named: Named, values: Array, parameters: Parameters) -> _Unit:
         factor = 100.0 if named.known == "Betaflight" else 1.0
         poles = float(parameters.get("motor_poles", 0) or 0)
         if poles:
-            reason = f"{called}: electric, over motor_poles {poles:.0f} / 2 of the header"
+            reason = f"{called}: electrical speed, divided by motor_poles {poles:.0f} / 2 of the header"
             return _Unit("rpm", factor / (poles / 2), 0.0, reason, "named")
         rival = Rival(f"scale: {factor / 6:.6g}", "six pole pairs; the log does not say how many the motors have")
-        reason = f"{called}: electric, over 7 pole pairs, a usual number"
+        reason = f"{called}: electrical speed, divided by 7 pole pairs, a usual number"
         return _Unit("rpm", factor / _USUAL_POLE_PAIRS, 0.0, reason, "guess", (rival,))
     if named.unit is not None:
         return _Unit(named.unit, named.scale, 0.0, f"{called}: {named.unit} by its name", "named")
     if level > _RPM_FROM:
-        return _Unit("rpm", 1.0, 0.0, f"{called}: faster than rotors turn in rad/s", "data")
-    rival = Rival("unit: rpm", f"a level of {level:.4g} is possible in both")
+        return _Unit("rpm", 1.0, 0.0, f"{called}: faster than any rotor in rad/s", "data")
+    rival = Rival("unit: rpm", f"a level of {level:.4g} fits both")
     return _Unit("rad/s", 1.0, 0.0, called, "guess", (rival,))
 
 
@@ -273,12 +273,12 @@ def _command_unit(named: Named, values: Array, parameters: Parameters) -> _Unit 
         reason = f"{called}: {begin:g} to {end:g} by {where}"
         return _Unit("1", 1 / (end - begin), -begin / (end - begin), reason, "named")
     if named.known == "Crazyflie":
-        return _Unit("1", named.scale, 0.0, f"{called}: 16 bits, as a Crazyflie has them", "named")
+        return _Unit("1", named.scale, 0.0, f"{called}: 16 bits, as on a Crazyflie", "named")
     words = {*named.group.words}
     if named.unit in SPEED_UNITS or words & {"om", "omega", "omcmd", "rpm", "rads", "speed", "rad"}:
         unit = named.unit or ("rpm" if high > _RPM_FROM else "rad/s")
-        rivals = () if named.unit or unit == "rpm" else (Rival("unit: rpm", "its size is possible in both"),)
-        reason = f"{called}: a speed that is asked for"
+        rivals = () if named.unit or unit == "rpm" else (Rival("unit: rpm", "its size fits both"),)
+        reason = f"{called}: a commanded speed"
         return _Unit(unit, named.scale, 0.0, reason, "guess" if rivals else "named", rivals)
     if named.unit == "1" and named.scale != 1.0:
         return _Unit("1", named.scale, 0.0, f"{called}: per cent by its name", "named")
@@ -320,19 +320,19 @@ def _meaning(command: RotorGuess, parameters: Parameters, system: str) -> KeyCho
     if command.kind == "Crazyflie":
         if "motor.m" in command.columns.columns[0]:
             older = Rival("rotor_command_is: speed", "before 2022 the firmware logged what the motors got")
-            return choose("thrust", "motor.m* of a Crazyflie are thrusts, before the battery is compensated", older)
+            return choose("thrust", "motor.m* of a Crazyflie are thrusts, before it compensates for the battery", older)
         return choose("speed", "pwm.* of a Crazyflie is what the motors get")
     factor = parameters.get("THR_MDL_FAC")
     if factor is not None:
         value = float(factor)
         if value >= 0.9:
-            return choose("thrust", f"THR_MDL_FAC is {value:g}: the autopilot makes commands shares of thrust")
+            return choose("thrust", f"THR_MDL_FAC is {value:g}: the autopilot treats commands as shares of thrust")
         if value <= 0.1:
-            return choose("speed", f"THR_MDL_FAC is {value:g}: the autopilot hands commands on as they are")
+            return choose("speed", f"THR_MDL_FAC is {value:g}: the autopilot passes commands on as they are")
         rival = Rival("rotor_command_is: thrust", f"THR_MDL_FAC is {value:g}, which lies between the two")
         return choose("speed", f"THR_MDL_FAC is {value:g}, between speed (0) and thrust (1)", rival, sure="guess")
     if "MOT_THST_EXPO" in parameters or system.startswith("Ardu"):
-        return choose("speed", "RCOU is what the motors get, behind the autopilot's own thrust curve")
+        return choose("speed", "RCOU is what the motors get, after the autopilot's own thrust curve")
     rival = Rival("rotor_command_is: thrust", "the log does not say which")
-    reason = f"taken as most motor controllers have it{f' ({system})' if system else ''}"
+    reason = f"as with most motor controllers{f' ({system})' if system else ''}"
     return choose("speed", reason, rival, sure="guess")

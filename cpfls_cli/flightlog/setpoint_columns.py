@@ -56,7 +56,7 @@ _UNITS: Final[dict[SignalName, tuple[UnitName, ...]]] = {
 }
 """What setpoints may be in where no name says it."""
 
-_REFERENCE: Final = "a reference may be a second measurement, and nothing that was asked for"
+_REFERENCE: Final = "a reference may be a second measurement instead of a setpoint"
 _RC_MAP: Final = ("RCMAP_ROLL", "RCMAP_PITCH", "RCMAP_YAW", "RCMAP_THROTTLE")
 
 
@@ -167,9 +167,7 @@ def _by_words(seen: Seen) -> Iterator[_Candidate]:
         columns, unit = _in_order(seen, named), named.unit
         usual = next(iter(_UNITS.get(named.signal, ())), None)
         if unit is None and usual is None:
-            seen.left_out.append(
-                f"{named.group.pattern}: looks like a thrust that is asked for, in no unit that is said"
-            )
+            seen.left_out.append(f"{named.group.pattern}: looks like a commanded thrust, but in no stated unit")
             continue
         mapped = SignalMap(columns=columns, unit=unit or usual or "1", scale=named.scale, required=False)
         mapped = _in_stated_unit(seen.log, named.signal, mapped)
@@ -206,9 +204,9 @@ def _judged(seen: Seen, own: _Candidate) -> _Judged:
     measured = _measured(seen, own.signal)
     columns = ", ".join(own.columns.columns)
     if measured is None:
-        against = f"no {_words(own.signal)} is there to hold it against"
+        against = f"there is no {_words(own.signal)} to compare it with"
         if not own.known:
-            return _Judged(None, f"{columns}: looks like a setpoint of the {_words(own.signal)}, and {against}")
+            return _Judged(None, f"{columns}: looks like a setpoint of the {_words(own.signal)}, but {against}")
         return _Judged(_guess(own, own.columns, f"{own.called}; {against}", "named"))
     if own.signal == "setpoint_attitude":
         asked = _as_angles(seen, own, asked, measured)
@@ -216,8 +214,8 @@ def _judged(seen: Seen, own: _Candidate) -> _Judged:
     if not fit.followed.any():
         return _Judged(
             None,
-            f"{columns}: looks like a setpoint of the {_words(own.signal)}, which does not follow it; if gusts keep it "
-            f"from that, state it as import.signals.{own.signal}",
+            f"{columns}: looks like a setpoint of the {_words(own.signal)}, which does not follow it; if gusts are "
+            f"why, state it as import.signals.{own.signal}",
         )
     return _by_motion(own, fit)
 
@@ -226,13 +224,13 @@ def _by_range(own: _Candidate, asked: Array) -> _Judged:
     """Judge shares by their range; nothing that is measured is in their unit."""
     columns, known = ", ".join(own.columns.columns), asked[np.isfinite(asked)]
     if not len(known):
-        return _Judged(None, f"{columns}: {own.called}, and it is absent in flight")
+        return _Judged(None, f"{columns}: {own.called}, but it is absent in flight")
     largest = float(np.quantile(np.abs(known), 0.999))
     what = "the largest thrust" if own.signal == "setpoint_thrust" else "full deflection"
     if own.columns.unit == "1" and largest > _FULL:
-        return _Judged(None, f"{columns}: {own.called}, and reaches {largest:.3g} times {what}")
+        return _Judged(None, f"{columns}: {own.called}, but reaches {largest:.3g} times {what}")
     if own.signal == "setpoint_thrust" and not float(np.median(known)) > 0:
-        return _Judged(None, f"{columns}: {own.called}, and it does not lift")
+        return _Judged(None, f"{columns}: {own.called}, but it does not lift")
     unit = f"shares of {what}" if own.columns.unit == "1" else f"in {own.columns.unit}"
     return _Judged(_guess(own, own.columns, f"{own.called}; {unit}, {largest:.2g} at most", "named"))
 
@@ -243,7 +241,7 @@ def _by_motion(own: _Candidate, fit: "_Following") -> _Judged:
     axes = columns if len(columns) == len(fit.along) else ("roll", "pitch", "yaw")
     opposed = [axis for axis, against in zip(axes, fit.opposed, strict=True) if against]
     if opposed and (own.known or axes is not columns):
-        return _Judged(None, f"{', '.join(columns)}: {own.called}, and the {what} runs against {', '.join(opposed)}")
+        return _Judged(None, f"{', '.join(columns)}: {own.called}, but the {what} runs against {', '.join(opposed)}")
     mapped, gain = own.columns, fit.gain
     if not own.states_unit:
         factor = _nearest(gain, _units(own))
@@ -252,7 +250,7 @@ def _by_motion(own: _Candidate, fit: "_Following") -> _Judged:
     most = _TIMES if own.known else _TIMES_BY_WORDS
     if not 1 / most < gain < most:
         return _Judged(
-            None, f"{', '.join(columns)}: {own.called}; the {what} is {gain:.2g} times as large, which no unit makes"
+            None, f"{', '.join(columns)}: {own.called}; the {what} is {gain:.2g} times as large, which no unit explains"
         )
     if opposed:
         mapped = replace(mapped, sign=tuple(-1.0 if against else 1.0 for against in fit.opposed))

@@ -146,7 +146,7 @@ def _check_signal(name: SignalName, signal: SignalMap) -> None:
             raise SettingError(f"{key}.columns", f"needs {words}, got {len(choice.names)}")
         if KNOWN_UNITS[choice.unit].si not in kinds:
             wanted = [unit for unit, entry in KNOWN_UNITS.items() if entry.si in kinds]
-            raise SettingError(f"{key}.unit", f"{choice.unit!r} does not measure it; one of {', '.join(wanted)}")
+            raise SettingError(f"{key}.unit", f"{choice.unit!r} is not a unit of it; use one of {', '.join(wanted)}")
         kinds = (KNOWN_UNITS[choice.unit].si,)
 
 
@@ -219,7 +219,7 @@ class ImportSettings(Settings):
         for name, signal in self.signals.items():
             _check_signal(name, signal)
         if self.signals and not self.signals.keys() - SETPOINTS.keys():
-            raise SettingError("signals", "holds setpoints alone; add what was measured, or commanded of the rotors")
+            raise SettingError("signals", "holds only setpoints; add measured signals, or rotor commands")
         if self.signals:
             _check_attitude(self)
             _check_torque(self)

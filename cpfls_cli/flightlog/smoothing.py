@@ -37,7 +37,7 @@ def low_pass(values: Array, rate_hz: float, cutoff_hz: float | None, order: int)
     if cutoff_hz is None:
         return values
     if cutoff_hz >= rate_hz / 2:
-        raise SettingError("lowpass_hz", f"does not lie below half of the log's rate, {rate_hz / 2:.4g} Hz")
+        raise SettingError("lowpass_hz", f"is not below half of the log's rate, {rate_hz / 2:.4g} Hz")
     sections = butterworth(cutoff_hz / rate_hz, order)
     padding = min(len(values) - 1, ceil(_PADDED_PERIODS * rate_hz / cutoff_hz))
     # Turned about its ends, so that level and slope go on while the filter settles.

@@ -78,7 +78,7 @@ def _warn_of_rest(name: str, signal: SignalMap, table: SignalTable, rest: BoolAr
         low, high = float(np.nanmin(values[rest])), float(np.nanmax(values[rest]))
         level = _shown(low, signal) if low == high else f"{low:.4g} to {_shown(high, signal)}"
         yield (
-            f"{name} stands at {level} on all rotors {_when(time, rest)}: on the ground, or falling, and no part of a"
+            f"{name} stands at {level} on all rotors {_when(time, rest)}: on the ground, or falling, and not part of a"
             f" flight; {_crop(time, rest)}"
         )
     backward = (values < -_UNDERSHOOT * np.nanmax(np.abs(values))).any(axis=1)
@@ -87,8 +87,8 @@ def _warn_of_rest(name: str, signal: SignalMap, table: SignalTable, rest: BoolAr
         column = signal.names[int(np.argmin(lowest))]
         yield (
             f"{name} is below zero in {backward.sum()} of {len(backward)} rows, down to"
-            f" {_shown(float(lowest.min()), signal)} in column {column}, and no rotor turns backward: where it rests,"
-            f" cut it off with import.crop_s; otherwise check import.signals.{name}.scale, offset and sign"
+            f" {_shown(float(lowest.min()), signal)} in column {column}, but no rotor turns backward: where the vehicle"
+            f" rests, cut it off with import.crop_s; otherwise check import.signals.{name}.scale, offset and sign"
         )
 
 
@@ -108,8 +108,8 @@ def _crop(time: Array, rest: BoolArray) -> str:
     flown = [(time[first], time[after - 1]) for first, after in runs(~rest)]
     begin, end = max(flown, key=lambda part: float(part[1] - part[0]), default=(0.0, 0.0))
     if end - begin < SMALLEST_SHARE_KEPT * (time[-1] - time[0]):
-        return "hardly anything else is in the log"
-    return f"import.crop_s: [{ceil(100 * begin) / 100:g}, {floor(100 * end) / 100:g}] keeps the longest part without"
+        return "there is hardly anything else in the log"
+    return f"import.crop_s: [{ceil(100 * begin) / 100:g}, {floor(100 * end) / 100:g}] keeps the longest part without it"
 
 
 def warn_of_dead(table: SignalTable, known: Sequence[str], settings: ImportSettings) -> Iterator[str]:
@@ -242,7 +242,7 @@ def _saturated(table: SignalTable, resting: Mapping[str, BoolArray], settings: I
 def warn_of_values(counts: ValueCounts) -> tuple[str, ...]:
     """Describe the columns whose suspicious values are used unchanged."""
     saturated = (
-        f"column {column} stands at its extreme for {count} samples in all: saturated?"
+        f"column {column} stays at its extreme for {count} samples in all: saturated?"
         for column, count in counts.saturated.items()
     )
     suspected = (
@@ -282,8 +282,8 @@ def refuse_steep_pitch(signals: Mapping[str, Array]) -> None:
     largest = float(np.abs(signals["attitude"][:, 1]).max())
     if largest > _LARGEST_PITCH:
         raise InputError(
-            f"attitude reaches {largest:.3g} rad of pitch, and no pitch is larger than a quarter turn, 1.57 rad: is"
-            " import.signals.attitude.unit deg? Otherwise check the order of its columns, and spikes"
+            f"attitude reaches {largest:.3g} rad of pitch, but no pitch is larger than a quarter turn, 1.57 rad: is"
+            " import.signals.attitude.unit deg? Otherwise check the order of its columns, and for spikes"
             " (import.spike_deviations)"
         )
 
@@ -301,8 +301,8 @@ def warn_of_angles(signals: Mapping[str, Array]) -> tuple[str, ...]:
     # A single spike says nothing about the unit.
     roll, _, yaw = np.nanquantile(np.abs(signals["attitude"]), _ANGLE_QUANTILE, axis=0)
     return tuple(
-        f"attitude reaches {angle:.3g} rad of {name}: is import.signals.attitude.unit deg? (good where the angle counts"
-        " on over full turns)"
+        f"attitude reaches {angle:.3g} rad of {name}: is import.signals.attitude.unit deg? (fine if the angle keeps"
+        " counting over full turns)"
         for name, angle in (("roll", float(roll)), ("yaw", float(yaw)))
         if angle > _FULL_TURN
     )

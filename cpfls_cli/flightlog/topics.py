@@ -81,7 +81,7 @@ def _tell_of_choices(settings: ImportSettings, chosen: ImportSettings) -> tuple[
     """Say which signals are not of the columns that are named first."""
     first = {name: signal.columns[0] for name, signal in settings.signals.items()}
     return tuple(
-        f"{name} is that of {', '.join(signal.columns)}: the log has not all of {first[name]} and its kin"
+        f"{name} is taken from {', '.join(signal.columns)}: the log lacks some of {first[name]} and its kind"
         for name, signal in chosen.signals.items()
         if signal.columns[0] != first[name]
     )
@@ -93,7 +93,7 @@ def _flat(
     time = settings.time_column
     if time is None:
         raise InputError(
-            "import.time_column = null takes the stamps of a topic, and this log has no topics: name the column of its"
+            "import.time_column = null takes the stamps of a topic, but this log has no topics: name the column of its"
             f" stamps; {columns_in_words(columns)}"
         )
     converted = {time: columns[time] / known_unit(settings.time_unit).factor} if time in units else {}
@@ -116,11 +116,11 @@ def _with_clock(topics: Topics, settings: ImportSettings) -> ImportSettings:
     if settings.time_column is None and fastest:
         return replace(settings, time_column=fastest)
     if settings.time_column is None:
-        raise InputError(f"import.signals: the log has no topic that is mapped; {columns_in_words(_named(topics))}")
+        raise InputError(f"import.signals: the log has none of the mapped topics; {columns_in_words(_named(topics))}")
     example = f", such as {fastest}" if fastest else ""
     raise InputError(
-        f"import.time_column = {settings.time_column!r}: in this log every topic has stamps; name those of the fastest"
-        f" one that is mapped{example}, or null for them; {columns_in_words(_named(topics))}"
+        f"import.time_column = {settings.time_column!r}: in this log every topic has its own stamps; name those of the"
+        f" fastest mapped one{example}, or null for them; {columns_in_words(_named(topics))}"
     )
 
 
@@ -195,8 +195,8 @@ def _warn_of_thinning(base: str, clocks: Mapping[str, Array]) -> tuple[str, ...]
     step = _step(clocks[base])
     faster = {topic: 1 / _step(time) for topic, time in clocks.items() if 0 < _step(time) * _THINNED < step}
     return tuple(
-        f"topic {topic} ({rate_hz:.4g} Hz) is thinned to the clock of {base} ({1 / step:.4g} Hz), which folds its noise"
-        f" into the flight: name the faster one in import.time_column"
+        f"topic {topic} ({rate_hz:.4g} Hz) is downsampled to the clock of {base} ({1 / step:.4g} Hz), which aliases its"
+        f" noise into the flight: name the faster one in import.time_column"
         for topic, rate_hz in faster.items()
     )
 

@@ -314,7 +314,7 @@ class Range(NamedTuple):
     rivals: tuple[tuple[str, str], ...] = ()
 
 
-_OLD_PX4 = ("scale: 0.00114286, offset: -1.22857", "where the range is 1075 to 1950, as PX4 once had it")
+_OLD_PX4 = ("scale: 0.00114286, offset: -1.22857", "if the range is 1075 to 1950, as in older PX4")
 RANGES: Final = (
     Range(-1.05, -inf, 1.05, 1.0, 0.0, "shares of the largest", "always"),
     Range(0.0, -inf, 101.0, 0.01, 0.0, "per cent", "of commands"),

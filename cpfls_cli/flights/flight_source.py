@@ -88,14 +88,14 @@ class FlightFile:
         if not self.path.is_file():
             fault = "no such file"
         elif (size := self.path.stat().st_size) != self.size_bytes:
-            fault = f"another file, of {size} bytes instead of {self.size_bytes}"
+            fault = f"another file, with {size} bytes instead of {self.size_bytes}"
         elif (rows := count_rows(self.path, FlightRecord.spec(), self.names[0])) != self.rows:
             fault = f"another file, with {rows or 'no'} samples instead of {self.rows}"
         else:
             return
         raise InputError(
-            f"{self.path}: {fault}; a flight of more than {IN_MEMORY} samples is read from its file also by the "
-            "workers of a scheduler: put the same file there on each of their machines, and leave it alone"
+            f"{self.path}: {fault}; the workers of a scheduler also read a flight of more than {IN_MEMORY} samples "
+            "from its file: put the same file there on each of their machines, and leave it unchanged"
         )
 
 

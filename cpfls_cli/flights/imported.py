@@ -20,7 +20,7 @@ from cpfls_cli.vehicle.rotors import body_wrench
 
 _DROPPED: Final = MappingProxyType(
     {
-        "time_not_finite": "time stamp that is no number: rows dropped",
+        "time_not_finite": "time stamp is not a number: rows dropped",
         "repeated_time": "repeated time: rows dropped",
         "backward_time": "backward time: rows dropped",
         "crop": "outside import.crop_s: rows dropped",

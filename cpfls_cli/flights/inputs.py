@@ -52,8 +52,8 @@ def choosing_source(flights: Sequence[Path], inputs: Mapping[str, InputFile]) ->
 
 
 _USED = {
-    "flight": "is a flight that trains",
-    "selection": "is the selection, no flight",
+    "flight": "is a training flight",
+    "selection": "is the selection, not a flight",
     "validate": "judges (--validate)",
     "choose": "is given twice",
 }
@@ -72,7 +72,7 @@ def held_out_parts(
     learned = {file.sha256 for role, file in inputs.items() if role.startswith("flight")}
     for role, path in numbered_roles("validate", validate).items():
         if inputs[role].sha256 in learned:
-            raise InputError(f"--validate {path}: is the flight that trains; validate on another one")
+            raise InputError(f"--validate {path}: is the training flight; validate on another one")
         names = chain([path.name], (f"{path.name} ({number})" for number in count(2)))
         parts[next(name for name in names if name not in {TRAINING, *parts})] = flight_source(path)
     return parts

@@ -53,8 +53,8 @@ def read_observer(path: Path, past_s: float) -> Observer:
     held = read_record(path, VehicleRecord).history if known else None
     if held is None:
         raise InputError(
-            f"{path}: holds no forecast that uses the past, which --history asks for; `cpfls vehicle` finds one where "
-            "playback.history_s is above 0 and the past helps on parts of the flights kept aside; or leave out "
+            f"{path}: holds no forecast that uses the past, which --history asks for; `cpfls vehicle` finds one if "
+            "playback.history_s is above 0 and the past helps on held-out parts of the flights; or leave out "
             "--history"
         )
     return observer(held, past_s)

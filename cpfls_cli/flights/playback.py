@@ -62,8 +62,8 @@ def flights_to_play(paths: Sequence[Path], study: Study, hold: Hold | None = Non
             rates = [f"{1 / period:.4g} Hz" for period in periods]
             one = max(1, floor((1 + _SAME_PERIOD) / max(each.parts[0].period for each in flights)))
             raise InputError(
-                f"{flight.name}: sampled at {rates[0]}, {first.name} at {rates[1]}, and this takes flights of one rate:"
-                f" --set import.rate_hz={one} gives it to logs, flights are imported again with it"
+                f"{flight.name}: sampled at {rates[0]}, {first.name} at {rates[1]}, but all flights need the same rate:"
+                f" use --set import.rate_hz={one} for logs, and import flights again with it"
             )
     stated = doubts(beyond_belief(study.vehicle))
     return (replace(first, warnings=(*stated, *first.warnings)), *flights[1:])
@@ -147,14 +147,13 @@ def _warnings(flight: ReadFlight, stretches: Sequence[slice], signals: Signals) 
     used, samples = sum(part.stop - part.start for part in stretches), len(flight.signals["time"])
     if len(stretches) > 1 or used < samples:
         warnings.append(
-            f"{len(stretches)} stretches without a pause, {used} of {samples} samples; no window crosses from one to "
-            "the next"
+            f"{len(stretches)} stretches without a pause, {used} of {samples} samples; no window spans two of them"
         )
     lacks = [name for name in ("attitude", "velocity") if getattr(signals, name) is None]
     if signals.rotor_speed is None and signals.stated_thrust is None:
         lacks.append("thrust")
     if lacks:
-        warnings.append(f"lacks {' and '.join(lacks)}, so rotation alone is played back")
+        warnings.append(f"lacks {' and '.join(lacks)}, so only rotation is played back")
     return warnings
 
 

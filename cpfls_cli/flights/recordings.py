@@ -195,7 +195,7 @@ def _actuated(signals: Signals, flight: ReadFlight, known: Mapping[str, Array], 
         commanded = True
     rotors = len(study.vehicle.rotors)
     if speed is not None and speed.shape[1] != rotors:
-        raise InputError(f"{flight.name}: has {speed.shape[1]} rotors, vehicle.rotors of the config has {rotors}")
+        raise InputError(f"{flight.name}: has {speed.shape[1]} rotors, but vehicle.rotors of the config has {rotors}")
     if speed is None and "body_torque" not in known:
         raise InputError(
             f"{flight.name}: has no rotor_speed, rotor_command or body_torque, so there is nothing to compare its "
@@ -239,7 +239,7 @@ def known_stretches(name: str, known: BoolArray, time: Array) -> list[slice]:
     number = np.concatenate([[1], 1 + np.cumsum(paused | (known[1:] != known[:-1]))])
     long = [part for (part,) in find_objects(number[: len(known)]) if known[part.start] and len(known[part]) >= FEWEST]
     if not long:
-        wanted = f"{FEWEST} samples one after another" if known.any() else "sample"
+        wanted = f"{FEWEST} consecutive samples" if known.any() else "sample"
         raise InputError(f"{name}: no {wanted} at which all of its signals are known")
     return long
 
@@ -298,7 +298,7 @@ def check_flight(flight: ReadFlight, study: Study, *, driven: bool = True) -> tu
 
 def full_battery(volts: float) -> str:
     """Say which voltage is taken for that of a full battery."""
-    return f"voltage: the largest of these flights, {volts:.3g} V, is taken for that of a full battery"
+    return f"voltage: the largest of these flights, {volts:.3g} V, is taken as that of a full battery"
 
 
 def in_volts(units: Mapping[str, str]) -> bool:
@@ -338,7 +338,7 @@ def split_flights(given: Sequence[Recording], held_out: Sequence[Recording], set
         first = len(given) - max(1, len(given) // 3)
         training, last = tuple(given[:first]), tuple(given[first:])
         return FlightSplit(
-            training, last, f"no flight was held out by name, so the last third of them is: {_names(last)}"
+            training, last, f"no flight was held out by name, so the last third of them was: {_names(last)}"
         )
     return _thirds(given[0], settings)
 
@@ -377,10 +377,10 @@ def _thirds(flight: Recording, settings: GapSettings) -> FlightSplit:
         common_windows([training, last], settings)
     except InputError as error:
         raise InputError(
-            f"{flight.name}: one flight is too short to hold a third of it out; give more flights, or --held-out "
+            f"{flight.name}: the only flight is too short to hold out a third of it; give more flights, or --held-out "
             f"FLIGHT: {error}"
         ) from None
-    return FlightSplit((training,), (last,), f"there is one flight only, so it was held out in time: {last.name}")
+    return FlightSplit((training,), (last,), f"there is only one flight, so its last third was held out: {last.name}")
 
 
 def _names(flights: Sequence[Recording]) -> str:

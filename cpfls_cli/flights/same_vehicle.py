@@ -24,7 +24,7 @@ def require_same_vehicle(path: Path, given: VehicleSettings, wanted: VehicleSett
     different = _different(_with_what_was_open(given, wanted) if given.unknown == wanted.unknown else given, wanted)
     if different:
         raise InputError(
-            f"{path}: was made with another vehicle; not the same: {different}; use the config of that vehicle, or "
+            f"{path}: was made with another vehicle; these differ: {different}; use the config of that vehicle, or "
             "make the file again"
         )
 
@@ -52,7 +52,7 @@ def other_vehicles(paths: Sequence[Path], study: Study) -> tuple[str, ...]:
     """Say which flights were made with another vehicle, a sentence each; configs that are not read are passed over."""
     differences = [(path, _difference_of(path, study)) for path in dict.fromkeys(paths)]
     return tuple(
-        f"{path}: was made with another vehicle; not the same: {different}; what it says of the model is of that one"
+        f"{path}: was made with another vehicle; these differ: {different}; what it says applies to that vehicle"
         for path, different in differences
         if different
     )
@@ -61,7 +61,7 @@ def other_vehicles(paths: Sequence[Path], study: Study) -> tuple[str, ...]:
 def model_of_another(path: Path, study: Study) -> tuple[str, ...]:
     """Say of a model that it is one of another vehicle than that of the config, in a sentence or none."""
     different = _difference_of(path, study)
-    return (f"{path}: is a model of another vehicle than the config's; not the same: {different}",) if different else ()
+    return (f"{path}: models a vehicle other than the config's; these differ: {different}",) if different else ()
 
 
 def _difference_of(path: Path, study: Study) -> str:

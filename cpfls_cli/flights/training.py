@@ -137,10 +137,10 @@ def _selected(flights: Mapping[Path, str], selection: Path, candidates: IntArray
     _require_made_from(flights, selection, record)
     indices = np.unique(record.indices)
     if len(indices) == 0 or indices[0] < 0 or len(indices) != len(record.indices):
-        raise InputError(f"{selection}: indices is empty, negative or repeats itself; run `cpfls reduce` again")
+        raise InputError(f"{selection}: indices is empty, negative or has repeats; run `cpfls reduce` again")
     if not np.isin(indices, candidates).all():
         raise InputError(
-            f"{selection}: selects samples other than the {len(candidates)} that train; "
+            f"{selection}: selects samples other than the {len(candidates)} training samples; "
             "identification.training_share has changed since: run `cpfls reduce` again"
         )
     return indices

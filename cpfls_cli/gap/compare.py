@@ -121,7 +121,7 @@ def compare(
     hypothesis = extended.system(flights)
     floor = best_floor(hypothesis)
     residual = extended.residual(flights)
-    progress(0.5, "what the gap follows")
+    progress(0.5, "what the gap depends on")
     states = joined_states([state_signals(f, s) for f, s in zip(flights, hypothesis.signals, strict=True)])
     block = block_index(hypothesis, settings)
     centres = np.concatenate([windows.centres(flight.signals.time) for flight in flights])

@@ -185,7 +185,7 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
     judge, refusals = named.judge, list(named.refusals)
     found = by_instruments(named.judgement.found, given, judge.floor, settings)
     while out := nothing_by_size(found):
-        refusals += [Refusal(name, "by what instruments tell it may be 0") for name in out]
+        refusals += [Refusal(name, "judged by what instruments tell, it may be 0") for name in out]
         kept = [each for each in found.hypothesis.chosen if each.effect.name not in out]
         found = by_instruments(fitted(judge.training, kept, judge.floor, settings), given, judge.floor, settings)
     return named._replace(judgement=judge.judge(found), refusals=refusals)
@@ -201,20 +201,20 @@ def _doubts(unnamed: Sequence[str], judged: Sequence[JudgedEffect], settings: Ga
     """Say what intervals leave room for, and which effects chance could stand for once the others did what they can."""
     if unnamed:
         yield (
-            f"beside these, what is not named explains more than chance ({', '.join(unnamed)}); the intervals hold the"
-            " numbers with and without"
+            f"beside these, something unnamed explains more than chance ({', '.join(unnamed)}); the intervals cover the"
+            " numbers with and without it"
         )
     for effect in (each.effect for each in judged):
         if effect.p_value > settings.significance:
-            yield f"{effect.name} is not sure: chance explains as much beside the others, p = {effect.p_value:.2g}"
+            yield f"{effect.name} is not certain: chance explains as much beside the others, p = {effect.p_value:.2g}"
 
 
 def not_judged(unseen: HeldOut) -> Iterator[str]:
     """Say where the held-out flights go beyond what was learned, and what that costs."""
     for name, share in unseen.unlearned.items():
         yield (
-            f"{100 * share:.2g} % of what is held out goes where no flight learned from went, and what {name} is"
-            " there is not known: not judged there; learn from a flight that goes as far"
+            f"{100 * share:.2g} % of what is held out goes where no training flight went, and {name} is not known"
+            " there: not judged there; learn from a flight that goes as far"
         )
 
 

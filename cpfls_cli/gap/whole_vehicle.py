@@ -105,7 +105,7 @@ def require_body(extended: ExtendedModel, vehicle: VehicleSettings) -> None:
     ComputationError
     """
     if extended.base is None and not is_body(inertia_tensor(vehicle) + _parts(extended, vehicle)[0].inertia):
-        raise ComputationError("not extended: with the effects that are named the inertia is that of no body")
+        raise ComputationError("not extended: with the named effects, the inertia is not that of any body")
 
 
 def _numbers(parameters: Array, vehicle: VehicleSettings, corrected: Array) -> tuple[ModelEffect, ...]:

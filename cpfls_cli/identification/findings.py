@@ -103,13 +103,13 @@ def _physics(diagnostics: FitDiagnostics) -> Iterator[str]:
     remedy = "check signs, axes, frames and units of the log"
     why = why_unphysical(diagnostics.rigid_body)
     if why is not None:
-        yield f"the rigid body that fits best {why}: {remedy}"
+        yield f"the best-fitting rigid body {why}: {remedy}"
     if diagnostics.indefinite:
         training = next(iter(diagnostics.samples.values()))
         share = f"{diagnostics.indefinite} of {training} training samples"
         if why is None and np.all(diagnostics.training_scores["rigid-body"].r2_body > _BADLY_EXPLAINED_R2):
-            remedy = "a rigid body explains this flight, so it is the structure or its excitation that fails"
-        yield f"D(q) is not positive definite at {share}: not a model of a body, do not use it; {remedy}"
+            remedy = "a rigid body explains this flight, so the structure or its excitation is at fault"
+        yield f"D(q) is not positive definite at {share}: this is not a model of a body, do not use it; {remedy}"
 
 
 def _scale(diagnostics: FitDiagnostics) -> Iterator[str]:
@@ -135,8 +135,8 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
     if freed.setpoints:
         asked = joined("the sticks" if name == "sticks" else f"the setpoint of {name}" for name in freed.setpoints)
         know = "know" if len(freed.setpoints) > 1 or freed.setpoints == ("sticks",) else "knows"
-        source = f"{asked} {know} of no gust, so the parameters come from the torque that follows"
-        little, without = "too little of yaw follows", "hold no such setpoint"
+        source = f"{asked} {know} no gust, so the parameters come from the torque that follows"
+        little, without = "too little of yaw follows", "have no such setpoint"
     else:
         paths = "1 path" if freed.paths == 1 else f"{freed.paths} paths"
         source = f"{freed.runs} runs repeat {paths}, so the parameters come from the torque that comes again"
@@ -144,13 +144,13 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
     moments = ", ".join(
         f"{name} {value:.3g} ({value * np.exp(-half):.3g} to {value * np.exp(half):.3g})"
         if told
-        else f"{name} not determined, for {little}, so it stays as least squares has it"
+        else f"{name} not determined because {little}, so the value of least squares is kept"
         for name, value, half, told in zip(INERTIA_PARAMETERS, freed.rigid_body, freed.half, freed.told, strict=False)
     )
-    rest = f"; {freed.alone} of the flights that train {without} and teach nothing" if freed.alone else ""
+    rest = f"; {freed.alone} of the training flights {without} and contribute nothing" if freed.alone else ""
     least = " ".join(f"{value:.3g}" for value in freed.least_squares[:3])
     yield (
-        f"{source}, in which no gust acts; scores are those of the torque as measured, gusts among it. "
+        f"{source}, in which no gust acts; scores are for the torque as measured, gusts included. "
         f"Rigid body, kg m^2: {moments}; least squares of the torque as measured finds {least}{rest}"
     )
 
@@ -172,10 +172,10 @@ def loop_in_words(loop: LoopBounds) -> str:
         for name, low, high in zip(INERTIA_PARAMETERS[:2], loop.low, loop.high, strict=False)
     )
     return (
-        f"the flights show the loop: torque explains {shares} in some band of 0.5 to 6 Hz. An autopilot that answers "
-        "gusts, or an effect that is missing here, makes a body look heavier or lighter than it is; true moments over "
-        f"those found: {bounds}. Fly each path three times or more, a log each, and give all flights (cpfls trajectory "
-        "--repeat plans them), or log the setpoint of position or velocity, or the sticks"
+        f"the flights show the loop: torque explains {shares} in some band of 0.5 to 6 Hz. An autopilot that reacts to "
+        "gusts, or an effect missing here, makes a body look heavier or lighter than it is; true moments over "
+        f"those found: {bounds}. Fly each path at least three times, one log each, and give all flights (cpfls "
+        "trajectory --repeat plans them), or log the setpoint of position or velocity, or the sticks"
     )
 
 
@@ -220,7 +220,7 @@ def _fuzzy_part_off(diagnostics: FitDiagnostics) -> Iterator[str]:
         yield (
             "cross-validation switched the fuzzy part off: no evidence for an inertia that depends on attitude; what "
             f"the rigid body leaves unexplained of roll, pitch, yaw ({unexplained}; above 100 % a constant explains "
-            "more) is noise or an effect that has no term"
+            "more) is noise or an effect without a term"
         )
 
 
@@ -269,8 +269,8 @@ def _vertical(diagnostics: FitDiagnostics) -> Iterator[str]:
     left_out = [f"{count} of {samples[part]} ({part})" for part, count in vertical.items() if count]
     if left_out:
         yield (
-            f"body torque is judged without the samples nearer than {np.degrees(np.arcsin(VERTICAL)):.0f} degrees to a "
-            f"pitch of +-90 degrees, {', '.join(left_out)}: it is divided by cos(pitch), and every error with it"
+            f"body torque is judged without the samples closer than {np.degrees(np.arcsin(VERTICAL)):.0f} degrees to a "
+            f"pitch of +-90 degrees, {', '.join(left_out)}: it is divided by cos(pitch), and so is every error"
         )
 
 
@@ -287,8 +287,8 @@ def short_flight(training: Swings, parameters: int) -> str | None:
     if counted:
         needed = f"about {float(f'{training.seconds * parameters / counted:.2g}'):g} s of such flight"
     return (
-        f"the flights that train are short: in {training.seconds:.3g} s the rates turn round"
+        f"the training flights are short: in {training.seconds:.3g} s the rates reverse"
         f" {', '.join(map(str, training.by_axis))} times about {', '.join(AXES)}, {counted} swings for {parameters}"
-        f" parameters, and a swing tells about one number, so noise decides the rest; train on {needed}, or take a"
-        " structure with fewer parameters"
+        f" parameters, and one swing determines about one number, so noise decides the rest; train on {needed}, or use"
+        " a structure with fewer parameters"
     )

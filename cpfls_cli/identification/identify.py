@@ -108,7 +108,7 @@ def identify(
     result = search(evaluator, settings, rng, run, kept)
     solved = _solve(evaluator, training, result.front.chromosomes[result.front.chosen])
     if solved is None:
-        raise ComputationError("no chromosome gave a finite model; the data may not move at all")
+        raise ComputationError("no chromosome gave a finite model; perhaps nothing moves in the data")
     model, fit, system = solved
     baselines = fit_baselines(told_by(freed, training, learned)[1], fit.row_scale, settings.rank_tolerance)
     predictors = {"model": model.torque} | {baseline.name: baseline.torque for baseline in baselines}

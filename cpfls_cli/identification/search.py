@@ -147,7 +147,7 @@ class NothingFoundError(ComputationError):
     """
 
     def __init__(self, stop_reason: StopReason) -> None:
-        super().__init__("no chromosome gave a finite model; the data may not move at all")
+        super().__init__("no chromosome gave a finite model; perhaps nothing moves in the data")
         self.stop_reason = stop_reason
 
 
@@ -326,7 +326,7 @@ def require_flights(rule: Choice, *, given: bool) -> None:
     SettingError
     """
     if rule == "held-out" and not given:
-        raise SettingError("choice", "needs a flight that is kept for the choice; add --choose-on FLIGHT")
+        raise SettingError("choice", "needs a flight kept for the choice; add --choose-on FLIGHT")
     if rule != "held-out" and given:
         raise SettingError("choice", "does not use the flights of --choose-on; set it to held-out, or leave them out")
 

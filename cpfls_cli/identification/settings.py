@@ -185,4 +185,4 @@ class SweepSettings(Settings):
         count = Counter(setting.name for setting in self.settings)
         for number, setting in enumerate(self.settings):
             if count[setting.name] > 1:
-                raise SettingError(f"settings.{number}.name", "stands more than once; give each setting its own name")
+                raise SettingError(f"settings.{number}.name", "appears more than once; give each setting its own name")

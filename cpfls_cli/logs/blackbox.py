@@ -24,20 +24,20 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     content = bytes_of(path)
     begins = [found.start() for found in re.finditer(re.escape(BLACKBOX_MAGIC), content)]
     if not begins:
-        raise InputError(f"{path}: not a blackbox log: it does not begin as one")
+        raise InputError(f"{path}: not a blackbox log: it does not start like one")
     try:
         flights = [_flight(content[begin:end]) for begin, end in zip(begins, [*begins[1:], None], strict=True)]
         longest = max(range(len(flights)), key=lambda number: len(flights[number][1]))
         header, rows, broken = flights[longest]
         columns, units = _scaled_columns(header, rows)
     except KeyError as error:
-        raise InputError(f"{path}: a broken blackbox log: its header: the line {error} is missing") from None
+        raise InputError(f"{path}: a broken blackbox log: its header lacks the line {error}") from None
     except (ValueError, OverflowError) as error:
         raise InputError(f"{path}: a broken blackbox log: its header: {error}") from None
     if len(rows) < 2:
-        raise InputError(f"{path}: a blackbox log without frames that can be read")
+        raise InputError(f"{path}: a blackbox log without readable frames")
     several = f"holds {len(begins)} flights; the longest, number {longest + 1}, is read: {columns['time'][-1]:.0f} s"
-    lost = f"{broken} frames are broken; what follows up to the next whole one is missing"
+    lost = f"{broken} frames are broken; everything up to the next whole frame is missing"
     warnings = (*((several,) if len(begins) > 1 else ()), *((lost,) if broken else ()))
     # Lines that are not about the log itself.
     stated = {key: value for key, value in header.items() if not re.match(r"Product|Data version|Field|[IP] ", key)}

@@ -38,7 +38,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     except (ValueError, IndexError, TypeError, struct.error) as error:
         raise InputError(f"{path}: a broken log of a Crazyflie's uSD card: its header: {error}") from None
     if version not in _STAMPS:
-        raise InputError(f"{path}: a log of a Crazyflie's uSD card of version {version}; read are 1 and 2")
+        raise InputError(f"{path}: a log of a Crazyflie's uSD card of version {version}; only 1 and 2 can be read")
     _find_samples(content[: -_CHECK_SUM if whole else None], begin, events)
     tables = {event.name: table(content, event.begins, event.kind) for event in events.values() if event.begins}
     if not tables:
@@ -51,7 +51,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         }
         for name, samples in tables.items()
     }
-    broken = "the check sum is wrong, the file is cut off or broken; what could be read of it is used"
+    broken = "the checksum is wrong: the file is cut off or damaged; what could be read is used"
     return LogContents(topics, system="Crazyflie uSD", warnings=() if whole else (broken,))
 
 

@@ -41,7 +41,7 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
     with _rows(path) as (names, lines):
         repeated = sorted(name for name, count in Counter(names).items() if count > 1 and name in wanted)
         if repeated:
-            raise InputError(f"{path}: column '{repeated[0]}' stands twice")
+            raise InputError(f"{path}: column '{repeated[0]}' appears twice")
         kept = [index for index, name in enumerate(names) if name in wanted]
         # Lists of numbers would take ten times as much.
         numbers, count = array("d"), 0
@@ -71,7 +71,7 @@ def _rows(path: Path) -> Iterator[tuple[list[str], Iterator[list[str]]]]:
         with _open(path) as stream:
             first = stream.readline(_LONGEST_LINE)
             if len(first) == _LONGEST_LINE:
-                raise InputError(f"{path}: not a CSV file: its first line, of column names, does not end")
+                raise InputError(f"{path}: not a CSV file: its first line, the column names, does not end")
             if not first.strip():
                 raise InputError(f"{path}: is empty; a log starts with a line of column names")
             delimiter = max(",;\t", key=first.count)
@@ -92,7 +92,7 @@ def _refuse_inflated(path: Path) -> None:
         while part := raw.read(_LONGEST_LINE):
             held += len(part)
             if held > most:
-                raise InputError(f"{path}: holds more than {most / 1e6:.3g} MB of text: damaged, or no log")
+                raise InputError(f"{path}: holds more than {most / 1e6:.3g} MB of text: damaged, or not a log")
 
 
 @contextmanager

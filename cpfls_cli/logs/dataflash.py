@@ -53,7 +53,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     del wanted
     content = bytes_of(path)
     if not content.startswith(DATAFLASH_MAGIC):
-        raise InputError(f"{path}: not a DataFlash log: it does not begin as one (encrypted, or of another program?)")
+        raise InputError(f"{path}: not a DataFlash log: it does not start like one (encrypted, or of another kind?)")
     kinds, lost = _find_messages(content)
     tables = {kind.name: table(content, kind.begins, kind.record) for kind in kinds.values() if kind.begins}
     stated = _stated_units(tables, kinds)
@@ -64,7 +64,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         for topic, fields in _topics(kind, tables[kind.name], stated.get(kind.name, {}))
     }
     if not topics:
-        raise InputError(f"{path}: holds no messages with stamps (TimeUS)")
+        raise InputError(f"{path}: holds no messages with time stamps (TimeUS)")
     origin = min(fields[STAMP][0] for fields in topics.values())
     for fields in topics.values():
         # Whole microseconds again: a difference of two large numbers of seconds is none.
@@ -79,7 +79,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     for name, value in _rows(tables, "PARM", Name="S", Value="fiu"):
         # As the log begins.
         parameters.setdefault(_text(name), float(value))
-    broken = (f"{lost} bytes are no messages: the file is broken in places; what could be read of it is used",)
+    broken = (f"{lost} bytes belong to no message: the file is damaged in places; what could be read is used",)
     return LogContents(topics, units, parameters, _system(tables), broken if lost else ())
 
 

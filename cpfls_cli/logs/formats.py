@@ -208,8 +208,8 @@ def _refuse_other_content(path: Path, form: LogFormat) -> None:
     first = _first_line(path)
     alike = [other for other in LOG_FORMATS if other.begins(first)]
     if alike and form not in alike:
-        remedy = f"rename it to end in {alike[0].suffix}" if alike[0].suffix else "rename it to have no ending"
-        raise InputError(f"{path}: seems to hold {alike[0].content}, not what its name ends in; {remedy}")
+        remedy = f"rename it to end in {alike[0].suffix}" if alike[0].suffix else "rename it without an ending"
+        raise InputError(f"{path}: seems to hold {alike[0].content}, unlike the ending of its name; {remedy}")
 
 
 def _is_header(line: bytes) -> bool:

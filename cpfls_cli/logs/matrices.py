@@ -42,7 +42,7 @@ with h5py.File(sys.argv[1], "r") as file:
     print(name if isinstance(name, str) and name.startswith("cpfls/") else "")
     file.visititems(count)
     if states > int(sys.argv[2]):
-        print(f"states {states / 1e9:.3g} GB of numbers, far more than a file of its size holds: damaged, or no log")
+        print(f"claims {states / 1e9:.3g} GB of numbers, far more than a file of its size holds: damaged, or not a log")
         sys.exit(3)
     file.visititems(read)
 """
@@ -105,7 +105,7 @@ def _probed(state: FileState) -> _Probed:
             text=True,
         )
     except subprocess.TimeoutExpired:
-        return _Probed(False, "", f"damaged: HDF5 does not come to an end with it within {limit:.0f} s")
+        return _Probed(False, "", f"damaged: HDF5 did not finish reading it within {limit:.0f} s")
     if done.returncode == _INFLATED:
         return _Probed(True, "", done.stdout.strip().splitlines()[-1])
     if done.returncode:
@@ -178,7 +178,7 @@ def _refuse_inflated(path: Path) -> None:
 def _require_held(path: Path, total: int, size: int) -> None:
     if total > most_held(size):
         raise InputError(
-            f"{path}: holds more than {total / 1e9:.2g} GB of numbers in {size / 1e6:.2g} MB: damaged, or no log"
+            f"{path}: holds more than {total / 1e9:.2g} GB of numbers in {size / 1e6:.2g} MB: damaged, or not a log"
         )
 
 

@@ -29,11 +29,11 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
             kept = schema.names if wanted is None else [name for name in schema.names if name in wanted]
             repeated = sorted(name for name, count in Counter(kept).items() if count > 1)
             if repeated:
-                raise InputError(f"{path}: column '{repeated[0]}' stands twice")
+                raise InputError(f"{path}: column '{repeated[0]}' appears twice")
             held = 8 * file.metadata.num_rows * len(kept)
             if held > most_held(path.stat().st_size):
                 raise InputError(
-                    f"{path}: states {held / 1e9:.3g} GB of numbers, far more than a file of its size holds"
+                    f"{path}: claims {held / 1e9:.3g} GB of numbers, far more than a file of its size holds"
                 )
             table = file.read(columns=kept)
     # A column's name may be no text.
@@ -55,7 +55,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
 def _numbers_of_column(path: Path, name: str, column: Any) -> Array:
     if not _is_numeric(column.type):
         raise InputError(
-            f"{path}: column '{name}' holds {_kind(column.type)}: not numbers; map another column in import.signals, "
+            f"{path}: column '{name}' holds {_kind(column.type)}, not numbers; map another column in import.signals, "
             "or write this one as numbers"
         )
     if _states_unit(column.type):

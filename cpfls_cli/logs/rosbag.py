@@ -76,10 +76,10 @@ def _read(path: Path, reader: Reader, wanted: set[str] | None) -> LogContents:
                 units |= {f"{topic}.{name}": unit for name, unit in known}
     if not topics:
         listed = f": no definition fits {', '.join(unknown)}" if unknown else ""
-        raise InputError(f"{path}: a ROS 2 bag without messages that can be read{listed}")
+        raise InputError(f"{path}: a ROS 2 bag without readable messages{listed}")
     warnings = (
-        f"topics left out, as the file has no fitting definition of their messages: {', '.join(unknown)}",
-        f"the clocks of these topics are not the recorder's, and are shifted by the median: {', '.join(shifted)}",
+        f"topics left out because the file has no matching definition of their messages: {', '.join(unknown)}",
+        f"these topics do not use the recorder's clock and are shifted by the median offset: {', '.join(shifted)}",
     )
     present = [warning for warning, causes in zip(warnings, (unknown, shifted), strict=True) if causes]
     return LogContents(topics, units, system="ROS 2", warnings=tuple(present))

@@ -45,14 +45,14 @@ def _parsed(path: Path) -> Any:
         # The reader prints what it finds wrong, which is asked for below, and leaves a file that it cannot read open.
         with path.open("rb") as stream, redirect_stdout(io.StringIO()):
             if stream.read(len(ULOG_MAGIC)) != ULOG_MAGIC:
-                raise InputError(f"{path}: not a ULog file: it does not begin as one")
+                raise InputError(f"{path}: not a ULog file: it does not start like one")
             _refuse_endless(path, stream)
             stream.seek(0)
             return pyulog.ULog(stream)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
     except RecursionError:
-        raise InputError(f"{path}: a broken ULog file: a message of it contains itself") from None
+        raise InputError(f"{path}: a broken ULog file: one of its messages contains itself") from None
     except (pyulog.core.ULogException, struct.error, ValueError, KeyError, IndexError, TypeError) as error:
         raise InputError(f"{path}: a broken ULog file: {error}") from None
 
@@ -99,7 +99,7 @@ def _field(field: str, values: Any, origin: int) -> Array:
 def _warn_of_file(log: Any, origin: int) -> tuple[str, ...]:
     warnings = []
     if log.file_corruption:
-        warnings.append("the file is broken in places; what could be read of it is used")
+        warnings.append("the file is damaged in places; what could be read is used")
     if log.dropouts:
         longest = max(log.dropouts, key=lambda dropout: dropout.duration)
         total_s = 1e-3 * sum(dropout.duration for dropout in log.dropouts)

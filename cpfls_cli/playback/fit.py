@@ -292,7 +292,7 @@ def fit_parts(
 
     start = _Sums(free, windows, np.clip(free.values(known), *bounds)).mean()
     if not np.isfinite(start.objective):
-        raise ComputationError("the prediction error is not finite at the stated numbers; look at the units of the log")
+        raise ComputationError("the prediction error is not finite with the stated numbers; check the units of the log")
     sums = _Sums(free, windows, best(place >= 0, start, steps).values)
     losses = sums.losses()
     whole = sums.mean(losses)

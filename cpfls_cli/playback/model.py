@@ -161,7 +161,7 @@ class VehicleModel:
         """
         learned = airflow_terms(airflow_of(self.remainder))
         if learned > 2 * MOST_COLUMNS:
-            raise ComputationError(f"a remainder of {learned // 2} columns is too large; {MOST_COLUMNS} are possible")
+            raise ComputationError(f"a remainder of {learned // 2} columns is too large; {MOST_COLUMNS} at most")
         parts = {"rotors": np.zeros((6, len(STATE_TERMS) + learned, 1 + 4 * self.rotors))}
         parts["rotors"][:, 0] = rotor_weights(self.vehicle, self.thrust_linear, self.response)
         for name, weights in self._polynomials.items():

@@ -185,7 +185,7 @@ def effect_weights(name: str, shape: Mapping[str, float], probe: Probe) -> Array
     known = effect(name)
     found = polynomial(wrench_of_numbers() if known.kind == "parameter" else known, probe, shape)
     if found is None:
-        raise ComputationError(f"the effect {name} is no polynomial of motion and rotor speeds")
+        raise ComputationError(f"the effect {name} is not a polynomial of motion and rotor speeds")
     return with_slow(found, probe)
 
 

@@ -91,7 +91,7 @@ class KeptFile:
         """Refuse a file of the user that happens to have the name of what is left."""
         if self.path.exists() and not (self.path.is_file() and is_hdf5(self.path)):
             raise InputError(
-                f"{self.path}: has the name of what a stopped {self.WORK} leaves, and is none of it; move it away, or "
+                f"{self.path}: has the name of what a stopped {self.WORK} leaves, but is none; move it away, or "
                 "name another output"
             )
 
@@ -147,7 +147,7 @@ class KeptFile:
         listed = "; ".join(differing)
         if listed:
             raise InputError(
-                f"{self.path}: is of another {self.WORK}: {listed}. Repeat the command as it was, with --resume, or "
+                f"{self.path}: belongs to another {self.WORK}: {listed}. Repeat the original command with --resume, or "
                 "start again with --force alone"
             )
 
@@ -187,7 +187,7 @@ class Checkpoint(KeptFile):
         differing = [*differences(then, self.header, old, new, unimportant="validate")]
         generations = keys_of(self.header)[_GENERATIONS]
         if generation > generations:
-            differing.append(f"{_GENERATIONS} = {generations}, but it has come to generation {generation}")
+            differing.append(f"{_GENERATIONS} = {generations}, but it has reached generation {generation}")
         self._require_same(differing)
 
 

@@ -55,7 +55,7 @@ class SearchOptions:
     def require_workers(self) -> None:
         """Refuse more processes than this machine can run, and a scheduler beside them or without an address."""
         if self.scheduler is not None and self.workers > 1:
-            raise InputError("--scheduler: knows its own workers; leave --workers out")
+            raise InputError("--scheduler: brings its own workers; leave out --workers")
         if self.scheduler is not None:
             require_address(self.scheduler)
         processors = os.cpu_count() or 1

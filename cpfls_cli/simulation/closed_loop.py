@@ -33,7 +33,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 _ROUNDING = 1e-6
 _STEPS_BETWEEN_REPORTS = 100
-_REMEDY = "fly gentler, make the effects smaller, or change the frequencies of simulation.closed_loop"
+_REMEDY = "fly more gently, make the effects smaller, or change the frequencies of simulation.closed_loop"
 
 
 @dataclass(frozen=True)
@@ -410,7 +410,7 @@ def _refuse_lost(state: Array, planned: Array, time: float, limit: float) -> Non
         raise ComputationError(f"the flight is out of control at t = {time:g} s: {_REMEDY}")
     roll, pitch, _ = state[ATTITUDE]
     if cos(roll) * cos(pitch) <= 0:
-        raise ComputationError(f"the vehicle tilts over 90 degrees at t = {time:g} s: {_REMEDY}")
+        raise ComputationError(f"the vehicle tilts beyond 90 degrees at t = {time:g} s: {_REMEDY}")
     away = float(np.linalg.norm(state[POSITION] - planned))
     if away > limit:
         raise ComputationError(

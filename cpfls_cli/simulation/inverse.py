@@ -200,7 +200,7 @@ def _refuse_noise_of_nothing(exact: Mapping[str, Array], settings: SimulationSet
     for key in ("noise", "relative_noise"):
         missing = sorted({str(name) for name in getattr(settings, key)} - exact.keys())
         if missing:
-            raise SettingError(key, f"{', '.join(missing)}: a vehicle that is held at its centre of mass has none")
+            raise SettingError(key, f"{', '.join(missing)}: a vehicle held at its centre of mass has none")
 
 
 def _torques(signals: Mapping[str, Array], noised: frozenset[str]) -> tuple[Array, Array]:

@@ -164,7 +164,7 @@ def played_gusts(model: VehicleModel | None, asked: bool) -> Gusts | None:
     if model is None or model.gusts is None:
         raise SettingError(
             "closed_loop.gusts",
-            "no gusts are known; give --model a vehicle of `cpfls vehicle` whose flights told them, or leave it out",
+            "no gusts are known; give --model a vehicle of `cpfls vehicle` whose flights showed them, or leave it out",
         )
     return model.gusts
 

@@ -121,8 +121,8 @@ def room_left(path: Trajectory, added: AddedMotion, settings: TrajectorySettings
         if size < _LEAST_SHARE * asked:
             raise SettingError(
                 "excite.size_rad",
-                f"there is room for {np.degrees(size):.2g} degrees of {axis} only: {limit}; lower the top of "
-                f"excite.band_hz, leave {axis} out, fly a gentler path, or ask for less",
+                f"there is room for only {np.degrees(size):.2g} degrees of {axis}: {limit}; lower the top of "
+                f"excite.band_hz, leave {axis} out, fly a gentler path, or lower this",
             )
     return RoomLeft(added.of_sizes(together), limits)
 

@@ -158,11 +158,11 @@ class SimulationSettings(Settings):
 
     def _check_noise(self, key: str, signals: set[str]) -> None:
         if "body_torque" in signals and "torque" in {*self.noise, *self.relative_noise}:
-            raise SettingError(key, "body_torque: torque has noise too, and one follows from the other; drop one")
+            raise SettingError(key, "body_torque: torque has noise too, and one follows from the other; remove one")
         if self.mode != "inverse" and "body_torque" in signals:
             raise SettingError(key, f"body_torque: in mode {self.mode} it follows from torque; give torque the noise")
         extra = ", ".join(sorted(_NO_SENSOR[self.mode] & signals))
         if extra and self.mode == "inverse":
-            raise SettingError(key, f"{extra}: only a flight in mode closed-loop has such a sensor")
+            raise SettingError(key, f"{extra}: only a flight in mode closed-loop has this sensor")
         if extra:
-            raise SettingError(key, f"{extra}: a vehicle whose attitude alone is controlled logs none; leave it out")
+            raise SettingError(key, f"{extra}: a vehicle with only attitude control does not log it; leave it out")

@@ -129,7 +129,7 @@ def _refuse_free_fall(time: Array, force: Array, gravity: float) -> None:
     if weightless.any():
         raise ComputationError(
             f"free fall at t = {time[weightless.argmax()]:g} s: the thrust vanishes or turns by 90 degrees or "
-            "more within one sample, so the attitude is not defined; lower the acceleration of the path"
+            "more within one sample, so the attitude is undefined; lower the acceleration of the path"
         )
 
 
@@ -137,7 +137,7 @@ def _refuse_sideways(time: Array, tilted: Array, gravity: float) -> None:
     sideways = tilted <= _NO_THRUST * gravity
     if sideways.any():
         raise ComputationError(
-            f"roll of 90 degrees at t = {time[sideways.argmax()]:g} s: the pitch is not defined there; change "
+            f"roll of 90 degrees at t = {time[sideways.argmax()]:g} s: pitch is undefined there; change "
             "the acceleration of the path or the yaw"
         )
 

@@ -37,7 +37,7 @@ def check_consistency(settings: TrajectorySettings) -> None:
         if settings.waypoints:
             check_waypoints(settings.waypoints, settings.duration_s is None)
         if settings.amplitude_m_s5 is not None:
-            message = "has no meaning through waypoints, whose distances choose it; set it to null"
+            message = "does not apply to waypoints, whose distances determine it; set it to null"
             raise SettingError("amplitude_m_s5", message)
         return
     _check_size(settings)
@@ -52,17 +52,17 @@ def _check_clock(settings: TrajectorySettings) -> None:
     check_samples(settings.duration_s, settings.sample_time_s)
     if settings.pause_s:
         raise SettingError(
-            "pause_s", "contradicts duration_s, which determines the rest between moves; set that to null"
+            "pause_s", "contradicts duration_s, which determines the rest between moves; set duration_s to null"
         )
 
 
 def _check_held(settings: TrajectorySettings) -> None:
     if settings.pause_s:
-        raise SettingError("pause_s", f"has no meaning on path {settings.path}, which never rests; set it to 0")
+        raise SettingError("pause_s", f"does not apply to path {settings.path}, which never rests; set it to 0")
     if settings.limits.given:
-        raise SettingError("limits", f"hold for moves in space; path {settings.path} has those of the key rotation")
+        raise SettingError("limits", f"apply to moves in space; path {settings.path} has those of the key rotation")
     if settings.tilt_max_rad is not None:
-        raise SettingError("tilt_max_rad", f"holds for paths in space; path {settings.path} turns all the way round")
+        raise SettingError("tilt_max_rad", f"applies to paths in space; path {settings.path} turns full circles")
 
 
 def _check_excited(settings: TrajectorySettings) -> None:
@@ -75,9 +75,9 @@ def _check_excited(settings: TrajectorySettings) -> None:
     if not asked.axes:
         return
     if settings.held or settings.path == "next-flight":
-        raise SettingError("excite.axes", f"excite a path in space; path {settings.path} chooses its motion itself")
+        raise SettingError("excite.axes", f"need a path in space; path {settings.path} chooses its motion itself")
     if settings.sample_time_s > (1 + 1e-9) * coarsest_excited(asked):
-        message = f"leaves less than {_SAMPLES_IN_A_PERIOD} samples in a period of {high:g} Hz, the top of"
+        message = f"leaves fewer than {_SAMPLES_IN_A_PERIOD} samples in a period of {high:g} Hz, the top of"
         remedy = f"lower it to {coarsest_excited(asked):.3g} or less"
         raise SettingError("sample_time_s", f"{message} excite.band_hz; {remedy}")
 
@@ -91,9 +91,9 @@ def _check_repeated(settings: TrajectorySettings) -> None:
     if settings.repeat == 1:
         return
     if settings.held:
-        raise SettingError("repeat", f"flies a path from rest to rest again; path {settings.path} never rests")
+        raise SettingError("repeat", f"repeats a path from rest to rest; path {settings.path} never rests")
     if settings.yaw_profile == "uniform" and settings.yaw_turn:
-        message = "turns at the ends of a run too, and a run that is repeated begins and ends at rest; use base"
+        message = "turns at the ends of a run too, but a repeated run begins and ends at rest; use base"
         raise SettingError("yaw_profile", f"uniform {message}, or yaw_turn_rad: 0")
 
 
@@ -108,15 +108,15 @@ def _check_direction(settings: TrajectorySettings) -> None:
 def _check_limits(settings: TrajectorySettings) -> None:
     if not settings.limits.given:
         if settings.coordination == "each-axis":
-            raise SettingError("coordination", "each-axis plans under limits; give some, or use straight-line")
+            raise SettingError("coordination", "each-axis needs limits; give some, or use straight-line")
         return
     given = [key for key, value in asdict(settings.holds).items() if value]
     if given:
-        raise SettingError(f"hold_{given[0]}_s", "contradicts limits, which choose the holds; set it to 0")
+        raise SettingError(f"hold_{given[0]}_s", "contradicts limits, which determine the holds; set it to 0")
     if settings.amplitude_m_s5 is not None:
-        raise SettingError("amplitude_m_s5", "contradicts limits, which choose it; set it to null")
+        raise SettingError("amplitude_m_s5", "contradicts limits, which determine it; set it to null")
     if settings.coordination == "each-axis" and settings.displacement_measure == "along-path":
-        message = "along-path has no meaning where every axis is planned by itself; use per-axis"
+        message = "along-path does not apply if every axis is planned by itself; use per-axis"
         raise SettingError("displacement_measure", message)
 
 
@@ -161,7 +161,7 @@ def check_peaks(profile: BaseProfile, key: str) -> None:
 def check_samples(duration: float, sample_time: float) -> None:
     """Refuse a sample time with which there would be one sample, or more than memory holds; both in s."""
     if duration > _LARGEST_SIZE * sample_time:
-        raise SettingError("sample_time_s", f"makes more than {_LARGEST_SIZE} samples of {duration:g} s; raise it")
+        raise SettingError("sample_time_s", f"divides {duration:g} s into more than {_LARGEST_SIZE} samples; raise it")
     if sample_time > duration:
         raise SettingError("sample_time_s", f"is longer than the whole path, which takes {duration:g} s")
 
@@ -198,11 +198,11 @@ def check_waypoints(waypoints: Sequence[WaypointSettings], paused: bool) -> None
         raise SettingError("waypoints", f"holds {len(waypoints)}; a path needs two or more, here or in a CSV file")
     for number, (before, point) in enumerate(pairwise(waypoints), start=1):
         if before.position_m == point.position_m:
-            message = "repeats the point before; take one out: a rest is pause_s, and no turn on the spot is planned"
+            message = "repeats the point before; remove one: a rest is pause_s, and turning on the spot is not planned"
             raise SettingError(f"waypoints.{number}.position_m", message)
     headings = [point.yaw_rad is None for point in waypoints]
     if len(set(headings)) > 1:
-        message = "is missing while other points have a yaw; give it at all of them, or at none"
+        message = "is missing, but other points have a yaw; give it at all of them, or at none"
         raise SettingError(f"waypoints.{headings.index(True)}.yaw_rad", message)
     for number, point in enumerate(waypoints):
         if point.pause_s and not paused:

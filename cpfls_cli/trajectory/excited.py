@@ -133,7 +133,7 @@ def added_motion(settings: ExciteSettings, path: Trajectory, gravity: float) -> 
 def _refuse_turning(settings: ExciteSettings, path: Trajectory) -> None:
     tilting = [axis for axis in settings.axes if axis in ("roll", "pitch")]
     if tilting and np.ptp(path.yaw) > _STEADY_YAW:
-        message = f"turns the path in yaw, and {' and '.join(tilting)} excited with it would change places"
+        message = f"turns the path in yaw, so {' and '.join(tilting)} excited along with it would change places"
         raise SettingError("yaw_turn_rad", f"{message}; set it to 0, and no yaw_rad in waypoints")
 
 
@@ -154,7 +154,7 @@ def _of_axis(settings: ExciteSettings, number: int, time: Array, duration: float
         least = _LEAST_PERIODS / settings.band_hz[0]
         raise SettingError(
             "excite.band_hz",
-            f"begins below what {length:.4g} s, the sweep of one axis, hold: a sweep takes {least:.4g} s or more for "
+            f"begins below what fits {length:.4g} s, the sweep of one axis: a sweep takes {least:.4g} s or more for "
             "each axis; raise the lowest frequency or trajectory.duration_s, or excite fewer axes",
         )
     begin = number * length
@@ -182,7 +182,7 @@ def lines_of(settings: ExciteSettings, number: int, duration: float) -> IntArray
         least = _LEAST_LINES * axes / (high - low)
         raise SettingError(
             "excite.band_hz",
-            f"has {len(lines)} of the frequencies whose periods fit {duration:.4g} s, and a multisine needs "
+            f"has {len(lines)} of the frequencies whose periods fit {duration:.4g} s, but a multisine needs "
             f"{_LEAST_LINES} for each axis; widen it, or fly {least:.3g} s or longer",
         )
     return lines[number::axes]

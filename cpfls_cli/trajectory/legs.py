@@ -191,7 +191,7 @@ def _smooth(moves: tuple[Move, ...], directions: Array) -> MoveInSpace:
         if not move.outcome.solved:
             raise SettingError("limits", move.outcome.words)
         if not np.isfinite(move.peaks.snap):
-            message = "leave the snap without limit, and with it the acceleration of the attitude; give a limit on"
+            message = "leave the snap unlimited, and with it the acceleration of the attitude; give a limit on"
             raise SettingError("limits", f"{message} snap_m_s4, crackle_m_s5 or pop_m_s6, or a period_s")
     # Where no limit is reached, the period that was given decides.
     reached = dict.fromkeys(name for move in moves for name in move.active) or {"period": None}

@@ -45,11 +45,11 @@ class MoveOutcome(IntEnum):
 
 _WORDS = {
     MoveOutcome.SOLVED: "solved: the shortest move of the family that keeps all limits",
-    MoveOutcome.ZERO_DISPLACEMENT: "the displacement is zero: nothing moves, and it takes no time",
-    MoveOutcome.NO_LIMIT: "no solution: nothing limits the move, so none is the shortest; give a limit on "
+    MoveOutcome.ZERO_DISPLACEMENT: "the displacement is zero: nothing moves, and the move takes no time",
+    MoveOutcome.NO_LIMIT: "no solution: nothing limits the move, so there is no shortest one; give a limit on "
     f"{', '.join(LIMIT_NAMES[:-1])} or {LIMIT_NAMES[-1]}, or a period",
     MoveOutcome.OUT_OF_RANGE: "no solution: the move's times are too long or too short for floating-point numbers; "
-    "bring the displacement and the limits nearer to 1",
+    "bring the displacement and the limits closer to 1",
 }
 
 

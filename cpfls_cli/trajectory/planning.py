@@ -108,7 +108,7 @@ def plan(settings: TrajectorySettings, gravity: float) -> Trajectory:
         planned = Trajectory(duration=duration, legs=legs, maxima=_maxima(legs), runs=(), **flown)
     if not all(np.isfinite(values).all() for values in vars(planned).values() if isinstance(values, np.ndarray)):
         raise ComputationError(
-            "the attitude's derivatives are too large for numbers to hold; lower trajectory.yaw_turn_rad"
+            "the attitude's derivatives are too large for floating-point numbers; lower trajectory.yaw_turn_rad"
         )
     return planned
 
@@ -211,7 +211,7 @@ def sample_interval(time: Array, what: str) -> float:
         If there are fewer than two samples, or they are not uniform.
     """
     if len(time) < 2 or np.ptp(np.diff(time)) > _UNIFORM * (time[1] - time[0]):
-        raise ComputationError(f"{what} needs a trajectory of two or more samples at one rate")
+        raise ComputationError(f"{what} needs a trajectory with at least two samples at one rate")
     return float(time[-1] - time[0]) / (len(time) - 1)
 
 

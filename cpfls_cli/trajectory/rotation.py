@@ -196,7 +196,7 @@ class RotationLimits:
 
     def __init__(self, settings: RotationSettings, inertia: Sequence[float] | None = None) -> None:
         if settings.torque_max_n_m is not None and inertia is None:
-            raise SettingError("torque_max_n_m", "a limit on the torque needs the inertia of the vehicle; use null")
+            raise SettingError("torque_max_n_m", "a torque limit needs the inertia of the vehicle; use null")
         self._rate, self._acceleration = settings.rate_max_rad_s, settings.acceleration_max_rad_s2
         self._torque = settings.torque_max_n_m
         self._inertia = six_parameters(inertia or ())
@@ -258,7 +258,7 @@ class RotationLimits:
             raise SettingError(
                 _LIMITS[worst],
                 f"{turns} complete turns of roll, pitch and yaw in {path.duration:g} s need {peaks[worst]:.3g} times "
-                "as much; raise it or the duration, or lower turns",
+                "this limit; raise it or the duration, or lower turns",
             )
 
         def excess(factor: float) -> float:

@@ -79,21 +79,17 @@ def _definite(grounds: Grounds) -> Iterator[Reason]:
 def _draws(grounds: Grounds) -> Iterator[Reason]:
     share = grounds.definite
     if share is not None and not grounds.impossible:
-        text = f"D(q) is positive definite in all cells clear of a vertical pitch in {100 * share:.3g} % of the draws"
+        text = f"D(q) is positive definite in all cells away from vertical pitch in {100 * share:.3g} % of the draws"
         enough = share >= DEFINITE_SHARE
-        yield Reason(
-            text if enough else f"{text}; {100 * DEFINITE_SHARE:g} % are asked for", FOR if enough else AGAINST
-        )
+        yield Reason(text if enough else f"{text}; {100 * DEFINITE_SHARE:g} % are required", FOR if enough else AGAINST)
 
 
 def _elsewhere(grounds: Grounds) -> Iterator[Reason]:
     """Report attitudes without a definite D(q) that training, though it went all round, did not visit."""
     physics = grounds.physics
     if grounds.one_rule and not grounds.impossible and physics.indefinite_anywhere:
-        text = (
-            f"D(q) is not positive definite in {physics.indefinite_anywhere} of the {physics.every_cell} cells of all"
-        )
-        yield Reason(f"{text} roll and pitch, though in none that training visited", AGAINST)
+        text = f"D(q) is not positive definite in {physics.indefinite_anywhere} of {physics.every_cell} cells of roll"
+        yield Reason(f"{text} and pitch, but in none that training visited", AGAINST)
 
 
 def _fuzzy_part(grounds: Grounds) -> Iterator[Reason]:
@@ -111,7 +107,7 @@ def _determined(grounds: Grounds) -> Iterator[Reason]:
     else:
         share, weak = 100 * float(np.mean(result.excitation.determined)), int(np.sum(~result.excitation.excited))
         rules = f"{weak} of {len(result.excitation.name)} rules are not excited beyond the noise"
-        yield Reason(f"{share:.3g} % of what the rules could say is determined by the flight; {rules}", AGAINST)
+        yield Reason(f"{share:.3g} % of what the rules could express is determined by the flight; {rules}", AGAINST)
 
 
 def _band(grounds: Grounds) -> Iterator[Reason]:
@@ -152,18 +148,18 @@ def _white(grounds: Grounds) -> Iterator[Reason]:
     biased = np.flatnonzero(errors.mean_p < _NOT_WHITE)
     if len(biased):
         torques = ", ".join(f"{errors.mean[axis]:.3g} N m about {AXES[axis]}" for axis in biased)
-        text = f"a constant torque is left over: {torques} ({errors.part}"
+        text = f"a constant torque remains: {torques} ({errors.part}"
         yield Reason(f"{text}, p {_printed(float(np.min(errors.mean_p[biased])))}), which the model lacks", NEITHER)
     coloured = [AXES[axis] for axis in tested if errors.ljung_box[axis] < _NOT_WHITE]
     if coloured:
         smallest = float(np.min(errors.ljung_box[tested]))
         text = f"torque errors about {', '.join(coloured)} are not white ({errors.part}, p {_printed(smallest)})"
-        yield Reason(f"{text}: filters of the log do that, and so does an effect that has no term", NEITHER)
+        yield Reason(f"{text}: filters of the log cause that, and so does an effect without a term", NEITHER)
     elif len(tested) and not len(biased):
-        text = f"torque errors are white noise as far as {errors.samples} samples of {errors.part} tell"
+        text = f"torque errors are white noise, as far as {errors.samples} samples of {errors.part} show"
         yield Reason(f"{text} (p {_printed(float(np.min(errors.ljung_box[tested])))})", FOR)
     elif not len(tested) and np.all(errors.exact):
-        yield Reason(f"the torque of {errors.part} is met to rounding", FOR)
+        yield Reason(f"the torque of {errors.part} is matched to rounding", FOR)
 
 
 def _printed(p_value: float) -> str:
@@ -174,8 +170,8 @@ def _held_out(grounds: Grounds) -> Iterator[Reason]:
     r2 = grounds.r2(MODEL)
     if not grounds.held_out:
         yield Reason(
-            f"judged on its own training data alone (R2 of body torque {numbers(r2)}), which says nothing of any other "
-            "flight: hold some out with identification.training_share below 1, or --validate another flight",
+            f"judged only on its own training data (R2 of body torque {numbers(r2)}), which says nothing about other "
+            "flights: hold some out with identification.training_share below 1, or --validate another flight",
             AGAINST,
         )
         return
@@ -191,11 +187,11 @@ def _held_out(grounds: Grounds) -> Iterator[Reason]:
 def _hardly_excited(grounds: Grounds) -> Iterator[Reason]:
     for axis in np.flatnonzero(grounds.hardly_excited):
         ours, still = grounds.rate_error(MODEL)[axis], grounds.rate_error(NOTHING_MOVES)[axis]
-        text = f"{AXES[axis]} hardly moves in training: its rate is predicted with an error of {ours:.3g} rad/s"
+        text = f"{AXES[axis]} barely moves in training: its rate is predicted with an error of {ours:.3g} rad/s"
         if not np.isfinite(ours):
-            yield Reason(f"{AXES[axis]} hardly moves in training, and windows of it cannot be replayed", AGAINST)
+            yield Reason(f"{AXES[axis]} barely moves in training, and windows of it cannot be replayed", AGAINST)
         elif grounds.beats_nothing_moves(MODEL)[axis]:
-            neither = "which is better by more than chance, but confirms no model of its torque"
+            neither = "which is better by more than chance but confirms no model of its torque"
             yield Reason(f"{text}, {still:.3g} if nothing moved, {neither}", NEITHER)
         else:
             yield Reason(f"{text}, {still:.3g} if nothing moved: not better by more than chance", AGAINST)
@@ -209,7 +205,7 @@ def _beside_rigid_body(grounds: Grounds) -> Iterator[Reason]:
     for part, steps in grounds.replayed.items():
         if steps.windows:
             compared = grounds.replay_beside(part, MODEL, RIGID_BODY)
-            reason = _compared(f"squared error of the body rate replayed ({part})", compared)
+            reason = _compared(f"squared error of the replayed body rate ({part})", compared)
             # What was learned from is no witness.
             yield reason if part in grounds.held_out else Reason(reason.text, NEITHER)
 
@@ -221,7 +217,7 @@ def _constant(grounds: Grounds) -> Iterator[Reason]:
     for axis in np.flatnonzero((constant > _LARGE_BESIDE_NOISE * noise) & (constant > _SMALL * axes.torque)):
         share = f"{100 * constant[axis] / axes.torque[axis]:.3g} % of its torque"
         text = f"{AXES[axis]}: a constant torque of {axes.constant[axis]:.3g} N m acts in training, {share}"
-        yield Reason(f"{text}: no inertia makes it, and errors are compared with the rigid body's without it", NEITHER)
+        yield Reason(f"{text}: no inertia causes it; errors are compared with the rigid body's without it", NEITHER)
 
 
 def _compared(what: str, errors: Comparison) -> Reason:
@@ -247,9 +243,7 @@ def _steps(grounds: Grounds) -> Iterator[Reason]:
         for name in (MODEL, NOTHING_MOVES)
     )
     if np.isfinite(ours):
-        text = (
-            f"after {steps.horizon[-1]:.3g} s of torques replayed ({steps.part}, {steps.windows} windows) the attitude"
-        )
+        text = f"after {steps.horizon[-1]:.3g} s of replayed torques ({steps.part}, {steps.windows} windows), attitude"
         yield Reason(
             f"{text} is off by {ours:.3g} degrees, {still:.3g} if nothing moved", FOR if ours < still else AGAINST
         )
@@ -258,7 +252,7 @@ def _steps(grounds: Grounds) -> Iterator[Reason]:
 def _lost(grounds: Grounds) -> Iterator[Reason]:
     if grounds.lost(MODEL):
         yield Reason(
-            f"{grounds.lost(MODEL)} of {grounds.windows} windows replayed do not come to their end: D(q) is not "
+            f"{grounds.lost(MODEL)} of {grounds.windows} replayed windows do not run to the end: D(q) is not "
             "positive definite there, or the model turns faster than any step of integration",
             AGAINST,
         )

@@ -301,7 +301,7 @@ def _identified_again(
     solver = model_evaluator(*sources, settings).solver
     fit = solver.fit(model.partitions)
     if fit is None:
-        raise ComputationError("the simulation of the model gives no finite model")
+        raise ComputationError("identifying the simulation of the model gives no finite model")
     exact, _ = solver.exact(model.partitions, fit)
     return replace(model, coefficients=exact.coefficients, rigid_body=exact.rigid_body)
 

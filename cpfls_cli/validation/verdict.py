@@ -133,28 +133,27 @@ def _better(grounds: Grounds) -> bool:
 def _not_good_enough(grounds: Grounds) -> str | None:
     """Explain why a model that is better than the rigid body is not to be used; None where it is."""
     if grounds.loses_many:
-        return f"{grounds.lost(MODEL)} of {grounds.windows} windows replayed do not come to their end"
+        return f"{grounds.lost(MODEL)} of {grounds.windows} replayed windows do not run to the end"
     if grounds.definite is not None and grounds.definite < DEFINITE_SHARE:
         share = f"only {100 * grounds.definite:.3g} % of the bootstrap draws"
         return (
-            f"{share} have a D(q) that is positive definite wherever training was; {100 * DEFINITE_SHARE:g} % are asked"
+            f"{share} have a D(q) that is positive definite wherever training was; {100 * DEFINITE_SHARE:g} % are "
+            "required"
         )
     if np.all(good_axes(grounds, MODEL)) and np.any(confirmed_axes(grounds, MODEL)):
         return None
     r2 = numbers(grounds.r2(MODEL))
     denied = (grounds.r2(MODEL) >= grounds.r2_min) & ~grounds.predicts(MODEL)
     if np.any(denied):
-        return (
-            f"its body rate about {_names(denied)}, replayed, is farther off than if nothing moved (R2 of torque {r2})"
-        )
-    return f"not good enough for control: R2 of held-out body torque {r2}; {grounds.r2_min:g} is asked for"
+        return f"its replayed body rate about {_names(denied)} is farther off than if nothing moved (R2 of torque {r2})"
+    return f"not good enough for control: R2 of held-out body torque {r2}; {grounds.r2_min:g} is required"
 
 
 def _r2_in_words(grounds: Grounds, predictor: str) -> str:
     """Format the R2 of the axes that it confirms, and name those that nothing confirms."""
     confirmed, r2 = confirmed_axes(grounds, predictor), grounds.r2(predictor)
-    text = f"R2 of body torque {numbers(r2, confirmed)}; {grounds.r2_min:g} is asked for"
-    return text if np.all(confirmed) else f"{text}; about {_names(~confirmed)} nothing confirms it"
+    text = f"R2 of body torque {numbers(r2, confirmed)}; {grounds.r2_min:g} is required"
+    return text if np.all(confirmed) else f"{text}; nothing confirms it about {_names(~confirmed)}"
 
 
 def _beside_rigid_body(grounds: Grounds) -> tuple[Trust, Reason]:
@@ -181,9 +180,9 @@ def _rigid_body_instead(grounds: Grounds) -> Reason:
         use = "use the rigid body: it is simpler, and the model is not better by more than chance on held-out data"
         return Reason(f"{use}; it is itself good for control ({_r2_in_words(grounds, RIGID_BODY)})", NEITHER)
     neither = bad & ~good_axes(grounds, MODEL)
-    who, where = ("neither is", neither) if np.any(neither) else ("that is not", bad)
+    who, where = ("neither is", neither) if np.any(neither) else ("the latter is not", bad)
     text = f"the model is not better than the rigid body by more than chance, and {who} "
-    explains = f"rigid body: R2 of body torque {numbers(grounds.r2(RIGID_BODY))}; {grounds.r2_min:g} is asked for"
+    explains = f"rigid body: R2 of body torque {numbers(grounds.r2(RIGID_BODY))}; {grounds.r2_min:g} is required"
     return Reason(f"{text}good enough for control about {_names(where)} ({explains})", AGAINST)
 
 

@@ -110,7 +110,7 @@ def test_selection_given_as_flight_to_identify(refuse, pipeline, study, tmp_path
     [
         ("schema_version", 99, "schema_version = 99: written by a newer cpfls; this one reads up to 2"),
         ("schema_version", "x", "the root attribute 'schema_version' is missing or not a number"),
-        ("format", "cpfls/other", "format = 'cpfls/other': this cpfls does not know it"),
+        ("format", "cpfls/other", "format = 'cpfls/other': not known to this cpfls"),
         ("seed", "x", "damaged: invalid literal for int() with base 10: 'x'"),
     ],
 )
@@ -167,7 +167,7 @@ def test_flight_of_no_samples(refuse, changed, study, tmp_path):
 
     flight = changed("flight", empty)
     assert refuse("reduce", study, flight, "-o", tmp_path / "out.h5") == [
-        f"{flight}: time: holds 0 samples, and two are the least"
+        f"{flight}: time: holds 0 samples; at least two are needed"
     ]
 
 
@@ -204,7 +204,7 @@ def test_model_whose_numbers_do_not_fit_its_structure(refuse, changed, pipeline,
     (line,) = refuse("predict", study, model, pipeline.flight, "-o", tmp_path / "out.h5")
     assert line == (
         f"{model}: vehicle/inertia_functions holds [5, 5, 5, 5, 5, 5] breakpoints and 112 coefficients; its structure "
-        "asks for [5, 5, 5, 5, 5, 5] and 113"
+        "needs [5, 5, 5, 5, 5, 5] and 113"
     )
 
 
@@ -238,7 +238,7 @@ def test_selection_with_wrong_indices(refuse, changed, pipeline, study, tmp_path
     selection = changed("selection", change)
     words = ("identify", study, pipeline.flight, "--selection", selection, "-o", tmp_path / "out.h5")
     (line,) = refuse(*words)
-    assert line.startswith(f"{selection}: indices is empty, negative or repeats itself")
+    assert line.startswith(f"{selection}: indices is empty, negative or has repeats")
 
 
 @pytest.mark.parametrize("stage", ["flight", "model"])
@@ -252,17 +252,17 @@ def test_a_flipped_bit_anywhere_is_seen_by_all_that_read(refuse, pipeline, study
         path.write_bytes(good[:place] + bytes([good[place] ^ 4]) + good[place + 1 :])
         for command in (("check", path), ("info", path), ("report", study, path, "-o", tmp_path / "r.html"), read):
             (line,) = refuse(*command)
-            assert line == f"{path}: damaged: its content does not fit the checksum at its end; copy or make it again"
+            assert line == f"{path}: damaged: its content does not match the checksum at its end; copy or make it again"
 
 
 def test_what_leads_elsewhere_is_refused(refuse, changed, pipeline):
     for link in (h5py.SoftLink("/attitude"), h5py.ExternalLink(str(pipeline.flight), "/torque")):
         path = changed("flight", put("torque", link))
         assert refuse("check", path) == [
-            f"{path}: damaged: torque is a {type(link).__name__}; an artifact holds all that it names"
+            f"{path}: damaged: torque is a {type(link).__name__}; an artifact must hold all that it refers to"
         ]
     raw = (str(pipeline.flight), 0, h5py.h5f.UNLIMITED)
     path = changed("flight", lambda file: file.create_dataset("delay/value", (1,), float, external=[raw]))
     assert refuse("check", path) == [
-        f"{path}: damaged: delay/value lies in another file; an artifact holds all that it names"
+        f"{path}: damaged: delay/value lies in another file; an artifact must hold all that it refers to"
     ]

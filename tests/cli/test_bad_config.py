@@ -129,8 +129,8 @@ ALIASES = "a0: &a0 [x]\n" + "".join(f"a{n}: &a{n} [{', '.join(10 * [f'*a{n - 1}'
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("vehicle: {mass_kg: 1, mass_kg: 2}", "FILE:1:23: not valid YAML: key 'mass_kg' stands twice"),
-        ("seed: 1\nseed: 2\n", "FILE:2:1: not valid YAML: key 'seed' stands twice"),
+        ("vehicle: {mass_kg: 1, mass_kg: 2}", "FILE:1:23: not valid YAML: key 'mass_kg' appears twice"),
+        ("seed: 1\nseed: 2\n", "FILE:2:1: not valid YAML: key 'seed' appears twice"),
         ("vehicle:\n\tmass_kg: 1\n", "FILE:2:1: not valid YAML: found character '\\t' that cannot start any token"),
         ("seed: [1\nb: }", "FILE:2:2: not valid YAML: expected ',' or ']', but got ':'"),
         ("seed: 1\n---\nseed: 2\n", "FILE:2:1: not valid YAML: but found another document"),
@@ -159,7 +159,7 @@ def test_tags_beyond_plain_data_are_refused(wrong, tag):
 
 def test_a_number_of_many_digits_and_a_deep_list(wrong):
     assert wrong("seed: 1" + "0" * 5000) == ["FILE:1:7: not valid YAML: a number of 5001 digits"]
-    assert wrong("[" * 3000) == ["FILE: lists or mappings are nested deeper than those of any config"]
+    assert wrong("[" * 3000) == ["FILE: lists or mappings are nested deeper than in any config"]
 
 
 def test_what_has_no_end_is_not_read_to_its_end(refuse):
@@ -210,7 +210,7 @@ def test_what_a_vehicle_lacks_is_named_and_no_other_vehicle_stands_in_for_it(wro
         " vehicle.rotors.0.thrust_factor_n_s2: is missing",
         " vehicle.rotors.0.drag_factor_n_m_s2: is missing",
     ]
-    assert "null if nobody knows it" in lines[0]
+    assert "null if it is not known" in lines[0]
     assert "null" not in lines[1]
     assert len(wrong("seed: 1\n")) == 4
 

@@ -78,7 +78,7 @@ def test_missing_columns_are_all_named_with_the_nearest_ones(wrong, dry_run):
         "LOG: import.signals.attitude.columns: the log has no column 'roll'",
         "LOG: import.signals.body_torque.columns: the log has no column 'mz'",
         "LOG: import.signals: the log has the columns time, Roll, pitch, yaw, mx, my, torque_z; `cpfls init LOG`"
-        " proposes what maps to what",
+        " proposes the mapping",
     ]
     assert "nearest: Roll" in lines[1]
 
@@ -103,7 +103,7 @@ def test_a_log_of_another_tool_is_listed_once_and_shortened(wrong):
         ("", "LOG: is empty; a log starts with a line of column names"),
         ("\n\n", "LOG: is empty; a log starts with a line of column names"),
         (",".join(NAMES) + "\n", "LOG: holds column names but no samples"),
-        ("t,t,pitch\n0,1,2\n", "LOG: column 't' stands twice"),
+        ("t,t,pitch\n0,1,2\n", "LOG: column 't' appears twice"),
         (",".join(NAMES) + "\n0,0,0,0,0,0,0\n1,0,0\n", "LOG:3: 3 fields, but 7 column names"),
         (",".join(NAMES) + "\n0,0,0,0,0,0,0,0\n", "LOG:2: 8 fields, but 7 column names"),
         (",".join(NAMES) + "\n0,0,up,0,0,0,0\n", "LOG:2: column 'pitch' = 'up': not a number"),
@@ -141,10 +141,10 @@ def test_one_value_that_no_flight_has_is_missing_and_told(cpfls, log_study, writ
     ("content", "message"),
     [
         (changed("my", "9e18"), "import.signals.body_torque: column 'my' holds 200 of 200 values that no flight has"),
-        (changed("t", "0"), "the log has fewer than two rows of increasing time stamps"),
+        (changed("t", "0"), "the log has fewer than two rows with increasing time stamps"),
         (
             "\n".join([",".join(NAMES), *(f"{4e-12 * row},0,0,0,0,0,0" for row in range(50))]) + "\n",
-            "import.time_column: the median step is 4e-12 s in 1.96e-10 s of 50 rows, which is no clock of a log",
+            "import.time_column: the median step is 4e-12 s in 1.96e-10 s of 50 rows, which no log has",
         ),
     ],
 )
@@ -173,7 +173,7 @@ def test_quaternions_without_a_length_are_missing(cpfls, log_study, write, tmp_p
     result = cpfls("import", log_study, write("t,qw,qx,qy,qz\n" + lines + "\n"), "-o", flight)
     assert result.exit_code == 0
     rows = zeros.stop - zeros.start
-    assert f"quaternion: {rows} rows are 0 0 0 0, which is no attitude: taken as missing" in result.stderr
+    assert f"quaternion: {rows} rows are 0 0 0 0, not an attitude: taken as missing" in result.stderr
     with h5py.File(flight) as file:
         first = 0 if zeros.start else rows
         np.testing.assert_allclose(file["attitude"][:, 2], 2 * turn[first:], atol=1e-3)
@@ -216,7 +216,7 @@ def test_flight_without_torque_is_refused_by_identify(cpfls, refuse, log_study, 
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("lowpass_hz", "25.0", "does not lie below half of the log's rate, 25 Hz"),
+        ("lowpass_hz", "25.0", "is not below half of the log's rate, 25 Hz"),
         ("delay_s", "100.0", "longer than the flight, 3.98 s"),
         ("rate_hz", "1000000000000.0", "does not suit 3.98 s of flight at 50 Hz"),
         ("rate_hz", "0.001", "does not suit 3.98 s of flight at 50 Hz"),
@@ -233,4 +233,4 @@ def test_a_key_that_does_not_suit_the_log_is_named(wrong, key, value, message, d
 
 def test_a_header_without_an_end(wrong):
     (line,) = wrong(gzip.compress(b"a" * (1 << 21)), "log.csv.gz")
-    assert line == "LOG: not a CSV file: its first line, of column names, does not end"
+    assert line == "LOG: not a CSV file: its first line, the column names, does not end"

@@ -168,4 +168,4 @@ def test_lost_flight_is_refused_with_a_remedy(short, refuse, tmp_path):
     words = ("--effect", "parameter_error.thrust_scale=-0.8", "--set", "simulation.closed_loop.deviation_max_m=5")
     (line,) = refuse("simulate", *short, *words, "-o", tmp_path / "flight.h5", code=1)
     assert "away from the path" in line
-    assert "fly gentler" in line
+    assert "fly more gently" in line

@@ -83,7 +83,7 @@ def test_replay_says_it_first(logs, tmp_path):
     config, (first, _) = logs(wrong.sign)
     replayed = run("replay", config, "vehicle", first, "-o", tmp_path / "r.h5", "--every", "50", *asked(wrong))
     assert replayed.exit_code == 0, replayed.stderr
-    assert replayed.stdout.startswith(f"REPLAY: {SAID}{first.name}: by its attitude {wrong.words}")
+    assert replayed.stdout.startswith(f"REPLAY: {SAID}{first.name}: according to its attitude, {wrong.words}")
 
 
 def test_a_model_identified_in_it_is_not_to_be_used_and_predict_says_it_first(logs, tmp_path):

@@ -28,7 +28,7 @@ HEAVY = "too heavy for 0.8 kg between these rotors (Ixx 0.05 where"
 ROTATION = ("--set", "trajectory.path=full-rotation")
 TRUE = (0.05, 0.0044, 0.0075)
 HEAVY_BODY = (0.05, 0.045, 0.0075)
-GUESSED = "guesses from mass and arms stand for what the config leaves open (--accept-guesses)"
+GUESSED = "guesses from mass and arms are used for what the config leaves open (--accept-guesses)"
 
 
 @pytest.fixture(scope="module")
@@ -156,7 +156,7 @@ def test_what_was_made_from_an_inertia_of_no_body_is_read_again(cpfls, config, c
 def test_no_gap_is_told_from_an_inertia_of_no_body(refuse, command, vehicle):
     (line,) = refuse(*command("gap"), "--model", vehicle)
     assert line == (
-        f"{vehicle}: no body has this inertia, its largest principal moment 0.05 is more than the other two together, "
+        f"{vehicle}: no body has this inertia: its largest principal moment, 0.05, exceeds the sum of the other two, "
         f"0.0119, so no gap can be measured against it; --accept-guesses takes guesses from mass and arms, or fly "
         f"what tells its "
         f"inertia: {WHAT_TO_FLY}"

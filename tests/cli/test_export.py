@@ -113,7 +113,7 @@ def test_an_incomplete_model_is_refused_and_marked_with_force(cpfls, refuse, mod
     if form == "json":
         assert json.loads(text)["complete"] is False
     else:
-        assert "INCOMPLETE MODEL: its search did not come to its end (time-limit)." in text[:400]
+        assert "INCOMPLETE MODEL: its search did not run to the end (time-limit)." in text[:400]
         assert "\nCOMPLETE = False\n" in text if form == "python" else True
     if form == "c":
         assert "#define M_COMPLETE 0\n" in output.with_suffix(".h").read_text()
@@ -167,7 +167,7 @@ def test_not_a_good_model(refuse, pipeline, model, study, tmp_path):
         file.attrs["schema_version"] = 1
         file.attrs["format"] = "cpfls/extended"
     (line,) = refuse("export", model, *words)
-    assert line.startswith(f"{model}: a model that an earlier cpfls wrote, before all models had one format; ")
+    assert line.startswith(f"{model}: a model written by an earlier cpfls, before all models shared one format; ")
 
 
 @pytest.mark.parametrize(
@@ -244,12 +244,12 @@ def test_names(cpfls, refuse, pipeline, tmp_path):
     assert cpfls(*words, "--force", "--name", "Quad_7").exit_code == 0
     assert "#define QUAD_7_OUTSIDE 1u" in (tmp_path / "2-m.h").read_text()
     (line,) = refuse(*words, "--force", "--name", "x; int y")
-    assert line == "--name x; int y: is no identifier; use letters, digits and underscores, a letter first"
+    assert line == "--name x; int y: not an identifier; use letters, digits and underscores, a letter first"
 
 
 def test_an_empty_name_is_shown(refuse, pipeline, tmp_path):
     (line,) = refuse("export", pipeline.model, "-o", tmp_path / "m.c", "--name", "")
-    assert line == "--name '': is no identifier; use letters, digits and underscores, a letter first"
+    assert line == "--name '': not an identifier; use letters, digits and underscores, a letter first"
 
 
 def test_a_name_goes_to_c_and_json_only(cpfls, refuse, pipeline, tmp_path):

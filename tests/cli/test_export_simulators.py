@@ -103,8 +103,8 @@ def test_what_a_target_cannot_hold_at_all(refuse, tmp_path):
     write_record(path, record_of(replace(whole(HEXA), effects=(), remainder=None)))
     (line,) = refuse("export", path, "--format", "rotorpy", "-o", tmp_path / "uav.py")
     assert line == (
-        f"{path.name}: RotorPy allocates thrust and torque to four rotors, this vehicle has 6; --format mjcf, sdf, jax "
-        "and casadi take any number"
+        f"{path.name}: RotorPy allocates thrust and torque to four rotors, but this vehicle has 6; --format mjcf, sdf, "
+        "jax and casadi take any number"
     )
     assert not (tmp_path / "uav.py").exists()
 

@@ -46,7 +46,7 @@ def test_what_never_ends_is_ended_with_a_message(looping, command):
     ended = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
     assert ended.returncode not in (0, None)
     assert ended.stdout == ""
-    assert ended.stderr == f"cpfls: error: {looping}: damaged: HDF5 does not come to an end with it within 1 s\n"
+    assert ended.stderr == f"cpfls: error: {looping}: damaged: HDF5 did not finish reading it within 1 s\n"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")

@@ -128,7 +128,7 @@ def test_a_good_log_has_no_notes(notes_of):
 
 def test_motors_slower_than_the_log_are_said(notes_of):
     (note,), _ = notes_of(**{f"u{i}": np.repeat(0.5 + 0.05 * NOISE[:400, i], 5) for i in range(1, 5)})
-    assert note.startswith("cpfls: note: rotor_command is updated 10 times a second and the log has 50 rows a second;")
+    assert note.startswith("cpfls: note: rotor_command is updated 10 times a second, but the log has 50 rows a second:")
 
 
 def test_motors_on_the_ground_are_said_and_the_crop_that_is_named_mends_it(notes_of):
@@ -144,13 +144,13 @@ def test_a_dead_and_a_clipped_column_are_said_by_name(notes_of):
     clipped = np.clip(1.6 * np.sin(2 * np.arange(2000) / 50) + 0.02 * NOISE[:, 1], -2, 1.3)
     notes, _ = notes_of(u3=np.full(2000, 0.4), q=clipped, pitch=-0.8 * np.cos(2 * np.arange(2000) / 50))
     assert any("column u3 of import.signals.rotor_command does not change in 2000 rows: dead" in note for note in notes)
-    assert any("column q stands at its extreme" in note for note in notes)
+    assert any("column q stays at its extreme" in note for note in notes)
 
 
 def test_a_filter_before_the_log_is_said_and_its_cut_off_is_kept(notes_of):
     filtered = low_pass(0.3 * NOISE[:, :3] + 0.3, 50.0, 12.0, 4)
     notes, flight = notes_of(**dict(zip("pqr", filtered.T, strict=True)))
-    assert "the spectrum falls off a cliff in body_rate at about 12 Hz: low-passed before it was logged" in notes[0]
+    assert "the spectrum drops sharply: body_rate at about 12 Hz; low-passed before logging" in notes[0]
     with h5py.File(flight) as file:
         assert list(file["quality/filtered"].asstr()) == ["body_rate"]
         assert file["quality/cut_off"][0] == pytest.approx(12.0, rel=0.1)

@@ -130,14 +130,14 @@ def test_time_on_the_ground_is_cut_and_said(proposed, tmp_path, own):
     path = write_csv(tmp_path / "ground.csv", flat_log(with_ground(own)))
     result, text, data = proposed(path, "--mass", MASS, "--arm", ARM, "-v")
     assert data["import"]["crop_s"] == pytest.approx([5.5, 24.5], abs=0.1)
-    assert "the first 5.5 s are cut: the rotors below 60 % of their level at hover" in result.stdout
-    assert "# the last 4.5 s are cut: the rotors stand" in text
+    assert "the first 5.5 s are cut: the rotors are below 60 % of their hover level" in result.stdout
+    assert "# the last 4.5 s are cut: the rotors stand still" in text
 
 
 def test_two_guesses_that_the_data_cannot_part_are_both_listed(proposed, tmp_path, own):
     speed = named(own.speed, "rotor1", "rotor2", "rotor3", "rotor4")
     result, text, _ = proposed(write_csv(tmp_path / "log.csv", flat_log(own, speed=speed)))
-    assert re.search(r"# or unit: rpm \(a level of 57\d\.\d is possible in both\)", text)
+    assert re.search(r"# or unit: rpm \(a level of 57\d\.\d fits both\)", text)
     assert "rotor_speed: the data cannot rule out unit: rpm: a level of 57" in result.stderr
 
 
@@ -149,7 +149,7 @@ def test_mass_and_arm_part_two_units_of_speed(proposed, tmp_path, own, factor, u
     arm = ARM if unit == "rad/s" else "0.3"
     result, text, data = proposed(path, "--mass", MASS, "--arm", arm)
     assert data["import"]["signals"]["rotor_speed"]["unit"] == unit
-    assert "propellers that fit the arms carry the mass at hover" in " ".join(text.replace("#", "").split())
+    assert "propellers that fit between the arms carry the mass at hover" in " ".join(text.replace("#", "").split())
     assert "cannot rule out" not in result.stderr
 
 
@@ -159,7 +159,7 @@ def test_several_logs_share_one_mapping(proposed, tmp_path, own):
     _, text, data = proposed(first, second, "--mass", MASS, "--arm", ARM)
     assert data["import"]["signals"]["velocity"]["required"] is False
     assert data["import"]["signals"]["attitude"].get("required", True) is True
-    assert f"{second} lacks these columns" in " ".join(text.replace("#", "").split())
+    assert f"these columns are missing in {second}" in " ".join(text.replace("#", "").split())
 
 
 def test_logs_of_two_versions_share_a_config_by_columns_that_stand_in(cpfls, proposed, tmp_path, own):
@@ -208,8 +208,8 @@ def test_the_one_log_of_other_axes_is_named_to_be_left_out(refuse, tmp_path, own
     for logs in ((odd, one, two), (one, odd, two)):
         (line,) = refuse("init", *logs, "-o", tmp_path / "study.yaml")
         assert line.endswith(
-            f"so one config cannot suit both: {odd} reads otherwise than {one} and {two}: leave it out, or run cpfls"
-            " init for it apart"
+            f"so one config cannot suit both: {odd} reads differently from {one} and {two}: leave it out, or run cpfls"
+            " init for it separately"
         )
 
 
@@ -218,8 +218,8 @@ def test_two_vehicles_in_one_call_are_refused(refuse, tmp_path, own):
     swapped = named(own.speed[:, [1, 0, 2, 3]] * 60 / (2 * np.pi), "rpm1", "rpm2", "rpm3", "rpm4")
     second = write_csv(tmp_path / "two.csv", flat_log(own, speed=swapped))
     assert refuse("init", first, second, "-o", tmp_path / "study.yaml") == [
-        f"{first} and {second} are of two vehicles (by their motion the rotors are numbered or turn differently):"
-        " run cpfls init for each of them"
+        f"{first} and {second} are of different vehicles (judged by the motion, the rotors are numbered or turn"
+        " differently): run cpfls init for each of them"
     ]
 
 
@@ -277,7 +277,7 @@ def test_a_log_of_px4_brings_its_rotors_along(proposed, tmp_path, own):
             "CA_ROTOR*_PX, _PY and the signs of _KM in the log: these 4 rotors cannot turn the vehicle about"
             " yaw by themselves; correct the parameters in the autopilot, or state vehicle.rotors by hand",
         ),
-        ({"MAV_TYPE": 1}, "MAV_TYPE = 1 in its parameters is no multirotor"),
+        ({"MAV_TYPE": 1}, "MAV_TYPE = 1 in its parameters is not a multirotor"),
     ],
 )
 def test_parameters_that_contradict_a_multirotor_are_refused(refuse, tmp_path, own, parameters, message):
@@ -291,7 +291,7 @@ def test_a_vehicle_of_other_parameters_is_another_vehicle(refuse, tmp_path, own)
     first.write_bytes(ulog_of_flight(own))
     second.write_bytes(ulog_of_flight(own, CA_ROTOR0_PX=0.3, SYS_AUTOSTART=4002))
     (line,) = refuse("init", first, second, "-o", tmp_path / "study.yaml")
-    assert line.startswith(f"{first} and {second} are of two vehicles (CA_ROTOR0_PX 0.11 and 0.3; ")
+    assert line.startswith(f"{first} and {second} are of different vehicles (CA_ROTOR0_PX 0.11 and 0.3; ")
     assert "SYS_AUTOSTART 4001 and 4002" in line
 
 
@@ -301,7 +301,7 @@ def test_bad_logs_are_refused_with_one_message(refuse, tmp_path, own):
     cut.write_bytes(ulog_of_flight(own)[:12])
     text.write_text("no log\n")
     write_csv(still, flat_log(own, speed=named(np.zeros((2000, 4)), "cmd1", "cmd2", "cmd3", "cmd4")))
-    assert refuse("init", still, "-o", output) == [f"{still}: nothing flies in it: the rotors (cmd*) never change"]
+    assert refuse("init", still, "-o", output) == [f"{still}: no flight in it: the rotors (cmd*) never change"]
     assert refuse("init", tmp_path / "none.csv", "-o", output) == [f"{tmp_path / 'none.csv'}: no such file"]
     (line,) = refuse("init", text, "-o", output)
     assert line.startswith(f"{text}: not a log")
@@ -317,7 +317,8 @@ def test_a_stamp_a_year_off_takes_no_memory_and_is_told(refuse, tmp_path, own):
     columns[clock] = np.append(columns[clock][:-1], columns[clock][-1] + 3e7)
     path = write_csv(tmp_path / "log.csv", log)
     (line,) = refuse("init", path, "-o", tmp_path / "study.yaml")
-    assert line.startswith(f"{path}: its stamps span 3e+07 s, and 2000 rows at 100 Hz are 20 s: damaged, or no clock")
+    said = "its stamps span 3e+07 s, but 2000 rows at 100 Hz are 20 s: damaged, or not a clock"
+    assert line.startswith(f"{path}: {said}")
 
 
 @pytest.mark.parametrize("option", [("--mass", "inf"), ("--mass", "1e300"), ("--arm", "170")])
@@ -360,10 +361,11 @@ def test_two_masses_in_one_config_are_said_by_how_much(proposed, tmp_path, own, 
         values |= {} if by == "accelerometer" else {"force": None}
         logs.append(write_csv(tmp_path / f"{number}.csv", flat_log(other, **values)))
     result, _, _ = proposed(*logs, "--mass", "0.037", "--arm", "0.05")
-    found = re.search(r"so with equal propellers it weighs (\d+) % more, (0\.\d+) kg if the other has", result.stderr)
+    heavier = r"so with equal propellers it weighs (\d+) % more, (0\.\d+) kg if the other weighs"
+    found = re.search(heavier, result.stderr)
     assert bool(found) == (mass == 44.0)
     if found:
         assert int(found[1]) == pytest.approx(19, abs=3)
         assert float(found[2]) == pytest.approx(0.044, abs=0.001)
-        assert ("or its battery is emptier" in result.stderr) == (by == "command")
+        assert ("or its battery is lower" in result.stderr) == (by == "command")
         assert "its own --mass" in result.stderr

@@ -61,7 +61,7 @@ def test_messages_name_a_new_format(refuse, log_study, tmp_path):
     words = ("-o", tmp_path / "flight.h5")
     text.write_text("t,roll\n0,1\n")
     assert refuse("import", log_study, text, *words) == [
-        f"{text}: seems to hold CSV, not what its name ends in; rename it to end in .csv"
+        f"{text}: seems to hold CSV, unlike the ending of its name; rename it to end in .csv"
     ]
     assert refuse("import", log_study, other, *words) == [f"{other}: no such file"]
     other.write_text("t\n")

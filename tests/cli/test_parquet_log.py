@@ -112,7 +112,7 @@ def test_a_dot_in_a_name_is_part_of_it(cpfls, log_study, write, tmp_path):
 def test_columns_that_hold_no_numbers_are_named(wrong, write):
     log = write({"t": TIME} | COLUMNS | {"pitch": ["up"] * len(TIME)})
     assert wrong(log) == [
-        "LOG: column 'pitch' holds string: not numbers; map another column in import.signals, or write this one as "
+        "LOG: column 'pitch' holds string, not numbers; map another column in import.signals, or write this one as "
         "numbers"
     ]
     nested = write({"t": TIME} | COLUMNS | {"yaw": [[1.0]] * len(TIME)}, "nested.parquet")
@@ -170,7 +170,7 @@ def test_columns_of_nulls_are_named(wrong, write):
 def test_another_kind_than_the_name_says_is_named(wrong, tmp_path, name, held, called, ending):
     (tmp_path / name).write_bytes(held)
     (line,) = wrong(tmp_path / name)
-    assert line == f"LOG: seems to hold {called}, not what its name ends in; rename it to end in {ending}"
+    assert line == f"LOG: seems to hold {called}, unlike the ending of its name; rename it to end in {ending}"
 
 
 @pytest.mark.parametrize("name", ["log.parquet", "log.csv"])

@@ -203,7 +203,7 @@ def test_a_vehicle_of_unknown_numbers_needs_a_model(refuse, folder, tmp_path):
     config = tmp_path / "open.yaml"
     config.write_text(CONFIG + VEHICLE.replace("[0.6, 0.6, 1.2]", "null"))
     (message,) = refuse("response", config, folder / "light.csv", "-o", tmp_path / "r.h5")
-    assert "vehicle.inertia_kg_m2: not known in this config, and `cpfls response` needs" in message
+    assert "vehicle.inertia_kg_m2: not known in this config, but `cpfls response` needs" in message
 
 
 def test_an_identified_model_is_judged_with_its_inertia(cpfls, pipeline, study, tmp_path):

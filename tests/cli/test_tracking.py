@@ -158,10 +158,10 @@ def test_an_unfinished_search_is_said(control, made):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--set", "vehicle.mass_kg=7"], "was made with another vehicle; not the same: vehicle.mass_kg"),
+        (["--set", "vehicle.mass_kg=7"], "was made with another vehicle; these differ: vehicle.mass_kg"),
         (["--mode", "inverse"], "no model is flown in mode inverse; leave the mode out"),
         (["--effect", "rotor_drag=0.001"], "effects are flown in closed loop only; add --mode closed-loop"),
-        (["--set", "simulation.noise={position: 0.1}"], "position: a vehicle whose attitude alone is controlled"),
+        (["--set", "simulation.noise={position: 0.1}"], "position: a vehicle with only attitude control"),
         (
             ["--set", "simulation.computed_torque.control_rate_hz=40"],
             "simulation.computed_torque.control_rate_hz = 40.0: lower than the 50 samples in a second",

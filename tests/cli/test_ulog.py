@@ -160,7 +160,7 @@ def test_bytes_that_are_broken_are_warned_of(flown):
     place = content.find(data(*rows()[300]))
     content[place + 3 : place + 5] = b"\xff\xff"
     _, _, stderr = flown(bytes(content))
-    assert "the file is broken in places" in " ".join(stderr.split())
+    assert "the file is damaged in places" in " ".join(stderr.split())
 
 
 def test_other_topics_are_not_in_the_way(flown):
@@ -183,7 +183,7 @@ def test_a_topic_that_is_not_there_is_named_with_those_that_are(wrong, config):
     topics = "vehicle_angular_velocity, vehicle_attitude, vehicle_torque_setpoint"
     assert wrong(ulog()) == [
         "LOG: import.signals.body_torque.columns: the log has no column '?!'",
-        f"LOG: import.signals: the log has the topics {topics}; `cpfls init LOG` proposes what maps to what",
+        f"LOG: import.signals: the log has the topics {topics}; `cpfls init LOG` proposes the mapping",
     ]
 
 
@@ -191,10 +191,9 @@ def test_a_topic_that_is_not_there_is_named_with_those_that_are(wrong, config):
 def test_a_clock_that_is_none_is_told_what_one_is(wrong, column):
     (line,) = wrong(ulog(), "--set", f"import.time_column={column}")
     assert line == (
-        f"LOG: import.time_column = {column!r}: in this log every topic has stamps; name those of the fastest one that"
-        " is mapped, such as vehicle_angular_velocity.timestamp, or null for them; the log has the topics"
-        " vehicle_angular_velocity, vehicle_attitude, vehicle_torque_setpoint; `cpfls init LOG` proposes what maps to"
-        " what"
+        f"LOG: import.time_column = {column!r}: in this log every topic has its own stamps; name those of the"
+        " fastest mapped one, such as vehicle_angular_velocity.timestamp, or null for them; the log has the topics"
+        " vehicle_angular_velocity, vehicle_attitude, vehicle_torque_setpoint; `cpfls init LOG` proposes the mapping"
     )
 
 
@@ -209,15 +208,15 @@ def test_a_slow_topic_is_named(wrong):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "LOG: not a ULog file: it does not begin as one"),
-        (b"t,roll\n0,1\n", "LOG: seems to hold CSV, not what its name ends in; rename it to end in .csv"),
+        (b"", "LOG: not a ULog file: it does not start like one"),
+        (b"t,roll\n0,1\n", "LOG: seems to hold CSV, unlike the ending of its name; rename it to end in .csv"),
         (header()[:10], "LOG: a broken ULog file: "),
         (header(), "LOG: a ULog file without samples: was the logger stopped at once, or the file cut off?"),
         (header() + definitions(FIELDS), "LOG: a ULog file without samples: "),
         (header() + message("B", bytes(8) + b"\x80" + bytes(31)), "LOG: a broken ULog file: "),
         (
             header() + definitions({"wheel": "uint64_t timestamp;wheel inner;float x"}) + data(0, 0, [1.0]),
-            "LOG: a broken ULog file: a message of it contains itself",
+            "LOG: a broken ULog file: one of its messages contains itself",
         ),
     ],
     ids=["empty", "text", "header-cut", "header-only", "no-data", "unknown-flag", "wheel"],
@@ -326,8 +325,8 @@ def test_one_example_takes_logs_of_all_versions(cpfls, write, tmp_path, version)
     assert result.exit_code == 0, result.stderr
     told = " ".join(result.stderr.split())
     for signal, column in zip(("body_rate", "rotor_command"), VERSIONS[version], strict=True):
-        assert (f"{signal} is that of {column}" in told) == (column is not None)
-    assert ("acceleration is that of sensor_combined.accelerometer_m_s2[0]" in told) == (version != "1.17")
+        assert (f"{signal} is taken from {column}" in told) == (column is not None)
+    assert ("acceleration is taken from sensor_combined.accelerometer_m_s2[0]" in told) == (version != "1.17")
     with h5py.File(flight) as file:
         np.testing.assert_allclose(file["body_rate"][()], [[0.0, 0.0, -YAW_RATE]] * len(file["time"]), atol=1e-6)
         np.testing.assert_allclose(file["rotor_command"][-20], [0.5, 0.6, 0.6, 0.5], atol=1e-6)
@@ -356,7 +355,7 @@ def test_where_motors_are_not_logged_the_pulses_are_offered(refuse, write, tmp_p
 def test_what_no_version_has_is_said_to_have_been_tried(refuse, write, tmp_path):
     log = write(of_version("1.10", removed=("actuator_outputs",)))
     lines = refuse("import", EXAMPLE, log, "-o", tmp_path / "flight.h5")
-    begin = ".signals.rotor_command.columns: the log has no column 'actuator_motors.control[0]', nor all columns of an"
+    begin = ".signals.rotor_command.columns: the log has no column 'actuator_motors.control[0]', nor all columns of any"
     assert lines[0].partition(": import")[2].startswith(f"{begin} entry of otherwise (")
 
 

@@ -276,14 +276,14 @@ def test_what_cannot_be_resumed_is_refused(cpfls, refuse, config, flights, tmp_p
         ((flights[0], "--set", "seed=2"), "seed = 1 there, 2 here"),
     ):
         (message,) = refuse("vehicle", config, *words, "-o", output, "--resume")
-        assert message.startswith(f"{output}.checkpoint: is of another search: ")
+        assert message.startswith(f"{output}.checkpoint: belongs to another search: ")
         assert named in message
     checkpoint = tmp_path / "v.h5.checkpoint"
     content = bytearray(checkpoint.read_bytes())
     content[len(content) // 2] ^= 1
     checkpoint.write_bytes(content)
     (message,) = refuse("vehicle", config, flights[0], "-o", output, "--resume")
-    assert "damaged: its content does not fit the checksum at its end" in message
+    assert "damaged: its content does not match the checksum at its end" in message
 
 
 @pytest.fixture

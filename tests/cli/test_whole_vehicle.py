@@ -174,7 +174,7 @@ def test_people_read_what_was_flown(cpfls, config, path, vehicle, tmp_path):
     [
         (("--mode", "inverse"), "{model}: no model is flown in mode inverse; "),
         (("--mode", "computed-torque"), "{model}: a model with effects is flown in closed loop only; "),
-        (("--set", "vehicle.mass_kg=0.9"), "{model}: was made with another vehicle; not the same: vehicle.mass_kg"),
+        (("--set", "vehicle.mass_kg=0.9"), "{model}: was made with another vehicle; these differ: vehicle.mass_kg"),
         (
             ("--mode", "closed-loop", "--effect", "rotor_drag=1e-4"),
             "simulation.closed_loop.effects.rotor_drag = [0.0001]: the model has it already",
@@ -346,7 +346,7 @@ def test_what_a_config_leaves_open_is_no_fact_for_another_model(refuse, open_con
     left_open, log = open_config
     words = {"predict": (log, log), "replay": ("vehicle", log)}.get(command, (log,))
     (line,) = refuse(command, left_open, *words, "-o", tmp_path / "x.h5")
-    assert f"not known in this config, and `cpfls {command}` needs what is null there" in line
+    assert f"not known in this config, but `cpfls {command}` needs what is null there" in line
 
 
 def test_an_exported_vehicle_is_flown_back(cpfls, refuse, vehicle, flight, noisy, monkeypatch):

@@ -21,7 +21,7 @@ EFFECT = Effect(
     title="time shift between rotor and gyro channels",
     kind="actuator",
     formula="w(t) = w_logged(t - d);  M = M_rot(w) - M_rot(w_logged)",
-    sentence="Rotor speeds and rates are logged at different times, so that cause and effect do not meet.",
+    sentence="Rotor speeds and rates are logged at different times, so cause and effect do not line up.",
     needs=frozenset({"measured_rotor_speed"}),
     excitation="roll and pitch torque sweeps from 0.5 to 3 Hz",
     rivals={
@@ -46,7 +46,7 @@ EFFECT = Effect(
         smallest_samples=0.2,
         number=lambda _, value: f"{1000 * abs(value):.3g} ms {'behind' if value > 0 else 'ahead of'}",
         found="The gyroscope runs {} the attitude.",
-        nothing="Gyroscope and attitude keep the same time.",
+        nothing="Gyroscope and attitude are on the same clock.",
         error=lambda values: ReadingError(delay=float(values[0])),
     ),
 )

@@ -24,7 +24,7 @@ _EFFECT = Effect(
     title="offset of the centre of mass",
     kind="wrench",
     formula="M = -c x F,  F the force without weight, as measured, or else the thrust",
-    sentence="The centre of mass is not where the model has it, so that thrust tilts the vehicle.",
+    sentence="The centre of mass is not where the model has it, so thrust tilts the vehicle.",
     coefficients=(
         Coefficient("c_x", "m", -0.4, 0.4, "true centre of mass, forward of that of the model", scales.arm),
         Coefficient("c_y", "m", -0.4, 0.4, "true centre of mass, left of that of the model", scales.arm),
@@ -33,7 +33,7 @@ _EFFECT = Effect(
     excitation="changes of thrust: climbs, descents, hard stops",
     rivals={
         "torque_bias": "change the thrust: a bias stays, the torque of an offset grows with thrust",
-        "rotor_mismatch": "make yaw effort: it loads one pair of rotors more than the other",
+        "rotor_mismatch": "apply yaw effort: it loads one pair of rotors more than the other",
         "wind": "turn in yaw, and change the thrust",
     },
     source="geometry; RotorPy (hub positions relative to the centre of mass)",

@@ -17,7 +17,7 @@ EFFECT = Effect(
     excitation="roll and pitch torque sweeps from 0.5 to 3 Hz",
     rivals={
         "motor_lag": "sweep the torque up to 3 Hz and above: lag also weakens it, a delay does not",
-        "linear_damping": "log measured rotor speeds; a delay looks like damping below zero",
+        "linear_damping": "log measured rotor speeds; a delay looks like negative damping",
     },
     source="SkyFlow (command transport delay)",
     shapes=(Shape("delay_s", "s", (0.004, 0.008, 0.012, 0.02, 0.03, 0.04, 0.055, 0.07, 0.09, 0.12), "time of travel"),),

@@ -21,7 +21,7 @@ EFFECT = Effect(
     title="torque about Euler instead of body axes",
     kind="wrench",
     formula="M = (W^-T - 1) M_rot",
-    sentence="The log gives torques about the axes of the Euler angles, and the model takes them for body axes; they "
+    sentence="The log gives torques about the axes of the Euler angles, but the model takes them for body axes; these "
     "differ as soon as the vehicle tilts.",
     needs=frozenset({"attitude", "torque"}),
     excitation="roll, pitch and yaw torque at large tilt",

@@ -54,7 +54,7 @@ EFFECT = Effect(
     title="a part of the vehicle on springs",
     kind="wrench",
     formula="M = d/dt (share I s^2/(s^2 + 2 zeta W s + W^2) omega), W = 2 pi f, for each axis",
-    sentence="A part of the vehicle swings on springs: what turns fast turns without it.",
+    sentence="A part of the vehicle swings on springs and does not follow fast rotation.",
     coefficients=of_axes("share_{}", "1", 0.0, 0.8, "share of the inertia about {} that is on springs"),
     needs=frozenset({"body_rate", "torque"}),
     excitation="roll and pitch sweeps through the resonance, from 0.5 to 8 Hz, then hands off for a second",

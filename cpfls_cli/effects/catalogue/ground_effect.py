@@ -26,7 +26,7 @@ EFFECT = Effect(
     title="ground effect",
     kind="wrench",
     formula="dT_i = T_i (1 / (1 - G (R/4z_i)^2) - 1),  M = sum r_i x dT_i z",
-    sentence="Near the ground the rotors pull more, the lower ones most, so that the vehicle is levelled.",
+    sentence="Near the ground the rotors pull more, the lower ones most, so the vehicle is levelled.",
     needs=frozenset({"height", "rotor_speed", "rotor_radius"}),
     excitation="slow hover and tilt at heights of one, two and four rotor radii",
     rivals={

@@ -15,7 +15,7 @@ EFFECT = Effect(
     coefficients=of_axes("b_{}", "rad/s", -0.3, 0.3, "bias about {}"),
     needs=frozenset({"attitude"}),
     excitation="any flight of some minutes; the attitude must not come from the gyro alone",
-    rivals={"imu_misalignment": "roll, pitch and yaw: a bias stays the same at every rate"},
+    rivals={"imu_misalignment": "roll, pitch and yaw the vehicle: a bias stays the same at every rate"},
     source="definition; comparison of the gyro with the derivative of the attitude",
     log=gyroscope_log(lambda rate, bias: rate + bias),
     test=SensorTest(
@@ -23,7 +23,7 @@ EFFECT = Effect(
         smallest=0.0015,
         number=lambda axis, value: f"{value:+.4f} rad/s about {axis}",
         found="The gyroscope shows a rate where there is none: {}.",
-        nothing="No constant error of the gyroscope that matters.",
+        nothing="The gyroscope has no constant error that matters.",
         error=lambda values: ReadingError(offset=values),
     ),
 )

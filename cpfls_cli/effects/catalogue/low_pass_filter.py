@@ -14,13 +14,13 @@ EFFECT = Effect(
     title="second-order low-pass before the rotors",
     kind="actuator",
     formula="w_i = W^2/(s^2 + 2 b W s + W^2) w_i,commanded, W = 2 pi f;  M = M_rot(w) - M_rot(w_commanded)",
-    sentence="A filter of the autopilot, or a drive with its speed control, passes slow commands and loses fast ones.",
+    sentence="A filter in the autopilot, or a drive with speed control, passes slow commands and loses fast ones.",
     needs=frozenset({"body_rate", "command", "torque"}),
     excitation="roll and pitch torque sweeps to beyond the cut-off, or steps of the command",
     rivals={
-        "motor_lag": "log the speeds of the rotors at steps of the command: a lag sets off at once, a low-pass at rest",
-        "command_delay": "sweep the torque to higher frequencies: a delay lets all through, a low-pass ever less",
-        "notch_filter": "sweep the torque through the notch and beyond: behind a notch the motion follows again",
+        "motor_lag": "log the speeds of the rotors at steps of the command: a lag sets off at once, a low-pass slowly",
+        "command_delay": "sweep the torque to higher frequencies: a delay passes all, a low-pass less and less",
+        "notch_filter": "sweep the torque through the notch and beyond: beyond a notch the motion follows again",
     },
     source="second-order low-pass; ArduPilot LowPassFilter2p.cpp, PX4 LowPassFilter2p.hpp (bilinear transform)",
     shapes=(

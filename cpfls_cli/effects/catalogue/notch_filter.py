@@ -14,12 +14,12 @@ EFFECT = Effect(
     title="notch filter of the autopilot",
     kind="actuator",
     formula="w_i = (s^2 + W^2)/(s^2 + 2 b W s + W^2) w_i,commanded, W = 2 pi f;  M = M_rot(w) - M_rot(w_commanded)",
-    sentence="The autopilot takes a band of frequencies out of its commands before the rotors get them.",
+    sentence="The autopilot removes a band of frequencies from its commands before the rotors get them.",
     needs=frozenset({"body_rate", "command", "torque"}),
     excitation="roll and pitch torque sweeps through the frequency of the notch, from 0.5 to 6 Hz",
     rivals={
-        "command_delay": "sweep the torque through the notch: there motion stops following, a delay lets all through",
-        "motor_lag": "sweep the torque through the notch and beyond: behind the notch the motion follows again",
+        "command_delay": "sweep the torque through the notch: there the motion stops following, a delay passes all",
+        "motor_lag": "sweep the torque through the notch and beyond: beyond the notch the motion follows again",
     },
     source="second-order notch; ArduPilot NotchFilter.cpp, PX4 NotchFilter.hpp (bilinear transform, frequency kept)",
     shapes=(

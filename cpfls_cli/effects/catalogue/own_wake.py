@@ -36,12 +36,12 @@ def _lever(linear: Array, error: Array, vehicle: VehicleSettings) -> BoolArray:
 EFFECT = Effect(
     name="own_wake",
     order=55,
-    title="wake of the own rotors on rear rotors and body",
+    title="wake of its own rotors on rear rotors and body",
     kind="wrench",
     formula="F_z = -c_F T sin X,  M = (c_M + c_B sin X) T sin X (u_y, -u_x, 0)/|u|,  tan X = |u|/v_i, "
     "v_i = sqrt(T_h/(2 rho pi R^2))",
     sentence="In forward flight the wake of the front rotors is carried over the rear ones and the body, which lose "
-    "lift there: the nose rises.",
+    "lift: the nose rises.",
     coefficients=(
         Coefficient("c_F", "1", 0.0, 0.3, "share of the thrust that is lost in fast flight"),
         Coefficient("c_M", "m", 0.0, 0.3, "moment per thrust in fast flight, of rotors in the wake", scales.arm),
@@ -51,7 +51,7 @@ EFFECT = Effect(
     excitation="level legs at two speeds, one twice the other, forward and sideways",
     rivals={
         "flapping_moment": "log acceleration, and fly legs at two speeds above that of the wake: its moment stays, "
-        "that of the hubs grows on",
+        "that of the hubs keeps growing",
         "rotor_drag": "log acceleration: the wake takes lift, the drag acts against the motion",
         "parasitic_drag": "log acceleration, and fly legs at two speeds, one twice the other",
         "rolling_moment": "fly forward and sideways: the wake lifts the side that is ahead",

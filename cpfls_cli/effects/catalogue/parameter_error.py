@@ -182,8 +182,8 @@ EFFECT = Effect(
     title="wrong inertia or thrust scale",
     kind="parameter",
     formula="M = -(d/dt (dI omega) + omega x dI omega) - g_i I omega_j omega_k,  dI = diag(e_i I_ii);  F_z = e_T T",
-    sentence="The vehicle is as modelled, but a number of it is wrong. Rates and rotor speeds show only the ratio of "
-    "inertia to rotor torque; the force balance shows the scale of the thrust.",
+    sentence="The vehicle is as modelled, but one of its numbers is wrong. Rates and rotor speeds show only the ratio "
+    "of inertia to rotor torque; the force balance shows the scale of the thrust.",
     coefficients=(
         *of_axes("inertia_{}", "1", *_BOUNDS, "true I{0}{0} over that of the model, less 1"),
         *of_axes("coupling_{}", "1", -3.0, 3.0, _COUPLED),
@@ -195,7 +195,7 @@ EFFECT = Effect(
     rivals={
         "battery_sag": "compare the start with the end of a flight: a wrong parameter stays",
         "gyro_scale": "compare the gyro with the attitude: a wrong inertia leaves them equal",
-        "rotor_mismatch": "make yaw effort at constant roll and pitch",
+        "rotor_mismatch": "apply yaw effort at constant roll and pitch",
         "rotor_acceleration": "compare slow with fast yaw: a wrong Izz acts in both",
         "motor_lag": "compare slow with fast torque: a wrong inertia acts in both",
     },

@@ -42,8 +42,8 @@ EFFECT = Effect(
     title="parasitic drag of the fuselage",
     kind="wrench",
     formula="F = -|v| (c_x v_x, c_y v_y, c_z v_z),  M = cr x (-|v| v)",
-    sentence="The fuselage drags behind with the square of the air speed, and turns the vehicle where the drag acts "
-    "beside the centre of mass.",
+    sentence="The drag of the fuselage grows with the square of the air speed, and turns the vehicle if it acts off "
+    "the centre of mass.",
     coefficients=(*_FORCES, *_TORQUES),
     needs=frozenset({"velocity"}),
     excitation="legs at two or more speeds, in both directions",

@@ -317,7 +317,7 @@ EFFECT = Effect(
     title="load on a cable",
     kind="wrench",
     formula="M = m_p r_a x R^T t,  F = m_p R^T t,  t = (g + a_z) (e_x, e_y, -1)/|.|,  e'' + c e' + g/L e = -a/L",
-    sentence="A load on a cable swings under the vehicle and pulls it to and fro after each change of speed.",
+    sentence="A load on a cable swings under the vehicle and pulls it back and forth after each change of speed.",
     coefficients=(
         Coefficient("mass_times_depth", "kg m", 0.0, 1.0, "mass times depth of the hook", scales.arm_mass),
         Coefficient(

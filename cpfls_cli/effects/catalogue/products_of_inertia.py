@@ -25,7 +25,7 @@ EFFECT = Effect(
     title="products of inertia",
     kind="wrench",
     formula="M = -(d/dt (dI omega) + omega x dI omega),  dI off the diagonal",
-    sentence="The mass is spread askew, so that turning about one axis turns the vehicle about another.",
+    sentence="The mass is distributed unevenly, so rotation about one axis turns the vehicle about another.",
     coefficients=tuple(
         Coefficient(name, "kg m^2", -0.25, 0.25, f"entry {name} of the inertia tensor, added", scales.smallest_inertia)
         for name in INERTIA_PARAMETERS[3:]

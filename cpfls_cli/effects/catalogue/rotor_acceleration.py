@@ -23,7 +23,7 @@ EFFECT = Effect(
     title="reaction to rotor acceleration",
     kind="wrench",
     formula="M_z = -d/dt (J_r S),  S = sum s_i w_i",
-    sentence="A rotor that speeds up pushes the body the other way, so that yaw answers at once and then less.",
+    sentence="A rotor that speeds up pushes the body the other way, so yaw responds at once and then less.",
     coefficients=(Coefficient("J_r", "kg m^2", 0.0, 0.01, "inertia of one rotor about its axis", scales.MOMENTS[0]),),
     needs=frozenset({"body_rate", "rotor_speed"}),
     excitation="yaw steps, and a yaw sweep from 0.3 to 2 Hz, with rotor speeds logged at 100 Hz or more",

@@ -146,9 +146,9 @@ EFFECT = Effect(
     needs=frozenset({"rotor_speed"}),
     excitation="yaw effort to both sides, and changes of thrust",
     rivals={
-        "com_offset": "make yaw effort: it loads one pair of rotors more than the other",
-        "torque_bias": "change the thrust and make yaw effort",
-        "parameter_error": "make yaw effort at constant roll and pitch",
+        "com_offset": "apply yaw effort: it loads one pair of rotors more than the other",
+        "torque_bias": "change the thrust and apply yaw effort",
+        "parameter_error": "apply yaw effort at constant roll and pitch",
     },
     source="rotor by rotor thrust factors in quad_race_env (tudelft) and SkyFlow",
     columns=_columns,

@@ -29,7 +29,7 @@ EFFECT = Effect(
     title="rotor-plane damping",
     kind="wrench",
     formula="M = -k_w sum(w_i) (p, q, 0),  F_i = k_F w_i (-q, p, 0)",
-    sentence="The rotor discs tilt late behind a rolling or pitching body, and brake it the more the faster they spin.",
+    sentence="The rotor discs tilt later than a rolling or pitching body, and brake it more the faster they spin.",
     coefficients=(
         Coefficient(
             "k_w", "N m s^2/rad^2", 0.0, 1.0, "damping per rotor speed and rate", scales.inertia_per_rotor_speed

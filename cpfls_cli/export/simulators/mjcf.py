@@ -87,10 +87,10 @@ def mjcf_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) -> str:
 
 _USE = (
     "Controls: data.ctrl[:] = speed[rotor] ** power, with the rotor speeds in rad/s in the order of the config and the "
-    "two arrays model.numeric('ctrl_rotor').data.astype(int) and model.numeric('ctrl_power').data; rotor is -1, and "
-    "power 0, for what needs no speed.",
-    "The frame of the body is x forward, y left, z up, its origin the centre of mass. MuJoCo's wind acts on the sphere "
-    "that drags, not on the actuators.",
+    "two arrays model.numeric('ctrl_rotor').data.astype(int) and model.numeric('ctrl_power').data; rotor is -1 and "
+    "power is 0 for what needs no speed.",
+    "The frame of the body is x forward, y left, z up, its origin the centre of mass. MuJoCo's wind acts on the drag "
+    "sphere, not on the actuators.",
 )
 
 

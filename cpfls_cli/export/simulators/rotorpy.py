@@ -34,8 +34,8 @@ def rotorpy_held(model: VehicleModel) -> tuple[Held, Holds]:
     """Take what RotorPy flies of a vehicle."""
     if model.rotors != _ROTORS:
         raise InputError(
-            f"RotorPy allocates thrust and torque to four rotors, this vehicle has {model.rotors}; --format mjcf, sdf, "
-            "jax and casadi take any number"
+            f"RotorPy allocates thrust and torque to four rotors, but this vehicle has {model.rotors}; --format mjcf, "
+            "sdf, jax and casadi take any number"
         )
     numbers = numbers_of(model, _wrenches, alike=True)
     body = constant_body(model)._replace(gravity=_GRAVITY)

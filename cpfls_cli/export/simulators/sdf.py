@@ -99,7 +99,7 @@ def sdf_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) -> str:
 
 _USE = (
     "Commands: actuators messages on the topic /NAME/command/motor_speed, speeds in rad/s in the order of the config. "
-    "The world has to set gravity and a wind, which may be zero; the model needs no other plugin.",
+    "The world must set gravity and a wind, which may be zero; the model needs no other plugin.",
 )
 
 

@@ -93,12 +93,12 @@ class Judge:
             channel = int(np.argmax(harm[worst]))
             return Refusal(
                 worst,
-                f"on the flights held out it makes the {CHANNELS[channel]} worse, "
+                f"on the held-out flights it makes the {CHANNELS[channel]} worse, "
                 f"{compared[worst].left[channel]:.2g} floors without it and {after[channel]:.2g} with it",
             )
         least = smallest(compared, lambda each: compared[each].visibly)
         if compared[least].visibly < VISIBLE**2:
-            return Refusal(least, "on the flights held out the gap is as small without it")
+            return Refusal(least, "on the held-out flights the gap is as small without it")
         return _elsewhere(judgement, compared) or _filling(judgement, compared)
 
     def _without(self, judgement: Judgement, name: str) -> Without:
@@ -171,8 +171,8 @@ def _elsewhere(judgement: Judgement, compared: dict[str, Without]) -> Refusal | 
         if most != candidate.effect.name:
             return Refusal(
                 candidate.effect.name,
-                f"its {reaching[0]} may be at the bound of what is possible, and what the formula of {most} is"
-                f" off by in the {CHANNELS[channel]} would then look no different",
+                f"its {reaching[0]} may be at the bound of what is possible, and the error of the formula of"
+                f" {most} in the {CHANNELS[channel]} would then look the same",
             )
     return None
 
@@ -192,8 +192,8 @@ def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | No
             told = f"{left:.2g} floors are left with it" if left > CLEAR else f"it is {off**0.5:.2g} floors large"
             return Refusal(
                 name,
-                f"in the {CHANNELS[channel]} {told}, and it takes off less than a hundredth of what the largest effect"
-                " does: what the formula of that one is off by looks no different",
+                f"in the {CHANNELS[channel]} {told}, and it removes less than a hundredth of what the largest effect"
+                " does: the error of that one's formula looks the same",
             )
     return None
 
@@ -228,15 +228,15 @@ def differences(
     if seen[there] > CLEAR and not unseen[here] > CLEAR:
         what = f" of what would be {' and '.join(names)}" if names else ""
         return (
-            f"the flights learned from have a gap of {seen[there]:.2g} floors in the {CHANNELS[there]}{what}, and those"
-            f" held out have none ({unseen[here]:.2g} floors at most): something changed between them, or the flights"
-            " held out do not move so that it shows",
+            f"the training flights have a gap of {seen[there]:.2g} floors in the {CHANNELS[there]}{what}, and the"
+            f" held-out flights have none ({unseen[here]:.2g} floors at most): something changed between them, or the"
+            " held-out flights do not move in a way that shows it",
         )
     if unseen[here] > CLEAR and not seen[there] > CLEAR and not judge.remainder(last.found).unexplained:
         return (
-            f"the flights held out have a gap of {unseen[here]:.2g} floors in the {CHANNELS[here]}, and those learned"
-            f" from have none ({seen[there]:.2g} floors at most): something changed between them, or only the flights"
-            " held out move so that it shows; learn from one of them",
+            f"the held-out flights have a gap of {unseen[here]:.2g} floors in the {CHANNELS[here]}, and the training"
+            f" flights have none ({seen[there]:.2g} floors at most): something changed between them, or only the"
+            " held-out flights move in a way that shows it; learn from one of them",
         )
     return _other_numbers(first, judge, settings) if names else ()
 
@@ -262,7 +262,7 @@ def _other_numbers(first: Judgement, judge: Judge, settings: GapSettings) -> tup
             if apart:
                 sentences.append(
                     f"{number.name} is {number.value:.3g} [{number.low:.3g}, {number.high:.3g}] {number.unit} in the"
-                    f" flights learned from and {other.value:.3g} [{other.low:.3g}, {other.high:.3g}] in those held out"
+                    f" training flights and {other.value:.3g} [{other.low:.3g}, {other.high:.3g}] in the held-out ones"
                 )
     return tuple(sentences)
 

@@ -257,7 +257,7 @@ def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
     missing = [effect.missing(signals) for signals in hypothesis.signals]
     if all(missing):
         if "command" in missing[0]:
-            return "rotor speeds are measured, so what lies between command and speed does not show"
+            return "rotor speeds are measured, so nothing between command and speed shows"
         wanted = hypothesis.signals[0].to_log(missing[0])
         return f"the flights lack {', '.join(name.replace('_', ' ') for name in wanted)}"
     if effect.columns is None:

@@ -38,7 +38,7 @@ def require_tellable(effects: Sequence[Effect], source: str, vehicle: VehicleSet
     for effect in effects:
         if effect.columns is None:
             raise InputError(
-                f"{source}: {effect.name} is a fault of the sensors, found on the sensors alone and not by a planned "
+                f"{source}: {effect.name} is a sensor fault, found from the sensors alone and not by a planned "
                 f"flight; what shows it: {effect.excitation}"
             )
         if "rotor_radius" in effect.needs and any(rotor.radius_m is None for rotor in vehicle.rotors):
@@ -49,8 +49,8 @@ def require_tellable(effects: Sequence[Effect], source: str, vehicle: VehicleSet
     measured = [effect.name for effect in effects if "measured_rotor_speed" in effect.needs]
     if actuators and measured:
         raise InputError(
-            f"{source}: {actuators[0]} shows where commands are logged in place of rotor speeds, {measured[0]} where "
-            "rotor speeds are measured; no one flight tells them apart. Log measured rotor speeds: they rule out "
+            f"{source}: {actuators[0]} shows if commands are logged instead of rotor speeds, {measured[0]} if "
+            "rotor speeds are measured; no single flight tells them apart. Log measured rotor speeds: they rule out "
             f"{actuators[0]}"
         )
 

@@ -252,12 +252,12 @@ def room_of(settings: TrajectorySettings, vehicle: VehicleSettings, ground: floa
     half = 0.5 * (box - [size, size, 0.0])
     if (half[:2] <= 0).any():
         given = " ".join(f"{side:g}" for side in asked.box_m)
-        message = f"is {given}, and the vehicle is {size:.3g} m across; give a box that it can move in"
+        message = f"is {given}, but the vehicle is {size:.3g} m across; give a box that it can move in"
         raise SettingError("next_flight.box_m", message)
     if asked.height_m < 0.5 * box[2]:
         message = (
-            f"is {asked.height_m:g}, and the box {box[2]:g} m high about it would reach into the ground; raise it to "
-            f"{0.5 * box[2]:g} or more, or lower next_flight.box_m"
+            f"is {asked.height_m:g}, but the box around it, {box[2]:g} m high, would reach into the ground; raise it "
+            f"to {0.5 * box[2]:g} or more, or lower next_flight.box_m"
         )
         raise SettingError("next_flight.height_m", message)
     hover = hover_squared(vehicle)

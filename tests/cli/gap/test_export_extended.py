@@ -56,7 +56,7 @@ def test_what_a_table_does_not_hold_is_told_with_numbers_and_size(cpfls, extende
     sizes = LeftOutGroup(name=("battery_sag",), wrench=size, ends=ends)
     write_record(path, replace(record, vehicle=outside, left_out=sizes))
     said = cpfls("export", path, "-o", output).stdout.splitlines()[-1]
-    assert said.startswith("Not held, or not whole: battery sag (")
+    assert said.startswith("Not held, or only in part: battery sag (")
     floors = 0.4 / record.gap.floor[1]
     assert said.endswith(
         f"; exponent = 1.5): 0.4 N m and 0 N along its held-out flights, {floors:.3g} noise floors; half a second "
@@ -87,7 +87,7 @@ def test_one_of_before_is_refused(refuse, extended, tmp_path, name, command):
         file.attrs["schema_version"] = 1
     (line,) = refuse("export", old, "-o", tmp_path / "m.c")
     assert line == (
-        f"{old}: a model that an earlier cpfls wrote, before all models had one format; make it again with "
+        f"{old}: a model written by an earlier cpfls, before all models shared one format; make it again with "
         f"`cpfls {command}`"
     )
 

@@ -77,7 +77,7 @@ def test_a_model_with_effects_needs_closed_loop(refuse, gap_config, path, extend
 def test_a_model_of_another_vehicle_is_refused(refuse, gap_config, path, extended, tmp_path):
     words = ("--model", extended, "--set", "vehicle.mass_kg=7", "-o", tmp_path / "x.h5")
     (line,) = refuse("simulate", gap_config, path, *CLOSED, *words)
-    assert f"{extended}: was made with another vehicle; not the same: vehicle.mass_kg" in line
+    assert f"{extended}: was made with another vehicle; these differ: vehicle.mass_kg" in line
 
 
 def test_a_file_that_is_no_model_is_refused(refuse, gap_config, path, tmp_path):

@@ -41,7 +41,7 @@ def test_output_that_is_a_file(refuse, gap_config, shifted, tmp_path):
 def test_a_folder_in_the_place_of_a_file(refuse, gap_config, shifted, tmp_path):
     (tmp_path / "out" / "report.html").mkdir(parents=True)
     (message,) = refuse("gap", gap_config, *shifted, "-o", tmp_path / "out", "--force")
-    assert message.endswith("report.html: is a folder, and a file of this name is to be written; move it away")
+    assert message.endswith("report.html: is a folder, but a file of this name must be written; move it away")
 
 
 @pytest.mark.parametrize("made", [True, False])
@@ -66,7 +66,7 @@ def test_flight_too_short_to_split(refuse, gap_config, shifted, tmp_path):
     data, header = column(shifted[0])
     short = write(tmp_path / "short.csv", data[:900], header)
     (message,) = refuse("gap", gap_config, short, "-o", tmp_path / "x")
-    assert message.startswith("short.csv: one flight is too short to hold a third of it out")
+    assert message.startswith("short.csv: the only flight is too short to hold out a third of it")
     assert "--held-out" in message
     assert "gap.window_s = 0.4" in message
 
@@ -97,7 +97,7 @@ def test_flight_of_another_vehicle(cpfls, refuse, gap_config, other_config, shif
     flight = tmp_path / "flight.h5"
     assert cpfls("import", other_config, shifted[0], "-o", flight).exit_code == 0
     (message,) = refuse("compare", gap_config, flight, "-o", tmp_path / "x.h5")
-    assert "was made with another vehicle; not the same: vehicle.mass_kg (7.0 there, 6.0 in the config)" in message
+    assert "was made with another vehicle; these differ: vehicle.mass_kg (7.0 there, 6.0 in the config)" in message
 
 
 def test_disagreement_of_another_vehicle(cpfls, refuse, gap_config, other_config, shifted, tmp_path):

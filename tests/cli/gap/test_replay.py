@@ -90,7 +90,7 @@ def test_an_extended_model_predicts_better_than_the_vehicle(replayed, extended, 
     assert models["model"]["attitude"] is None
     assert models["model"]["body_rate"]["sum"] < 0.05 * models["stated"]["body_rate"]["sum"]
     assert models["model"]["body_rate"]["sum"] < 0.2 * models["nothing-moves"]["body_rate"]["sum"]
-    assert any("rotation alone is played back" in warning for warning in answer["warnings"])
+    assert any("only rotation is played back" in warning for warning in answer["warnings"])
 
 
 def test_an_identified_model_is_played_back(replayed, pipeline, study):
@@ -222,7 +222,7 @@ def test_people_read_to_which_horizon_it_is_better(cpfls, gap_config, extended, 
     assert "Prediction" not in result.stdout
     assert "more with -v: Errors by horizon; Where it is farthest off" in result.stdout
     assert "% smaller" in result.stdout
-    assert "rotation alone is played back" in result.stderr
+    assert "only rotation is played back" in result.stderr
 
 
 def test_report_shows_it(cpfls, gap_config, of_vehicle, tmp_path):
@@ -287,7 +287,7 @@ def test_a_horizon_shorter_than_a_sample_is_refused(refused, shifted):
 def test_a_model_of_another_vehicle_is_refused(refused, extended, shifted):
     message = refused(extended, shifted[0], options=("--set", "vehicle.mass_kg=5.5"))
     assert message.startswith(
-        f"{extended}: was made with another vehicle; not the same: vehicle.mass_kg (6.0 there, 5.5"
+        f"{extended}: was made with another vehicle; these differ: vehicle.mass_kg (6.0 there, 5.5"
     )
 
 
@@ -313,7 +313,7 @@ def test_flights_of_different_rates_are_refused(refused, shifted, tmp_path):
     np.savetxt(log, table, delimiter=",", header="t,wx,wy,wz,om1,om2,om3,om4", comments="", fmt="%.9g")
     message = refused("vehicle", shifted[1], log)
     assert message.startswith("slow.csv: sampled at 50 Hz, flight_2.csv at 100 Hz")
-    assert "--set import.rate_hz=50 gives it to logs" in message
+    assert "--set import.rate_hz=50 for logs" in message
 
 
 def test_a_missing_model_is_refused(refused, shifted, tmp_path):

@@ -60,7 +60,7 @@ def test_choice_and_flights_must_go_together(refuse, study, pipeline, others, tm
 def test_a_flight_that_trains_or_judges_cannot_choose(refuse, study, pipeline, others, tmp_path):
     output = ("-o", tmp_path / "out.h5")
     (message,) = refuse("identify", study, pipeline.flight, "--choose-on", pipeline.flight, *HELD_OUT, *output)
-    assert "is a flight that trains" in message
+    assert "is a training flight" in message
     same = ("--validate", others[0], "--choose-on", others[0])
     (message,) = refuse("identify", study, pipeline.flight, *same, *HELD_OUT, *output)
     assert "judges (--validate)" in message
@@ -73,7 +73,7 @@ def test_what_is_no_flight_cannot_choose(refuse, study, pipeline, tmp_path):
     """Not even where the same file is an input of its own."""
     words = ("--choose-on", pipeline.selection, *HELD_OUT, "-o", tmp_path / "out.h5")
     (message,) = refuse("identify", study, pipeline.flight, "--selection", pipeline.selection, *words)
-    assert f"--choose-on {pipeline.selection}: is the selection, no flight" in message
+    assert f"--choose-on {pipeline.selection}: is the selection, not a flight" in message
     (message,) = refuse("identify", study, pipeline.flight, *words)
     assert str(pipeline.selection) in message
     assert "flight" in message
@@ -94,12 +94,12 @@ def test_flights_of_another_vehicle_are_named(cpfls, study, pipeline, others, tm
     assert result.exit_code == 0, result.stderr
     said = [line for line in result.stderr.splitlines() if "another vehicle" in line]
     assert len(said) == 1
-    assert f"{heavy}: was made with another vehicle; not the same: vehicle.inertia_kg_m2" in said[0]
+    assert f"{heavy}: was made with another vehicle; these differ: vehicle.inertia_kg_m2" in said[0]
 
 
 def test_a_model_of_another_vehicle_is_named(cpfls, study, pipeline, tmp_path):
     words = ("predict", study, pipeline.model, pipeline.flight, "--set", "vehicle.inertia_kg_m2=[0.7, 0.6, 1.2]")
     result = cpfls(*words, "-o", tmp_path / "prediction.h5")
     assert result.exit_code == 0, result.stderr
-    said = f"{pipeline.model}: is a model of another vehicle than the config's; not the same: vehicle.inertia_kg_m2"
+    said = f"{pipeline.model}: models a vehicle other than the config's; these differ: vehicle.inertia_kg_m2"
     assert said in result.stderr

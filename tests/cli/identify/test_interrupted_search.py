@@ -110,7 +110,7 @@ def test_search_that_found_nothing_at_its_end_leaves_nothing(cpfls, words, pipel
     result = cpfls(*words, "-o", tmp_path / "model.h5")
     assert result.exit_code == 1
     assert result.stderr == (
-        f"cpfls: error: {pipeline.flight}: no chromosome gave a finite model; the data may not move at all\n"
+        f"cpfls: error: {pipeline.flight}: no chromosome gave a finite model; perhaps nothing moves in the data\n"
     )
     assert names(tmp_path) == []
 

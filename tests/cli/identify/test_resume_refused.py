@@ -79,12 +79,12 @@ def test_search_that_is_refused_keeps_the_checkpoint(refuse, words, stopped, tmp
     [
         (("--seed", 2), "seed = 1 there, 2 here"),
         (("--set", "identification.population=18"), "identification.population = 16 there, 18 here"),
-        (("--set", "identification.generations=0"), "identification.generations = 0, but it has come to generation"),
+        (("--set", "identification.generations=0"), "identification.generations = 0, but it has reached generation"),
     ],
 )
 def test_other_config(refuse, words, stopped, options, said):
     (line,) = refuse(*words, "-o", stopped, "--resume", *options)
-    assert line.startswith(f"{stopped}.checkpoint: is of another search: {said}")
+    assert line.startswith(f"{stopped}.checkpoint: belongs to another search: {said}")
 
 
 def test_other_selection_and_other_flight(cpfls, refuse, search, pipeline, stopped, tmp_path):
@@ -122,8 +122,7 @@ def test_a_file_of_the_user_with_the_name_of_the_checkpoint_is_kept(refuse, word
     notes.mkdir() if folder else notes.write_text("my notes\n")
     (line,) = refuse(*words, "-o", tmp_path / "model.h5", *option)
     assert line == (
-        f"{notes}: has the name of what a stopped search leaves, and is none of it; move it away, or name another "
-        "output"
+        f"{notes}: has the name of what a stopped search leaves, but is none; move it away, or name another output"
     )
     assert notes.is_dir() if folder else notes.read_text() == "my notes\n"
 
@@ -144,4 +143,4 @@ def test_killed_between_the_model_and_the_removal_of_its_checkpoint(cpfls, words
 def test_workers_and_scheduler_exclude_each_other(refuse, words, tmp_path):
     several = ("--workers", 2, "--scheduler", "tcp://127.0.0.1:1")
     (line,) = refuse(*words, "-o", tmp_path / "model.h5", *several)
-    assert line == "--scheduler: knows its own workers; leave --workers out"
+    assert line == "--scheduler: brings its own workers; leave out --workers"

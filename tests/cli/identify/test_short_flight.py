@@ -54,9 +54,7 @@ def notes(cpfls, tmp_path):
 
 def test_two_seconds_are_too_short_and_it_says_how_long_would_do(notes):
     (note,) = notes(2.0)
-    assert note.startswith(
-        "cpfls: note: the flights that train are short: in 2 s the rates turn round 2, 2, 1 times about"
-    )
+    assert note.startswith("cpfls: note: the training flights are short: in 2 s the rates reverse 2, 2, 1 times about")
     assert "roll, pitch, yaw, 5 swings for " in note
     assert "train on about " in note
 

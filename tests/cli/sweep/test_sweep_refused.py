@@ -67,7 +67,7 @@ def test_force_starts_again(cpfls, words, stopped, whole):
 )
 def test_other_sweep(refuse, words, stopped, options, said):
     (line,) = refuse(*words, "-o", stopped, "--resume", *options)
-    assert line.startswith(f"{stopped}.partial: is of another sweep: ")
+    assert line.startswith(f"{stopped}.partial: belongs to another sweep: ")
     assert said in line
 
 
@@ -103,7 +103,7 @@ def test_other_file_in_the_place_of_the_output_is_not_replaced(refuse, words, st
 
 def test_workers_and_scheduler_exclude_each_other(refuse, words, tmp_path):
     (line,) = refuse(*words, "-o", tmp_path / "x.h5", "--workers", 2, "--scheduler", "tcp://127.0.0.1:1")
-    assert line == "--scheduler: knows its own workers; leave --workers out"
+    assert line == "--scheduler: brings its own workers; leave out --workers"
 
 
 def test_samples_that_cannot_be_chosen_name_the_setting(refuse, words, tmp_path):
@@ -114,7 +114,7 @@ def test_samples_that_cannot_be_chosen_name_the_setting(refuse, words, tmp_path)
 
 def test_a_flight_that_trains_cannot_judge(refuse, words, sweep_flight, tmp_path):
     (line,) = refuse(*words, "-o", tmp_path / "x.h5", "--validate", sweep_flight)
-    assert "is the flight that trains" in line
+    assert "is the training flight" in line
 
 
 MISFIT = ("--set", "identification.subpopulations=5")

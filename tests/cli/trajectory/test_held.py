@@ -83,7 +83,7 @@ def test_what_a_held_vehicle_lacks_has_no_noise(cpfls, refuse, tmp_path, study):
     noise = ("--set", "simulation.noise={position: 0.5}")
     (message,) = refuse("simulate", study(), tmp_path / "t.h5", "-o", tmp_path / "f.h5", *noise)
     assert "simulation.noise" in message
-    assert "position: a vehicle that is held at its centre of mass has none" in message
+    assert "position: a vehicle held at its centre of mass has none" in message
 
 
 def test_no_autopilot_flies_a_held_vehicle(cpfls, refuse, tmp_path, study):

@@ -152,4 +152,4 @@ def test_guesses_choose_no_path(refuse, tmp_path, words):
     vehicle["vehicle"]["inertia_kg_m2"] = None
     (tmp_path / "study.yaml").write_text(to_yaml(vehicle))
     (line,) = refuse("trajectory", tmp_path / "study.yaml", *words, "-o", tmp_path / "x.h5")
-    assert "not known in this config, and `cpfls trajectory` needs what is null there" in line
+    assert "not known in this config, but `cpfls trajectory` needs what is null there" in line

@@ -98,8 +98,8 @@ def test_a_single_effect_is_shown(cpfls, config, tmp_path):
     ("options", "message"),
     [
         (("--to-tell", "com_ofset,torque_bias"), "did you mean com_offset?"),
-        (("--to-tell", "com_offset,gyro_bias"), "gyro_bias is a fault of the sensors"),
-        (("--to-tell", "motor_lag,channel_delay"), "no one flight tells them apart"),
+        (("--to-tell", "com_offset,gyro_bias"), "gyro_bias is a sensor fault"),
+        (("--to-tell", "motor_lag,channel_delay"), "no single flight tells them apart"),
         (("--to-tell", "parameter_error"), "to_tell = [parameter_error]: nothing to tell"),
         (("--to-tell", ""), "nothing to tell; name effects with --to-tell A,B"),
         ((*PAIR, "--box", "0.4,4,3"), "trajectory.next_flight.box_m = [0.4, 4.0, 3.0]"),

@@ -154,7 +154,7 @@ def test_a_duration_too_short_for_the_file_is_refused(refuse, tmp_path, config):
         ("limits.velocity_m_s", "[1, 2]", "3"),
         ("limits.velocty_m_s", "1", "did you mean 'velocity_m_s'?"),
         ("displacement_m", "0", "must be greater than 0"),
-        ("limits", "{velocity_m_s: 1}", "the snap without limit"),
+        ("limits", "{velocity_m_s: 1}", "the snap unlimited"),
     ],
 )
 def test_bad_limits_name_their_key(refuse, tmp_path, config, key, value, complaint):

@@ -65,7 +65,7 @@ def test_the_second_hover_of_a_real_log_is_the_longer_one():
     recognition = seen(path_of_log("real/crazypad_com", "normal_flight__E9_log00"))
     begin, end = recognition.flown.span_s
     assert (begin, end) == (pytest.approx(17.8, abs=0.3), pytest.approx(25.7, abs=0.3))
-    assert "it flies again at 3.6 to 11.5 s" in recognition.flown.reasons[1]
+    assert "it also flies at 3.6 to 11.5 s" in recognition.flown.reasons[1]
     assert recognition.choice("rotor_command_is") == "thrust"
 
 
@@ -95,7 +95,7 @@ def test_a_card_of_a_crazyflie_is_read_without_a_word_of_config():
     # Where the rotors carry it, it hovers, and follows a third of the rates that are asked for.
     (why,) = recognition.left_out
     assert "controller.rollRate" in why
-    assert "which no unit makes" in why
+    assert "which no unit explains" in why
 
 
 def test_what_is_written_imports_the_flight(tmp_path):

@@ -111,7 +111,7 @@ def test_biases_that_differ_between_flights_are_mentioned():
     made = [faulty_flight(rng, Faults(bias=np.array([0, b, 0])), level=LEVELS["mid"]) for b in (0.0, 0.01, 0.02)]
     found = audit(made, WINDOWS)
     np.testing.assert_allclose(fit_of(made).flight_bias[:, 1], [-0.01, 0.0, 0.01], atol=0.0008)
-    assert any("differs between flights" in note for note in found.notes)
+    assert any("rad/s between flights" in note for note in found.notes)
 
 
 @pytest.mark.parametrize("period", [0.02, 0.004])

@@ -95,7 +95,7 @@ def of_accelerometer(change):
 
 WRONG = {
     "in g": (of_acceleration(lambda _, a: a / 9.80665), "The acceleration is in g"),
-    "with gravity": (of_acceleration(lambda _, a: a + UP), "The acceleration holds gravity"),
+    "with gravity": (of_acceleration(lambda _, a: a + UP), "The acceleration includes gravity"),
     "reversed": (of_acceleration(lambda _, a: -a), "The acceleration has -x, -y, -z"),
     "body for world": (of_acceleration(to_body), "The acceleration is in body axes"),
     "late": (of_acceleration(lambda _, a: late(a, 0.03)), "The acceleration is late by"),
@@ -107,7 +107,7 @@ WRONG = {
     "sensed without gravity": (of_accelerometer(lambda s, f: f - to_body(s, 0 * f + UP)), "lacks gravity"),
     "velocity in body axes": (of_velocity(to_body), "The velocity is in body axes"),
     "velocity in NED": (of_velocity(lambda _, v: v[:, [1, 0, 2]] * [1, 1, -1]), "The velocity has y, x, -z"),
-    "velocity of another north": (of_velocity(lambda _, v: v @ turned(30).T), "The velocity is turned by"),
+    "velocity of another north": (of_velocity(lambda _, v: v @ turned(30).T), "The velocity is rotated by"),
     "velocity late": (of_velocity(lambda _, v: late(v, 0.1)), "The velocity is late by"),
     "velocity in km/h": (of_velocity(lambda _, v: 3.6 * v), "The velocity is in km/h"),
     "attitude late": (lambda s: replace(s, attitude=late(s.attitude, 0.03)), "The attitude is late by 30 ms"),
@@ -174,7 +174,7 @@ def test_a_position_knows_better_than_a_velocity_that_fits_in_body_axes(flights)
     found = audit(given, WINDOWS)
     assert found.repairs == ()
     assert found.repaired(given[0]) is given[0]
-    [said] = [each for each in (*found.warnings, *found.contradictions) if "so nothing is set right" in each]
+    [said] = [each for each in (*found.warnings, *found.contradictions) if "so nothing is corrected" in each]
     assert "the velocity is in body axes" in said.lower()
     assert "which the position contradicts" in said
     alone = audit([replace(signals, position=None) for signals in given], WINDOWS)
@@ -198,7 +198,7 @@ def test_velocity_and_accelerometer_know_better_than_gyroscope_and_rotors(lively
 
     found = audit([wired(signals) for signals in lively], WINDOWS)
     assert not any(repair.channel == "attitude" for repair in found.repairs)
-    [said] = [warning for warning in found.warnings if "so nothing is set right" in warning]
+    [said] = [warning for warning in found.warnings if "so nothing is corrected" in warning]
     assert "The attitude is early by" in said
     assert "which velocity, accelerometer and thrust of the rotors contradict" in said
     assert "check the clocks of attitude, gyroscope and rotors" in said
@@ -208,7 +208,7 @@ def test_commands_do_not_tell_whose_clock_is_wrong(flights):
     commanded = [replace(s, commanded=True, attitude=late(s.attitude, 0.03)) for s in flights]
     found = audit(commanded, WINDOWS)
     assert not any(repair.channel == "attitude" for repair in found.repairs)
-    assert any("gyroscope or attitude is late" in note for note in found.notes)
+    assert any("gyroscope or the attitude is late" in note for note in found.notes)
 
 
 def with_rotors_late(flights, *delays):
@@ -291,8 +291,8 @@ def test_the_effect_is_named_in_spite_of_a_wrong_channel(flights, wrong):
 def test_a_low_passed_log_has_the_floors_of_the_raw_one_and_says_so_first(flights):
     raw, filtered = answer(*flights), answer(*(all_low_passed(signals) for signals in flights))
     assert (filtered.verdict, [effect.name for effect in filtered.effects]) == ("NAMED", ["rotor_drag"])
-    assert "low-passed, by import.lowpass_hz or before: attitude at about 1" in filtered.notes[0]
-    assert "Feed raw logs" in filtered.notes[0]
+    assert "low-passed, by import.lowpass_hz or earlier: attitude at about 1" in filtered.notes[0]
+    assert "Use raw logs" in filtered.notes[0]
     assert not any("low-passed" in note for note in raw.notes)
     ratio = filtered.floor / raw.floor
     assert np.all((ratio > 0.6) & (ratio < 2.0))

@@ -60,6 +60,6 @@ def test_a_constant_torque_and_a_short_flight_are_refused():
     time, rate, torque = delayed_signals(0.05)
     with pytest.raises(ComputationError, match="torque is constant"):
         estimate_delay(time, rate, np.ones_like(torque))
-    with pytest.raises(SettingError, match="at least 50 must") as caught:
+    with pytest.raises(SettingError, match="at least 50 are needed") as caught:
         estimate_delay(time[:60], rate[:60], torque[:60])
     assert caught.value.key == "delay_max_s"

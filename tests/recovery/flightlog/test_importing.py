@@ -93,7 +93,7 @@ def test_another_rate_is_interpolated_and_thinning_without_a_filter_is_warned_of
     flight = import_log(log(), ImportSettings(signals=mapped(), rate_hz=100.0))
     assert flight.report.rate_hz == 100
     np.testing.assert_allclose(flight.attitude, motion(flight.time)[0], atol=1e-8)
-    assert any("folded" in sentence for sentence in flight.report.warnings)
+    assert any("aliases" in sentence for sentence in flight.report.warnings)
     filtered = import_log(log(), ImportSettings(signals=mapped(), rate_hz=100.0, lowpass_hz=20.0))
     assert filtered.report.warnings == ()
 

@@ -182,7 +182,7 @@ def test_numbers_that_took_up_what_the_others_lack_hide_no_difference():
     worse = last._replace(held_out=replace(last.held_out, parameters=2 * last.held_out.parameters))
     assert kept(last.found) == []
     assert (
-        "of what would be rotor_drag, and those held out have none"
+        "of what would be rotor_drag, and the held-out flights have none"
         in differences(first, worse, start, there, SETTINGS)[0]
     )
 
@@ -196,7 +196,7 @@ def test_what_makes_a_channel_worse_goes():
 
 @pytest.mark.parametrize(
     ("training", "held", "says"),
-    [((OFFSET,), (), "those held out have none"), ((), (OFFSET,), "those learned from have none")],
+    [((OFFSET,), (), "the held-out flights have none"), ((), (OFFSET,), "the training flights have none")],
     ids=["in training", "held out"],
 )
 def test_a_gap_in_some_flights_only_is_said(training, held, says):

@@ -113,8 +113,8 @@ def test_what_was_asked_for_tells_the_body_of_flights_that_repeat_none(identifie
     assert (np.abs(off(freed.rigid_body)) < np.minimum(freed.half[:2], 0.05)).all()
     np.testing.assert_allclose(result.rigid_body[:2], freed.rigid_body[:2], rtol=5e-3)
     assert result.loop is None
-    (finding,) = (each for each in result.findings if "setpoint of position knows of no gust" in each)
-    assert "Izz not determined, for too little of yaw follows" in finding
+    (finding,) = (each for each in result.findings if "setpoint of position knows no gust" in each)
+    assert "Izz not determined because too little of yaw follows" in finding
 
 
 def test_gusts_of_a_flight_do_not_leak_into_what_its_setpoint_foretells():

@@ -84,7 +84,7 @@ def test_scores_hold_those_of_training(kind):
 
 def test_empty_datasets_are_not_an_error_of_the_rules_but_time_has_two_samples():
     assert findings(attitude=np.zeros((0, 3))) == []
-    assert findings(time=np.zeros(1)) == ["time: holds 1 samples, and two are the least"]
+    assert findings(time=np.zeros(1)) == ["time: holds 1 samples; at least two are needed"]
 
 
 def test_numbers_that_nothing_comes_near_are_told():

@@ -101,7 +101,7 @@ def test_what_appears_while_a_command_is_at_work_is_kept(tmp_path):
     for path in (output, second):
         check_output(path, force=False)
     second.write_text("mine")
-    with pytest.raises(OutputError, match=r"b\.txt: was not there when the command began"):
+    with pytest.raises(OutputError, match=r"b\.txt: appeared while the command was running"):
         write_texts({output: "new", second: "new"})
     assert [path.name for path in tmp_path.iterdir()] == ["b.txt"]
     assert second.read_text() == "mine"
@@ -123,7 +123,7 @@ def test_what_appears_in_a_folder_is_kept(tmp_path):
     (folder / "b.txt").unlink()
     check_folder(folder, False, ["a.txt", "b.txt"])
     (folder / "a.txt").write_text("mine")
-    with pytest.raises(OutputError, match=r"a\.txt: was not there when the command began"):
+    with pytest.raises(OutputError, match=r"a\.txt: appeared while the command was running"):
         fill(folder)
     assert (folder / "a.txt").read_text() == "mine"
 

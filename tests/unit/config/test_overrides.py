@@ -108,7 +108,7 @@ def test_without_settings_there_is_one():
         ),
         (
             {"identification.preset": "paper"},
-            'identification.preset = "paper": speaks for keys that the config leaves out; name the keys that differ',
+            'identification.preset = "paper": stands for keys that the config leaves out; name the keys that differ',
         ),
         (
             {"reduction": {"size": 3}},
@@ -141,7 +141,7 @@ def test_all_errors_come_together_and_once():
 
 def test_equal_names():
     (first,) = errors(swept([{"name": "a"}, {"name": "b"}, {"name": "a"}, {"name": "a"}]))
-    assert first == 'FILE: sweep.settings.0.name = "a": stands more than once; give each setting its own name'
+    assert first == 'FILE: sweep.settings.0.name = "a": appears more than once; give each setting its own name'
 
 
 @pytest.mark.parametrize("sweep", [3, [], {"settings": 3}, {"settings": [3]}, {"settings": [{"name": "a", "set": 3}]}])

@@ -44,5 +44,5 @@ def test_merge_keys_and_anchors_are_plain_yaml():
 
 
 def test_messages_name_line_and_column():
-    with pytest.raises(ConfigError, match=r"^file:2:1: not valid YAML: key 'a' stands twice$"):
+    with pytest.raises(ConfigError, match=r"^file:2:1: not valid YAML: key 'a' appears twice$"):
         parse_yaml("a: 1\na: 2\n", "file")

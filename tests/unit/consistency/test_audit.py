@@ -59,7 +59,7 @@ def test_a_flight_that_rests_for_most_of_its_time_is_told_to_hardly_turn(seed):
     time = flight.period * np.arange(count + len(flight))
     found = audit([replace(flight, time=time, **both)], WINDOWS)
     assert found.named == ()
-    assert "the flights hardly turn, so it would not show" in found.untested.values()
+    assert "the flights barely rotate, so it would not show" in found.untested.values()
 
 
 def integrated(signals):
@@ -114,7 +114,7 @@ def test_channels_that_agree_are_not_warned_about(turning):
         (lambda s: replace(s, velocity=s.velocity * [1, -1, -1], acceleration=None), "opposite signs along y"),
         (lambda s: replace(s, position=None, acceleration=s.acceleration + 0.5 * UP), "gravity"),
         (lambda s: replace(s, velocity=np.roll(s.velocity, 6, axis=0), acceleration=None), "late by 6"),
-        (lambda s: replace(s, velocity=s.velocity[::-1] ** 2 - 2.0, acceleration=None), "do not belong together"),
+        (lambda s: replace(s, velocity=s.velocity[::-1] ** 2 - 2.0, acceleration=None), "do not match"),
     ],
 )
 def test_channels_that_disagree_are_warned_about(turning, change, words):

@@ -30,7 +30,7 @@ def turned(signals, signs):
     return replace(signals, body_rate=signals.body_rate * np.array(signs))
 
 
-def found(signals, words="hardly agree"):
+def found(signals, words="barely agree"):
     return [finding for finding in check([signals], GapSettings()) if words in finding.what]
 
 
@@ -91,7 +91,7 @@ def test_rates_in_the_other_unit_are_named_by_their_gain(factor, unit, noise):
         "about body z (yaw)",
     ]
     np.testing.assert_allclose([each.size for each in told], factor, rtol=0.1 if noise else 0.005)
-    assert all(f"does the log hold rates in {unit} (import.signals.body_rate.unit" in each.remedy for each in told)
+    assert all(f"does the log give rates in {unit} (import.signals.body_rate.unit" in each.remedy for each in told)
     assert all(each.contradiction for each in told)
 
 

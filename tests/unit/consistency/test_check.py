@@ -71,11 +71,12 @@ FAULTS = {
         ": is the position in mm",
     ),
     "acceleration in g": (lambda s: replace(s, acceleration=s.acceleration / 9.80665), "the acceleration is in g"),
-    "world down": (upside_down, "along z the thrust of the rotors is opposite to"),
+    "world down": (upside_down, "along z, the thrust of the rotors is opposite to"),
     "world down, thrust unknown": (lambda s: upside_down(guessed(s, 30.0)), "opposite to velocity"),
     "rotors in another order": (
         lambda s: replace(s, rotor_speed=s.rotor_speed[:, [1, 0, 2, 3]]),
-        "by the motion the rotors are, in the order of their columns: right, clockwise; front, counter-clockwise; rear",
+        "judged by the motion, the rotors are, in the order of their columns: right, clockwise; front, "
+        "counter-clockwise; rear",
     ),
     "spins reversed": (
         lambda s: with_vehicle(s, rotors=tuple(replace(each, spin=-each.spin) for each in VEHICLE.rotors)),
@@ -83,21 +84,22 @@ FAULTS = {
     ),
     "heading turned": (
         lambda s: replace(s, attitude=s.attitude + np.array([0.0, 0.0, 1.0])),
-        "by thrust and attitude velocity and acceleration lie turned by -57 deg about the vertical",
+        "judged by thrust and attitude, the axes of velocity and acceleration are rotated by -57 deg about the "
+        "vertical",
     ),
     "world turned over its x": (
         lambda s: replace(
             s, **{name: getattr(s, name) * [1.0, -1.0, 1.0] for name in ("velocity", "position", "acceleration")}
         ),
-        "by thrust and attitude velocity and acceleration lie mirrored",
+        "judged by thrust and attitude, the axes of velocity and acceleration are mirrored",
     ),
     "hanging": (
         lambda s: replace(s, attitude=s.attitude + np.array([np.pi, 0.0, 0.0])),
-        "by its attitude the vehicle hangs upside down on average",
+        "according to its attitude, the vehicle is upside down on average",
     ),
     "twice the mass": (
         lambda s: with_vehicle(s, mass_kg=2 * VEHICLE.mass_kg),
-        "the thrust of the rotors is 0.50 times what the motion takes along the vertical",
+        "the thrust of the rotors is 0.50 times what the motion requires along the vertical",
     ),
     "gyroscope of another scale": (
         lambda s: replace(s, body_rate=1.3 * s.body_rate),
@@ -117,7 +119,7 @@ FAULTS = {
     ),
     "speeds in rpm, thrust unknown": (
         lambda s: replace(guessed(s, 1.0), rotor_speed=s.rotor_speed * 60 / (2 * np.pi)),
-        "and vehicle.rotor_speed_max_rad_s is 1000",
+        "but vehicle.rotor_speed_max_rad_s is 1000",
     ),
     "speeds in turns a second": (
         lambda s: replace(s, rotor_speed=s.rotor_speed / (2 * np.pi)),

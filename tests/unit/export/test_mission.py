@@ -125,7 +125,7 @@ def test_a_plan_that_no_mission_flies_is_refused(square, shaken):
     with pytest.raises(InputError, match="holds no excitation"):
         qgc_plan(shaken, HOME)
     below = TrajectoryRecord(**{**vars(square), "position": square.position - [0, 0, 4.0]})
-    with pytest.raises(InputError, match=r"0\.5 m above the take-off is too low: the path comes down to -3\.5 m"):
+    with pytest.raises(InputError, match=r"0\.5 m above take-off is too low: the path descends to -3\.5 m"):
         qgc_plan(below, Home(0.0, 0.0, 0.5))
     curve = harmonic_trajectory(random_path(10.0, 1.0, 5, np.random.default_rng(1)).scaled(0.1), 0.02, GRAVITY)
     with pytest.raises(InputError, match="this path is a curve"):
@@ -189,7 +189,7 @@ def test_thrust_is_a_share_of_the_largest(shaken):
 
 
 @pytest.mark.parametrize(
-    ("run", "words"), [(300.0, "SID_T_REC takes 255 at most"), (3.0, "holds 0.5 Hz for 4 s before it sweeps")]
+    ("run", "words"), [(300.0, "SID_T_REC allows 255 at most"), (3.0, "holds 0.5 Hz for 4 s before it sweeps")]
 )
 def test_what_ardupilot_does_not_take_is_refused(shaken, run, words):
     with pytest.raises(InputError, match=words):

@@ -72,7 +72,7 @@ def test_each_simulator_names_what_it_lacks():
     lacks = {form: " ".join(each.title for each in missing) for form, missing in rests.items()}
     rolling = {form: sum(e.torque for e in missing if "rolling" in e.title) for form, missing in rests.items()}
     for words in lacks.values():
-        assert all(each in words for each in ("slow actuation", "delay of the rotors", "what is learned"))
+        assert all(each in words for each in ("slow actuation", "delay of the rotors", "the learned part"))
     assert "constant torque" in lacks["rotorpy"]
     # Rotors that differ stand where their thrust gives the model's torque, which moves their air a little.
     assert rolling["sdf"] < 0.01 * rolling["rotorpy"]
@@ -108,8 +108,8 @@ def test_an_effect_outside_the_weights_is_named():
     made = exported(sheet_of_vehicle(truth(), outside=outside), "casadi", "v.py")
     assert made.missing == outside
     assert made.told == (
-        "Not held: payload; its size depends on the flight, and was not measured along one.",
-        "Not held, or not whole: sag: 0.2 N m and 3 N here, 30 noise floors; half a second without it ends 4 rad/s, "
+        "Not held: payload; its size depends on the flight and was not measured along one.",
+        "Not held, or only in part: sag: 0.2 N m and 3 N here, 30 noise floors; half a second without it ends 4 rad/s, "
         "172 degrees, 2 m/s and 1 m off.",
     )
     assert "Not held: payload" in made.text
@@ -152,7 +152,7 @@ def test_an_inertia_that_no_body_has_is_brought_to_the_nearest():
 
 def test_six_rotors_are_too_many_for_rotorpy_alone():
     model = whole(HEXA)
-    with pytest.raises(InputError, match=r"vehicle\.h5: RotorPy allocates .* to four rotors, this vehicle has 6"):
+    with pytest.raises(InputError, match=r"vehicle\.h5: RotorPy allocates .* to four rotors, but this vehicle has 6"):
         exported(sheet_of_vehicle(model), "rotorpy", "v.py")
     _, found = fly("mjcf", replace(model, remainder=None, response=RotorResponse()), 4, 2)
     assert found.agrees
@@ -163,9 +163,9 @@ def test_a_flight_that_an_export_cannot_be_flown_along_is_refused():
     made = exported(sheet_of_vehicle(model), "mjcf", "v.xml")
     flight: PlaybackFlight = probe_flight(model)
     pair = flight, player_of(model, flight)
-    with pytest.raises(InputError, match="has no rotor speeds, by which an exported vehicle flies"):
+    with pytest.raises(InputError, match="has no rotor speeds, which drive an exported vehicle"):
         verified("mjcf", made, replace(flight, wrench=np.zeros((len(flight), 6))), pair, 4, 2)
-    with pytest.raises(InputError, match="lacks attitude or velocity, and the vehicle depends on its velocity"):
+    with pytest.raises(InputError, match="lacks attitude or velocity, but the vehicle depends on its velocity"):
         verified("mjcf", made, replace(flight, has_velocity=False), pair, 4, 2)
 
 

@@ -53,7 +53,7 @@ def test_identifier(stem, name):
 
 @pytest.mark.parametrize("name", ["", "2x", "_x", "a b", "a-b", "é", "a;b", "a\n"])
 def test_a_name_that_is_no_identifier_is_refused(name):
-    with pytest.raises(InputError, match="is no identifier; use letters, digits and underscores"):
+    with pytest.raises(InputError, match="not an identifier; use letters, digits and underscores"):
         checked_identifier(name)
 
 

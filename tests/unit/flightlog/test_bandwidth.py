@@ -74,7 +74,7 @@ def held(values, jitter=False):
 @pytest.mark.parametrize("jitter", [False, True])
 def test_commands_that_are_repeated_four_times_are_named_with_their_rate_and_its_cost(jitter):
     (warning,) = slow({"rotor_command": held(WAVES, jitter), "body_rate": WAVES[:, :3]}, TIME)
-    assert warning.startswith("rotor_command is updated 10 times a second and the log has 50 rows a second")
+    assert warning.startswith("rotor_command is updated 10 times a second, but the log has 50 rows a second")
     assert "repeat the last value: it is 50 ms late on average, and knows nothing of motion above 5 Hz" in warning
 
 
@@ -84,7 +84,7 @@ def test_straight_lines_between_updates_are_found(shift_s):
     lines = np.column_stack([np.interp(TIME, updates, WAVES[::5, axis]) for axis in range(3)])
     (warning,) = slow({"body_rate": lines}, TIME)
     assert warning.startswith("body_rate is updated 10 times a second")
-    assert "lie on a straight line between two: it knows nothing of motion above 5 Hz" in warning
+    assert "lie on a straight line between two updates: it knows nothing of motion above 5 Hz" in warning
 
 
 def test_a_coarse_signal_and_a_smooth_one_are_not_slow():

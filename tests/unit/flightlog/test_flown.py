@@ -27,7 +27,7 @@ def test_standing_and_idling_rotors_are_cut_with_a_margin():
     flown = find_flown(TIME, level, None, turning(10, 30))
     assert flown.span_s == (pytest.approx(10.5, abs=0.1), pytest.approx(29.5, abs=0.1))
     assert flown.reasons[0].startswith("the first 10.5 s are cut: ")
-    assert flown.reasons[1].endswith(" s are cut: the rotors stand")
+    assert flown.reasons[1].endswith(" s are cut: the rotors stand still")
 
 
 def test_rotors_that_turn_fast_on_the_ground_do_not_fly():
@@ -48,7 +48,7 @@ def test_idling_in_flips_is_part_of_the_flight():
     assert lively.span_s == (pytest.approx(5.5, abs=0.1), pytest.approx(34.5, abs=0.1))
     quiet = find_flown(TIME, level, None, turning(5, 15, 6.0) + turning(20, 35, 6.0))
     assert quiet.span_s == (pytest.approx(20.5, abs=0.6), pytest.approx(34.5, abs=0.1))
-    assert any("it flies again at" in reason for reason in quiet.reasons)
+    assert any("it also flies at" in reason for reason in quiet.reasons)
 
 
 def test_height_alone_tells_a_flight():
@@ -59,13 +59,13 @@ def test_height_alone_tells_a_flight():
 @pytest.mark.parametrize(
     ("level", "height", "rate", "reason"),
     [
-        (0 * TIME, None, turning(0, 40), "nothing flies in it: the rotors stand all the time"),
-        (0 * TIME + 0.3, 0 * TIME, 0 * TIME, "nothing flies in it: the vehicle neither turns nor moves"),
+        (0 * TIME, None, turning(0, 40), "no flight in it: the rotors stand still throughout"),
+        (0 * TIME + 0.3, 0 * TIME, 0 * TIME, "no flight in it: the vehicle neither turns nor moves"),
         (
             None,
             None,
             None,
-            f"no rotors, no height and no rates are recognised, so no flight can be told from a stand: {BY_HAND}",
+            f"no rotors, no height and no rates are recognised, so flight cannot be told from standing: {BY_HAND}",
         ),
     ],
 )

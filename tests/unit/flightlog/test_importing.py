@@ -172,7 +172,7 @@ def test_saturated_values_are_counted_and_left_alone():
     columns["q"] = np.clip(columns["q"], -0.5, 0.5)
     signals = read_signals(columns, settings())
     assert signals.report.saturated == {"q": int((np.abs(columns["q"]) == 0.5).sum())}
-    assert any(sentence.startswith("column q stands at its extreme") for sentence in signals.report.warnings)
+    assert any(sentence.startswith("column q stays at its extreme") for sentence in signals.report.warnings)
     np.testing.assert_allclose(signals.body_rate[:, 1], columns["q"], atol=1e-12)
 
 
@@ -264,7 +264,7 @@ def test_a_step_longer_than_the_gap_asks_for_the_unit_of_time(rule):
     with pytest.raises(InputError) as caught:
         read_signals(log() | {"t": 1e3 * log()["t"]}, settings(gap_rule=rule))
     assert str(caught.value) == (
-        "the median step is 10 s, longer than import.gap_s = 0.1: is import.time_unit = s right, or raise import.gap_s"
+        "the median step is 10 s, longer than import.gap_s = 0.1: check import.time_unit = s, or raise import.gap_s"
     )
 
 

@@ -68,7 +68,7 @@ def test_parameters_that_the_motion_contradicts_are_warned_of(own):
     proposal = proposed(swapped, "ArduCopter 4.5.1", {"FRAME_CLASS": 1.0, "FRAME_TYPE": 1.0})
     (warning,) = proposal.warnings
     assert warning.startswith(
-        "the rotors are taken as in FRAME_CLASS and FRAME_TYPE in the log: quad X, and others are"
+        "the rotors are taken from FRAME_CLASS and FRAME_TYPE in the log: quad X, which contradicts"
     )
     assert "rear left counter-clockwise, front right counter-clockwise, front left clockwise" in warning
 

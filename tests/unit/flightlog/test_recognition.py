@@ -151,7 +151,7 @@ def test_an_acceleration_of_the_world_is_told_from_what_is_sensed(own):
     assert recognition.choice("acceleration_frame") == "world"
     with_gravity = seen(flat_log(own, force=named(own.acceleration + np.array([0.0, 0.0, 9.81]), *ACC)))
     assert with_gravity.signal("acceleration") is None
-    assert "an acceleration of the world with gravity in it" in with_gravity.left_out[0]
+    assert "an acceleration in world axes that includes gravity" in with_gravity.left_out[0]
 
 
 def test_a_velocity_in_body_axes_is_left_out(own):
@@ -166,14 +166,14 @@ def test_the_position_whose_derivative_is_the_velocity_is_taken_and_the_other_on
     both = named(drifting, "x", "y", "z") | named(own.position, "mocap_x", "mocap_y", "mocap_z")
     recognition = seen(flat_log(own, position=both))
     assert recognition.signal("position").columns.columns == ("mocap_x", "mocap_y", "mocap_z")
-    assert any(words.startswith("x, y, z: also a position, whose") for words in recognition.left_out)
+    assert any(words.startswith("x, y, z: also a position; its") for words in recognition.left_out)
 
 
 def test_of_two_positions_that_fit_the_velocity_the_first_by_name_is_taken(own):
     both = named(own.position, "x", "y", "z") | named(own.position + 1.0, "mocap_x", "mocap_y", "mocap_z")
     recognition = seen(flat_log(own, position=both))
     assert recognition.signal("position").columns.columns == PLACE
-    assert recognition.left_out == ("mocap_x, mocap_y, mocap_z: also position by name, not used",)
+    assert recognition.left_out == ("mocap_x, mocap_y, mocap_z: also position by name; not used",)
 
 
 def test_lengths_in_millimetres_are_told_by_what_the_lean_does(own):

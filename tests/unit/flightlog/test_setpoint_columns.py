@@ -228,7 +228,7 @@ def test_setpoints_of_mavros(own, asked):
     assert known["setpoint_attitude"].columns.columns[0] == "/mavros/setpoint_raw/target_attitude.orientation.w"
     assert known["setpoint_body_rate"].columns.columns[2] == "/mavros/setpoint_raw/target_attitude.body_rate.z"
     assert "setpoint_thrust" not in known
-    assert any("thrust that is asked for, in no unit" in words for words in proposal.first.left_out)
+    assert any("commanded thrust, but in no stated unit" in words for words in proposal.first.left_out)
 
 
 @pytest.mark.parametrize("word", ["{}_sp", "{}_des", "{}_setpoint", "target_{}", "{}_ref", "desired_{}"])
@@ -283,7 +283,7 @@ def test_what_is_unclear_is_left_out_and_said(own, asked, kind):
     columns = flat_log(own, velocity=None, wished=named(wished, *(name.format(axis) for axis in axes))).topics
     known, proposal = found(columns, "")
     assert known == {}
-    said = {"unlike": "does not follow it", "too large": "which no unit makes", "of nothing": "to hold it against"}
+    said = {"unlike": "does not follow it", "too large": "which no unit explains", "of nothing": "to compare it with"}
     assert any(said[kind] in words for words in proposal.first.left_out), proposal.first.left_out
 
 

@@ -31,7 +31,7 @@ def test_no_cut_off_leaves_the_values():
 
 
 def test_a_cut_off_above_half_the_rate_is_refused():
-    with pytest.raises(SettingError, match=r"does not lie below half of the log's rate, 50 Hz") as caught:
+    with pytest.raises(SettingError, match=r"is not below half of the log's rate, 50 Hz") as caught:
         low_pass(np.zeros((50, 3)), 100, 60.0, 4)
     assert caught.value.key == "lowpass_hz"
 

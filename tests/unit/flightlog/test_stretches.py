@@ -32,7 +32,7 @@ def test_rotors_at_rest_are_said_with_place_and_crop(rest, level):
     assert warning.startswith(
         f"rotor_command stands at {level} on all rotors from 0.00 s to 2.98 s, from 17.00 s to 19.98"
     )
-    assert "import.crop_s: [3, 16.98] keeps the longest part without" in warning
+    assert "import.crop_s: [3, 16.98] keeps the longest part without it" in warning
     assert warnings(log(rest), crop_s=(3.0, 16.98)) == []
 
 

@@ -127,7 +127,7 @@ def test_the_clock_is_named_or_that_of_the_fastest_mapped_topic():
     ):
         on_one_clock(topics, {}, replace(settings, time_column="t"))
     with pytest.raises(
-        InputError, match=r"import\.signals: the log has no topic that is mapped; the log has the topics other;"
+        InputError, match=r"import\.signals: the log has none of the mapped topics; the log has the topics other;"
     ):
         on_one_clock({"other": topics["other"]}, {}, settings)
 
@@ -163,7 +163,7 @@ def test_it_is_told_which_columns_stand_in():
     mapped = {"body_rate": SignalMap(columns=RATE, unit="rad/s", otherwise=(old,))}
     settings = ImportSettings(time_column=None, torque_source=None, signals=mapped)
     assert on_one_clock({"gyro": gyro(), "old": gyro()}, {}, settings)[2] == ()
-    told = "body_rate is that of old.x, old.y, old.z: the log has not all of gyro.x and its kin"
+    told = "body_rate is taken from old.x, old.y, old.z: the log lacks some of gyro.x and its kind"
     assert on_one_clock({"old": gyro()}, {}, settings)[2] == (told,)
     flat = {"": {"t": GYRO} | dict.fromkeys(old.columns, GYRO)}
     assert on_one_clock(flat, {}, replace(settings, time_column="t"))[2] == (told,)
@@ -198,7 +198,7 @@ def test_maps_that_stand_in_for_each_other_have_one_number_of_columns_and_one_ki
     with pytest.raises(SettingError, match="needs 2 columns, got 1") as caught:
         command("1", "c")
     assert caught.value.key == "signals.rotor_command.otherwise.0.columns"
-    with pytest.raises(SettingError, match=r"'us' does not measure it; one of 1$"):
+    with pytest.raises(SettingError, match=r"'us' is not a unit of it; use one of 1$"):
         command("us", "c", "d")
 
 
@@ -212,7 +212,7 @@ def test_clock_that_is_too_slow_is_warned_of():
     topics = {"gyro": gyro(), "slow": {"timestamp": SLOW, "v": SLOW}}
     _, warnings = put(topics, time_column="slow.timestamp", body_rate=RATE, voltage=("slow.v",))
     assert len(warnings) == 1
-    assert warnings[0].startswith("topic gyro (250 Hz) is thinned to the clock of slow (50 Hz)")
+    assert warnings[0].startswith("topic gyro (250 Hz) is downsampled to the clock of slow (50 Hz)")
 
 
 @pytest.mark.parametrize("between", [interpolate, hold_previous])

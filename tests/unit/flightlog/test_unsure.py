@@ -50,10 +50,10 @@ def assert_the_rest_is_as_named(proposal, *odd):
 @pytest.mark.parametrize(
     ("changed", "odd", "sign", "said"),
     [
-        ({"position": named(OWN.position * UP_DOWN, *PLACE)}, "position", UP_DOWN, "*: z runs against all others"),
-        ({"position": named(OWN.position * [-1, 1, 1], *PLACE)}, "position", [-1, 1, 1], "*: x runs against"),
-        ({"velocity": named(OWN.velocity * UP_DOWN, *SPEED)}, "velocity", UP_DOWN, "v*: vz runs against all others"),
-        ({"rate": named(OWN.rate * [1, -1, 1], *GYRO)}, "body_rate", [1, -1, 1], "gyro_*: gyro_y runs against"),
+        ({"position": named(OWN.position * UP_DOWN, *PLACE)}, "position", UP_DOWN, "*: z is opposite to all others"),
+        ({"position": named(OWN.position * [-1, 1, 1], *PLACE)}, "position", [-1, 1, 1], "*: x is opposite"),
+        ({"velocity": named(OWN.velocity * UP_DOWN, *SPEED)}, "velocity", UP_DOWN, "v*: vz is opposite to all others"),
+        ({"rate": named(OWN.rate * [1, -1, 1], *GYRO)}, "body_rate", [1, -1, 1], "gyro_*: gyro_y is opposite"),
         ({"attitude": named(OWN.angles * [-1, 1, 1], *ANGLES)}, "attitude", [-1, 1, 1], ""),
     ],
 )
@@ -90,7 +90,7 @@ def test_without_an_accelerometer_an_odd_altitude_and_a_turned_log_are_both_poss
     assert choices(proposal)["body_frame"] == ("FLU", "guess")
     (rival,) = next(choice for choice in proposal.choices if choice.key == "body_frame").rivals
     assert rival.text == "body_frame: FRD"
-    assert "a flight of which one lean, turn or climb is known" in rival.reason
+    assert "a flight with one known lean, turn or climb" in rival.reason
     # Left is right in the other reading, so the rotors are asked for.
     assert proposal.airframe.is_guess
 
@@ -108,7 +108,7 @@ def test_a_quaternion_whose_names_and_columns_disagree_is_put_in_order_and_said(
     proposal = proposed(attitude=named(quaternion(OWN.rotation)[:, columns], *Q))
     assert_the_rest_is_as_named(proposal)
     assert ", ".join(signal(proposal, "quaternion").columns.columns) == held
-    assert f"log: {held} are taken for w, x, y, z: so the log agrees with itself, and as named it does not" in (
+    assert f"log: {held} are taken for w, x, y, z: this way the log agrees with itself; as named it does not" in (
         proposal.warnings
     )
 
@@ -175,7 +175,7 @@ def test_a_unit_is_read_however_it_is_written(name, part, columns, unit, scale):
             "position",
             {"position": named(1e3 * OWN.position, "pos_x_m", "pos_y_m", "pos_z_m")},
             "mm",
-            "said to be in m; by tilt and gravity it is in mm",
+            "said to be in m; judged by tilt and gravity, it is in mm",
         ),
         (
             "acceleration",
@@ -227,7 +227,7 @@ def test_what_is_chosen_is_no_rival_of_itself():
 @pytest.mark.parametrize(
     ("columns", "said"),
     [
-        ([0, 1, 1], "gyro_y and gyro_z hold the same numbers"),
+        ([0, 1, 1], "gyro_y and gyro_z have the same values"),
         ([0, 1, 3], "gyro_z never changes"),
     ],
 )
@@ -255,7 +255,7 @@ def test_three_of_four_rotors_are_a_guess():
     ("stamps", "said"),
     [
         (np.arange(len(LONGER.time)) * 1.0, "t rises by 1 from row to row"),
-        (1e4 * LONGER.time, "which no unit makes: is the unit of the stamps right?"),
+        (1e4 * LONGER.time, "which no unit explains: is the unit of the stamps right?"),
     ],
 )
 def test_stamps_that_count_something_else_are_doubted(stamps, said):

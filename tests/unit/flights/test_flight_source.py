@@ -57,7 +57,7 @@ def another_length(path):
     ("change", "said"),
     [
         (Path.unlink, "no such file"),
-        (another_size, "another file, of [0-9]+ bytes instead of"),
+        (another_size, "another file, with [0-9]+ bytes instead of"),
         (another_length, "another file, with 27 samples instead of 30"),
     ],
 )
@@ -137,7 +137,7 @@ def test_a_voltage_that_no_battery_has_is_not_used_and_said(tmp_path, unit, volt
         parts, warnings = [each.signals for each in found], found.warnings
     assert [part.voltage for part in parts] == [None] * len(parts)
     assert len(re.findall(said, " ".join(warnings))) == 1
-    assert "taken for that of a full battery" not in " ".join(warnings)
+    assert "taken as that of a full battery" not in " ".join(warnings)
 
 
 @pytest.mark.parametrize(("unit", "shares"), [("1", True), ("rad/s", False), (None, False)])

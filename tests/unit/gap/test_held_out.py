@@ -85,7 +85,7 @@ def test_nothing_is_judged_where_no_flight_learned_from_went():
     assert beyond.size(beyond.after).value[0] == pytest.approx(np.sqrt(np.mean(left**2)))
     (told,) = not_judged(beyond)
     assert told.startswith(
-        f"{100 * beyond.unlearned['vertical_descent']:.2g} % of what is held out goes where no flight"
+        f"{100 * beyond.unlearned['vertical_descent']:.2g} % of what is held out goes where no training flight"
     )
 
 

@@ -23,7 +23,7 @@ def reasons(signals, chosen=(), floor=FLOOR):
 def test_a_rich_flight_hides_little_and_says_which_signals_it_lacks():
     found = reasons([fly(1, speed=5.0)])
     assert found["battery_sag"] == "the flights lack voltage"
-    assert found["motor_lag"] == "rotor speeds are measured, so what lies between command and speed does not show"
+    assert found["motor_lag"] == "rotor speeds are measured, so nothing between command and speed shows"
     for seen in ("com_offset", "rotor_drag", "linear_damping", "rotor_mismatch", "products_of_inertia", "wind"):
         assert seen not in found
 

@@ -108,7 +108,7 @@ def test_what_is_broken_costs_the_frames_up_to_the_next_whole_one(read):
     parts[11] = parts[11][:1] + b"\xff" * 9
     contents = read(header() + b"".join(parts))
     held(contents, np.delete(rows, range(11, 16), axis=0))
-    assert contents.warnings == ("1 frames are broken; what follows up to the next whole one is missing",)
+    assert contents.warnings == ("1 frames are broken; everything up to the next whole frame is missing",)
 
 
 def test_a_jump_in_time_is_a_broken_frame_unless_the_recorder_paused(read):
@@ -117,7 +117,7 @@ def test_a_jump_in_time_is_a_broken_frame_unless_the_recorder_paused(read):
     parts = frames(rows)
     contents = read(header() + b"".join(parts))
     held(contents, np.delete(rows, range(32, 40), axis=0))
-    assert contents.warnings == ("1 frames are broken; what follows up to the next whole one is missing",)
+    assert contents.warnings == ("1 frames are broken; everything up to the next whole frame is missing",)
     paused = read(header() + b"".join([*parts[:32], RESUMED, *parts[32:]]))
     held(paused, rows)
 
@@ -140,16 +140,16 @@ def test_of_several_flights_the_longest_is_read(read):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (header(), "a blackbox log without frames that can be read"),
-        (header() + bytes(500), "a blackbox log without frames that can be read"),
-        (header()[:100], "a broken blackbox log: its header: the line 'Field I name' is missing"),
+        (header(), "a blackbox log without readable frames"),
+        (header() + bytes(500), "a blackbox log without readable frames"),
+        (header()[:100], "a broken blackbox log: its header lacks the line 'Field I name'"),
         (header(**{"Data version": "1"}), "a broken blackbox log: its header: Data version 1, not 2"),
         (header(**{"Field I signed": "0,1"}), "a broken blackbox log: its header: "),
         (header(**{"Field P encoding": ",".join("5" * len(FIELDS))}), "its header: fields of kind P in the encoding 5"),
         (header(**{"Field I name": "loopIteration,tim"}), "its header: the second field is not time"),
         (
             header(**{"Field I encoding": None}) + b"".join(frames(flight())),
-            "a broken blackbox log: its header: the line 'Field I encoding' is missing",
+            "a broken blackbox log: its header lacks the line 'Field I encoding'",
         ),
         (header(gyro_scale="one") + b"".join(frames(flight())), "a broken blackbox log: its header: "),
     ],

@@ -83,7 +83,7 @@ def test_a_message_of_a_ulog_that_is_longer_than_any_is_refused_before_it_is_lis
 def test_a_message_of_a_ulog_within_itself_is_refused(tmp_path):
     path = tmp_path / "log.ulg"
     path.write_bytes(ulogs.ulog([(0, 0, [1.0])], {"a": "uint64_t timestamp;a x"}))
-    with pytest.raises(InputError, match=r"log\.ulg: a broken ULog file: a message of it contains itself"):
+    with pytest.raises(InputError, match=r"log\.ulg: a broken ULog file: one of its messages contains itself"):
         log_contents(path)
 
 
@@ -91,13 +91,13 @@ def test_what_a_small_file_cannot_hold_is_refused_before_it_is_read(tmp_path, mo
     monkeypatch.setattr(files, "_PLAIN", 1 << 16)
     text, table, bytes_of_eight = tmp_path / "log.csv.gz", tmp_path / "log.parquet", tmp_path / "log.h5"
     text.write_bytes(gzip.compress(b"t,roll\n" + b"1,0\n" * (1 << 20)))
-    with pytest.raises(InputError, match=r"log\.csv\.gz: holds more than .* MB of text: damaged, or no log"):
+    with pytest.raises(InputError, match=r"log\.csv\.gz: holds more than .* MB of text: damaged, or not a log"):
         log_contents(text)
     parquet.write_table(pyarrow.table({"t": np.zeros(1 << 22)}), table)
-    with pytest.raises(InputError, match=r"log\.parquet: states 0\.0336 GB of numbers, far more"):
+    with pytest.raises(InputError, match=r"log\.parquet: claims 0\.0336 GB of numbers, far more"):
         log_contents(table)
     # A byte each in the file, eight in memory.
     with h5py.File(bytes_of_eight, "w") as file:
         file.create_dataset("t", (1 << 18,), "u1", chunks=(1 << 12,))
-    with pytest.raises(InputError, match=r"log\.h5: states 0\.0021 GB of numbers"):
+    with pytest.raises(InputError, match=r"log\.h5: claims 0\.0021 GB of numbers"):
         log_contents(bytes_of_eight)

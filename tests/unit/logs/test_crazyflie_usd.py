@@ -50,13 +50,13 @@ def test_a_check_sum_that_is_wrong_is_warned_of_and_what_is_whole_is_read(read, 
     contents = read(broken)
     assert contents.topics["fixedFrequency"]["gyro.x"].tolist()[:1] == [0.5]
     (warning,) = contents.warnings
-    assert warning.startswith("the check sum is wrong, the file is cut off or broken")
+    assert warning.startswith("the checksum is wrong: the file is cut off or damaged")
 
 
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (log(3), "a log of a Crazyflie's uSD card of version 3; read are 1 and 2"),
+        (log(3), "a log of a Crazyflie's uSD card of version 3; only 1 and 2 can be read"),
         (log()[:40], "a broken log of a Crazyflie's uSD card: its header: "),
         (log()[:3], "a broken log of a Crazyflie's uSD card: its header: "),
         (log().replace(b"(f)", b"(x)"), "a broken log of a Crazyflie's uSD card: its header: "),

@@ -92,17 +92,17 @@ def test_bytes_that_are_lost_or_strange_are_warned_of_and_cost_the_message_befor
         contents = read(broken)
         assert contents.topics["IMU"]["GyrX"].tolist() == [0.5, 0.75]
         (warning,) = contents.warnings
-        assert warning.startswith(f"{lost} bytes are no messages: the file is broken in places")
+        assert warning.startswith(f"{lost} bytes belong to no message: the file is damaged in places")
 
 
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "not a DataFlash log: it does not begin as one (encrypted, or of another program?)"),
-        (bytes(range(256)), "not a DataFlash log: it does not begin as one (encrypted, or of another program?)"),
-        (b"t,roll\n0,1\n", "seems to hold CSV, not what its name ends in; rename it to end in .csv"),
-        (log()[:60], "holds no messages with stamps (TimeUS)"),
-        (dataflash({}, []), "holds no messages with stamps (TimeUS)"),
+        (b"", "not a DataFlash log: it does not start like one (encrypted, or of another kind?)"),
+        (bytes(range(256)), "not a DataFlash log: it does not start like one (encrypted, or of another kind?)"),
+        (b"t,roll\n0,1\n", "seems to hold CSV, unlike the ending of its name; rename it to end in .csv"),
+        (log()[:60], "holds no messages with time stamps (TimeUS)"),
+        (dataflash({}, []), "holds no messages with time stamps (TimeUS)"),
     ],
     ids=["empty", "noise", "text", "cut", "none"],
 )

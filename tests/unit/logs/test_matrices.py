@@ -113,7 +113,7 @@ def test_what_keeps_hdf5_busy_for_ever(tmp_path, monkeypatch):
     # As damage does, where HDF5 follows addresses in a circle.
     monkeypatch.setattr(matrices, "_PROBE", "while True: pass")
     monkeypatch.setattr(matrices, "longest_read_s", lambda _: 0.3)
-    with pytest.raises(InputError, match=r"log\.h5: damaged: HDF5 does not come to an end with it within"):
+    with pytest.raises(InputError, match=r"log\.h5: damaged: HDF5 did not finish reading it within"):
         log_contents(tmp_path / "log.h5")
     assert not matrices.is_log(tmp_path / "log.h5")
 
@@ -138,7 +138,7 @@ def test_a_file_that_states_more_than_memory_may_hold_is_refused(tmp_path, monke
     with h5py.File(tmp_path / "log.h5", "w") as file:
         file.create_dataset("t", (10**9,), "f8", chunks=(1 << 16,))
     scipy.io.savemat(tmp_path / "log.mat", {"t": np.zeros(3 << 20)}, do_compression=True)
-    with pytest.raises(InputError, match=r"log\.h5: states 8 GB of numbers, far more"):
+    with pytest.raises(InputError, match=r"log\.h5: claims 8 GB of numbers, far more"):
         log_contents(tmp_path / "log.h5")
-    with pytest.raises(InputError, match=r"log\.mat: holds more than .* GB of numbers in .* MB: damaged, or no log"):
+    with pytest.raises(InputError, match=r"log\.mat: holds more than .* GB of numbers in .* MB: damaged, or not a log"):
         log_contents(tmp_path / "log.mat")

@@ -43,7 +43,7 @@ def test_messages_are_flattened_and_stamped_by_who_sent_them(bag):
     np.testing.assert_allclose(turning["timestamp_sample"], 0.01 * np.arange(20) - 0.001, atol=1e-6)
     (warning,) = contents.warnings
     assert warning.startswith(
-        "the clocks of these topics are not the recorder's, and are shifted by the median: /fmu/out/rates (+1.7e+09 s)"
+        "these topics do not use the recorder's clock and are shifted by the median offset: /fmu/out/rates (+1.7e+09 s)"
     )
     assert contents.system == "ROS 2"
 
@@ -81,13 +81,13 @@ def test_types_without_definition_are_named(tmp_path):
     assert contents.topics.keys() == {"/imu/data", "/note"}
     (warning,) = contents.warnings
     assert warning == (
-        "topics left out, as the file has no fitting definition of their messages: /fmu/out/rates"
+        "topics left out because the file has no matching definition of their messages: /fmu/out/rates"
         " (px4_msgs/msg/VehicleAngularVelocity)"
     )
 
 
 def test_a_bag_without_messages(tmp_path):
-    with pytest.raises(InputError, match=r"a ROS 2 bag without messages that can be read$"):
+    with pytest.raises(InputError, match=r"a ROS 2 bag without readable messages$"):
         log_contents(write_bag(tmp_path / "bag", ".mcap", []))
 
 
@@ -102,7 +102,7 @@ def test_a_definition_that_does_not_fit_costs_its_topic_only(tmp_path, change):
     database.close()
     contents = log_contents(path)
     assert contents.topics.keys() == {"/imu/data", "/note"}
-    assert "no fitting definition of their messages: /fmu/out/rates" in contents.warnings[0]
+    assert "no matching definition of their messages: /fmu/out/rates" in contents.warnings[0]
 
 
 def test_constants_of_a_type_are_no_columns(tmp_path):

@@ -90,7 +90,7 @@ def test_a_wrong_number_of_the_vehicle_is_named_as_people_do():
     ]
 
 
-GUESSED = "guesses from mass and arms stand for what the config leaves open (--accept-guesses); as multiples"
+GUESSED = "guesses from mass and arms are used for what the config leaves open (--accept-guesses); as multiples"
 
 
 @pytest.mark.parametrize(

@@ -122,7 +122,7 @@ class Bent(Rigid):
         return InertiaValues(value, gradient)
 
 
-@pytest.mark.parametrize("known", [{}, {"has_velocity": False}], ids=["moving", "rotation alone"])
+@pytest.mark.parametrize("known", [{}, {"has_velocity": False}], ids=["moving", "only rotation"])
 def test_a_tensor_in_euler_coordinates_plays_like_the_rigid_body(known):
     flight, starts = flight_of(**known), np.arange(0, 30, 7)
     rigid = free_runs(player_of(VehicleModel(vehicle=VEHICLE, effects=EFFECTS), flight), flight, starts, 40)

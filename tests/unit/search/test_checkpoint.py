@@ -128,7 +128,7 @@ def test_none_to_resume(tmp_path):
         (header(seed=2), "seed = 1 there, 2 here"),
         (header(mutated_bits=0.5), "identification.mutated_bits = 0.003 there, 0.5 here"),
         (header(ridge={"folds": 7}), "identification.ridge.folds = 5 there, 7 here"),
-        (header(generations=2), "identification.generations = 2, but it has come to generation 3"),
+        (header(generations=2), "identification.generations = 2, but it has reached generation 3"),
         (
             header({"flight": replace(INPUTS["flight"], sha256="c" * 64)}),
             "flight = f.h5 (aaaaaaaaaaaa) there, f.h5 (c",
@@ -140,7 +140,7 @@ def test_none_to_resume(tmp_path):
 def test_checkpoint_of_another_search_names_the_difference(checkpoint, now, said):
     with pytest.raises(InputError) as error:
         Checkpoint(checkpoint.path, now).read()
-    assert str(error.value).startswith(f"{checkpoint.path}: is of another search: ")
+    assert str(error.value).startswith(f"{checkpoint.path}: belongs to another search: ")
     assert said in str(error.value)
     assert str(error.value).count(" here") <= 1
     assert "--force" in str(error.value)

@@ -77,6 +77,6 @@ def test_an_axis_that_can_little_leaves_the_others_their_size():
 
 
 def test_next_to_no_room_is_refused():
-    with pytest.raises(SettingError, match=r"room for .* degrees of roll only: rotor speed") as caught:
+    with pytest.raises(SettingError, match=r"room for only .* degrees of roll: rotor speed") as caught:
         of(size_rad=0.5, band_hz=(0.5, 10.0))
     assert caught.value.key == "excite.size_rad"

@@ -99,7 +99,7 @@ def test_nothing_that_limits_is_no_solution_and_says_what_would_help():
 def test_times_that_numbers_cannot_hold_are_no_solution(displacement, limit):
     move = plan_move(displacement, Limits(velocity=limit, pop=limit))
     assert (move.outcome, move.duration) == (MoveOutcome.OUT_OF_RANGE, np.inf)
-    assert "bring the displacement and the limits nearer to 1" in move.outcome.words
+    assert "bring the displacement and the limits closer to 1" in move.outcome.words
 
 
 def test_a_negative_displacement_is_the_mirror_image():
