@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.changes.judge import changed
+from cpfls_cli.changes.numbers import flight_numbers
 from cpfls_cli.consistency.audit import Audit, audit
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.consistency.numbers import impossible
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, has_force
 from cpfls_cli.gap.balance.weak_flight import Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
@@ -43,6 +47,13 @@ from cpfls_cli.weak_form.windows import Recording, common_windows
 
 _EXCITED_FLOORS = 3.0
 """Standard deviation of the inertial torque, in floors, above which a flight moves: a third of it is noise at most."""
+
+
+_OPEN = (GapVerdict.UNEXPLAINED, GapVerdict.PARTIAL)
+"""Verdicts that leave a gap, which may be that of another vehicle."""
+
+_FEWEST_COMPARED = 2
+"""Training flights that the held-out ones are compared with: of one nobody knows what it differs by from the next."""
 
 
 @dataclass(frozen=True)
@@ -131,10 +142,37 @@ def diagnose(
     notes = [*not_judged(judgement.held_out), *notes]
     remainder = judge.remainder(judgement.found)
     excited = _excited(hypothesis, quiet)
-    diagnosis = _concluded(
-        judged, faults, judgement, remainder, differ, notes, steps, excited, settings, torque_alone, audited
-    )
+    concluded = partial(_concluded, judged, faults, judgement, remainder)
+    further = (notes, steps, excited, settings, torque_alone, audited)
+    diagnosis = concluded(differ, *further)
+    if diagnosis.verdict in _OPEN and (between := _changed_between(training, held)):
+        diagnosis = concluded(between, *further)
     return DiagnosisRun(diagnosis, gusts, audited, hypothesis, estimates, judgement.held_out)
+
+
+def _changed_between(training: Sequence[Recording], held: Sequence[Recording]) -> tuple[str, ...]:
+    """Say how the vehicle changed between the training flights and the held-out ones; nothing where it did not.
+
+    What no effect explains may be the same in all of them; what they differ by is not.
+    """
+    if len(training) < _FEWEST_COMPARED:
+        return ()
+    try:
+        before, today = ([flight_numbers(recording) for recording in flights] for flights in (training, held))
+        # What chance gives is drawn, and hangs on no seed of the study.
+        change = changed(today, before, training[0].signals.vehicle, np.random.default_rng(0))
+    except InputError:
+        # Torques are stated, or it hardly flies.
+        return ()
+    if not change.found:
+        return ()
+    first, p_value = change.found[0], change.p_value
+    alike = ", ".join(f"{name} {100 * share:.0f} %" for name, share in first.alike)
+    return (
+        f"the vehicle of the held-out flights is not that of the training flights (p = {p_value:.2g}): "
+        f"{first.cause.name}, sure to {100 * first.belief:.0f} %{f' ({alike})' if alike else ''}; cpfls changed says by"
+        " how much",
+    )
 
 
 class _Flights(NamedTuple):
