@@ -29,6 +29,7 @@ _PAGES = {
     "cpfls/response": "response",
     "cpfls/disagreement": "disagreement",
     "cpfls/diagnosis": "diagnosis",
+    "cpfls/flight-numbers": "flight_numbers",
 }
 """Modules of `pages` that word an answer, by format; a flight, whose answer needs all of it, may not fit in memory."""
 

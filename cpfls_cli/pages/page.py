@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
+from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
@@ -15,6 +16,7 @@ from cpfls_cli.pages.disagreement import disagreement_blocks
 from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
 from cpfls_cli.pages.extended import extension_section
 from cpfls_cli.pages.flight import flight_section, vehicle_section
+from cpfls_cli.pages.flight_numbers import answer as flight_numbers_blocks
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
 from cpfls_cli.pages.identification import identification_section, search_section
 from cpfls_cli.pages.model import model_section
@@ -90,6 +92,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | None]] = (
     prediction_section,
     response_section,
     replay_section,
+    _of_each("flight-numbers", "What each flight tells", FlightNumbersRecord, flight_numbers_blocks),
     tracking_section,
     _of_each("rules", "Excitation of the rules", IdentifiedRecord, rules_blocks),
     provenance_section,

@@ -1,0 +1,73 @@
+"""The artifact of what one flight tells of its vehicle in numbers, made once and kept."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.spec import Format, Record, dataset, record
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cpfls_cli.changes.numbers import FlightNumbers
+
+
+@record
+class FlightNumbersRecord(Record):
+    """The artifact `cpfls/flight-numbers`."""
+
+    FORMAT: ClassVar = Format(
+        "cpfls/flight-numbers",
+        "what one flight tells of its vehicle in numbers that other flights of it tell alike",
+        "changed",
+        ("flight",),
+    )
+
+    flight: str = dataset("name of the flight")
+    number: tuple[str, ...] = dataset("its kind, and the rotor, axis or sensor that it is of: load M3", "number")
+    unit: tuple[str, ...] = dataset("unit of each number", "number")
+    value: Array = dataset("each number, in its unit", "number")
+    error: Array = dataset("its standard error, over blocks of the flight, in its unit", "number", least=0.0)
+    voltage: float = dataset(
+        "mean of the battery in flight, V, or a share of a full one where the flight states that", gaps=True
+    )
+    duration: float = dataset("time that it flies, away from take-off and landing", units="s")
+    period: float = dataset("time from sample to sample", units="s")
+    commanded: bool = dataset("1 where the loads are of commands, 0 where they are of speeds that were measured")
+    flown_at: float = dataset("when it was flown, since 1970 began (UTC), where the log tells", units="s", gaps=True)
+    warning: tuple[str, ...] = dataset("what to know about the flight", "warning")
+
+    @classmethod
+    def of(
+        cls, told: FlightNumbers, units: Sequence[str], period: float, flown_at: float, warnings: Sequence[str]
+    ) -> Self:
+        """Arrange the numbers of a flight."""
+        return cls(
+            flight=told.name,
+            number=tuple(told.values),
+            unit=tuple(units),
+            value=np.array(list(told.values.values())),
+            error=np.array([told.errors[name] for name in told.values]),
+            voltage=told.voltage,
+            duration=told.duration_s,
+            period=period,
+            commanded=told.commanded,
+            flown_at=flown_at,
+            warning=tuple(warnings),
+        )
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The numbers for machines."""
+        rows = zip(self.number, self.value.tolist(), self.error.tolist(), self.unit, strict=True)
+        return {
+            "flight": self.flight,
+            "flown_at_s": self.flown_at,
+            "duration_s": self.duration,
+            "voltage": self.voltage,
+            "commanded": self.commanded,
+            "numbers": {name: {"value": value, "error": error, "unit": unit} for name, value, error, unit in rows},
+        }

@@ -1,0 +1,66 @@
+"""Numbers of flights, computed once for each content and config, and kept in a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
+from cpfls_cli.artifacts.job import header_of
+from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.store import holds, read_record, write_record
+from cpfls_cli.changes.numbers import KINDS, flight_numbers
+from cpfls_cli.config.load import stored_study
+from cpfls_cli.config.study import Study
+from cpfls_cli.errors import InputError
+from cpfls_cli.flights.recordings import read_alone
+from cpfls_cli.version import __version__
+
+FOLDER = "flights"
+"""Of the folder that a command fills, where numbers are kept."""
+
+_HASH = 8
+"""Digits by which flights of one name are told apart."""
+
+
+def kept_numbers(
+    flight: Path, file: InputFile, study: Study, folder: Path, cautions: Iterable[str] = ()
+) -> FlightNumbersRecord:
+    """Give the numbers of a flight or log as they are kept in a folder, or compute them and keep them there.
+
+    Those that are kept are taken where content, vehicle and import are the same, and the version of the program.
+
+    Raises
+    ------
+    InputError
+        If the flight tells none.
+    """
+    path = folder / f"{flight.name}-{file.sha256[:_HASH]}.h5"
+    kept = _kept(path, file, study)
+    if kept is not None:
+        return kept
+    recording, full, warnings = read_alone(flight, study)
+    told = flight_numbers(recording, full)
+    units = [KINDS[name.split()[0]].unit for name in told.values]
+    made = FlightNumbersRecord.of(told, units, recording.signals.period, float("nan"), warnings)
+    record = made.with_header(header_of(study, {"flight": file}, cautions))
+    folder.mkdir(parents=True, exist_ok=True)
+    write_record(path, record)
+    return record
+
+
+def _kept(path: Path, file: InputFile, study: Study) -> FlightNumbersRecord | None:
+    if not path.is_file() or not holds(path, FlightNumbersRecord):
+        return None
+    try:
+        record = read_record(path, FlightNumbersRecord)
+        made_by = stored_study(record.origin.config, path)
+    except InputError:
+        return None
+    same = record.made_from("flight") == file.sha256 and record.origin.version == __version__
+    return record if same and _of_flight(made_by) == _of_flight(study) else None
+
+
+def _of_flight(study: Study) -> tuple[object, ...]:
+    """Give what of a study the numbers of a flight follow from: a delay that is not given is found in a share of it."""
+    return study.vehicle, study.import_, study.identification.training_share
