@@ -279,11 +279,11 @@ def _writing(path: Path) -> Iterator[None]:
         raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
-def check_folder(folder: Path, force: bool, names: Sequence[str]) -> None:
-    """Refuse a folder that cannot or must not be filled with files of these names."""
+def check_folder(folder: Path, force: bool, names: Sequence[str], kept: str = "") -> None:
+    """Refuse a folder that cannot or must not be filled with files of these names; what is kept may be there."""
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: is a file; -o names a folder")
-    if folder.exists() and any(folder.iterdir()) and not force:
+    if folder.exists() and any(own.name != kept for own in folder.iterdir()) and not force:
         raise InputError(f"{folder}: exists already and is not empty; --force replaces what is in it")
     if not folder.absolute().parent.is_dir():
         raise InputError(f"{folder}: cannot be made: there is no folder {folder.parent}")

@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cpfls_cli.cli.interrupts import deferred_interrupts
-from cpfls_cli.cli.options import Commands, Common, ConfigArgument, OutputOption, seconds, with_common
+from cpfls_cli.cli.options import (
+    Commands,
+    Common,
+    ConfigArgument,
+    OutputOption,
+    SeveralAfterOption,
+    seconds,
+    with_common,
+)
 from cpfls_cli.cli.path_options import (
     BandOption,
     BoxOption,
@@ -38,6 +46,8 @@ from cpfls_cli.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+
+    from typer.core import TyperCommand
 
     from cpfls_cli.artifacts.job import Job
     from cpfls_cli.config.study import Study
@@ -222,9 +232,11 @@ def _version(asked: bool) -> None:
         raise typer.Exit
 
 
-def _command(name: str | None = None) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def _command(
+    name: str | None = None, kind: type[TyperCommand] | None = None
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Make a function a command with the options that every command takes."""
-    return lambda function: app.command(name)(with_common(function))
+    return lambda function: app.command(name, cls=kind)(with_common(function))
 
 
 @app.callback()
@@ -537,6 +549,39 @@ def gap(
 ) -> None:
     """Compare, diagnose and extend in one go, with a report."""
     _run("gap", config, output, common, lambda command, job: command.run(job, flights, held_out or [], model))
+
+
+@_command(kind=SeveralAfterOption)
+def changed(
+    config: ConfigArgument,
+    today: Annotated[
+        list[Path],
+        typer.Argument(metavar="TODAY...", help=f"Flights, or logs ({formats_in_words()}), to look for a change in."),
+    ],
+    output: FolderOption,
+    since: Annotated[
+        list[Path],
+        typer.Option(
+            "--since",
+            metavar="REFERENCE...",
+            help="Flights or logs of the same vehicle from before; several after one another, three or more.",
+            show_default=False,
+        ),
+    ],
+    fail_on_change: Annotated[
+        bool, typer.Option("--fail-on-change", help="End with exit code 1 where something has changed, for scripts.")
+    ] = False,
+    *,
+    common: Common,
+) -> None:
+    """Say what has changed about a vehicle since reference flights: a rotor, its weight, its battery, or nothing."""
+    _run(
+        "changed",
+        config,
+        output,
+        common,
+        lambda command, job: command.run(job, today, since, fail_on_change=fail_on_change),
+    )
 
 
 @_command()

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 from typer.models import ArgumentInfo
 
 if TYPE_CHECKING:
@@ -89,6 +89,23 @@ class Commands(TyperGroup):
         except typer.BadParameter as error:
             error.message = _in_own_words(error)
             raise
+
+
+class SeveralAfterOption(TyperCommand):
+    """A command whose options that may be repeated take all values that follow, as a shell writes ``--since old/*``."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Repeat such an option before each of its values."""
+        several = {name for own in self.params if getattr(own, "multiple", False) for name in own.opts} - {"--set"}
+        given: list[str] = []
+        option = ""
+        for index, word in enumerate(args):
+            if word.startswith("-"):
+                option = word if word in several else ""
+            elif option and args[index - 1] != option:
+                given.append(option)
+            given.append(word)
+        return super().parse_args(ctx, given)
 
 
 def _in_own_words(error: typer.BadParameter) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,7 @@ _PAGES = {
     "cpfls/disagreement": "disagreement",
     "cpfls/diagnosis": "diagnosis",
     "cpfls/flight-numbers": "flight_numbers",
+    "cpfls/changed": "changed",
 }
 """Modules of `pages` that word an answer, by format; a flight, whose answer needs all of it, may not fit in memory."""
 
@@ -73,11 +75,12 @@ def _answered(artifact: Outline, record: Record, path: Path, more: Sequence[tupl
 
 def artifact_that_tells(output: Path) -> Path | None:
     """Find the artifact among what a command wrote whose `info` tells its answer again; None where there is none."""
-    path = output / "diagnosis.h5" if output.is_dir() else output
-    try:
-        return path if read_outline(path).spec.name in _PAGES else None
-    except InputError:
-        return None
+    paths = [output / "diagnosis.h5", output / "changed.h5"] if output.is_dir() else [output]
+    for path in paths:
+        with suppress(InputError):
+            if read_outline(path).spec.name in _PAGES:
+                return path
+    return None
 
 
 def description(artifact: Outline, more: Sequence[tuple[str, str]] = ()) -> tuple[Block, Facts, Block]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from cpfls_cli.artifacts.changed import ChangedRecord
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+from cpfls_cli.pages.changed import changed_blocks
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
 from cpfls_cli.pages.diagnosis import diagnosis_blocks
 from cpfls_cli.pages.disagreement import disagreement_blocks
@@ -92,6 +94,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | None]] = (
     prediction_section,
     response_section,
     replay_section,
+    _of_each("changed", "What changed", ChangedRecord, changed_blocks),
     _of_each("flight-numbers", "What each flight tells", FlightNumbersRecord, flight_numbers_blocks),
     tracking_section,
     _of_each("rules", "Excitation of the rules", IdentifiedRecord, rules_blocks),

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from cpfls_cli.artifacts.changed import ChangedRecord
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
@@ -95,6 +96,7 @@ _COMMANDS: dict[type[Record], _Command] = {
     DisagreementRecord: _Command("compare", ("flight",), ("model",)),
     DiagnosisRecord: _Command("diagnose", ("disagreement",), ("held-out",)),
     ExtendedRecord: _Command("extend", ("diagnosis",), ("model",)),
+    ChangedRecord: _Command("changed", ("today",), ("since",)),
     VehicleRecord: _Command("vehicle", ("flight",), ("held-out",)),
 }
 _IMPORT = _Command("import", ("log",))

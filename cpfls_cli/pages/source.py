@@ -23,6 +23,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
     # A page loads the records that it is about, not all others.
+    from cpfls_cli.artifacts.changed import ChangedRecord
     from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
     from cpfls_cli.artifacts.disagreement import DisagreementRecord
     from cpfls_cli.artifacts.extended import ExtendedRecord
@@ -95,6 +96,7 @@ class Sources:
     disagreements: ClassVar[_OfFormat[DisagreementRecord]] = _OfFormat("cpfls/disagreement")
     diagnoses: ClassVar[_OfFormat[DiagnosisRecord]] = _OfFormat("cpfls/diagnosis")
     vehicles: ClassVar[_OfFormat[VehicleRecord]] = _OfFormat("cpfls/model", "vehicle")
+    changes: ClassVar[_OfFormat[ChangedRecord]] = _OfFormat("cpfls/changed")
     extensions: ClassVar[_OfFormat[ExtendedRecord]] = _OfFormat("cpfls/model", "extended")
 
     @property
@@ -105,7 +107,7 @@ class Sources:
     @property
     def only_gap(self) -> bool:
         """Whether nothing else was given than how models and flights disagree, and what was found then."""
-        told = (self.gap, self.replays, self.responses, self.vehicles)
+        told = (self.gap, self.replays, self.responses, self.vehicles, self.changes)
         return sum(map(len, told)) == len(self.all)
 
     @property
@@ -115,6 +117,8 @@ class Sources:
             return self.settings.title
         if self.vehicles:
             return "A vehicle found in flights"
+        if self.changes:
+            return "What changed about a vehicle"
         if self.gap:
             return "Where simulation and flight disagree"
         return "What a model predicts of flights" if self.replays else "How a vehicle answers its rotors"

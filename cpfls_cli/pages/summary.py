@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
+from cpfls_cli.pages.changed import changed_box
 from cpfls_cli.pages.diagnosis import gap_blocks
 from cpfls_cli.pages.identification import scores_table, solution, verdict_line
 from cpfls_cli.pages.model import cautions_of, trust_box
@@ -28,6 +29,7 @@ def summary_section(sources: Sources) -> Section:
     blocks += [trust_box(vehicle) for vehicle in sources.vehicles]
     blocks += [verdict_box(replay) for replay in sources.replays if told_at(replay.record, sources) is None]
     blocks += [response_box(response.record) for response in sources.responses]
+    blocks += [changed_box(changed.record, changed.vehicle) for changed in sources.changes]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)
     if not sources.models and not sources.only_gap:

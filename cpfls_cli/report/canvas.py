@@ -189,9 +189,9 @@ def legend_above(axes: Axes, columns: int = 4) -> None:
     axes.legend(*named(axes), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.1)
 
 
-def legend_over(figure: Figure, axes: Axes) -> None:
+def legend_over(figure: Figure, axes: Axes, columns: int = 4) -> None:
     """Put one legend above a whole figure, of the curves of one of its plots."""
-    figure.legend(*named(axes), loc="outside upper left", ncols=4)
+    figure.legend(*named(axes), loc="outside upper left", ncols=columns)
 
 
 def named(axes: Axes) -> tuple[list[Artist], list[str]]:

@@ -1,0 +1,219 @@
+"""The artifact of what has changed about a vehicle between reference flights and those of today."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.artifacts.spec import Format, Record, columns_of, dataset, group, record, rows_of
+
+if TYPE_CHECKING:
+    from cpfls_cli.changes.judge import Change, Found
+    from cpfls_cli.changes.numbers import FlightNumbers
+
+
+@record
+class FoundGroup:
+    """Changes that were found, each in what the others leave."""
+
+    cause: tuple[str, ...] = dataset("what changed, as a key: rotor M3", "found")
+    unit: tuple[str, ...] = dataset("unit of its sizes", "found")
+    belief: Array = dataset("how sure that is beside others in its place", "found")
+
+
+@record
+class SizesGroup:
+    """Sizes of the changes that were found: of some there are several, by axis or rotor."""
+
+    found: IntArray = dataset("index of the change", "size", into="found")
+    value: Array = dataset("by how much, in its unit", "size")
+    low: Array = dataset("lower end of its 95 % interval", "size")
+    high: Array = dataset("upper end", "size")
+
+
+@record
+class AlikeGroup:
+    """Changes that would look alike."""
+
+    found: IntArray = dataset("index of the change in whose place it could be", "alike", into="found")
+    cause: tuple[str, ...] = dataset("what it would be", "alike")
+    belief: Array = dataset("how sure that is", "alike")
+
+
+@record
+class ShowsGroup:
+    """What would show."""
+
+    cause: tuple[str, ...] = dataset("change that is looked for", "cause")
+    unit: tuple[str, ...] = dataset("unit of its size", "cause")
+    smallest: Array = dataset("smallest size that shows with 90 %; not finite where none does", "cause", gaps=True)
+
+
+@record
+class ChangedRecord(Record):
+    """The artifact `cpfls/changed`."""
+
+    FORMAT: ClassVar = Format(
+        "cpfls/changed",
+        "what has changed about a vehicle between reference flights and flights of today",
+        "changed",
+        ("today", "since"),
+    )
+
+    today: tuple[str, ...] = dataset("names of today's flights, in the order given", "today")
+    before: tuple[str, ...] = dataset("names of the reference flights", "before")
+    commanded: bool = dataset("1 where loads are of commands, 0 where they are of speeds that were measured")
+    number: tuple[str, ...] = dataset("numbers that all flights tell: kind, and rotor, axis or sensor", "number")
+    unit: tuple[str, ...] = dataset("unit of each number", "number")
+    mean: Array = dataset("mean of the reference flights, in its unit", "number")
+    deviation: Array = dataset("what flights of one day differ by from it where nothing changed", "number")
+    apart: Array = dataset("today's flights less the mean; loads at the reference's voltage", "today", "number")
+    scatter: Array = dataset("reference flights less the mean, alike", "before", "number")
+    hover: float = dataset("what the loads of all rotors have in common of that, logarithm", gaps=True)
+    hover_deviation: float = dataset("what that differs by where nothing changed", gaps=True)
+    p_value: float = dataset("probability that flights of an unchanged vehicle look as much like any change")
+    by_flight: Array = dataset("the same of each flight of today alone", "today")
+    false_alarm: float = dataset("probability below which the vehicle is said to have changed")
+    named_from: float = dataset("belief from which on a change is named, and not one of several")
+    found: FoundGroup = group()
+    size: SizesGroup = group()
+    alike: AlikeGroup = group()
+    shows: ShowsGroup = group()
+    warning: tuple[str, ...] = dataset("what to know about the flights", "warning")
+
+    @classmethod
+    def of(
+        cls,
+        change: Change,
+        today: Sequence[FlightNumbers],
+        before: Sequence[FlightNumbers],
+        units: Mapping[str, str],
+        warnings: Sequence[str],
+        *,
+        false_alarm: float,
+        named_from: float,
+    ) -> Self:
+        """Arrange a change, with the units of its numbers and causes by name."""
+        hover, hover_deviation = _in_common(change, today)
+        return cls(
+            today=tuple(flight.name for flight in today),
+            before=tuple(flight.name for flight in before),
+            commanded=today[0].commanded,
+            number=change.names,
+            unit=tuple(units[name] for name in change.names),
+            mean=change.reference.mean,
+            deviation=change.deviation,
+            apart=change.apart,
+            scatter=change.reference.apart(before)[0],
+            hover=hover,
+            hover_deviation=hover_deviation,
+            p_value=change.p_value,
+            by_flight=change.by_flight,
+            false_alarm=false_alarm,
+            named_from=named_from,
+            found=FoundGroup(
+                cause=tuple(each.cause.name for each in change.found),
+                unit=tuple(each.cause.unit for each in change.found),
+                belief=np.array([each.belief for each in change.found]),
+            ),
+            **_sizes_and_alike(change.found),
+            shows=ShowsGroup(
+                cause=tuple(change.shows),
+                unit=tuple(units[name] for name in change.shows),
+                smallest=np.array(list(change.shows.values())),
+            ),
+            warning=tuple(warnings),
+        )
+
+    @property
+    def changed(self) -> bool:
+        """Whether the vehicle is said to have changed."""
+        return self.p_value <= self.false_alarm
+
+    @property
+    def named(self) -> BoolArray:
+        """Whether each change that was found is named, shape (found,)."""
+        return np.asarray(self.found.belief >= self.named_from)
+
+    @property
+    def since(self) -> int | None:
+        """Index of today's flight from which on each shows a change alone; None where the last does not."""
+        still = np.flatnonzero(self.by_flight > self.false_alarm)
+        first = int(still[-1]) + 1 if len(still) else 0
+        return first if self.changed and first < len(self.today) else None
+
+    @property
+    def hover_changed(self) -> bool:
+        """Whether hover needs another thrust than in the reference, beyond 95 % of what it differs by."""
+        return bool(abs(self.hover) > 1.96 * self.hover_deviation)
+
+    def sizes(self, index: int) -> list[tuple[float, float, float]]:
+        """Give the sizes of a change that was found with their intervals, in its unit."""
+        own = self.size.found == index
+        return [tuple(row) for row in np.stack([self.size.value, self.size.low, self.size.high], axis=1)[own].tolist()]
+
+    def others(self, index: int) -> list[tuple[str, float]]:
+        """List what would look alike, and how sure each is."""
+        rows = zip(self.alike.found, self.alike.cause, self.alike.belief.tolist(), strict=True)
+        return [(cause, belief) for of, cause, belief in rows if of == index]
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What changed for machines."""
+        since = self.since
+        return {
+            "changed": self.changed,
+            "p": self.p_value,
+            "by_flight": dict(zip(self.today, self.by_flight.tolist(), strict=True)),
+            "since": None if since is None else self.today[since],
+            "causes": [
+                {
+                    "name": name,
+                    "named": bool(self.named[index]),
+                    "belief": float(self.found.belief[index]),
+                    "unit": self.found.unit[index],
+                    "sizes": [dict(zip(("value", "low", "high"), each, strict=True)) for each in self.sizes(index)],
+                    "alike": dict(self.others(index)),
+                }
+                for index, name in enumerate(self.found.cause)
+            ],
+            "shows": rows_of(self.shows),
+            "reference_flights": list(self.before),
+            "numbers": {
+                name: {
+                    "unit": self.unit[index],
+                    "reference": float(self.mean[index]),
+                    "deviation": float(self.deviation[index]),
+                    "today": (self.mean[index] + self.apart[:, index]).tolist(),
+                }
+                for index, name in enumerate(self.number)
+            },
+            "warnings": list(self.warning),
+        }
+
+
+def _in_common(change: Change, today: Sequence[FlightNumbers]) -> tuple[float, float]:
+    loads = np.array([name.startswith("load ") for name in change.names])
+    if not loads.any():
+        return np.nan, np.nan
+    apart, covariance = change.reference.apart(today)
+    mean = loads / loads.sum()
+    return float((apart @ mean).mean()), float(np.sqrt(mean @ covariance @ mean))
+
+
+def _sizes_and_alike(found: Sequence[Found]) -> dict[str, Any]:
+    sizes = [(index, size) for index, each in enumerate(found) for size in each.sizes]
+    alike = [(index, *other) for index, each in enumerate(found) for other in each.alike]
+    return {
+        "size": columns_of(
+            SizesGroup, (size for _, size in sizes), found=np.array([index for index, _ in sizes], dtype=np.int64)
+        ),
+        "alike": AlikeGroup(
+            found=np.array([index for index, _, _ in alike], dtype=np.int64),
+            cause=tuple(cause for _, cause, _ in alike),
+            belief=np.array([belief for _, _, belief in alike]),
+        ),
+    }

@@ -1,0 +1,165 @@
+"""Command `changed`: what has changed about a vehicle between reference flights and flights of today."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from cpfls_cli.artifacts.changed import ChangedRecord
+from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
+from cpfls_cli.artifacts.job import Job, finish, go_on, take_inputs
+from cpfls_cli.artifacts.output import check_folder, filled_folder, refuse_inputs, write_text
+from cpfls_cli.artifacts.rebuilt import numbers_of_flight
+from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.changes.causes import causes
+from cpfls_cli.changes.judge import FALSE_ALARM, NAMED, changed
+from cpfls_cli.changes.numbers import KINDS
+from cpfls_cli.changes.reference import FEWEST, common_numbers
+from cpfls_cli.commands import report
+from cpfls_cli.errors import InputError
+from cpfls_cli.flights.inputs import hashes_of, numbered_roles
+from cpfls_cli.flights.kept_numbers import FOLDER, kept_numbers
+from cpfls_cli.pages.changed import answer
+from cpfls_cli.pages.source import source_of, unique_labels
+from cpfls_cli.report.content import Text
+from cpfls_cli.report.outcome import Command, Outcome, as_json
+from cpfls_cli.words import joined
+
+FILES = ("changed.h5", "report.html", "changed.json")
+"""What a folder holds in the end, beside the numbers of each flight."""
+
+_RATE = 0.01
+"""By which sampling rates differ that are another."""
+
+
+def run(job: Job, today: Sequence[Path], since: Sequence[Path], *, fail_on_change: bool = False) -> Outcome:
+    """Hold flights of today against reference flights, and say what has changed."""
+    given = numbered_roles("today", today) | numbered_roles("since", since)
+    inputs = take_inputs(job, given)
+    check_folder(job.output, job.force, FILES, kept=FOLDER)
+    for name in FILES:
+        refuse_inputs(job.output / name, job.inputs)
+    kept, twice = _once(given, inputs)
+    if job.dry_run:
+        line = Text(f"{job.output}: would be filled; the config and all inputs are good")
+        return Outcome({"dry_run": True, "output": str(job.output)}, (line,))
+    flights, left_out = _flights(job, kept, inputs)
+    record = _record(job, flights, [*twice, *left_out])
+    with filled_folder(job.output, FILES) as folder:
+        written = finish(replace(job, output=folder / FILES[0]), record, {role: inputs[role] for role in flights})
+        write_text(folder / FILES[2], json.dumps(as_json(written.summary), indent=1, allow_nan=False) + "\n")
+        # Without a bar of its own: the bar is that of the whole.
+        report.run(replace(job, output=folder / FILES[1], progress=lambda *_: None), [folder / FILES[0]])
+    source = source_of(replace(job, output=job.output / FILES[0]), written)
+    page = Text(f"{job.output / FILES[1]}: all of it, with the picture")
+    failed = int(fail_on_change and written.changed)
+    return Outcome(
+        written.summary, (*answer(source), page), failed, (_next(job, written, [kept[role] for role in flights]),)
+    )
+
+
+def _once(given: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> tuple[dict[str, Path], list[str]]:
+    """Leave out copies of a flight; one that is of today and of the reference is refused."""
+    known: dict[str, str] = {}
+    kept, warnings = {}, []
+    for role, path in given.items():
+        hashes = hashes_of(path, inputs[role])
+        same = next((known[each] for each in hashes if each in known), None)
+        if same is None:
+            kept[role] = path
+            known.update(dict.fromkeys(hashes, role))
+        elif same.partition("-")[0] != role.partition("-")[0]:
+            also = "" if given[same].name == path.name else f", as {given[same]}"
+            raise InputError(
+                f"{path}: is both a flight of today and one of the reference (--since){also}; leave it out of one"
+            )
+        else:
+            warnings.append(f"{path.name}: is given twice, also as {given[same].name}; counted once")
+    return kept, warnings
+
+
+def _flights(
+    job: Job, given: Mapping[str, Path], inputs: Mapping[str, InputFile]
+) -> tuple[dict[str, FlightNumbersRecord], list[str]]:
+    """Tell the numbers of all flights by role, under names that tell them apart; one that tells none is left out."""
+    labels = unique_labels(list(given.values()))
+    flights: dict[str, FlightNumbersRecord] = {}
+    refused: dict[str, InputError] = {}
+    for index, ((role, path), label) in enumerate(zip(given.items(), labels, strict=True)):
+        job.progress(index, len(given), label)
+        try:
+            told = kept_numbers(path, inputs[role], job.study, job.output / FOLDER, job.cautions)
+            flights[role] = replace(told, flight=label)
+        except InputError as error:
+            refused[role] = error
+    job.progress(len(given), len(given))
+    for side in ("today", "since"):
+        if not any(role.startswith(side) for role in flights):
+            raise next(error for role, error in refused.items() if role.startswith(side))
+    return flights, [f"left out: {error}" for error in refused.values()]
+
+
+def _record(job: Job, flights: Mapping[str, FlightNumbersRecord], notes: Sequence[str]) -> ChangedRecord:
+    vehicle = job.study.vehicle
+    of_today, of_before = (
+        [own for role, own in flights.items() if role.startswith(side)] for side in ("today", "since")
+    )
+    today, before = ([numbers_of_flight(own) for own in side] for side in (of_today, of_before))
+    change = changed(today, before, vehicle, np.random.default_rng(job.study.seed))
+    units = {name: KINDS[name.split()[0]].unit for name in change.names}
+    units |= {cause.name: cause.unit for cause in causes(change.names, vehicle)}
+    warnings = [
+        *_warnings(of_today, of_before, change.names),
+        *notes,
+        *(f"{own.flight}: {words}" for own in (*of_today, *of_before) for words in own.warning),
+    ]
+    return ChangedRecord.of(change, today, before, units, warnings, false_alarm=FALSE_ALARM, named_from=NAMED)
+
+
+def _warnings(
+    today: Sequence[FlightNumbersRecord], before: Sequence[FlightNumbersRecord], names: Sequence[str]
+) -> Iterator[str]:
+    """Say what the comparison lacks."""
+    flights = [*before, *today]
+    if len(before) < FEWEST:
+        yield (
+            f"{len(before)} reference flight{'s' if len(before) > 1 else ''}: {FEWEST} or more would tell what differs "
+            "from day to day; what is usual stands for it"
+        )
+    if len({own.commanded for own in flights}) > 1:
+        speeds, commands = ([own.flight for own in flights if own.commanded == of] for of in (False, True))
+        yield (
+            f"{joined(speeds)} log speeds of rotors, {joined(commands)} commands: loads are not compared; import the "
+            "same signal of all"
+        )
+    elif flights[0].commanded and not all(np.isfinite(own.voltage) for own in flights):
+        without = [own.flight for own in flights if not np.isfinite(own.voltage)]
+        yield (
+            f"without the battery's voltage: {'all flights' if len(without) == len(flights) else joined(without)}; an "
+            "emptier battery looks like a heavier vehicle, so name import.signals.voltage"
+        )
+    usual = float(np.median([own.period for own in before]))
+    other = [own for own in flights if abs(own.period / usual - 1) > _RATE]
+    if other:
+        listed = joined(f"{own.flight} ({1 / own.period:.4g} Hz)" for own in other)
+        yield (
+            f"another sampling rate than the usual one of the reference, {1 / usual:.4g} Hz: {listed}; what vibrates "
+            "faster than half the rate looks otherwise there"
+        )
+    known = [numbers_of_flight(own) for own in flights]
+    lost = [name for name in dict.fromkeys(name for own in known for name in own.values) if name not in names]
+    if lost:
+        few = sorted({own.name for own in known if not set(common_numbers(known)) >= set(own.values)})
+        yield f"not compared, for not all flights tell it: {joined(lost)} (only {joined(few)})"
+
+
+def _next(job: Job, record: ChangedRecord, flown: Sequence[Path]) -> Command:
+    """Give the command that goes on: what a model misses of the flights that changed, or the numbers of all flights."""
+    if not record.changed:
+        return "cpfls", "info", job.output / FILES[0], "-v"
+    changed_ones = flown[record.since or 0 : len(record.today)]
+    return go_on(job, "gap", *changed_ones, output=job.beside("gap"))

@@ -1,0 +1,152 @@
+"""Changes of a vehicle in words: what changed, by how much in units that people use, and what to look at by hand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from cpfls_cli.report.numbers import number
+from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.words import joined
+
+Size = tuple[float, float, float]
+"""A value with the ends of its interval, in the unit of the cause."""
+
+Sizes = Sequence[Size]
+
+_NAMES = {
+    "mass": "another weight",
+    "centre of mass": "a centre of mass elsewhere",
+    "all rotors": "another thrust of all rotors",
+    "torque about z": "a torque about z",
+    "late": "another delay",
+    "gusts": "gusts",
+    "lean": "steady wind or a tilted sensor",
+    "drift": "an offset of the gyroscope",
+    "battery sag": "another battery",
+}
+"""What a cause is, where its key does not say it."""
+
+_CHECKS = {
+    "rotor": "look at its propeller for a cut, a chip or a bend; change it for a new one; turn the motor by hand",
+    "rotors": "look at both propellers for cuts, chips or bends; change them for new ones; turn the motors by hand",
+    "mass": "weigh it, with battery and load",
+    "centre of mass": "see where the battery sits, and what else can be put elsewhere",
+    "all rotors": "weigh it; see whether all propellers are of the usual kind; charge the battery",
+    "torque about z": "see whether a motor stands askew: its screws, its arm, a twisted frame",
+    "vibration": "balance the propellers; tighten the screws of motors and autopilot; look for tape and chips",
+    "turn": "turn the motor by hand: its bearing, its cable, its speed controller",
+    "follow": "see whether something sits further out or in than before, and whether all propellers are of one kind",
+    "late": "see whether filters, speed controllers or the autopilot's settings were changed",
+    "gusts": "fly again in still air; if it stays, look for what is loose",
+    "lean": "fly again in still air; if it stays, calibrate the level, and see how the autopilot is mounted",
+    "drift": "calibrate the gyroscope, warm and at rest",
+    "battery": "charge and balance the battery, or take another; feel its contacts for heat",
+}
+"""What to look at, by cause or its first word."""
+
+
+def cause_name(cause: str) -> str:
+    """Name a change without its size."""
+    kind, _, of = cause.partition(" ")
+    if kind == "turn":
+        return f"the speed of rotor {of}"
+    if kind == "follow":
+        return f"{of} that follows otherwise"
+    return _NAMES.get(cause, cause)
+
+
+def what_to_check(cause: str) -> str:
+    """Say what to look at by hand."""
+    return _CHECKS.get(cause, _CHECKS.get(cause.split()[0], "look at the numbers that changed"))
+
+
+def change_words(cause: str, sizes: Sizes, vehicle: VehicleSettings, axes: Sequence[str] = ()) -> str:
+    """Say what changed and by how much.
+
+    Parameters
+    ----------
+    axes : sequence of str
+        Of a cause that has a size along several.
+    """
+    kind, _, of = cause.partition(" ")
+    size = sizes[0]
+    words = {
+        "rotor": lambda: f"rotor {of} pulls {_percent(size, ('less', 'more'))}",
+        "rotors": lambda: f"rotors {of} pull {joined(_percent(each, ('less', 'more')) for each in sizes)}",
+        "mass": lambda: f"it is {_amount(size, 1e3 * vehicle.mass_kg, ' g', ('heavier', 'lighter'))}",
+        "all": lambda: f"all rotors are asked for {_percent(size, ('more', 'less'))} thrust",
+        "centre": lambda: f"the centre of mass lies {_off_centre(sizes)}",
+        "torque": lambda: f"a torque about z takes {_percent(size)} of the rotors' drag",
+        "vibration": lambda: f"it vibrates {_times(size)}",
+        "turn": lambda: f"rotor {of} turns {_percent(_less_one(0.5, size), ('faster', 'slower'))} than it is told",
+        "follow": lambda: f"{of} follows the rotors' torque {_percent(_less_one(1.0, size), ('more', 'less'))}",
+        "late": lambda: f"rotation follows the rotors {_amount(size, 1e3, ' ms', ('later', 'earlier'))}",
+        "gusts": lambda: f"what turns it beside the rotors, gusts, is {_times(size)}",
+        "lean": lambda: f"it leans with {_each(sizes, axes, 'm/s²', 'along')} of the world, as against wind",
+        "drift": lambda: f"the gyroscope is off by {_each(sizes, axes, 'rad/s', 'about')}",
+        "battery": lambda: f"the battery falls {_percent(size, ('further', 'less far'))}",
+    }
+    return words[kind]() if kind in words else f"{cause}: {number(size[0], 2)}"
+
+
+def smallest_words(cause: str, size: float, vehicle: VehicleSettings) -> str:
+    """Say how large a change is that would have shown."""
+    kind, _, of = cause.partition(" ")
+    words = {
+        "rotor": f"a rotor that pulls {number(100 * size, 2)} % less",
+        "rotors": f"two rotors that pull {number(100 * size, 2)} % less",
+        "mass": f"{number(1e3 * vehicle.mass_kg * size, 2)} g",
+        "all": f"{number(100 * size, 2)} % of the thrust of all rotors",
+        "centre": f"{number(1e3 * size, 2)} mm of the centre of mass",
+        "torque": f"{number(100 * size, 2)} % of the rotors' drag in yaw",
+        "vibration": f"{number(math.exp(size), 2)} times the vibration",
+        "turn": f"{number(50 * size, 2)} % of the speed of rotor {of}",
+        "follow": f"{number(100 * math.expm1(size), 2)} % of {of} for the same torque",
+        "late": f"{number(1e3 * size, 2)} ms of delay",
+        "gusts": f"{number(math.exp(size), 2)} times the gusts",
+        "lean": f"{number(size, 2)} m/s² of steady wind or a tilted sensor",
+        "drift": f"{number(size, 2)} rad/s of the gyroscope",
+        "battery": f"{number(100 * size, 2)} % of a full battery",
+    }
+    return words.get(kind, f"{cause}: {number(size, 2)}")
+
+
+def _off_centre(sizes: Sizes) -> str:
+    ways = (("to the front", "to the back"), ("to the left", "to the right"))
+    shown = [_amount(size, 1e3, " mm", way) for size, way in zip(sizes, ways, strict=True) if _is_clear(size)]
+    return joined(shown) if shown else "elsewhere, by too little to say where"
+
+
+def _each(sizes: Sizes, axes: Sequence[str], unit: str, before: str) -> str:
+    shown = [f"{number(size[0], 2)} {unit} {before} {axis}" for size, axis in zip(sizes, axes, strict=False)]
+    clear = [each for each, size in zip(shown, sizes, strict=False) if _is_clear(size)]
+    return joined(clear or shown)
+
+
+def _is_clear(size: Size) -> bool:
+    return size[1] * size[2] > 0
+
+
+def _percent(size: Size, ways: tuple[str, str] = ("", "")) -> str:
+    return _amount(size, 100.0, " %", ways)
+
+
+def _amount(size: Size, scale: float, unit: str, ways: tuple[str, str]) -> str:
+    """Write how much a size is, which way, and its interval turned alike."""
+    value, low, high = (scale * each for each in size)
+    if value < 0:
+        value, low, high = -value, -high, -low
+    way = ways[0] if size[0] > 0 else ways[1]
+    return f"{number(value, 2)}{unit}{' ' if way else ''}{way} ({number(low, 2)} to {number(high, 2)}{unit})"
+
+
+def _less_one(power: float, size: Size) -> Size:
+    """Turn logarithms into ratios to a power, less 1."""
+    value, low, high = (math.expm1(power * each) for each in size)
+    return value, low, high
+
+
+def _times(size: Size) -> str:
+    value, low, high = map(math.exp, size)
+    return f"{number(value, 2)} times as strong ({number(low, 2)} to {number(high, 2)})"

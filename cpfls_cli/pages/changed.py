@@ -1,0 +1,258 @@
+"""The page of what has changed about a vehicle: the answer, what would look alike, and each number in a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.changed import ChangedRecord
+from cpfls_cli.pages.change_words import cause_name, change_words, smallest_words, what_to_check
+from cpfls_cli.pages.source import Source
+from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, plot
+from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Plot, Table, Text
+from cpfls_cli.report.numbers import number, sentence, whole_percent
+from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.words import joined
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_SHARES = {"mass", "all rotors"}
+"""Causes of which hover tells first, and nothing tells apart."""
+
+_NATURAL = {
+    "load": "",
+    "turn": "",
+    "vibration gyroscope": "rad/s",
+    "vibration accelerometer": "m/s²",
+    "follow": "",
+    "gusts": "rad/s²",
+}
+"""Units of numbers that are logarithms, without their axis: of what they are the logarithm of."""
+
+_UNITS = {"m/s^2": "m/s²", "1": ""}
+_SHOWN_FIRST = ("rotor M1", "mass", "centre of mass", "vibration", "late", "gusts")
+"""Of what would have shown, as much as a first screen has room for; of rotors the one that shows least."""
+
+_ALIKE = 3
+"""Others that are told beside a change that is not sure."""
+
+_CHECKED = 2
+_MARKERS = "osD^vP"
+"""Of today's flights; more look alike."""
+
+_LONG = 18
+"""Letters of a flight's name from which on names stand one below the other."""
+
+_ROW, _HEAD = 0.19, 0.8
+"""Inches of a picture for each number, and beside them."""
+
+_REFERENCE: dict[str, Any] = {"color": GREY, "marker": "|", "markersize": 7, "linestyle": "none", "zorder": 2}
+_TODAY: dict[str, Any] = {
+    "color": "black",
+    "linestyle": "none",
+    "markersize": 4.5,
+    "markerfacecolor": "none",
+    "zorder": 3,
+}
+_BAND: dict[str, Any] = {"color": "#dddddd", "linewidth": 0.0, "zorder": 0.5}
+
+
+def answer(changed: Source[ChangedRecord], index: int = 1) -> Iterator[Block]:
+    """Say whether the vehicle changed: what, by how much, how sure, since when, what looks alike, what to check."""
+    record, vehicle = changed.record, changed.vehicle
+    yield changed_box(record, vehicle)
+    yield Facts(list(_facts(record, vehicle)))
+    yield Folded("each number beside the reference, and what would have shown", [*_tables(record, vehicle, index)])
+    yield from (Text(words, "warning") for words in record.warning)
+
+
+def changed_box(record: ChangedRecord, vehicle: VehicleSettings) -> Box:
+    """Say in a sentence what changed, or that nothing did."""
+    if not record.changed:
+        return Box("NO CHANGE", "nothing beyond what flights of this vehicle differ by", (), "good")
+    first, *more = (sentence(_told(record, index, vehicle)) for index in range(len(record.found.cause)))
+    return Box("CHANGED", first, [f"And: {each[:1].lower()}{each[1:]}" for each in more], "warning")
+
+
+def _told(record: ChangedRecord, index: int, vehicle: VehicleSettings) -> str:
+    cause, others = record.found.cause[index], record.others(index)
+    axes = [name.split()[-1] for name in record.number if name.split()[0] == cause]
+    what = change_words(cause, record.sizes(index), vehicle, axes)
+    sure = f"sure to {whole_percent(float(record.found.belief[index]))}"
+    if record.named[index]:
+        with_another = any(is_within(cause, name) for name, _ in others)
+        return f"{what}{', perhaps with another' if with_another else ''}; {sure}"
+    alike = [f"{cause_name(name)}, {whole_percent(belief)}" for name, belief in others[:_ALIKE]]
+    return f"one of: {'; or '.join([f'{what}, {sure}', *alike])}"
+
+
+def is_within(cause: str, other: str) -> bool:
+    """Tell whether a pair of rotors holds the one that changed."""
+    return cause.startswith("rotor ") and other.startswith("rotors ") and cause.split()[-1] in other.split()
+
+
+def _facts(record: ChangedRecord, vehicle: VehicleSettings) -> Iterator[tuple[str, str]]:
+    if record.hover_changed and record.changed:
+        yield "Hover", sentence(_hover(record, vehicle))
+    if record.changed:
+        yield "Since", sentence(_since(record))
+        for index, cause in enumerate(record.found.cause):
+            alike = [name for name, _ in record.others(index) if not is_within(cause, name)]
+            if alike and record.named[index]:
+                yield "Looks alike", sentence(joined(map(cause_name, alike)))
+        yield from _checks(record)
+    else:
+        yield (
+            "Would have shown",
+            sentence(", ".join(_would_have_shown(record, vehicle)) or "nothing that is looked for"),
+        )
+        kinds = joined(dict.fromkeys(name.split()[0] for name in record.number))
+        of = "; loads are of commands" if record.commanded else "; loads are of measured speeds"
+        yield "Compared", sentence(f"{kinds}{of if 'load' in kinds else ''}")
+    yield "Chance", sentence(_chance(record))
+
+
+def _hover(record: ChangedRecord, vehicle: VehicleSettings) -> str:
+    """Say what hover needs, the plainest clue, and what that can be where nothing else is known."""
+    share = float(np.expm1(record.hover))
+    grams = number(abs(1e3 * share * vehicle.mass_kg), 2)
+    up = share > 0
+    listed = {*record.found.cause, *record.alike.cause}
+    either = f"{grams} g {'heavier' if up else 'lighter'}, or all rotors pull {'less' if up else 'more'}"
+    tail = f": {either}" if listed & _SHARES else " than in the reference"
+    return f"needs {number(100 * abs(share), 2)} % {'more' if up else 'less'} thrust{tail}"
+
+
+def _since(record: ChangedRecord) -> str:
+    if len(record.today) == 1:
+        return record.today[0]
+    alone = [name for name, p in zip(record.today, record.by_flight, strict=True) if p <= record.false_alarm]
+    if record.since is not None:
+        first = record.today[record.since]
+        if record.since == 0:
+            return f"{first}, the first of today: each of the {len(record.today)} flights shows it alone"
+        return f"{first}, number {record.since + 1} of {len(record.today)}; those before do not show it alone"
+    return (
+        f"not known: {joined(alone)} alone show{'s' if len(alone) == 1 else ''} it"
+        if alone
+        else (f"not known: no flight alone shows it, all {len(record.today)} together do")
+    )
+
+
+def _checks(record: ChangedRecord) -> Iterator[tuple[str, str]]:
+    looked: dict[str, str] = {}
+    for index, cause in enumerate(record.found.cause):
+        for name in [cause, *(() if record.named[index] else (name for name, _ in record.others(index)))]:
+            looked.setdefault(what_to_check(name), cause_name(name))
+    for check, name in list(looked.items())[:_CHECKED]:
+        yield "Check", sentence(check if len(looked) == 1 else f"{name}: {check}")
+
+
+def _chance(record: ChangedRecord) -> str:
+    today, before = len(record.today), len(record.before)
+    return (
+        f"an unchanged vehicle looks like this with p = {number(record.p_value, 1)}; {today} "
+        f"flight{'s' if today > 1 else ''} of today beside {before} of the reference"
+    )
+
+
+def _would_have_shown(record: ChangedRecord, vehicle: VehicleSettings) -> Iterator[str]:
+    smallest = dict(zip(record.shows.cause, record.shows.smallest.tolist(), strict=True))
+    rotors = [size for name, size in smallest.items() if name.startswith("rotor ")]
+    smallest["rotor M1"] = max(rotors, default=np.nan)
+    for name in _SHOWN_FIRST:
+        if np.isfinite(smallest.get(name, np.nan)):
+            yield smallest_words(name, smallest[name], vehicle)
+
+
+def _tables(record: ChangedRecord, vehicle: VehicleSettings, index: int) -> Iterator[Table]:
+    rows: list[list[str | Cell]] = []
+    for at, name in enumerate(record.number):
+        usual, today = float(record.mean[at]), float(record.mean[at] + record.apart[:, at].mean())
+        deviation, apart = float(record.deviation[at]), float(record.apart[:, at].mean() / record.deviation[at])
+        natural = _natural(name)
+        if natural is None:
+            told = [_UNITS.get(record.unit[at], record.unit[at]), *(number(each, 3) for each in (usual, today))]
+            told.append(number(deviation, 2))
+        else:
+            told = [natural, *(number(float(np.exp(each)), 3) for each in (usual, today))]
+            told.append(f"{number(100 * float(np.expm1(deviation)), 2)} %")
+        rows.append([name, *told, Cell(number(apart, 2), "warning" if abs(apart) > 2 else "plain")])
+    header = ("Number", "Unit", "Reference", "Today", "Differs by", "Deviations")
+    yield Table(
+        f"changed-numbers-{index}",
+        "Each number of today, on average, beside the reference.",
+        header,
+        rows,
+        frozenset({0, 1}),
+        legend="Differs by: what flights of one day are off the reference by where nothing changed, one standard "
+        "deviation; deviations: today less the reference in these.",
+    )
+    shows = zip(record.shows.cause, record.shows.smallest.tolist(), strict=True)
+    caption = "The smallest change of each kind that shows in 9 of 10 days like this one."
+    yield Table(
+        f"changed-shows-{index}",
+        caption,
+        ("Change", "Shows from"),
+        [[name, smallest_words(name, size, vehicle) if np.isfinite(size) else "—"] for name, size in shows],
+        frozenset({0, 1}),
+    )
+
+
+def _natural(name: str) -> str | None:
+    """Give the unit of what a number is the logarithm of; None where it is none."""
+    kind, _, rest = name.partition(" ")
+    return _NATURAL.get(kind, _NATURAL.get(f"{kind} {rest.rpartition(' ')[0]}"))
+
+
+def changed_blocks(changed: Source[ChangedRecord], index: int) -> Iterator[Block]:
+    """Show beside the answer on a page: since when, what to check, the picture, and all numbers."""
+    record, vehicle = changed.record, changed.vehicle
+    yield Heading(changed.label)
+    yield Facts(list(_facts(record, vehicle)))
+    yield changed_figure(f"changed-{index}", record)
+    yield from _tables(record, vehicle, index)
+    yield from (Text(words, "warning") for words in record.warning)
+
+
+def changed_figure(name: str, record: ChangedRecord) -> Plot:
+    """Draw each number of today's flights over the band of the reference, in deviations."""
+    names = list(record.number)
+    places = _places(names)
+    today, before = record.apart / record.deviation, record.scatter / record.deviation
+    more = max(0, len(today) - len(_MARKERS))
+    columns = 1 if max(map(len, record.today)) > _LONG else 4
+    height = _HEAD + _ROW * (float(places[-1]) + 1 + (min(len(today), len(_MARKERS)) + 3) / columns)
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        axes.axvspan(-2.0, 2.0, label="two deviations", **_BAND)
+        axes.axvline(0.0, **BASELINE)
+        axes.plot(before.ravel(), np.tile(places, len(before)), label="reference", **_REFERENCE)
+        for marker, own, label in zip(_MARKERS, today, record.today, strict=False):
+            axes.plot(own, places, marker=marker, label=label, **_TODAY)
+        if more:
+            axes.plot(today[-more:].ravel(), np.tile(places, more), marker="x", label=f"{more} more", **_TODAY)
+        axes.set_yticks(places, names)
+        axes.invert_yaxis()
+        axes.set_xlabel("deviations from the reference")
+        axes.grid(visible=False, axis="y")
+        legend_over(figure, axes, columns)
+
+    caption = (
+        "Each number of today's flights over what the reference flights tell, in deviations: grey the two deviations "
+        "in which nearly all days lie where nothing changed, and the reference flights themselves."
+    )
+    description = "Numbers of today's flights in deviations from the reference, by kind"
+    return plot(name, caption, description, height, draw)
+
+
+def _places(names: Sequence[str]) -> Array:
+    """Give each number a row, and each kind some room before it."""
+    kinds = [name.split()[0] for name in names]
+    new = [0.0, *(0.6 * (one != other) for one, other in zip(kinds[1:], kinds[:-1], strict=True))]
+    return np.asarray(np.arange(len(names)) + np.cumsum(new))
