@@ -27,9 +27,14 @@ _NAMES = {
 }
 """What a cause is, where its key does not say it."""
 
+_HEAVY = 1000.0
+"""Grams that are told in kg."""
+
 _CHECKS = {
     "rotor": "look at its propeller for a cut, a chip or a bend; change it for a new one; turn the motor by hand",
     "rotors": "look at both propellers for cuts, chips or bends; change them for new ones; turn the motors by hand",
+    "load": "see what hangs under it",
+    "unbalance": "clean and balance its propeller; see that it sits straight; feel the bell of the motor for play",
     "mass": "weigh it, with battery and load",
     "centre of mass": "see where the battery sits, and what else can be put elsewhere",
     "all rotors": "weigh it; see whether all propellers are of the usual kind; charge the battery",
@@ -51,6 +56,8 @@ def cause_name(cause: str) -> str:
     kind, _, of = cause.partition(" ")
     if kind == "turn":
         return f"the speed of rotor {of}"
+    if kind == "unbalance":
+        return f"another balance of rotor {of}"
     if kind == "follow":
         return f"{of} that follows otherwise"
     return _NAMES.get(cause, cause)
@@ -61,24 +68,32 @@ def what_to_check(cause: str) -> str:
     return _CHECKS.get(cause, _CHECKS.get(cause.split()[0], "look at the numbers that changed"))
 
 
-def change_words(cause: str, sizes: Sizes, vehicle: VehicleSettings, axes: Sequence[str] = ()) -> str:
+def change_words(
+    cause: str, sizes: Sizes, vehicle: VehicleSettings, axes: Sequence[str] = (), cable: float = math.nan
+) -> str:
     """Say what changed and by how much.
 
     Parameters
     ----------
     axes : sequence of str
         Of a cause that has a size along several.
+    cable : float
+        Length of that of a load, m.
     """
     kind, _, of = cause.partition(" ")
-    size = sizes[0]
+    size, weight = sizes[0], _weight(vehicle, sizes[0][0])
     words = {
         "rotor": lambda: f"rotor {of} pulls {_percent(size, ('less', 'more'))}",
         "rotors": lambda: f"rotors {of} pull {joined(_percent(each, ('less', 'more')) for each in sizes)}",
-        "mass": lambda: f"it is {_amount(size, 1e3 * vehicle.mass_kg, ' g', ('heavier', 'lighter'))}",
+        "mass": lambda: f"it is {_amount(size, *weight, ('heavier', 'lighter'))}",
+        "load": lambda: (
+            f"{_amount(size, 1e3 * vehicle.mass_kg, ' g')} hang under it on a cable of {number(cable, 2)} m"
+        ),
         "all": lambda: f"all rotors are asked for {_percent(size, ('more', 'less'))} thrust",
         "centre": lambda: f"the centre of mass lies {_off_centre(sizes)}",
         "torque": lambda: f"a torque about z takes {_percent(size)} of the rotors' drag",
         "vibration": lambda: f"it vibrates {_times(size)}",
+        "unbalance": lambda: f"what turns with rotor {of} shakes it {_times(size)}",
         "turn": lambda: f"rotor {of} turns {_percent(_less_one(0.5, size), ('faster', 'slower'))} than it is told",
         "follow": lambda: f"{of} follows the rotors' torque {_percent(_less_one(1.0, size), ('more', 'less'))}",
         "late": lambda: f"rotation follows the rotors {_amount(size, 1e3, ' ms', ('later', 'earlier'))}",
@@ -93,10 +108,13 @@ def change_words(cause: str, sizes: Sizes, vehicle: VehicleSettings, axes: Seque
 def smallest_words(cause: str, size: float, vehicle: VehicleSettings) -> str:
     """Say how large a change is that would have shown."""
     kind, _, of = cause.partition(" ")
+    weight = weight_words(vehicle, size)
     words = {
         "rotor": f"a rotor that pulls {number(100 * size, 2)} % less",
         "rotors": f"two rotors that pull {number(100 * size, 2)} % less",
-        "mass": f"{number(1e3 * vehicle.mass_kg * size, 2)} g",
+        "mass": weight,
+        "load": f"{weight} on a cable",
+        "unbalance": f"{number(math.exp(size), 2)} times the unbalance of rotor {of}",
         "all": f"{number(100 * size, 2)} % of the thrust of all rotors",
         "centre": f"{number(1e3 * size, 2)} mm of the centre of mass",
         "torque": f"{number(100 * size, 2)} % of the rotors' drag in yaw",
@@ -110,6 +128,18 @@ def smallest_words(cause: str, size: float, vehicle: VehicleSettings) -> str:
         "battery": f"{number(100 * size, 2)} % of a full battery",
     }
     return words.get(kind, f"{cause}: {number(size, 2)}")
+
+
+def weight_words(vehicle: VehicleSettings, share: float) -> str:
+    """Write a share of the mass in g or kg."""
+    scale, unit = _weight(vehicle, share)
+    return f"{number(abs(scale * share), 2)}{unit}"
+
+
+def _weight(vehicle: VehicleSettings, share: float) -> tuple[float, str]:
+    """Give the mass in g, or in kg where the share of it is that large."""
+    grams = 1e3 * vehicle.mass_kg
+    return (vehicle.mass_kg, " kg") if abs(grams * share) >= _HEAVY else (grams, " g")
 
 
 def _off_centre(sizes: Sizes) -> str:
@@ -132,7 +162,7 @@ def _percent(size: Size, ways: tuple[str, str] = ("", "")) -> str:
     return _amount(size, 100.0, " %", ways)
 
 
-def _amount(size: Size, scale: float, unit: str, ways: tuple[str, str]) -> str:
+def _amount(size: Size, scale: float, unit: str, ways: tuple[str, str] = ("", "")) -> str:
     """Write how much a size is, which way, and its interval turned alike."""
     value, low, high = (scale * each for each in size)
     if value < 0:
