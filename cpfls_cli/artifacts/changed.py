@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from cpfls_cli.changes.numbers import FlightNumbers
 
 
+CABLE = "load on a cable"
+"""The change that has a length."""
+
+
 @record
 class FoundGroup:
     """Changes that were found, each in what the others leave."""
@@ -74,6 +78,9 @@ class ChangedRecord(Record):
     scatter: Array = dataset("reference flights less the mean, alike", "before", "number")
     hover: float = dataset("what the loads of all rotors have in common of that, logarithm", gaps=True)
     hover_deviation: float = dataset("what that differs by where nothing changed", gaps=True)
+    cable: Array = dataset(
+        "length of the cable that fits best what swings, if anything does", "today", units="m", gaps=True
+    )
     p_value: float = dataset("probability that flights of an unchanged vehicle look as much like any change")
     by_flight: Array = dataset("the same of each flight of today alone", "today")
     false_alarm: float = dataset("probability below which the vehicle is said to have changed")
@@ -110,6 +117,7 @@ class ChangedRecord(Record):
             scatter=change.reference.apart(before)[0],
             hover=hover,
             hover_deviation=hover_deviation,
+            cable=np.array([flight.cable_m for flight in today]),
             p_value=change.p_value,
             by_flight=change.by_flight,
             false_alarm=false_alarm,
@@ -150,6 +158,12 @@ class ChangedRecord(Record):
         """Whether hover needs another thrust than in the reference, beyond 95 % of what it differs by."""
         return bool(abs(self.hover) > 1.96 * self.hover_deviation)
 
+    @property
+    def cable_length(self) -> float:
+        """Length of the cable of a load, m, over all flights of today; NaN where none tells it."""
+        known = self.cable[np.isfinite(self.cable)]
+        return float(np.median(known)) if len(known) else np.nan
+
     def sizes(self, index: int) -> list[tuple[float, float, float]]:
         """Give the sizes of a change that was found with their intervals, in its unit."""
         own = self.size.found == index
@@ -177,6 +191,7 @@ class ChangedRecord(Record):
                     "unit": self.found.unit[index],
                     "sizes": [dict(zip(("value", "low", "high"), each, strict=True)) for each in self.sizes(index)],
                     "alike": dict(self.others(index)),
+                    **({"cable_m": self.cable_length} if name == CABLE else {}),
                 }
                 for index, name in enumerate(self.found.cause)
             ],

@@ -37,6 +37,9 @@ class FlightNumbersRecord(Record):
     duration: float = dataset("time that it flies, away from take-off and landing", units="s")
     period: float = dataset("time from sample to sample", units="s")
     commanded: bool = dataset("1 where the loads are of commands, 0 where they are of speeds that were measured")
+    cable: float = dataset(
+        "length of the cable that fits best what swings under it, if anything does", units="m", gaps=True
+    )
     flown_at: float = dataset("when it was flown, since 1970 began (UTC), where the log tells", units="s", gaps=True)
     warning: tuple[str, ...] = dataset("what to know about the flight", "warning")
 
@@ -55,6 +58,7 @@ class FlightNumbersRecord(Record):
             duration=told.duration_s,
             period=period,
             commanded=told.commanded,
+            cable=told.cable_m,
             flown_at=flown_at,
             warning=tuple(warnings),
         )

@@ -118,4 +118,5 @@ def numbers_of_flight(record: FlightNumbersRecord) -> FlightNumbers:
         voltage=record.voltage,
         duration_s=record.duration,
         commanded=record.commanded,
+        cable_m=record.cable,
     )

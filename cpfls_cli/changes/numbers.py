@@ -91,6 +91,9 @@ _LATEST_S = 0.12
 _STEP_S = 0.002
 _DELAYS = np.arange(0.0, _LATEST_S, _STEP_S)
 
+_COLLINEAR = 1e-9
+"""Squared share of a signal of its own below which it goes with the others."""
+
 
 @dataclass(frozen=True)
 class FlightNumbers:
@@ -292,9 +295,9 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
     inertia = symmetric(signals.vehicle.inertia_kg_m2)
     momentum = signals.body_rate @ inertia
     turned = own.derivative(momentum) + own.average(np.cross(signals.body_rate, momentum))
-    torque = signals.torque
-    assert torque is not None, "rotor speeds are there"
-    found = _followed(own, inside, turned, torque, signals.period)
+    assert signals.torque is not None, "rotor speeds are there"
+    assert signals.thrust is not None, "rotor speeds are there"
+    found = _followed(own, inside, turned, np.column_stack([signals.torque, signals.thrust]), signals.period)
     moments = np.diag(inertia)
     told = np.stack([np.log(found[:, 0]), _STEP_S * found[:, 1], np.log(found[:, 2] / moments)], axis=1)
     for kind, values in zip(("follow", "late", "gusts"), told.transpose(1, 0, 2), strict=True):
@@ -317,23 +320,29 @@ def _fit(turned: Array, driven: Array) -> Array:
 
     A delay at the end of what is tried is not known.
 
+    Beside what goes with the other columns, and with those that nothing follows: of a weak rotor thrust turns the body
+    too, and so does each torque about all axes.
+
     Parameters
     ----------
     turned : array, shape (window, column)
-    driven : array, shape (delay, window, column)
+    driven : array, shape (delay, window, column or more)
     """
     y, x = turned - turned.mean(axis=0), driven - driven.mean(axis=1, keepdims=True)
-    cross, power = (x * y).sum(axis=1), np.maximum((x**2).sum(axis=1), 1e-300)
-    left = np.maximum((y**2).sum(axis=0) - cross**2 / power, 0.0)
+    size = np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-300)
+    x = x / size
+    cross = np.einsum("dwk,wa->dka", x, y)
+    found = np.linalg.solve(np.einsum("dwk,dwl->dkl", x, x) + _COLLINEAR * np.eye(x.shape[2]), cross)
+    left = np.maximum((y**2).sum(axis=0) - (cross * found).sum(axis=1), 0.0)
     best = np.argmin(left, axis=0)
     axis = np.arange(left.shape[1])
     inner = np.clip(best, 1, len(left) - 2)
     before, there, after = (left[inner + step, axis] for step in (-1, 0, 1))
     bend = before - 2 * there + after
     step = np.where((bend > 0) & (inner == best), 0.5 * (before - after) / np.where(bend > 0, bend, 1.0), 0.0)
-    gain = cross[best, axis] / power[best, axis]
+    gain = found[best, axis, axis] / size[best, 0, axis]
     late = np.where(best < len(left) - 1, best + step, np.nan)
-    return np.array([np.where(gain > 0, gain, np.nan), late, np.sqrt(left[best, axis] / len(y))])
+    return np.array([np.where(gain > 0, gain, np.nan), late, np.sqrt(left[best, axis] / len(turned))])
 
 
 def _drift(signals: Signals, flies: BoolArray) -> _Numbers:

@@ -17,7 +17,7 @@ Sizes = Sequence[Size]
 _NAMES = {
     "mass": "another weight",
     "centre of mass": "a centre of mass elsewhere",
-    "hover": "another weight, or rotors that all pull otherwise",
+    "hover": "another weight, or another thrust of all rotors",
     "all motors": "the speed of all rotors",
     "torque about z": "a torque about z",
     "late": "another delay",
@@ -29,18 +29,21 @@ _NAMES = {
 }
 """What a cause is, where its key does not say it."""
 
+_HEAVY = 1000.0
+"""Grams that are told in kg."""
+
 _CHECKS = {
     "rotor": "look at its propeller for a cut, a chip or a bend; change it for a new one; turn the motor by hand",
     "rotors": "look at both propellers for cuts, chips or bends; change them for new ones; turn the motors by hand",
+    "load": "see what hangs under it",
+    "unbalance": "clean and balance its propeller; see that it sits straight; feel the bell of the motor for play",
     "mass": "weigh it, with battery and load",
     "centre of mass": "see where the battery sits, and what else can be put elsewhere",
     "hover": "weigh it; see whether all propellers are of the usual kind; charge the battery",
-    "all": "charge the battery; see whether the speed controllers' settings were changed",
-    "weight": "look for a load there, and at that rotor's propeller: in hover they look alike",
-    "load": "see what hangs under it; measure its cable",
     "torque about z": "see whether a motor stands askew: its screws, its arm, a twisted frame",
     "vibration": "balance the propellers; tighten the screws of motors and autopilot; look for tape and chips",
-    "unbalance": "balance its propeller; look for tape and chips; tighten its screws",
+    "all": "charge the battery; see whether the speed controllers' settings were changed",
+    "weight": "look for a load there, and at that rotor's propeller: in hover they look alike",
     "answer": "see whether motors, propellers or the speed controllers' settings were changed",
     "felt": "calibrate the accelerometer; see how the autopilot is mounted",
     "turn": "turn the motor by hand: its bearing, its cable, its speed controller",
@@ -59,13 +62,13 @@ def cause_name(cause: str) -> str:
     kind, _, of = cause.partition(" ")
     if kind == "turn":
         return f"the speed of rotor {of}"
+    if kind == "unbalance":
+        return f"another balance of rotor {of}"
     if kind == "follow":
         return f"{of} that follows otherwise"
-    if kind == "unbalance":
-        return f"an unbalanced rotor {of}"
     if kind == "felt":
         return f"an offset of the accelerometer along {of}"
-    if cause.startswith(("weight ", "load ")):
+    if kind == "weight":
         return f"a {cause}"
     return _NAMES.get(cause, cause)
 
@@ -75,32 +78,38 @@ def what_to_check(cause: str) -> str:
     return _CHECKS.get(cause, _CHECKS.get(cause.split()[0], "look at the numbers that changed"))
 
 
-def change_words(cause: str, sizes: Sizes, vehicle: VehicleSettings, axes: Sequence[str] = ()) -> str:
+def change_words(
+    cause: str, sizes: Sizes, vehicle: VehicleSettings, axes: Sequence[str] = (), cable: float = math.nan
+) -> str:
     """Say what changed and by how much.
 
     Parameters
     ----------
     axes : sequence of str
         Of a cause that has a size along several.
+    cable : float
+        Length of that of a load, m.
     """
     kind, _, of = cause.partition(" ")
-    size = sizes[0]
+    size, weight = sizes[0], _weight(vehicle, sizes[0][0])
     words = {
         "rotor": lambda: f"rotor {of} pulls {_percent(size, ('less', 'more'))}",
         "rotors": lambda: f"rotors {of} pull {joined(_percent(each, ('less', 'more')) for each in sizes)}",
-        "mass": lambda: f"it is {_amount(size, 1e3 * vehicle.mass_kg, ' g', ('heavier', 'lighter'))}",
-        "hover": lambda: f"hover needs {_percent(size, ('more', 'less'))} thrust: {_either(size, vehicle)}",
+        "mass": lambda: f"it is {_amount(size, *weight, ('heavier', 'lighter'))}",
+        "load": lambda: (
+            f"{_amount(size, 1e3 * vehicle.mass_kg, ' g')} hang under it on a cable of {number(cable, 2)} m"
+        ),
+        "hover": lambda: f"hover needs {_percent(size, ('more', 'less'))} thrust: {either_words(vehicle, size[0])}",
         "all": lambda: f"all rotors turn {_percent(_less_one(0.5, size), ('faster', 'slower'))} than they are told",
-        "weight": lambda: f"{_amount(size, 1e3 * vehicle.mass_kg, ' g', ('hang', 'lack'))} {of}",
-        "load": lambda: f"{_amount(size, 1e3 * vehicle.mass_kg, ' g', ('swing', 'lack'))} {of}",
+        "weight": lambda: f"{_amount(size, *weight, ('hang', 'are missing'))} {of}",
         "centre": lambda: f"the centre of mass lies {_off_centre(sizes)}",
         "torque": lambda: f"a torque about z takes {_percent(size)} of the rotors' drag",
         "vibration": lambda: f"it vibrates {_times(size)}",
-        "turn": lambda: f"rotor {of} turns {_percent(_less_one(0.5, size), ('faster', 'slower'))} than it is told",
-        "follow": lambda: f"{of} follows the rotors' torque {_percent(_less_one(1.0, size), ('more', 'less'))}",
         "unbalance": lambda: f"what turns with rotor {of} shakes it {_times(size)}",
         "answer": lambda: f"rotors follow their commands {_amount(size, 1e3, ' ms', ('later', 'earlier'))}",
         "felt": lambda: f"the accelerometer is off by {number(size[0], 2)} m/s² along {of}",
+        "turn": lambda: f"rotor {of} turns {_percent(_less_one(0.5, size), ('faster', 'slower'))} than it is told",
+        "follow": lambda: f"{of} follows the rotors' torque {_percent(_less_one(1.0, size), ('more', 'less'))}",
         "late": lambda: f"rotation follows the rotors {_amount(size, 1e3, ' ms', ('later', 'earlier'))}",
         "gusts": lambda: f"what turns it beside the rotors, gusts, is {_times(size)}",
         "lean": lambda: f"it leans with {_each(sizes, axes, 'm/s²', 'along')} of the world, as against wind",
@@ -110,24 +119,19 @@ def change_words(cause: str, sizes: Sizes, vehicle: VehicleSettings, axes: Seque
     return words[kind]() if kind in words else f"{cause}: {number(size[0], 2)}"
 
 
-def _either(size: Size, vehicle: VehicleSettings) -> str:
-    """Say what another thrust in hover can be."""
-    grams = number(abs(1e3 * vehicle.mass_kg * size[0]), 2)
-    return f"{grams} g heavier, or all rotors pull less" if size[0] > 0 else f"{grams} g lighter, or they all pull more"
-
-
 def smallest_words(cause: str, size: float, vehicle: VehicleSettings) -> str:
     """Say how large a change is that would have shown."""
     kind, _, of = cause.partition(" ")
+    weight = weight_words(vehicle, size)
     words = {
         "rotor": f"a rotor that pulls {number(100 * size, 2)} % less",
         "rotors": f"two rotors that pull {number(100 * size, 2)} % less",
-        "mass": f"{number(1e3 * vehicle.mass_kg * size, 2)} g",
+        "mass": weight,
+        "load": f"{weight} on a cable",
+        "unbalance": f"{number(math.exp(size), 2)} times the unbalance of rotor {of}",
         "hover": f"{number(100 * size, 2)} % of the thrust in hover",
         "all": f"{number(50 * size, 2)} % of the speed of all rotors",
-        "weight": f"{number(1e3 * vehicle.mass_kg * size, 2)} g {of}",
-        "load": f"{number(1e3 * vehicle.mass_kg * size, 2)} g {of}",
-        "unbalance": f"{number(math.exp(size), 2)} times what turns with rotor {of}",
+        "weight": f"{weight} {of}",
         "answer": f"{number(1e3 * size, 2)} ms of the rotors' answer",
         "felt": f"{number(size, 2)} m/s² of the accelerometer along {of}",
         "centre": f"{number(1e3 * size, 2)} mm of the centre of mass",
@@ -142,6 +146,24 @@ def smallest_words(cause: str, size: float, vehicle: VehicleSettings) -> str:
         "battery": f"{number(100 * size, 2)} % of a full battery",
     }
     return words.get(kind, f"{cause}: {number(size, 2)}")
+
+
+def either_words(vehicle: VehicleSettings, share: float) -> str:
+    """Say what another thrust in hover can be, of a share of it."""
+    ways = ("heavier", "less") if share > 0 else ("lighter", "more")
+    return f"{weight_words(vehicle, share)} {ways[0]}, or all rotors pull {ways[1]}"
+
+
+def weight_words(vehicle: VehicleSettings, share: float) -> str:
+    """Write a share of the mass in g or kg."""
+    scale, unit = _weight(vehicle, share)
+    return f"{number(abs(scale * share), 2)}{unit}"
+
+
+def _weight(vehicle: VehicleSettings, share: float) -> tuple[float, str]:
+    """Give the mass in g, or in kg where the share of it is that large."""
+    grams = 1e3 * vehicle.mass_kg
+    return (vehicle.mass_kg, " kg") if abs(grams * share) >= _HEAVY else (grams, " g")
 
 
 def _off_centre(sizes: Sizes) -> str:
@@ -164,7 +186,7 @@ def _percent(size: Size, ways: tuple[str, str] = ("", "")) -> str:
     return _amount(size, 100.0, " %", ways)
 
 
-def _amount(size: Size, scale: float, unit: str, ways: tuple[str, str]) -> str:
+def _amount(size: Size, scale: float, unit: str, ways: tuple[str, str] = ("", "")) -> str:
     """Write how much a size is, which way, and its interval turned alike."""
     value, low, high = (scale * each for each in size)
     if value < 0:

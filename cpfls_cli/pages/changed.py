@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.changed import ChangedRecord
-from cpfls_cli.pages.change_words import cause_name, change_words, smallest_words, what_to_check
+from cpfls_cli.pages.change_words import cause_name, change_words, either_words, smallest_words, what_to_check
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, plot
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Plot, Table, Text
@@ -42,6 +42,7 @@ _ALIKE = 3
 """Others that are told beside a change that is not sure."""
 
 _CHECKED = 2
+_SUREST = 0.999
 _MARKERS = "osD^vP"
 """Of today's flights; more look alike."""
 
@@ -82,8 +83,8 @@ def changed_box(record: ChangedRecord, vehicle: VehicleSettings) -> Box:
 def _told(record: ChangedRecord, index: int, vehicle: VehicleSettings) -> str:
     cause, others = record.found.cause[index], record.others(index)
     axes = [name.split()[-1] for name in record.number if name.split()[0] == cause]
-    what = change_words(cause, record.sizes(index), vehicle, axes)
-    sure = f"sure to {whole_percent(float(record.found.belief[index]))}"
+    what = change_words(cause, record.sizes(index), vehicle, axes, record.cable_length)
+    sure = f"sure to {whole_percent(min(float(record.found.belief[index]), _SUREST))}"
     if record.named[index]:
         with_another = any(is_within(cause, name) for name, _ in others)
         return f"{what}{', perhaps with another' if with_another else ''}; {sure}"
@@ -120,11 +121,9 @@ def _facts(record: ChangedRecord, vehicle: VehicleSettings) -> Iterator[tuple[st
 def _hover(record: ChangedRecord, vehicle: VehicleSettings) -> str:
     """Say what hover needs, the plainest clue, and what that can be where nothing else is known."""
     share = float(np.expm1(record.hover))
-    grams = number(abs(1e3 * share * vehicle.mass_kg), 2)
     up = share > 0
     listed = {*record.found.cause, *record.alike.cause}
-    either = f"{grams} g {'heavier' if up else 'lighter'}, or all rotors pull {'less' if up else 'more'}"
-    tail = f": {either}" if listed & _SHARES else " than in the reference"
+    tail = f": {either_words(vehicle, share)}" if listed & _SHARES else " than in the reference"
     return f"needs {number(100 * abs(share), 2)} % {'more' if up else 'less'} thrust{tail}"
 
 

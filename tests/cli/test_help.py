@@ -28,6 +28,7 @@ COMMANDS = (
     "diagnose",
     "extend",
     "gap",
+    "changed",
     "info",
     "check",
     "config",

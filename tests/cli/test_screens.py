@@ -19,6 +19,7 @@ from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Table, unfolded
 from cpfls_cli.report.terminal import terminal_lines
+from tests.builders.changed_flights import write_flights
 from tests.builders.command_line import undrawn
 from tests.builders.shifted_flights import CONFIG, OFFSET, flight_table, save
 from tests.builders.studies import VEHICLE
@@ -71,6 +72,7 @@ def screens(cpfls, pipeline, study, tmp_path_factory):
         shutil.copy(source, folder)
     _of_torque(show)
     _of_gaps(show, folder)
+    _of_changes(show, folder)
     _of_logs(show, folder)
     _of_open_numbers(show, folder)
     return shown
@@ -113,6 +115,15 @@ def _of_gaps(show, folder):
     show("response of a model", "response", "gap.yaml", flights[0].name, "--model", "extended.h5", output="answer.h5")
 
 
+def _of_changes(show, folder):
+    own = folder / "own"
+    own.mkdir(exist_ok=True)
+    write_flights(own)
+    before = [f"own/before{number}.csv" for number in range(1, 5)]
+    show("changed", "changed", "own/study.yaml", "own/weak1.csv", "--since", *before, output="changed")
+    show("not changed", "changed", "own/study.yaml", "own/same.csv", "--since", *before, output="unchanged")
+
+
 def _of_logs(show, folder):
     logs = [write_csv(folder / f"log{number}.csv", flat_log(flight(seconds=20.0, seed=number))) for number in (1, 2, 3)]
     names = [log.name for log in logs]
@@ -125,7 +136,7 @@ def _of_open_numbers(show, folder):
     """Show what goes on from a vehicle whose config leaves its numbers open: they are guessed, or were found."""
     config, data = folder / "open.yaml", yaml.safe_load(CONFIG + VEHICLE)
     study = load_study(folder / "gap.yaml")
-    (folder / "own").mkdir()
+    (folder / "own").mkdir(exist_ok=True)
     write_record(folder / "own" / "vehicle.h5", record_of(VehicleModel(vehicle=study.vehicle), resolved_yaml(study)))
     wide = VehicleModel(vehicle=replace(study.vehicle, inertia_kg_m2=(3.0, 0.6, 1.2)))
     write_record(folder / "own" / "wide.h5", record_of(wide, resolved_yaml(study)))
@@ -149,6 +160,7 @@ NAMES = (
     *("trajectory", "mission", "simulate", "tracking", "reduce", "identify", "sweep", "response"),
     *("info flight", "info selection", "info diagnosis", "check", "effects", "effect payload", "effect flexible_mount"),
     *("effect linear_damping", "compare", "diagnose", "extend", "gap", "gap of nothing", "response of a model"),
+    *("changed", "not changed"),
     *("init", "init of one", "import"),
 )
 """Runs by name."""

@@ -10,17 +10,19 @@ from cpfls_cli.artifacts.formats import record_of_format, records
 from cpfls_cli.artifacts.store import file_sha256, read_any
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import resolved
-from cpfls_cli.pages import diagnosis, disagreement, model
+from cpfls_cli.pages import changed, diagnosis, disagreement, flight_numbers, model
 from cpfls_cli.pages.source import Source
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.report.content import Table, Text, unfolded
 from cpfls_cli.report.outcome import as_json
 from tests.builders import gap_artifacts, vehicle_models
+from tests.builders.changed_flights import write_flights
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
 
 FROM_COMMANDS = ("trajectory", "flight", "selection", "model", "prediction", "replay", "response", "sweep")
+FROM_FLIGHTS = ("flight-numbers", "changed")
 FROM_NUMBERS = {"disagreement": disagreement, "diagnosis": diagnosis, "extended": model}
-FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS, "vehicle")
+FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS, *FROM_FLIGHTS, "vehicle")
 # What a plan asks of the vehicle between its samples is not in its artifact.
 ON_PAGES = tuple(name for name in FORMATS if name != "trajectory")
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
@@ -57,8 +59,22 @@ def source_of(record, label, sha256="f" * 64):
     return Source(label, sha256, record, resolved(study), study.vehicle, parameters)
 
 
+@pytest.fixture(scope="session")
+def of_flights(cpfls, tmp_path_factory):
+    """What is kept of one flight, and what has changed between two and one with a weak rotor."""
+    folder = write_flights(tmp_path_factory.mktemp("flights"))
+    before = [folder / f"before{number}.csv" for number in (1, 2)]
+    result = cpfls(
+        "changed", folder / "study.yaml", folder / "weak1.csv", "--since", *before, "-o", folder / "out", "--json"
+    )
+    assert result.exit_code == 0, result.stderr
+    (kept,) = (folder / "out" / "flights").glob("weak1*.h5")
+    paths = {"flight-numbers": kept, "changed": folder / "out" / "changed.h5"}
+    return {name: source_of(read_any(path), path.name, file_sha256(path)) for name, path in paths.items()}
+
+
 @pytest.fixture
-def answered(told):
+def answered(told, of_flights):
     """A record by its format, and the blocks that its command says."""
 
     def of(name):
@@ -67,6 +83,9 @@ def answered(told):
         if name == "vehicle":
             source = source_of(vehicle_models.record_of(vehicle_models.whole()), f"{name}.h5")
             return source, tuple(model.answer(source))
+        if name in of_flights:
+            page = {"flight-numbers": flight_numbers, "changed": changed}[name]
+            return of_flights[name], tuple(page.answer(of_flights[name]))
         made = getattr(gap_artifacts, name)()
         source = source_of(
             record_of_format(made.spec.name, made.spec.kind).of_data(made.header, made.data), f"{name}.h5"

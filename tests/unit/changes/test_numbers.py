@@ -7,8 +7,10 @@ import pytest
 
 from cpfls_cli.changes.judge import FALSE_ALARM, changed
 from cpfls_cli.changes.numbers import KINDS, flight_numbers, in_flight
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.weak_form.windows import Recording
+from tests.builders.changed_flights import WEAK, flight_table
 from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, signals_of
 
 NOISE = {"body_rate": 0.01, "attitude": 0.003, "velocity": 0.01, "acceleration": 0.1}
@@ -121,3 +123,19 @@ def test_the_ground_is_no_flight():
     flies = in_flight(replace(signals, rotor_speed=idle))
     assert not flies[:549].any()
     assert flies[560:].all()
+
+
+def test_a_weak_rotor_turns_the_body_less_however_thrust_and_yaw_turn_it_too():
+    """Of a cross M3 does half of the pitch; what it lacks of thrust and yaw pitches the body beside that."""
+
+    def follows(*does):
+        time, *columns = flight_table(3, does).T
+        speed = np.stack(columns[6:10], axis=1)
+        signals = Signals(
+            time=time, vehicle=VEHICLE, body_rate=np.stack(columns[:3], axis=1), rotor_speed=speed, commanded=True
+        )
+        told = flight_numbers(Recording("flight.csv", signals)).values
+        return np.array([told["follow roll"], told["follow pitch"]])
+
+    less = follows(*WEAK) - follows(1.0, 1.0, 1.0, 1.0)
+    assert less == pytest.approx([0.0, np.log(0.9)], abs=0.03)
