@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from math import ceil, floor, log10
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from cpfls_cli.vehicle_limits import IN_ROOM, room, thrust_number
 from cpfls_cli.words import joined
 
 _SURENESS: Final = ("data", "named", "guess")
-_WORTH_IT = 0.8
-"""Share of every flight that a stretch common to all logs has to keep."""
-
 _STEPS_BRIDGED = 2.5
 """Steps of the slowest topic that a gap may have: one sample of it may be lost."""
 
@@ -91,8 +88,8 @@ class Proposal:
         The clock of all of them; None for that of each log's fastest topic.
     signals, choices : tuple
         That hold for all of them.
-    crop_s : tuple of float or None
-        That suits all logs; None where none is to be cut, or none suits all.
+    crop_s : tuple of float, "flown" or None
+        Of one log; of several each takes what flies in it. None where none is to be cut.
     crops : mapping from str to tuple of float or None
         Of each log.
     gap_s : float
@@ -112,7 +109,7 @@ class Proposal:
     time_unit: str
     signals: tuple[Guess, ...]
     choices: tuple[KeyChoice, ...]
-    crop_s: tuple[float, float] | None
+    crop_s: tuple[float, float] | Literal["flown"] | None
     crops: Mapping[str, tuple[float, float] | None]
     gap_s: float
     airframe: Airframe | None
@@ -169,7 +166,7 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
     airframe, doubts = _airframe(logs)
     if airframe is not None and arm_m is not None:
         airframe = airframe.with_arm(arm_m)
-    crop, crops = _crops(logs)
+    crops = {one.name: one.recognition.flown.span_s for one in logs}
     warnings = [f"{one.name}: {warning}" for one in logs for warning in one.recognition.warnings]
     doubts = [*doubts, *_two_masses(logs, mass_kg)]
     return Proposal(
@@ -178,7 +175,7 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
         time_unit=logs[0].recognition.time_unit,
         signals=signals,
         choices=_merged_choices(logs),
-        crop_s=crop,
+        crop_s=crops[logs[0].name] if len(logs) == 1 else "flown" if any(crops.values()) else None,
         crops=crops,
         gap_s=max(_LEAST_GAP_S, _rounded_up(_STEPS_BRIDGED * slowest)),
         airframe=airframe,
@@ -398,21 +395,6 @@ def _airframe(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
     orders = [[(rotor.name, rotor.spin) for rotor in found.rotors] for found in (taken, best.airframe)]
     differ = best.clear and orders[0] != orders[1] and all(rotor.name for rotor in taken.rotors)
     return taken, [f"the rotors are taken from {taken.reason}, which contradicts {says}"] if differ else []
-
-
-def _crops(
-    logs: Sequence[KnownLog],
-) -> tuple[tuple[float, float] | None, dict[str, tuple[float, float] | None]]:
-    """Find one stretch that suits all logs; None where there is none, or nothing is to be cut."""
-    crops = {one.name: one.recognition.flown.span_s for one in logs}
-    known = [crop for crop in crops.values() if crop is not None]
-    if not known:
-        return None, crops
-    if len(logs) == 1:
-        return known[0], crops
-    begin, end = max(crop[0] for crop in known), min(crop[1] for crop in known)
-    keeps = all(end - begin >= _WORTH_IT * (crop[1] - crop[0]) for crop in known)
-    return ((begin, end) if keeps and len(known) == len(logs) else None), crops
 
 
 def _speed_max(logs: Sequence[KnownLog], signals: Sequence[Guess]) -> float:

@@ -12,7 +12,7 @@ from cpfls_cli.flightlog.agreement import first_derivative, slow
 from cpfls_cli.flightlog.airframe import MovedBy, Parameters, airframe_from_motion
 from cpfls_cli.flightlog.attitude_columns import BODY_OF, doubt_reading, read_attitude
 from cpfls_cli.flightlog.conversion import as_mapped
-from cpfls_cli.flightlog.flown import FlownPart, find_flown
+from cpfls_cli.flightlog.flown import FlownPart, find_flown, rotor_level, turning_size
 from cpfls_cli.flightlog.log_table import LogTable, holding_values, make_grid, refuse_dead_rotors
 from cpfls_cli.flightlog.motion_columns import position_by_velocity, tell_acceleration, tell_body_rate, tell_places
 from cpfls_cli.flightlog.nameless import nameless_signals
@@ -120,9 +120,7 @@ def _level(log: LogTable, rotors: RotorColumns) -> Array | None:
     if found is None:
         return None
     values = log.on_grid(found.columns.columns, spikes=False)
-    level = as_mapped(values, found.columns).mean(axis=1)
-    largest = max(1.0, float(np.quantile(level, 0.98))) if rotors.command is None else 1.0
-    return np.asarray(level / largest)
+    return rotor_level(as_mapped(values, found.columns), shares=found is rotors.command)
 
 
 def _find_flown(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], level: Array | None) -> FlownPart:
@@ -133,7 +131,7 @@ def _find_flown(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]],
     if gyro is not None:
         values = log.on_grid(gyro.group.columns)
         factor = gyro.scale / (_DEGREES if gyro.unit == "deg/s" else 1.0)
-        rate = factor * np.linalg.norm(values - np.median(values, axis=0), axis=1)
+        rate = factor * turning_size(values)
     return find_flown(log.grid - log.grid[0], level, height, rate)
 
 

@@ -75,7 +75,7 @@ def _parts(path: Path, study: Study) -> list[ImportedFlight]:
     first = imported(path, longest)
     # A delay that is estimated is estimated once, on the longest part.
     others = _importing(longest, delay_s=first.report.delay_s)
-    parts, left = [first], _around(first, study.import_.crop_s or (0.0, np.inf))
+    parts, left = [first], _around(first, first.report.crop_s or (0.0, np.inf))
     while left and len(parts) < _MOST_PARTS:
         begin, end = left.pop(0)
         try:

@@ -339,11 +339,11 @@ def _import(proposal: Proposal) -> Iterator[str]:
     for one in proposal.logs:
         for reason in one.recognition.flown.reasons:
             yield from _comment(reason if alone else f"{one.name}: {reason}", 2)
-    if proposal.crop_s is None and any(proposal.crops.values()):
-        yield from _comment("No one stretch suits all logs; each takes its own:", 2)
+    if proposal.crop_s == "flown":
+        yield from _comment("Each log is cut to what flies in it, a later one too; to s from the first stamp now:", 2)
         for name, crop in proposal.crops.items():
-            yield f"  # {name}: {'null' if crop is None else f'--set import.crop_s=[{crop[0]:g},{crop[1]:g}]'}"
-    yield f"  crop_s: {'null' if proposal.crop_s is None else _flow(list(proposal.crop_s))}"
+            yield f"  # {name}: {'all of it' if crop is None else f'[{crop[0]:g}, {crop[1]:g}]'}"
+    yield f"  crop_s: {_flow(list(proposal.crop_s) if isinstance(proposal.crop_s, tuple) else proposal.crop_s)}"
     yield f"  gap_s: {_flow(proposal.gap_s)}"
     yield "  gap_rule: longest-part"
     if first.rate_hz > _FASTEST_HZ:
