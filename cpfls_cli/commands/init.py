@@ -44,8 +44,8 @@ def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
 
 
 def _next(job: Job, proposal: Proposal) -> Iterator[Command]:
-    """Give the commands that import all logs, and the one that learns from all but the last, which judges."""
-    logs = [Path(one.name) for one in proposal.logs]
+    """Give the commands that import logs of one mass, and the one that learns from all but the last, which judges."""
+    logs = [Path(name) for name in proposal.equal]
     # Many logs are taken as they are.
     as_logs = bool(proposal.rotors) and len(logs) > _IMPORTED
     flights = logs if as_logs else [job.beside(name) for name in _flight_names(logs)]

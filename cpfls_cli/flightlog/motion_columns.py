@@ -10,15 +10,18 @@ from cpfls_cli.flightlog.agreement import (
     AxisFit,
     Order,
     Sign,
+    body_rate_from,
     first_derivative,
     fit_axes,
     second_derivative,
     slow,
 )
+from cpfls_cli.flightlog.airframe import explained_by_rotors
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.readings import CLEAR, Reading
 from cpfls_cli.flightlog.recognised import Rival, Seen, Sure, called
 from cpfls_cli.flightlog.vocabulary import RATES, SENSED, Row
+from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
 
 GOOD = 0.6
@@ -32,6 +35,10 @@ _RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
 
 NEAR_GRAVITY, _WEIGHT = 1.3, 1.15
 """Ratios to gravity: of what is gravity in some unit, since a vehicle pushes, and of what is no more than that."""
+
+_FAST_HZ, _DERIVED = 10.0, 0.8
+"""Up to where a rate is compared with the attitude's derivative, and the share from which on it may be nothing else: of
+a gyroscope beside motion capture it is 0.1 to 0.4."""
 
 _CLOSER = 0.4
 """What is left of a velocity in body axes, as a share of what is left in those of the world, that tells the former."""
@@ -54,6 +61,46 @@ def over_ground(seen: Seen) -> Array | None:
 
 
 # The gyroscope.
+
+
+def gyroscope_first(seen: Seen, reading: Reading, rotors: tuple[Array, bool] | None) -> bool:
+    """Put a gyroscope before a rate that is the attitude's own derivative, where the rotors explain more of it.
+
+    Both are one motion where that is slow. Above, a derivative holds what noise and filter of the attitude make of it,
+    and a gyroscope what the rotors do.
+    """
+    first, *others = seen.candidates.get("body_rate", ()) or (None,)
+    fit = reading.rates
+    if first is None or first.known or rotors is None or fit is None or fit.explained < CLEAR:
+        return False
+    derived = body_rate_from(reading.attitude.rotation, seen.rate_hz)
+    if _fast_share(derived, seen.grid(first), seen.rate_hz) < _DERIVED:
+        return False
+    turning = slow(derived, seen.rate_hz)
+    driven = {first: explained_by_rotors(seen.grid(first), rotors[0], seen.rate_hz, rotors[1])}
+    for named in others:
+        own = fit_axes(turning, slow(seen.grid(named), seen.rate_hz))
+        if own.explained > GOOD and _fast_share(derived, seen.grid(named), seen.rate_hz) < _DERIVED:
+            driven[named] = explained_by_rotors(seen.grid(named), rotors[0], seen.rate_hz, rotors[1])
+    best = largest(driven, lambda named: driven[named])
+    if best is first:
+        return False
+    seen.candidates = {
+        **seen.candidates,
+        "body_rate": (best, *(own for own in (first, *others) if own is not best)),
+    }
+    seen.left_out.append(
+        f"{', '.join(first.group.columns)}: also a body rate, but the derivative of the attitude, of which the rotors"
+        f" explain {100 * driven[first]:.0f} % where they explain {100 * driven[best]:.0f} % of"
+        f" {', '.join(best.group.columns)}"
+    )
+    return True
+
+
+def _fast_share(derived: Array, measured: Array, rate_hz: float) -> float:
+    """Give the share of what is fast of a rate that the derivative of the attitude explains."""
+    fast = [slow(own, rate_hz, _FAST_HZ) - slow(own, rate_hz) for own in (derived, measured)]
+    return fit_axes(*fast).explained
 
 
 def tell_body_rate(seen: Seen, reading: Reading | None) -> None:

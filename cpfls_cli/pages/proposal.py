@@ -353,6 +353,9 @@ def _import(proposal: Proposal) -> Iterator[str]:
         )
         yield f"  rate_hz: {_flow(_RATE_HZ)}"
         yield f"  lowpass_hz: {_flow(_LOWPASS_HZ)}"
+    elif proposal.rate_hz is not None:
+        yield from _comment("The logs are of several rates, and what learns from them takes flights of one.", 2)
+        yield f"  rate_hz: {_flow(proposal.rate_hz)}"
 
 
 def _entry(reason: str, rivals: Sequence[Rival], lines: Sequence[str], indent: int) -> Iterator[str]:
