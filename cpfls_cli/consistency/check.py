@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from cpfls_cli.consistency.findings import Finding
+from cpfls_cli.consistency.motion import beside_lean
 from cpfls_cli.consistency.rotors import (
     IDLE,
     beyond_propellers,
@@ -74,6 +75,8 @@ def _findings(parts: Sequence[Signals], sensors: Sensors | None) -> Iterator[Fin
     yield weighs if weighs is not None else beyond_propellers(parts)
     hangs = _upside_down(_middle(parts))
     yield hangs
+    if hangs is None:
+        yield from beside_lean(max(_middle(parts), key=len))
     if sensors is None or hangs is not None:
         return
     if not sensors.gyroscope.apart:
