@@ -33,6 +33,13 @@ _TOLERANCE, _TEN = 1.4, 10.0
 _RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
 """Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s."""
 
+_OVER_GROUND: Sequence[Row] = (
+    (1.0, "m/s^2", 1.0),
+    (1 / STANDARD_GRAVITY, "g", 1.0),
+    (1000.0, "m/s^2", 1e-3),
+)
+"""Sizes of an acceleration that holds no gravity, beside that over ground in m/s^2."""
+
 NEAR_GRAVITY, _WEIGHT = 1.3, 1.15
 """Ratios to gravity: of what is gravity in some unit, since a vehicle pushes, and of what is no more than that."""
 
@@ -292,12 +299,7 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
         for weight in (carried, 1.0)
     )
     sensed = next((row for row in fitting if row[1] == (stated or row[1])), fitting[0] if fitting else None)
-    position, velocity = seen.first("position"), seen.guesses.get("velocity")
-    world = None
-    if velocity is not None:
-        world = first_derivative(seen.log.on_grid(velocity.columns.columns)[seen.part], seen.rate_hz)
-    elif position is not None:
-        world = second_derivative(seen.grid(position), seen.rate_hz)
+    world = _of_places(seen)
     along_world = None
     if world is not None:
         ground = np.array([1.0, 1.0, 0.0 if sensed else 1.0])
@@ -305,11 +307,10 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
     if sensed is not None:
         # In body axes next to nothing is sensed along x and y in flight; over ground the world's axes have it all.
         of_body = named.frame in ("FLU", "FRD")
-        if along_world is not None and along_world.as_named > GOOD and along_world.gain > 0.5 and not of_body:
-            seen.left_out.append(
-                f"{named.group.pattern}: an acceleration in world axes that includes gravity (the motion explains"
-                f" {100 * along_world.as_named:.0f} %), which import.signals cannot express"
-            )
+        _, unit, scale = sensed
+        size = known_unit(unit).factor * scale
+        if along_world is not None and along_world.as_named > GOOD and size * along_world.gain > 0.5 and not of_body:
+            _leave_gravity_out(seen, named, along_world)
             return False
         _tell_sensed(seen, named, vertical, carried, sensed, reading)
         if at_hover and sensed not in at_hover:
@@ -324,15 +325,36 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
             " over ground does not explain it"
         )
         return False
-    unit: UnitName = "g" if abs(np.log(along_world.gain * STANDARD_GRAVITY)) < np.log(2) else "m/s^2"
+    size, unit, scale = nearest(along_world.gain, _OVER_GROUND)
+    if abs(vertical) > GOOD * size * STANDARD_GRAVITY:
+        _leave_gravity_out(seen, named, along_world)
+        return False
+    unit, scale = (unit, scale) if stated is None else (stated, 1.0)
     reason = (
         f"{called(named)}; the motion over ground explains {100 * along_world.explained:.0f} %, in"
-        f" {stated or unit}, and it does not include gravity"
+        f" {'thousandths of ' if scale != 1.0 else ''}{unit}, and it does not include gravity"
     )
-    seen.tell(named, stated or unit, reason, "data")
+    seen.tell(named, unit, reason, "data", scale=scale)
     words = "the acceleration does not include gravity and follows the motion"
     seen.choose("acceleration_frame", "world", words, "data")
     return True
+
+
+def _of_places(seen: Seen) -> Array | None:
+    """Derive the acceleration of the world, m/s^2, from what is told of velocity or position, in their own axes."""
+    velocity, position = seen.guesses.get("velocity"), seen.guesses.get("position")
+    guess, derived = (position, second_derivative) if velocity is None else (velocity, first_derivative)
+    if guess is None:
+        return None
+    size = known_unit(guess.columns.unit).factor * guess.columns.scale
+    return derived(size * seen.log.on_grid(guess.columns.columns)[seen.part], seen.rate_hz)
+
+
+def _leave_gravity_out(seen: Seen, named: Named, fit: AxisFit) -> None:
+    seen.left_out.append(
+        f"{named.group.pattern}: an acceleration in world axes that includes gravity (the motion explains"
+        f" {100 * fit.as_named:.0f} %), which import.signals cannot express"
+    )
 
 
 def _carried(seen: Seen, reading: Reading | None) -> float:

@@ -108,7 +108,10 @@ def _in_braces(names: Sequence[str]) -> str:
     begin = first[: next((place for place, letter in enumerate(first) if letter != last[place : place + 1]), None)]
     if len(names) < 2 or not begin:
         return ", ".join(names)
-    return f"{begin}{{{','.join(name.removeprefix(begin) for name in names)}}}"
+    rest = [name.removeprefix(begin) for name in names]
+    # An index is written whole within its bracket.
+    end = "]" if begin.endswith("[") and all(own.endswith("]") for own in rest) else ""
+    return f"{begin}{{{','.join(own.removesuffix(end) for own in rest)}}}{end}"
 
 
 def _reasons_table(proposal: Proposal) -> Table:
