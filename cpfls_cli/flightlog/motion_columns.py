@@ -304,14 +304,16 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
     if world is not None:
         ground = np.array([1.0, 1.0, 0.0 if sensed else 1.0])
         along_world = fit_axes(slow(ground * world, seen.rate_hz, 1.0), slow(ground * values, seen.rate_hz, 1.0))
-    if sensed is not None:
-        # In body axes next to nothing is sensed along x and y in flight; over ground the world's axes have it all.
-        of_body = named.frame in ("FLU", "FRD")
-        _, unit, scale = sensed
-        size = known_unit(unit).factor * scale
-        if along_world is not None and along_world.as_named > GOOD and size * along_world.gain > 0.5 and not of_body:
+    # In body axes next to nothing is sensed along x and y in flight; over ground the world's axes have it all.
+    follows = along_world is not None and along_world.as_named > GOOD and named.frame not in ("FLU", "FRD")
+    if sensed is not None and follows and along_world is not None:
+        size = known_unit(sensed[1]).factor * sensed[2] * along_world.gain
+        if 0.5 < size < _TEN:
             _leave_gravity_out(seen, named, along_world)
             return False
+        # By chance the middle of what moves in a far smaller unit is as large as gravity.
+        sensed = sensed if size < _TEN else None
+    if sensed is not None:
         _tell_sensed(seen, named, vertical, carried, sensed, reading)
         if at_hover and sensed not in at_hover:
             other = at_hover[0][1]

@@ -283,6 +283,7 @@ def test_a_log_of_px4_brings_its_rotors_along(proposed, tmp_path, own):
     path = tmp_path / "log.ulg"
     path.write_bytes(ulog_of_flight(own))
     result, text, data = proposed(path, "--mass", MASS)
+    assert "vehicle_attitude.q[{0,1,2,3}] " in result.stdout
     signals = data["import"]["signals"]
     assert signals["quaternion"]["columns"][0] == "vehicle_attitude.q[0]"
     assert signals["rotor_command"]["columns"] == [f"actuator_motors.control[{index}]" for index in range(4)]
