@@ -60,7 +60,8 @@ def flights_to_play(paths: Sequence[Path], study: Study, hold: Hold | None = Non
         if not same_rate([rates[0], rate]):
             raise InputError(
                 f"{flight.name}: sampled at {rate:.4g} Hz, {first.name} at {rates[0]:.4g} Hz, but all flights need the"
-                f" same rate: use --set import.rate_hz={common_rate(rates):g} for logs, and import flights again with it"
+                f" same rate: use --set import.rate_hz={common_rate(rates):g} for logs, and import flights again with"
+                " it"
             )
     stated = doubts(beyond_belief(study.vehicle))
     return (replace(first, warnings=(*stated, *first.warnings)), *flights[1:])

@@ -80,6 +80,10 @@ def test_a_thrust_factor_that_is_a_guess_contradicts_nothing(flight, factor):
 FAULTS = {
     "velocity in km/h": (lambda s: replace(s, velocity=3.6 * s.velocity), "the velocity is in km/h"),
     "velocity in mm/s": (lambda s: replace(s, velocity=1e3 * s.velocity), "the velocity is in mm/s"),
+    "acceleration with gravity": (
+        lambda s: replace(s, acceleration=s.acceleration + np.array([0.0, 0.0, 9.80665])),
+        "or leave import.signals.acceleration out",
+    ),
     "metres for millimetres": (
         lambda s: replace(s, position=1e-3 * s.position, velocity=1e-3 * s.velocity),
         "times what tilt and gravity make it: check import.signals.velocity.unit",
