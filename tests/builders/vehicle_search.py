@@ -1,6 +1,9 @@
-"""A small search for a vehicle: its config, and what it tries."""
+"""A small search for a vehicle: its config, and what it tries; and the search that fits whatever is tried."""
+
+import numpy as np
 
 from cpfls_cli.config.load import parse_config, validate
+from cpfls_cli.playback import structure
 from cpfls_cli.playback.parameters import blocks_of
 
 TRIED = ("inertia", "linear_damping", "rotor_drag", "lag")
@@ -29,3 +32,29 @@ simulation:
 def left_out(tried):
     vehicle = validate(parse_config(CONFIG, "config"), "config").vehicle
     return [block for block in blocks_of(vehicle) if block not in tried]
+
+
+def _gained_before(_bench, present, gained, blocks):
+    """Promise what a block gained when it was tried before, which bounds what it may gain now."""
+    return {block: gained.get(block, np.inf) for block in blocks if block not in present.structure.blocks}
+
+
+def _judge_all(bench, _near, others):
+    for each in others:
+        bench.judge(each)
+
+
+def _shrunk_and_fitted(bench, everything):
+    path = list(structure._shrinking(everything))
+    _judge_all(bench, everything, path)
+    return path
+
+
+WITHOUT_FORESIGHT = {
+    "_FORETOLD": 0,
+    "_BENT": (),
+    "_promised": _gained_before,
+    "_shrunk": _shrunk_and_fitted,
+    "_judge_hopeful": _judge_all,
+}
+"""What to put into `cpfls_cli.playback.structure` for a search that fits whatever it looks at."""

@@ -2,17 +2,20 @@
 
 from contextlib import suppress
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.checkpoint import VehicleCheckpointRecord
 from cpfls_cli.playback import structure
+from cpfls_cli.playback.judging import parts_of
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.structure import SearchStoppedError, Structure, choose, parts_of, tried_blocks
+from cpfls_cli.playback.structure import SearchStoppedError, Structure, choose, tried_blocks
 from cpfls_cli.search.vehicle_search import kept_of
 from tests.builders.playback_flights import MIDDLING, STATED, flown, truth
+from tests.builders.vehicle_search import WITHOUT_FORESIGHT
 
 TRIED = ("linear_damping", "rotor_drag", "flapping_moment", "quadratic_damping", "inertia")
 QUICK = PlaybackSettings(
@@ -87,18 +90,51 @@ def test_a_search_goes_on_from_what_was_kept(flights, number):
     assert resumed.complete
 
 
+def test_what_is_foretold_saves_fits_and_leads_to_the_same_structure(flights, monkeypatch):
+    quick = chosen(flights)
+    for name, value in WITHOUT_FORESIGHT.items():
+        monkeypatch.setattr(structure, name, value)
+    whole = chosen(flights)
+    assert quick.chosen.structure == whole.chosen.structure
+    assert quick.chosen.error == pytest.approx(whole.chosen.error, rel=1e-3)
+    assert quick.evaluated < whole.evaluated
+
+
+def test_errors_are_foretold_near_a_fit(flights):
+    """A block less, and one more: fitted, both come to what was foretold from the fit between them."""
+    bench = structure._Bench(STATED, parts_of(flights, QUICK), lambda *_: None, 1, {})
+    base = ("inertia", "thrust_factor", "lag", "linear_damping", "rotor_drag", "flapping_moment")
+    judged = bench.judge(Structure(base))
+    asked = [Structure(base[:4] + base[5:]), Structure((*base, "drag_factor"))]
+    outlook = bench.outlook(judged, asked)
+    for each in asked:
+        fitted = bench.judge(each)
+        assert outlook.errors(each.blocks) == pytest.approx(fitted.by_block, rel=0.2)
+        assert outlook.errors(each.blocks).mean() == pytest.approx(fitted.by_block.mean(), rel=0.05)
+        error, numbers, condition = outlook.objectives(each.blocks)
+        assert error == pytest.approx(fitted.error, rel=0.05)
+        assert numbers == fitted.numbers
+        assert 10**condition == pytest.approx(fitted.condition_number, rel=0.5)
+
+
 class Bench:
     """Knows the error of each structure, its blocks one letter each, with noise that no comparison sees through."""
 
     stays = 1.0
 
     def __init__(self, errors):
-        self.errors, self.known = errors, {}
+        self.errors, self.known, self.foretold = errors, {}, {}
 
     def judge(self, tried):
         error, count = self.errors["".join(tried.blocks)], len(tried.blocks)
-        by_block = error + 0.002 * (-1) ** count * np.array([-1.0, 1.0])
-        return self.known.setdefault(tried, structure.Judged(tried, error, by_block, count, 1.0, None, ()))
+        judged = structure.Judged(tried, error, self.by_block(tried.blocks), count, 1.0, None, ())
+        return self.known.setdefault(tried, judged)
+
+    def by_block(self, blocks):
+        return self.errors["".join(blocks)] + 0.002 * (-1) ** len(blocks) * np.array([-1.0, 1.0])
+
+    def outlook(self, near, asked):  # noqa: ARG002
+        return SimpleNamespace(errors=self.by_block, objectives=lambda _: (0.0, 0.0, 0.0))
 
 
 def test_blocks_that_gain_only_beside_others_are_added():
@@ -113,7 +149,7 @@ def test_no_block_can_be_left_out_of_the_choice():
     bench.judge(Structure(("a", "b", "c")))
     structure._refine(bench, ("a", "b", "c"))
     assert structure._preferred(bench)[2].structure.blocks == ("a", "b")
-    assert Structure(("a",)) in bench.known
+    assert Structure(("a",)) in (*bench.known, *bench.foretold)
 
 
 @pytest.mark.parametrize(
