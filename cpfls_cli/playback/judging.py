@@ -154,13 +154,16 @@ class Outlook:
             errors[aside] = (self.loss[aside] + self.gradient[aside] @ step + square) / self.count[aside]
         return errors
 
+    def error(self, blocks: Collection[str]) -> float:
+        """Foretell the mean error of a model of some of the blocks."""
+        return float(np.average(self.errors(blocks), weights=self.count))
+
     def objectives(self, blocks: Collection[str]) -> tuple[float, float, float]:
         """Foretell mean error, numbers and logarithm of the condition number of the fit of some of the blocks."""
         own = self._own(blocks)
         hessian = self.hessian.sum(axis=0) / self.count.sum() + np.diag(PRIOR / self.free.spreads**2)
         condition = Fitted(self.free, self.values, np.nan, hessian[np.ix_(own, own)]).condition_number
-        error = float(np.average(self.errors(blocks), weights=self.count))
-        return error, float(own.sum()), float(np.log10(condition))
+        return self.error(blocks), float(own.sum()), float(np.log10(condition))
 
     def _own(self, blocks: Collection[str]) -> BoolArray:
         """Tell which numbers a model of some of the blocks has; what is not known of a vehicle every one has."""

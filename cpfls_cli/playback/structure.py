@@ -374,40 +374,26 @@ def _promised(bench: _Bench, present: Judged, gained: Mapping[str, float], block
 
 
 def _shrunk(bench: _Bench, everything: Judged) -> list[Structure]:
-    """List structures with fewer and fewer blocks, and judge two: the best as foretold, and the simplest beside it."""
-    path = list(_shrinking(everything))
-    outlook = bench.outlook(everything, path)
+    """List structures without the block that is foretold to be missed least, one after another, and judge two of them.
+
+    These are the best as foretold, and the simplest that is hardly worse.
+    """
+    structure, outlook = everything.structure, bench.outlook(everything, [])
+    while len(structure.blocks) > 1:
+        structure = smallest(_fewer(structure), lambda each: outlook.error(each.blocks))
+        bench.foretold[structure] = outlook.objectives(structure.blocks)
+    path = list(bench.foretold)
     errors = {each: outlook.errors(each.blocks) for each in path}
-    best = smallest(path, lambda each: float(errors[each].mean()))
+    best = smallest(path, lambda each: bench.objectives(each)[0])
     simplest = [each for each in path if _gives_up(bench, errors[each], errors[best]) <= 1.0]
-    for each in path:
-        bench.foretold[each] = outlook.objectives(each.blocks)
     for each in (best, *simplest[-1:]):
         bench.judge(each)
     return path
 
 
-def _shrinking(everything: Judged) -> Iterator[Structure]:
-    """Take out the block that the loss near the fit of all blocks misses least, one after another.
-
-    Without the numbers b the loss rises by ``1/2 b' ((H^-1)_bb)^-1 b``, the other numbers fitted again.
-    """
-    structure, fitted = everything.structure, everything.fit
-    free, hessian = fitted.free, fitted.hessian
-    absent = np.array([number.absent for number in free.numbers])
-    away = (fitted.values - absent) / free.scales
-    inverse = np.linalg.inv(hessian)
-    place = {block: [i for i, n in enumerate(free.numbers) if n.block == block] for block in structure.blocks}
-
-    def missed(blocks: Sequence[str]) -> float:
-        at = [index for block in blocks for index in place[block]]
-        return float(away[at] @ np.linalg.solve(inverse[np.ix_(at, at)], away[at]))
-
-    gone: list[str] = []
-    while len(gone) + 1 < len(structure.blocks):
-        kept = [block for block in structure.blocks if block not in gone]
-        gone.append(smallest(kept, lambda block: missed([*gone, block])))
-        yield Structure(tuple(block for block in structure.blocks if block not in gone), structure.rules)
+def _fewer(structure: Structure) -> list[Structure]:
+    """List the structures with one block less."""
+    return [_with(structure, block, structure.blocks) for block in structure.blocks]
 
 
 def _with(structure: Structure, block: str, order: Sequence[str]) -> Structure:
@@ -419,7 +405,7 @@ def _with(structure: Structure, block: str, order: Sequence[str]) -> Structure:
 def _neighbours(bench: _Bench, judged: Judged) -> list[Structure]:
     """List the structures with one block less, or with other rules of what is learned, and judge the hopeful."""
     structure = judged.structure
-    fewer = [_with(structure, block, structure.blocks) for block in structure.blocks]
+    fewer = _fewer(structure)
     other = [structure._replace(rules=rules) for rules in REMAINDERS] if structure.learns else []
     _judge_hopeful(bench, judged, fewer)
     for each in other:
