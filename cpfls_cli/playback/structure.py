@@ -323,8 +323,8 @@ def choose(
     try:
         shrunk = _shrunk(bench, everything) if blocks else []
         path.extend(_greedy(bench, blocks, nothing))
-        first = smallest(bench.known.values(), lambda each: each.error)
-        _evolve(bench, blocks, [*(each.structure for each in path), *shrunk, *_neighbours(bench, first)], settings, rng)
+        near = _neighbours(bench, smallest(bench.known.values(), lambda each: each.error))
+        _evolve(bench, blocks, [*(each.structure for each in path), *shrunk, *near], settings, rng)
         _refine(bench, blocks)
     except SearchStoppedError:
         complete = False
@@ -385,7 +385,7 @@ def _shrunk(bench: _Bench, everything: Judged) -> list[Structure]:
     path = list(bench.foretold)
     errors = {each: outlook.errors(each.blocks) for each in path}
     best = smallest(path, lambda each: bench.objectives(each)[0])
-    simplest = [each for each in path if _gives_up(bench, errors[each], errors[best]) <= 1.0]
+    simplest = [each for each in path if _keeps_up(bench, errors[each], errors[best], 1.0)]
     for each in (best, *simplest[-1:]):
         bench.judge(each)
     return path
@@ -414,23 +414,23 @@ def _neighbours(bench: _Bench, judged: Judged) -> list[Structure]:
 
 
 def _judge_hopeful(bench: _Bench, near: Judged, others: Sequence[Structure]) -> None:
-    """Judge those of some structures, near one that is judged, that are not foretold to be hopeless."""
+    """Judge those of some structures that are not foretold to be hopeless, from a near one that is judged."""
     best = smallest(bench.known.values(), lambda each: each.error)
     new = [each for each in others if each not in bench.known]
     if not new:
         return
     outlook = bench.outlook(near, new)
     for each in new:
-        if _gives_up(bench, outlook.errors(each.blocks), best.by_block) > _HOPELESS:
-            bench.foretold[each] = outlook.objectives(each.blocks)
-        else:
+        if _keeps_up(bench, outlook.errors(each.blocks), best.by_block, _HOPELESS):
             bench.judge(each)
+        else:
+            bench.foretold[each] = outlook.objectives(each.blocks)
 
 
-def _gives_up(bench: _Bench, errors: Array, best: Array) -> float:
-    """Compare by block: how much worse than the best, in what may be given up for fewer numbers."""
-    worse = errors - best
-    return float(worse.mean() / max(float(mean_error(worse)), _visible(bench, float(best.mean()))))
+def _keeps_up(bench: _Bench, errors: Array, best: Array, most: float) -> bool:
+    """Tell by block whether errors are worse than the best by less than `most` times what fewer numbers may cost."""
+    worse, mean = errors - best, float(best.mean())
+    return bool(less(worse.mean(), most * max(float(mean_error(worse)), _visible(bench, mean)), mean))
 
 
 def _named_instead(bench: _Bench, judged: Judged, blocks: tuple[str, ...]) -> None:
