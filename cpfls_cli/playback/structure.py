@@ -310,7 +310,7 @@ def choose(
     """
     blocks = tried_blocks(vehicle, flights, settings)
     parts = parts_of(flights, settings)
-    expected = 3 * len(blocks) + settings.population * (1 + settings.generations) // 2
+    expected = 3 * len(blocks) + settings.population * (1 + settings.generations) // 4
     bench = _Bench(vehicle, parts, progress, expected, kept)
     nothing = bench.judge(Structure(()))
     # All blocks on the stated body first, or on a guessed one: a body that is free from the beginning is made so heavy
