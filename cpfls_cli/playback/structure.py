@@ -321,7 +321,7 @@ def choose(
     everything = bench.judge(Structure(blocks), guessed if INERTIA in vehicle.unknown else None)
     path, complete = [nothing], True
     try:
-        shrunk = _shrunk(bench, everything) if blocks else []
+        shrunk = _shrunk(bench, everything) if len(blocks) > 1 else []
         path.extend(_greedy(bench, blocks, nothing))
         near = _neighbours(bench, smallest(bench.known.values(), lambda each: each.error))
         _evolve(bench, blocks, [*(each.structure for each in path), *shrunk, *near], settings, rng)

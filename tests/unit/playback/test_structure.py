@@ -32,8 +32,8 @@ def flights():
     return flown(truth(), ("figure", "steps"), duration_s=5.0, noise=MIDDLING, seed=2)
 
 
-def chosen(flights, progress=lambda *_: None, kept=None):
-    return choose(STATED, flights, QUICK, np.random.default_rng(0), progress, kept or {})
+def chosen(flights, progress=lambda *_: None, kept=None, settings=QUICK):
+    return choose(STATED, flights, settings, np.random.default_rng(0), progress, kept or {})
 
 
 def stopping_at(number):
@@ -55,9 +55,15 @@ def test_a_search_stopped_before_all_blocks_were_judged_has_nothing(flights):
         chosen(flights, stopping_at(2))
 
 
-def test_a_search_tells_how_far_it_is(flights):
+@pytest.fixture(scope="module")
+def searched(flights):
+    """Search to the end: what was chosen, and what was told on the way."""
     told = []
-    choice = chosen(flights, lambda judged, total: told.append((judged, total)))
+    return chosen(flights, lambda judged, total: told.append((judged, total))), told
+
+
+def test_a_search_tells_how_far_it_is(searched):
+    choice, told = searched
     assert choice.complete
     assert [len(judged) for judged, _ in told] == list(range(1, choice.evaluated + 1))
     assert all(len(judged) <= total for judged, total in told)
@@ -67,31 +73,38 @@ def test_a_search_tells_how_far_it_is(flights):
     assert choice.chosen.error < 0.3 * choice.nothing.error
 
 
+@pytest.mark.parametrize("tried", [(), ("rotor_drag",)])
+def test_a_search_among_hardly_anything_comes_to_its_end(flights, tried):
+    choice = chosen(flights, settings=replace(QUICK, leave_out=tuple(set(blocks_of(STATED)) - set(tried))))
+    assert choice.complete
+    assert set(choice.everything.structure.blocks) == set(tried)
+
+
 @pytest.mark.parametrize("number", [1, 7])
-def test_a_search_goes_on_from_what_was_kept(flights, number):
+def test_a_search_goes_on_from_what_was_kept(flights, searched, number):
     """Nothing is judged twice, and every fit starts from where it would have started."""
-    whole, parts = [], []
+    parts = []
 
     def stopping(judged, _):
         parts.append(judged)
         if len(judged) == number:
             raise SearchStoppedError
 
-    without = chosen(flights, lambda judged, _: whole.append(judged))
+    without, told = searched
     with suppress(SearchStoppedError):
         chosen(flights, stopping)
     kept = kept_of(VehicleCheckpointRecord.of(parts[-1]))
     resumed = chosen(flights, lambda judged, _: parts.append(judged), kept)
     assert [len(judged) for judged in parts] == list(range(1, without.evaluated + 1))
-    pairs = list(zip(whole[-1], parts[-1], strict=True))
+    pairs = list(zip(told[-1][0], parts[-1], strict=True))
     assert [one.structure for one, _ in pairs] == [other.structure for _, other in pairs]
     assert all(a.error == b.error and np.array_equal(a.by_block, b.by_block) for a, b in pairs)
     assert resumed.chosen.structure == without.chosen.structure
     assert resumed.complete
 
 
-def test_what_is_foretold_saves_fits_and_leads_to_the_same_structure(flights, monkeypatch):
-    quick = chosen(flights)
+def test_what_is_foretold_saves_fits_and_leads_to_the_same_structure(flights, searched, monkeypatch):
+    quick, _ = searched
     for name, value in WITHOUT_FORESIGHT.items():
         monkeypatch.setattr(structure, name, value)
     whole = chosen(flights)
