@@ -63,6 +63,10 @@ SIZES = {
 """Shares; of the arm for the centre of mass, s for lag and delay, rad/s, m/s^2; wind as the acceleration it gives."""
 
 
+LOGARITHMS = ("inertia about x", "gyroscope scale", "gusts")
+"""Changes whose cause is told by the logarithm."""
+
+
 class Altered(NamedTuple):
     """A body after a change, what is right to say of it, and the sizes in the unit of that cause, where known."""
 
@@ -236,14 +240,20 @@ def _changes(fleet: Fleet, cases: Sequence[Case], instrument: str) -> tuple[list
             counts = [sum(getattr(each, what) for each in said) for what in ("found", "right", "among", "wrong")]
             held += [each for verdict in said for each in verdict.held]
             shares.append(counts[0] / len(own))
-            shows += [run.shows.get(case.right, np.nan) for case, run in zip(own, runs, strict=True)]
+            shows += [_shows(case, run) for case, run in zip(own, runs, strict=True)]
             others = [each.named for case, each in zip(own, said, strict=True) if each.named not in ("", case.right)]
             rows.append([name, size, len(own), *counts, ", ".join(sorted(others)) or "—"])
         enough = [size for at, size in enumerate(sizes) if min(shares[at:]) >= 0.9]
-        truth = np.linalg.norm([case for case in cases if case.name == name][-1].truth or [np.nan])
-        unit = truth / sizes[-1]
-        smallest.append([name, min(enough, default="—"), float(np.median(shows) / unit), f"{sum(held)} of {len(held)}"])
+        smallest.append([name, min(enough, default="—"), float(np.median(shows)), f"{sum(held)} of {len(held)}"])
     return rows, smallest
+
+
+def _shows(case: Case, run: Change) -> float:
+    """Give the smallest size that is said to show, as sizes are listed; NaN where no cause is right."""
+    told = run.shows.get(case.right, np.nan)
+    if case.name in LOGARITHMS:
+        return float(np.expm1(told))
+    return case.size * told / np.abs(case.truth).max() if case.truth else np.nan
 
 
 def _kept(path: Path | None, make: Callable[[], Any]) -> Any:
