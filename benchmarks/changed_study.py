@@ -67,12 +67,14 @@ LOGARITHMS = ("inertia about x", "gyroscope scale", "gusts")
 """Changes whose cause is told by the logarithm."""
 
 
+Right = dict[str, tuple[float, ...]]
+
+
 class Altered(NamedTuple):
-    """A body after a change, what is right to say of it, and the sizes in the unit of that cause, where known."""
+    """A body after a change, and what is right to say of it: causes, each with its sizes in its unit, where known."""
 
     body: Body
-    right: str
-    truth: tuple[float, ...]
+    right: Right
 
 
 def altered(name: str, size: float, kind: Kind, body: Body, draw: int) -> Altered:
@@ -92,40 +94,42 @@ def altered(name: str, size: float, kind: Kind, body: Body, draw: int) -> Altere
             drag=times(lost, 1 - size, body.drag),
         )
         words = " and ".join(f"M{index + 1}" for index in lost)
-        return Altered(weak, f"rotor{'s' * (len(lost) > 1)} {words}", (size,) * len(lost))
+        return Altered(weak, {f"rotor{'s' * (len(lost) > 1)} {words}": (size,) * len(lost)})
     if name == "drag of a rotor":
         heavy = body._replace(drag=times([one], 1 + size, body.drag))
-        return Altered(heavy, "torque about z", (float(kind.spins[one]) * size / rotors,))
+        return Altered(heavy, {"torque about z": (float(kind.spins[one]) * size / rotors,)})
     if name in ("mass", "mass off centre"):
         at = 0.5 * place if name == "mass off centre" else np.zeros(2)
         inertia = body.inertia + size * body.mass * np.array([at[1] ** 2, at[0] ** 2, at @ at])
         heavy = body._replace(mass=body.mass * (1 + size), centre=body.centre + size / (1 + size) * at, inertia=inertia)
-        return Altered(heavy, "mass", (size,))
+        beside: Right = {f"weight near M{one + 1}": ()} if name == "mass off centre" else {"hover": (size,)}
+        return Altered(heavy, {"mass": (size,), **beside})
     if name == "centre of mass":
         moved = size * kind.arm * side
-        return Altered(body._replace(centre=body.centre + moved), name, tuple(moved.tolist()))
+        return Altered(body._replace(centre=body.centre + moved), {name: tuple(moved.tolist())})
     if name == "inertia about x":
-        return Altered(body._replace(inertia=body.inertia * (1 + size * axis)), "follow roll", (-np.log1p(size),))
+        return Altered(body._replace(inertia=body.inertia * (1 + size * axis)), {"follow roll": (-np.log1p(size),)})
     if name == "motor lag":
-        return Altered(body._replace(lag=body.lag + size), "late", (size,))
+        return Altered(body._replace(lag=body.lag + size), {"late": (size,), "answer": (size,)})
     if name == "delay":
-        return Altered(body._replace(late=body.late + size), "late", (size,))
+        return Altered(body._replace(late=body.late + size), {"late": (size,), "answer": (size,)})
     if name == "drag of the body":
-        return Altered(body._replace(air=body.air * (1 + size)), "", ())
+        return Altered(body._replace(air=body.air * (1 + size)), {})
     if name == "gyroscope bias":
-        return Altered(body._replace(turn_bias=body.turn_bias + size * axis), "drift", (size, 0.0, 0.0))
+        return Altered(body._replace(turn_bias=body.turn_bias + size * axis), {"drift": (size, 0.0, 0.0)})
     if name == "gyroscope scale":
-        return Altered(body._replace(turn_gain=body.turn_gain * (1 + size * axis)), "follow roll", (np.log1p(size),))
+        return Altered(body._replace(turn_gain=body.turn_gain * (1 + size * axis)), {"follow roll": (np.log1p(size),)})
     if name == "accelerometer bias":
-        return Altered(body._replace(felt_bias=body.felt_bias + size * np.eye(3)[2]), "", ())
+        return Altered(body._replace(felt_bias=body.felt_bias + size * np.eye(3)[2]), {"felt z": (size,)})
     if name == "vibration":
-        return Altered(body._replace(unbalance=times([one], 1 + size, body.unbalance)), "vibration", ())
+        shaken = body._replace(unbalance=times([one], 1 + size, body.unbalance))
+        return Altered(shaken, {"vibration": (), f"unbalance M{one + 1}": ()})
     if name == "battery":
-        return Altered(body._replace(sag=body.sag * (1 + size)), "battery sag", (size * body.sag,))
+        return Altered(body._replace(sag=body.sag * (1 + size)), {"battery sag": (size * body.sag,)})
     if name == "gusts":
-        return Altered(body._replace(gusts=body.gusts * (1 + size)), "gusts", (np.log1p(size),))
+        return Altered(body._replace(gusts=body.gusts * (1 + size)), {"gusts": (np.log1p(size),)})
     blown = size * side
-    return Altered(body._replace(wind=body.wind + blown * body.mass / body.air), "lean", tuple((-blown).tolist()))
+    return Altered(body._replace(wind=body.wind + blown * body.mass / body.air), {"lean": tuple((-blown).tolist())})
 
 
 class Fleet(NamedTuple):
@@ -143,8 +147,7 @@ class Case(NamedTuple):
     size: float
     vehicle: int
     draw: int
-    right: str
-    truth: tuple[float, ...]
+    right: Right
     told: Told
 
 
@@ -173,7 +176,7 @@ def _cases(kind: Kind, trim: Trim, fleet: Fleet, draw: int) -> list[Case]:
             seed = [kind.rotors, 1000 + draw, number, step]
             now = altered(name, size, kind, day_of(kind, body, trim, np.random.default_rng(seed)), draw)
             told = _told(kind, vehicle, now.body, seed)
-            cases.append(Case(name, size, index, draw, now.right, now.truth, told))
+            cases.append(Case(name, size, index, draw, now.right, told))
     return cases
 
 
@@ -220,12 +223,12 @@ def _verdict(case: Case, run: Change) -> Verdict:
     held = tuple(
         size.low <= true <= size.high
         for found in run.found
-        if found.cause.name == case.right and case.truth
-        for size, true in zip(found.sizes, case.truth, strict=False)
+        for size, true in zip(found.sizes, case.right.get(found.cause.name, ()), strict=False)
     )
     names = "+".join(found.cause.name + "?" * (found.belief < NAMED) for found in run.found)
-    right = case.right in sure
-    return Verdict(bool(run.found), right, not right and case.right in listed, bool(sure - {case.right}), held, names)
+    rights = set(case.right)
+    right = bool(rights & sure)
+    return Verdict(bool(run.found), right, not right and bool(rights & listed), bool(sure - rights), held, names)
 
 
 def _changes(fleet: Fleet, cases: Sequence[Case], instrument: str) -> tuple[list[list[object]], list[list[object]]]:
@@ -241,7 +244,7 @@ def _changes(fleet: Fleet, cases: Sequence[Case], instrument: str) -> tuple[list
             held += [each for verdict in said for each in verdict.held]
             shares.append(counts[0] / len(own))
             shows += [_shows(case, run) for case, run in zip(own, runs, strict=True)]
-            others = [each.named for case, each in zip(own, said, strict=True) if each.named not in ("", case.right)]
+            others = [each.named for case, each in zip(own, said, strict=True) if each.named not in ("", *case.right)]
             rows.append([name, size, len(own), *counts, ", ".join(sorted(others)) or "—"])
         enough = [size for at, size in enumerate(sizes) if min(shares[at:]) >= 0.9]
         smallest.append([name, min(enough, default="—"), float(np.median(shows)), f"{sum(held)} of {len(held)}"])
@@ -250,10 +253,10 @@ def _changes(fleet: Fleet, cases: Sequence[Case], instrument: str) -> tuple[list
 
 def _shows(case: Case, run: Change) -> float:
     """Give the smallest size that is said to show, as sizes are listed; NaN where no cause is right."""
-    told = run.shows.get(case.right, np.nan)
+    told = [(run.shows[name], truth) for name, truth in case.right.items() if name in run.shows and truth]
     if case.name in LOGARITHMS:
-        return float(np.expm1(told))
-    return case.size * told / np.abs(case.truth).max() if case.truth else np.nan
+        return float(np.expm1(told[0][0])) if told else np.nan
+    return min((case.size * shows / np.abs(truth).max() for shows, truth in told), default=np.nan)
 
 
 def _kept(path: Path | None, make: Callable[[], Any]) -> Any:
