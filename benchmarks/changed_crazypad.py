@@ -48,6 +48,16 @@ class Told(NamedTuple):
         return "+".join(found.cause.name + "?" * (found.belief < NAMED) for found in self.run.found) or "—"
 
     @property
+    def sure(self) -> set[str]:
+        return {found.cause.name for found in self.run.found if found.belief >= NAMED}
+
+    @property
+    def listed(self) -> set[str]:
+        """What is found or looks alike."""
+        alike = {name for found in self.run.found for name, _ in found.alike}
+        return alike | {found.cause.name for found in self.run.found}
+
+    @property
     def share(self) -> str:
         most = int(np.argmax(self.deviations))
         return f"M{most + 1}" if np.abs(self.deviations).max() > self.threshold else "—"
@@ -131,8 +141,9 @@ def main() -> None:
                 kind,
                 len(own),
                 sum(bool(each.run.found) for each in own),
-                sum(each.named == each.right for each in own),
-                sum(each.right in each.named for each in own),
+                sum(each.sure == {each.right} for each in own),
+                sum(each.right in each.listed for each in own),
+                sum(bool(each.sure - {each.right}) for each in own),
                 sum(each.share != "—" for each in own),
                 sum(each.share in rotors and each.share in each.right for each in own),
             ]
@@ -141,8 +152,9 @@ def main() -> None:
         "done",
         "groups",
         "found",
-        "named alone",
-        "named, perhaps with others",
+        "named",
+        "among those alike",
+        "wrong name",
         "found by share",
         "rotor by share",
     ]
