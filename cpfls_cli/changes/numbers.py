@@ -260,13 +260,18 @@ def _unbalance(signals: Signals, feels: Array, flies: BoolArray) -> _Numbers:
 
 
 def _beside_gravity(signals: Signals) -> Array:
-    """Take gravity from what the accelerometer feels along z, or along the vertical: what a hover feels on average."""
+    """Take gravity from what the accelerometer feels: on average a flight that ends where it began feels nothing else.
+
+    With an attitude along axes that are level and turn with the heading, where no wind shows: it leans against it.
+    """
     assert signals.specific_force is not None, "asked for"
-    felt, gravity = signals.specific_force.copy(), signals.vehicle.gravity_m_s2
+    felt, gravity = signals.specific_force, signals.vehicle.gravity_m_s2
     if signals.attitude is not None:
-        felt[:, 2] = np.einsum("tj,tj->t", signals.rotation[:, 2], felt)
-    felt[:, 2] -= gravity
-    return felt
+        felt = np.einsum("tij,tj->ti", signals.rotation, felt)
+        cosine, sine = np.cos(signals.attitude[:, 2]), np.sin(signals.attitude[:, 2])
+        ahead, left = felt[:, 0], felt[:, 1]
+        felt = np.stack([cosine * ahead + sine * left, cosine * left - sine * ahead, felt[:, 2]], axis=1)
+    return np.asarray(felt - [0.0, 0.0, gravity])
 
 
 def _answer(signals: Signals, flies: BoolArray, rotors: list[str]) -> _Numbers:

@@ -139,3 +139,17 @@ def test_a_weak_rotor_turns_the_body_less_however_thrust_and_yaw_turn_it_too():
 
     less = follows(*WEAK) - follows(1.0, 1.0, 1.0, 1.0)
     assert less == pytest.approx([0.0, np.log(0.9)], abs=0.03)
+
+
+def test_a_lean_against_wind_is_no_fault_of_the_accelerometer():
+    """It feels gravity along its own axes however it leans; what it feels beside is its own, ahead and to the left."""
+    signals = recorded().signals
+    leans = np.array([0.1, -0.15, 2.0]) + np.zeros((len(signals), 3))
+    tilted = replace(signals, attitude=leans)
+    feels = np.einsum("tji,j->ti", tilted.rotation, [0.0, 0.0, 9.81])
+    calm, biased = (
+        flight_numbers(Recording("flight.h5", replace(tilted, specific_force=feels + bias))).values
+        for bias in (np.zeros(3), np.array([0.1, 0.2, 0.3]))
+    )
+    assert [calm[f"felt {axis}"] for axis in "xyz"] == pytest.approx(np.zeros(3), abs=1e-9)
+    assert [biased[f"felt {axis}"] for axis in "xyz"] == pytest.approx([0.1, 0.2, 0.3], abs=0.06)
