@@ -218,7 +218,6 @@ class _Row:
     def of(cls, flights: Sequence[FlightNumbers], reference: Reference, vehicle: VehicleSettings) -> _Row:
         """Gather what a row is held against."""
         names = reference.names
-        loads = np.array([name.startswith("load ") for name in names])
         lower = np.log([flight.voltage / reference.voltage for flight in flights])
         known = np.where(np.isfinite(lower), lower, 0.0)
         expected = expected_covariance(flights, names, vehicle)
@@ -227,7 +226,7 @@ class _Row:
             names,
             _apart(reference, flights)[0],
             expected,
-            voltage=reference.voltage_error * np.outer(known, loads),
+            voltage=np.outer(known, reference.voltage_error),
             noise=np.sqrt(np.maximum(measured - measured.mean(axis=0), 0.0)),
         )
 
