@@ -57,7 +57,54 @@ class ShowsGroup:
 
 
 @record
-class ChangedRecord(Record):
+class FoundRecord(Record):
+    """What an artifact of changes holds, however many times flights were held against others."""
+
+    number: tuple[str, ...] = dataset("numbers that all flights tell: kind, and rotor, axis or sensor", "number")
+    unit: tuple[str, ...] = dataset("unit of each number", "number")
+    false_alarm: float = dataset("probability below which the vehicle is said to have changed")
+    named_from: float = dataset("belief from which on a change is named, and not one of several")
+    found: FoundGroup = group()
+    size: SizesGroup = group()
+    alike: AlikeGroup = group()
+    shows: ShowsGroup = group()
+    warning: tuple[str, ...] = dataset("what to know about the flights", "warning")
+
+    @property
+    def cable_length(self) -> float:
+        """Length of the cable of a load, m; NaN where nothing tells it."""
+        return float("nan")
+
+    @property
+    def named(self) -> BoolArray:
+        """Whether each change that was found is named, shape (found,)."""
+        return np.asarray(self.found.belief >= self.named_from)
+
+    def sizes(self, index: int) -> list[tuple[float, float, float]]:
+        """Give the sizes of a change that was found with their intervals, in its unit."""
+        own = self.size.found == index
+        return [tuple(row) for row in np.stack([self.size.value, self.size.low, self.size.high], axis=1)[own].tolist()]
+
+    def others(self, index: int) -> list[tuple[str, float]]:
+        """List what would look alike, and how sure each is."""
+        rows = zip(self.alike.found, self.alike.cause, self.alike.belief.tolist(), strict=True)
+        return [(cause, belief) for of, cause, belief in rows if of == index]
+
+    def cause(self, index: int) -> dict[str, Any]:
+        """Tell a change that was found to machines."""
+        return {
+            "name": self.found.cause[index],
+            "named": bool(self.named[index]),
+            "belief": float(self.found.belief[index]),
+            "unit": self.found.unit[index],
+            "sizes": [dict(zip(("value", "low", "high"), each, strict=True)) for each in self.sizes(index)],
+            "alike": dict(self.others(index)),
+            **({"cable_m": self.cable_length} if self.found.cause[index] == CABLE else {}),
+        }
+
+
+@record
+class ChangedRecord(FoundRecord):
     """The artifact `cpfls/changed`."""
 
     FORMAT: ClassVar = Format(
@@ -70,8 +117,6 @@ class ChangedRecord(Record):
     today: tuple[str, ...] = dataset("names of today's flights, in the order given", "today")
     before: tuple[str, ...] = dataset("names of the reference flights", "before")
     commanded: bool = dataset("1 where loads are of commands, 0 where they are of speeds that were measured")
-    number: tuple[str, ...] = dataset("numbers that all flights tell: kind, and rotor, axis or sensor", "number")
-    unit: tuple[str, ...] = dataset("unit of each number", "number")
     mean: Array = dataset("mean of the reference flights, in its unit", "number")
     deviation: Array = dataset("what flights of one day differ by from it where nothing changed", "number")
     apart: Array = dataset("today's flights less the mean; loads at the reference's voltage", "today", "number")
@@ -83,13 +128,6 @@ class ChangedRecord(Record):
     )
     p_value: float = dataset("probability that flights of an unchanged vehicle look as much like any change")
     by_flight: Array = dataset("the same of each flight of today alone", "today")
-    false_alarm: float = dataset("probability below which the vehicle is said to have changed")
-    named_from: float = dataset("belief from which on a change is named, and not one of several")
-    found: FoundGroup = group()
-    size: SizesGroup = group()
-    alike: AlikeGroup = group()
-    shows: ShowsGroup = group()
-    warning: tuple[str, ...] = dataset("what to know about the flights", "warning")
 
     @classmethod
     def of(
@@ -122,17 +160,7 @@ class ChangedRecord(Record):
             by_flight=change.by_flight,
             false_alarm=false_alarm,
             named_from=named_from,
-            found=FoundGroup(
-                cause=tuple(each.cause.name for each in change.found),
-                unit=tuple(each.cause.unit for each in change.found),
-                belief=np.array([each.belief for each in change.found]),
-            ),
-            **_sizes_and_alike(change.found),
-            shows=ShowsGroup(
-                cause=tuple(change.shows),
-                unit=tuple(units[name] for name in change.shows),
-                smallest=np.array(list(change.shows.values())),
-            ),
+            **found_groups(change.found, change.shows, units),
             warning=tuple(warnings),
         )
 
@@ -140,11 +168,6 @@ class ChangedRecord(Record):
     def changed(self) -> bool:
         """Whether the vehicle is said to have changed."""
         return self.p_value <= self.false_alarm
-
-    @property
-    def named(self) -> BoolArray:
-        """Whether each change that was found is named, shape (found,)."""
-        return np.asarray(self.found.belief >= self.named_from)
 
     @property
     def since(self) -> int | None:
@@ -164,16 +187,6 @@ class ChangedRecord(Record):
         known = self.cable[np.isfinite(self.cable)]
         return float(np.median(known)) if len(known) else np.nan
 
-    def sizes(self, index: int) -> list[tuple[float, float, float]]:
-        """Give the sizes of a change that was found with their intervals, in its unit."""
-        own = self.size.found == index
-        return [tuple(row) for row in np.stack([self.size.value, self.size.low, self.size.high], axis=1)[own].tolist()]
-
-    def others(self, index: int) -> list[tuple[str, float]]:
-        """List what would look alike, and how sure each is."""
-        rows = zip(self.alike.found, self.alike.cause, self.alike.belief.tolist(), strict=True)
-        return [(cause, belief) for of, cause, belief in rows if of == index]
-
     @property
     def summary(self) -> dict[str, Any]:
         """What changed for machines."""
@@ -183,18 +196,7 @@ class ChangedRecord(Record):
             "p": self.p_value,
             "by_flight": dict(zip(self.today, self.by_flight.tolist(), strict=True)),
             "since": None if since is None else self.today[since],
-            "causes": [
-                {
-                    "name": name,
-                    "named": bool(self.named[index]),
-                    "belief": float(self.found.belief[index]),
-                    "unit": self.found.unit[index],
-                    "sizes": [dict(zip(("value", "low", "high"), each, strict=True)) for each in self.sizes(index)],
-                    "alike": dict(self.others(index)),
-                    **({"cable_m": self.cable_length} if name == CABLE else {}),
-                }
-                for index, name in enumerate(self.found.cause)
-            ],
+            "causes": [self.cause(index) for index in range(len(self.found.cause))],
             "shows": rows_of(self.shows),
             "reference_flights": list(self.before),
             "numbers": {
@@ -219,10 +221,16 @@ def _in_common(change: Change, today: Sequence[FlightNumbers]) -> tuple[float, f
     return float((apart @ mean).mean()), float(np.sqrt(mean @ covariance @ mean))
 
 
-def _sizes_and_alike(found: Sequence[Found]) -> dict[str, Any]:
+def found_groups(found: Sequence[Found], shows: Mapping[str, float], units: Mapping[str, str]) -> dict[str, Any]:
+    """Arrange changes that were found, and what would show, with the units of causes by name."""
     sizes = [(index, size) for index, each in enumerate(found) for size in each.sizes]
     alike = [(index, *other) for index, each in enumerate(found) for other in each.alike]
     return {
+        "found": FoundGroup(
+            cause=tuple(each.cause.name for each in found),
+            unit=tuple(each.cause.unit for each in found),
+            belief=np.array([each.belief for each in found]),
+        ),
         "size": columns_of(
             SizesGroup, (size for _, size in sizes), found=np.array([index for index, _ in sizes], dtype=np.int64)
         ),
@@ -230,5 +238,10 @@ def _sizes_and_alike(found: Sequence[Found]) -> dict[str, Any]:
             found=np.array([index for index, _, _ in alike], dtype=np.int64),
             cause=tuple(cause for _, cause, _ in alike),
             belief=np.array([belief for _, _, belief in alike]),
+        ),
+        "shows": ShowsGroup(
+            cause=tuple(shows),
+            unit=tuple(units[name] for name in shows),
+            smallest=np.array(list(shows.values())),
         ),
     }

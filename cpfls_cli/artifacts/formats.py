@@ -26,6 +26,7 @@ _RECORDS = {
     ("cpfls/model", "vehicle"): "vehicle_model.VehicleRecord",
     ("cpfls/flight-numbers", ""): "flight_numbers.FlightNumbersRecord",
     ("cpfls/changed", ""): "changed.ChangedRecord",
+    ("cpfls/trend", ""): "trend.TrendRecord",
     ("cpfls/vehicle-checkpoint", ""): "checkpoint.VehicleCheckpointRecord",
 }
 """Every artifact format by its name and kind, and where its record is: it is loaded when a file of it is met."""

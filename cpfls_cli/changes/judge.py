@@ -128,13 +128,20 @@ def changed(
         raise InputError("flights of today and of the reference tell no number in common; import the same signals")
     if {flight.commanded for flight in [*before, *today]} == {True, False}:
         names = tuple(name for name in names if not name.startswith("load "))
-    reference = Reference.of(before, names, vehicle)
+    return judged(today, Reference.of(before, names, vehicle), vehicle, rng)
+
+
+def judged(
+    today: Sequence[FlightNumbers], reference: Reference, vehicle: VehicleSettings, rng: np.random.Generator
+) -> Change:
+    """Hold flights of today against a reference, as `changed`."""
+    names = reference.names
     apart, covariance = reference.apart(today)
     listed = causes(names, vehicle)
     space = _Space(covariance, reference.freedom, kinds_of(names), listed)
     chance = np.sort(space.evidence(space.drawn(rng)).max(axis=0))
     evidence = space.evidence(np.vstack([apart.mean(axis=0), apart]))
-    p_value, *by_flight = (_beyond(chance, each) for each in evidence.max(axis=0))
+    p_value, *by_flight = (beyond_chance(chance, each) for each in evidence.max(axis=0))
     found = _found(space, apart.mean(axis=0), chance) if p_value <= FALSE_ALARM else ()
     threshold = float(np.quantile(chance, 1 - FALSE_ALARM))
     drawn = np.linalg.solve(space.root, space.drawn(rng, _SHOWN).T)
@@ -143,7 +150,8 @@ def changed(
     return Change(names, reference, apart, deviation, p_value, np.array(by_flight), found, shows)
 
 
-def _beyond(chance: Array, value: float) -> float:
+def beyond_chance(chance: Array, value: float) -> float:
+    """Tell how probable a value of at least this size is, held against draws of chance."""
     return float((1 + (chance >= value).sum()) / (1 + len(chance)))
 
 
@@ -262,7 +270,7 @@ def _found(space: _Space, apart: Array, chance: Array) -> tuple[Found, ...]:
     while len(chosen) < _MOST:
         evidence = _beside(space, apart, chosen)
         best = int(np.argmax(evidence))
-        if _beyond(chance, float(evidence[best])) > FALSE_ALARM:
+        if beyond_chance(chance, float(evidence[best])) > FALSE_ALARM:
             break
         chosen.append(best)
         # What came first was chosen for what the others do too.

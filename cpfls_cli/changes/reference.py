@@ -77,15 +77,10 @@ class Reference:
         power, error, voltage = _by_voltage(flights, names, values)
         if np.isfinite(voltage):
             values -= np.outer(np.log([flight.voltage / voltage for flight in flights]), power)
-        usual, mean = usual_covariance(names, vehicle), values.mean(axis=0)
-        apart = values - mean
-        seen = (apart.T @ apart) * _alike(names)
-        measured = _measured(flights, names)
-        freedom = _DAYS + len(flights) - 1
-        # Scatter of flights holds the error of each; what is usual from day to day comes beside that.
-        expected = usual + np.diag(measured)
-        covariance = (_DAYS * expected + seen) / freedom * (1 + 1 / len(flights))
-        return cls(tuple(names), mean, covariance, freedom, measured, power, error, voltage)
+        mean, measured = values.mean(axis=0), _measured(flights, names)
+        expected = expected_covariance(flights, names, vehicle)
+        covariance, freedom = learned_covariance(values - mean, len(flights) - 1.0, expected, names)
+        return cls(tuple(names), mean, covariance * (1 + 1 / len(flights)), freedom, measured, power, error, voltage)
 
     def apart(self, flights: Sequence[FlightNumbers]) -> tuple[Array, Array]:
         """Compute how far flights of a day are from the reference, shape (flight, number), and the covariance.
@@ -114,6 +109,24 @@ def _measured(flights: Sequence[FlightNumbers], names: Sequence[str]) -> Array:
 def common_numbers(flights: Sequence[FlightNumbers]) -> tuple[str, ...]:
     """List the numbers that all flights tell, in the order of the first."""
     return tuple(name for name in flights[0].values if all(name in flight.values for flight in flights))
+
+
+def expected_covariance(flights: Sequence[FlightNumbers], names: Sequence[str], vehicle: VehicleSettings) -> Array:
+    """Compute the covariance that is expected of flights before any of them is seen, shape (number, number)."""
+    # Scatter of flights holds the error of each; what is usual from day to day comes beside that.
+    return usual_covariance(names, vehicle) + np.diag(_measured(flights, names))
+
+
+def learned_covariance(apart: Array, freedom: float, expected: Array, names: Sequence[str]) -> tuple[Array, float]:
+    """Learn the covariance of flights from what is expected and what is seen, and give its degrees of freedom.
+
+    Parameters
+    ----------
+    apart : array, shape (row, number)
+        Whose squares add up to the covariance, times the degrees of freedom that they have.
+    """
+    seen = (apart.T @ apart) * _alike(names)
+    return (_DAYS * expected + seen) / (_DAYS + freedom), _DAYS + freedom
 
 
 def usual_covariance(names: Sequence[str], vehicle: VehicleSettings) -> Array:

@@ -193,6 +193,14 @@ HoldOption = Annotated[
 ]
 
 
+class TimeOrder(StrEnum):
+    """What tells which flight came first."""
+
+    DATE = "date"
+    NAME = "name"
+    GIVEN = "given"
+
+
 class ExportFormat(StrEnum):
     """What a model is exported as."""
 
@@ -582,6 +590,47 @@ def changed(
         common,
         lambda command, job: command.run(job, today, since, fail_on_change=fail_on_change),
     )
+
+
+@_command()
+def trend(
+    config: ConfigArgument,
+    flights: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FLIGHT...", help=f"Flights, logs ({formats_in_words()}), or folders that hold them, in any order."
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", metavar="FOLDER", help="Folder to fill, or to add to.", show_default=False),
+    ],
+    reference: Annotated[
+        int | None,
+        typer.Option(
+            "--reference",
+            metavar="N",
+            min=1,
+            help="The first N flights are those of the unchanged vehicle; default: half of them, as far as they do not "
+            "change, and three at least.",
+        ),
+    ] = None,
+    order: Annotated[
+        TimeOrder | None,
+        typer.Option("--order", help="What orders flights; default: their dates where all logs have one, or names."),
+    ] = None,
+    workers: Annotated[int, typer.Option("--workers", metavar="N", min=1, help="Processes that read logs.")] = 1,
+    scheduler: SchedulerOption = None,
+    *,
+    common: Common,
+) -> None:
+    """Say since which of many flights what is changed about a vehicle; a second call reads only new ones."""
+
+    def call(command: Any, job: Job) -> Any:
+        chosen = command.Options(reference, order and order.value, workers, scheduler)
+        return command.run(job, flights, chosen)
+
+    _run("trend", config, output, common, call)
 
 
 @_command()

@@ -27,6 +27,7 @@ from cpfls_cli.pages.changed import answer
 from cpfls_cli.pages.source import source_of, unique_labels
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Command, Outcome, as_json
+from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import joined
 
 FILES = ("changed.h5", "report.html", "changed.json")
@@ -110,14 +111,19 @@ def _record(job: Job, flights: Mapping[str, FlightNumbersRecord], notes: Sequenc
     )
     today, before = ([numbers_of_flight(own) for own in side] for side in (of_today, of_before))
     change = changed(today, before, vehicle, np.random.default_rng(job.study.seed))
-    units = {name: KINDS[name.split()[0]].unit for name in change.names}
-    units |= {cause.name: cause.unit for cause in causes(change.names, vehicle)}
+    units = units_of(change.names, vehicle)
     warnings = [
         *_warnings(of_today, of_before, change.names),
         *notes,
         *(f"{own.flight}: {words}" for own in (*of_today, *of_before) for words in own.warning),
     ]
     return ChangedRecord.of(change, today, before, units, warnings, false_alarm=FALSE_ALARM, named_from=NAMED)
+
+
+def units_of(names: Sequence[str], vehicle: VehicleSettings) -> dict[str, str]:
+    """Look up the units of numbers and of the changes that they can tell of, by name."""
+    units = {name: KINDS[name.split()[0]].unit for name in names}
+    return units | {cause.name: cause.unit for cause in causes(names, vehicle)}
 
 
 def _warnings(

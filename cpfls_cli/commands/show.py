@@ -32,6 +32,7 @@ _PAGES = {
     "cpfls/diagnosis": "diagnosis",
     "cpfls/flight-numbers": "flight_numbers",
     "cpfls/changed": "changed",
+    "cpfls/trend": "trend",
 }
 """Modules of `pages` that word an answer, by format; a flight, whose answer needs all of it, may not fit in memory."""
 
@@ -75,7 +76,7 @@ def _answered(artifact: Outline, record: Record, path: Path, more: Sequence[tupl
 
 def artifact_that_tells(output: Path) -> Path | None:
     """Find the artifact among what a command wrote whose `info` tells its answer again; None where there is none."""
-    paths = [output / "diagnosis.h5", output / "changed.h5"] if output.is_dir() else [output]
+    paths = [output / "diagnosis.h5", output / "changed.h5", output / "trend.h5"] if output.is_dir() else [output]
     for path in paths:
         with suppress(InputError):
             if read_outline(path).spec.name in _PAGES:

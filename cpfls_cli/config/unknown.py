@@ -35,16 +35,16 @@ _OFF: Final[dict[Unknown, str]] = {
 }
 """How many times a guess real vehicles have: by the ranges above, and hover at 0.4 to 0.8 of the largest speed."""
 
-_TAKEN = frozenset({"import", "vehicle", "report", "export", "predict", "trajectory", "changed"})
+_TAKEN = frozenset({"import", "vehicle", "report", "export", "predict", "trajectory", "changed", "trend"})
 _GUESSED: Final = "guesses from mass and arms are used for what the config leaves open (--accept-guesses)"
 
 _OF_MODELS = frozenset({"replay", "response", "compare", "simulate", "gap", "extend"})
 _TAKEN |= _OF_MODELS
 """Commands that work with guesses; a report and an export are of a model, which has its own numbers.
 
-`changed` compares flights of one vehicle, in which its numbers cancel. `predict` and those of models do with those of a
-whole vehicle, and ask `require_known` where theirs is another; `trajectory` where torque or effects choose the path.
-Else guesses only serve to check what it asks of the rotors.
+`changed` and `trend` compare flights of one vehicle, in which its numbers cancel. `predict` and those of models do with
+those of a whole vehicle, and ask `require_known` where theirs is another; `trajectory` where torque or effects choose
+the path. Else guesses only serve to check what it asks of the rotors.
 """
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from math import nan
 
 from cpfls_cli.arrays import Array
 
@@ -75,6 +76,8 @@ class ImportReport:
         How the delay was found, where it was estimated.
     warnings : tuple of str
         Plain sentences for the user.
+    flown_at : float
+        When the log begins, s since 1970 began (UTC); NaN where it does not tell.
     """
 
     samples_read: int
@@ -94,6 +97,7 @@ class ImportReport:
     delay_s: float = 0.0
     delay: DelayEstimate | None = None
     warnings: tuple[str, ...] = ()
+    flown_at: float = nan
 
 
 @dataclass(frozen=True, kw_only=True)

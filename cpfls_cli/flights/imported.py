@@ -42,7 +42,8 @@ def imported(log: Path, study: Study) -> ImportedFlight:
             # The delay is a parameter too: the part of the flight that is held out must not choose it.
             delay_share=study.identification.training_share,
         )
-    return replace(flight, report=replace(flight.report, warnings=(*flight.report.warnings, *read.warnings)))
+    warnings = (*flight.report.warnings, *read.warnings)
+    return replace(flight, report=replace(flight.report, warnings=warnings, flown_at=read.flown_at))
 
 
 @contextmanager

@@ -35,21 +35,26 @@ def kept_numbers(
     InputError
         If the flight tells none.
     """
-    path = folder / f"{flight.name}-{file.sha256[:_HASH]}.h5"
-    kept = _kept(path, file, study)
+    kept = find_kept(flight, file, study, folder)
     if kept is not None:
         return kept
-    recording, full, warnings = read_alone(flight, study)
+    recording, full, warnings, flown_at = read_alone(flight, study)
     told = flight_numbers(recording, full)
     units = [KINDS[name.split()[0]].unit for name in told.values]
-    made = FlightNumbersRecord.of(told, units, recording.signals.period, float("nan"), warnings)
+    made = FlightNumbersRecord.of(told, units, recording.signals.period, flown_at, warnings)
     record = made.with_header(header_of(study, {"flight": file}, cautions))
     folder.mkdir(parents=True, exist_ok=True)
-    write_record(path, record)
+    write_record(_path(flight, file, folder), record)
     return record
 
 
-def _kept(path: Path, file: InputFile, study: Study) -> FlightNumbersRecord | None:
+def _path(flight: Path, file: InputFile, folder: Path) -> Path:
+    return folder / f"{flight.name}-{file.sha256[:_HASH]}.h5"
+
+
+def find_kept(flight: Path, file: InputFile, study: Study, folder: Path) -> FlightNumbersRecord | None:
+    """Give the numbers of a flight as they are kept in a folder; None where those of another content or config are."""
+    path = _path(flight, file, folder)
     if not path.is_file() or not holds(path, FlightNumbersRecord):
         return None
     try:

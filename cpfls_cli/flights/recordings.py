@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -61,12 +62,15 @@ class ReadFlight:
         By the names of a flight's datasets.
     units : mapping of str to str
         Of the import that made it.
+    flown_at : float
+        When the log begins, s since 1970 began (UTC); NaN where it does not tell, and of an artifact.
     """
 
     name: str
     signals: Mapping[str, Array]
     units: Mapping[str, str]
     warnings: tuple[str, ...]
+    flown_at: float = nan
 
 
 def read_flights(paths: Sequence[Path], study: Study) -> Recordings:
@@ -78,12 +82,15 @@ def read_flights(paths: Sequence[Path], study: Study) -> Recordings:
     return Recordings(tuple(recordings), (*warnings, *notes))
 
 
-def read_alone(path: Path, study: Study) -> tuple[Recording, float, tuple[str, ...]]:
-    """Read one flight: with it the voltage that its voltages are shares of, 1 where it states shares, and warnings."""
+def read_alone(path: Path, study: Study) -> tuple[Recording, float, tuple[str, ...], float]:
+    """Read one flight: with it the voltage that its voltages are shares of, 1 where it states shares, and warnings.
+
+    Last comes when it was flown, as `ReadFlight.flown_at`.
+    """
     flight = read_flight(path, study)
     recording, about = _recording(flight, study)
     volts = _largest_volts(recording.signals, flight)
-    return (_share(recording, volts) if volts else recording), volts or 1.0, about
+    return (_share(recording, volts) if volts else recording), volts or 1.0, about, flight.flown_at
 
 
 def read_flight(path: Path, study: Study) -> ReadFlight:
@@ -102,12 +109,12 @@ def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> Rea
     done = tuple(f"{what} ({count})" for what, count in log_findings(first.report).items())
     signals = [FlightRecord.of_import(part, {}).signals for part in parts]
     if len(parts) == 1:
-        return ReadFlight(name, signals[0], _units(study), (*done, *first.report.warnings))
+        return ReadFlight(name, signals[0], _units(study), (*done, *first.report.warnings), first.report.flown_at)
     shared = [each for each in signals[0] if all(each in own for own in signals)]
     for own, part in zip(signals, parts, strict=True):
         own["time"] = own["time"] + part.report.span_s[0]
     joined = {each: np.concatenate([own[each] for own in signals]) for each in shared}
-    return ReadFlight(name, joined, _units(study), ())
+    return ReadFlight(name, joined, _units(study), (), first.report.flown_at)
 
 
 def _require_speeds(log: str, part: ImportedFlight, study: Study) -> None:

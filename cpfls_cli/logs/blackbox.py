@@ -3,7 +3,8 @@
 import re
 import struct
 from collections.abc import Collection, Mapping
-from math import pi
+from datetime import UTC, datetime
+from math import nan, pi
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import InputError
 from cpfls_cli.logs.blackbox_frames import ENCODINGS, KINDS, MAIN, ROLLOVER, Fields, decode
 from cpfls_cli.logs.formats import BLACKBOX_MAGIC, LogContents
-from cpfls_cli.logs.records import bytes_of
+from cpfls_cli.logs.records import bytes_of, date
 
 _LARGEST_SHORT = 0x7FFF
 _DEGREES = 180 / pi
@@ -42,7 +43,18 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     # Lines that are not about the log itself.
     stated = {key: value for key, value in header.items() if not re.match(r"Product|Data version|Field|[IP] ", key)}
     parameters = {key: float(own) if re.fullmatch(r"-?\d+(\.\d+)?", own) else own for key, own in stated.items()}
-    return LogContents({"": columns}, units, parameters, header.get("Firmware revision", ""), warnings)
+    return LogContents(
+        {"": columns}, units, parameters, header.get("Firmware revision", ""), warnings, _flown_at(header)
+    )
+
+
+def _flown_at(header: Mapping[str, str]) -> float:
+    """Read the date at which the log begins; without a clock the autopilot writes one of the year 0."""
+    try:
+        begins = datetime.fromisoformat(header.get("Log start datetime", ""))
+    except ValueError:
+        return nan
+    return date(begins.replace(tzinfo=begins.tzinfo or UTC).timestamp())
 
 
 def _flight(content: bytes) -> tuple[dict[str, str], IntArray, int]:

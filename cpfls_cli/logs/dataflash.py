@@ -3,6 +3,7 @@
 import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP
 from cpfls_cli.logs.formats import DATAFLASH_MAGIC, LogContents
-from cpfls_cli.logs.records import bytes_of, numbers, seconds, table
+from cpfls_cli.logs.records import bytes_of, date, numbers, seconds, table
 
 _HEAD = b"\xa3\x95"
 _OF_FORMATS = 0x80
@@ -26,6 +27,8 @@ _NUMBERS = {
 }
 _OTHERS = {"n": "S4", "N": "S16", "Z": "S64", "a": "V64"}
 _STAMPS = {"TimeUS": 10**6, "TimeMS": 10**3}
+# Of 1980-01-06, less the 18 leap seconds since.
+_GPS_BEGAN, _WEEK_S = 315_964_800 - 18, 604_800
 _INSTANCE = "#"
 _NO_FACTOR = "-?0"
 _SCALED = "cCeEL"
@@ -75,12 +78,13 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         for each, unit in stated.get(topic.partition("[")[0], {}).items()
         if each in fields and unit != _INSTANCE
     }
+    flown_at = _flown_at(topics.get("GPS", {}))
     parameters: dict[str, float | str] = {}
     for name, value in _rows(tables, "PARM", Name="S", Value="fiu"):
         # As the log begins.
         parameters.setdefault(_text(name), float(value))
     broken = (f"{lost} bytes belong to no message: the file is damaged in places; what could be read is used",)
-    return LogContents(topics, units, parameters, _system(tables), broken if lost else ())
+    return LogContents(topics, units, parameters, _system(tables), broken if lost else (), flown_at)
 
 
 def _find_messages(content: bytes) -> tuple[dict[int, _Kind], int]:
@@ -153,6 +157,15 @@ def _stated_units(tables: Mapping[str, np.ndarray], kinds: Mapping[int, _Kind]) 
         for number, kind in kinds.items()
         if number in stated
     }
+
+
+def _flown_at(fields: Mapping[str, Array]) -> float:
+    """Compute the time at which the log begins from the weeks and seconds of GPS."""
+    for week, since in (("GWk", "GMS"), ("Week", "TimeMS")):
+        if week in fields and since in fields:
+            begins = _GPS_BEGAN + _WEEK_S * fields[week] + 1e-3 * fields[since] - fields[STAMP]
+            return next((at for at in map(date, begins[fields[week] > 0]) if np.isfinite(at)), nan)
+    return nan
 
 
 def _system(tables: Mapping[str, np.ndarray]) -> str:

@@ -8,6 +8,7 @@ loaded when the first file of its format is read.
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -46,6 +47,8 @@ class LogContents:
         What wrote the log and its version, such as ``PX4 1.14.0``; empty where that is not known.
     warnings : tuple of str
         Faults of the file as a whole.
+    flown_at : float
+        When it begins, s since 1970 began (UTC); NaN where the log does not tell.
     """
 
     topics: dict[str, dict[str, "Array"]]
@@ -53,6 +56,7 @@ class LogContents:
     parameters: dict[str, float | str] = field(default_factory=dict)
     system: str = ""
     warnings: tuple[str, ...] = ()
+    flown_at: float = nan
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,7 @@ class LogColumns:
     columns: dict[str, "Array"]
     settings: "ImportSettings"
     warnings: tuple[str, ...] = ()
+    flown_at: float = nan
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,7 +188,7 @@ def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
         columns, chosen, warnings = on_one_clock(contents.topics, contents.units, settings)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    return LogColumns(columns, chosen, (*contents.warnings, *warnings))
+    return LogColumns(columns, chosen, (*contents.warnings, *warnings), contents.flown_at)
 
 
 def _format_of(path: Path) -> LogFormat | None:

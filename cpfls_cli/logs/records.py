@@ -1,12 +1,16 @@
 """Binary records of several kinds, mixed in one file, as tables of numbers."""
 
 from collections.abc import Sequence
+from math import nan
 from pathlib import Path
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
+
+# Of 2005 and 2100: nothing flew a multirotor that logs before, or has yet after.
+_FIRST_DATE, _LAST_DATE = 1.1e9, 4.1e9
 
 
 def bytes_of(path: Path) -> bytes:
@@ -28,6 +32,11 @@ def numbers(values: np.ndarray) -> Array:
     """Convert numbers of any type; what a broken log takes for one may be no number."""
     with np.errstate(invalid="ignore"):
         return np.asarray(values, dtype=float)
+
+
+def date(second: float) -> float:
+    """Give s since 1970 began, or NaN for what is no date: a clock that was never set begins in 1970 or 1980."""
+    return float(second) if _FIRST_DATE < second < _LAST_DATE else nan
 
 
 def seconds(stamps: np.ndarray, origin: int, per_second: int) -> Array:

@@ -16,7 +16,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP, topic_and_field
 from cpfls_cli.logs.formats import LogContents
-from cpfls_cli.logs.records import seconds
+from cpfls_cli.logs.records import date, seconds
 
 _NANOSECOND = 10**9
 _MICROSECONDS = 1000
@@ -82,7 +82,9 @@ def _read(path: Path, reader: Reader, wanted: set[str] | None) -> LogContents:
         f"these topics do not use the recorder's clock and are shifted by the median offset: {', '.join(shifted)}",
     )
     present = [warning for warning, causes in zip(warnings, (unknown, shifted), strict=True) if causes]
-    return LogContents(topics, units, system="ROS 2", warnings=tuple(present))
+    return LogContents(
+        topics, units, system="ROS 2", warnings=tuple(present), flown_at=date(reader.start_time / _NANOSECOND)
+    )
 
 
 def _columns_of_topic(reader: Reader, connections: Sequence[Connection]) -> tuple[np.ndarray, dict[str, np.ndarray]]:

@@ -3,20 +3,23 @@
 import io
 import re
 import struct
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from contextlib import redirect_stdout
+from math import nan
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
 import pyulog
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP
 from cpfls_cli.logs.formats import ULOG_MAGIC, LogContents
-from cpfls_cli.logs.records import numbers, seconds
+from cpfls_cli.logs.records import date, numbers, seconds
 
 _PER_SECOND = 10**6
+_RECEIVERS = ("vehicle_gps_position", "sensor_gps")
 _HEADER_BYTES, _LONGEST_MESSAGE = 16, 65535
 _FIELD = re.compile(r"([^;\s\[]+)(?:\[(\d+)\])? [^;]*")
 
@@ -37,7 +40,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     # As the log begins; in a broken one some parameters are no numbers.
     known = log.initial_parameters.items()
     parameters: dict[str, float | str] = {name: float(own) for name, own in known if isinstance(own, int | float)}
-    return LogContents(topics, {}, parameters, _system(log), _warn_of_file(log, origin))
+    return LogContents(topics, {}, parameters, _system(log), _warn_of_file(log, origin), _flown_at(topics))
 
 
 def _parsed(path: Path) -> Any:
@@ -88,6 +91,17 @@ def _system(log: Any) -> str:
     # Of a version that is no release too; old logs do not state it as a number.
     version = log.get_version_info() if isinstance(log.msg_info_dict.get("ver_sw_release"), int) else None
     return " ".join([name, ".".join(str(part) for part in version[:3])] if version else [name]).strip()
+
+
+def _flown_at(topics: Mapping[str, Mapping[str, Array]]) -> float:
+    """Look up what a receiver of GPS says of the time at which the log begins."""
+    for topic in _RECEIVERS:
+        fields = topics.get(topic, {})
+        if "time_utc_usec" in fields and STAMP in fields:
+            begins = fields["time_utc_usec"] / _PER_SECOND - fields[STAMP]
+            # Before it receives anything it says 0.
+            return next((at for at in map(date, begins) if np.isfinite(at)), nan)
+    return nan
 
 
 def _field(field: str, values: Any, origin: int) -> Array:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.changed import ChangedRecord
+from cpfls_cli.artifacts.changed import ChangedRecord, FoundRecord
 from cpfls_cli.pages.change_words import cause_name, change_words, hover_words, smallest_words, what_to_check
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, plot
@@ -76,11 +76,12 @@ def changed_box(record: ChangedRecord, vehicle: VehicleSettings) -> Box:
     """Say in a sentence what changed, or that nothing did."""
     if not record.changed:
         return Box("NO CHANGE", "nothing beyond what flights of this vehicle differ by", (), "good")
-    first, *more = (sentence(_told(record, index, vehicle)) for index in range(len(record.found.cause)))
+    first, *more = (sentence(told(record, index, vehicle)) for index in range(len(record.found.cause)))
     return Box("CHANGED", first, [f"And: {each[:1].lower()}{each[1:]}" for each in more], "warning")
 
 
-def _told(record: ChangedRecord, index: int, vehicle: VehicleSettings) -> str:
+def told(record: FoundRecord, index: int, vehicle: VehicleSettings) -> str:
+    """Say what a change is, by how much and how sure, or which ones it may be."""
     cause, others = record.found.cause[index], record.others(index)
     axes = [name.split()[-1] for name in record.number if name.split()[0] == cause]
     what = change_words(cause, record.sizes(index), vehicle, axes, record.cable_length)
@@ -108,11 +109,11 @@ def _facts(record: ChangedRecord, vehicle: VehicleSettings) -> Iterator[tuple[st
             alike = [name for name, _ in record.others(index) if not is_within(cause, name)]
             if alike and record.named[index]:
                 yield "Looks alike", sentence(joined(map(cause_name, alike)))
-        yield from _checks(record)
+        yield from checks(record)
     else:
         yield (
             "Would have shown",
-            sentence(", ".join(_would_have_shown(record, vehicle)) or "nothing that is looked for"),
+            sentence(", ".join(would_have_shown(record, vehicle)) or "nothing that is looked for"),
         )
         kinds = joined(dict.fromkeys(name.split()[0] for name in record.number))
         of = "; loads are of commands" if record.commanded else "; loads are of measured speeds"
@@ -136,7 +137,8 @@ def _since(record: ChangedRecord) -> str:
     )
 
 
-def _checks(record: ChangedRecord) -> Iterator[tuple[str, str]]:
+def checks(record: FoundRecord) -> Iterator[tuple[str, str]]:
+    """Say what to look at by hand."""
     looked: dict[str, str] = {}
     for index, cause in enumerate(record.found.cause):
         for name in [cause, *(() if record.named[index] else (name for name, _ in record.others(index)))]:
@@ -153,7 +155,8 @@ def _chance(record: ChangedRecord) -> str:
     )
 
 
-def _would_have_shown(record: ChangedRecord, vehicle: VehicleSettings) -> Iterator[str]:
+def would_have_shown(record: FoundRecord, vehicle: VehicleSettings) -> Iterator[str]:
+    """Say how large changes are that would have shown."""
     smallest = dict(zip(record.shows.cause, record.shows.smallest.tolist(), strict=True))
     rotors = [size for name, size in smallest.items() if name.startswith("rotor ")]
     smallest["rotor M1"] = max(rotors, default=np.nan)
@@ -167,7 +170,7 @@ def _tables(record: ChangedRecord, vehicle: VehicleSettings, index: int) -> Iter
     for at, name in enumerate(record.number):
         usual, today = float(record.mean[at]), float(record.mean[at] + record.apart[:, at].mean())
         deviation, apart = float(record.deviation[at]), float(record.apart[:, at].mean() / record.deviation[at])
-        natural = _natural(name)
+        natural = natural_unit(name)
         if natural is None:
             told = [_UNITS.get(record.unit[at], record.unit[at]), *(number(each, 3) for each in (usual, today))]
             told.append(number(deviation, 2))
@@ -196,7 +199,7 @@ def _tables(record: ChangedRecord, vehicle: VehicleSettings, index: int) -> Iter
     )
 
 
-def _natural(name: str) -> str | None:
+def natural_unit(name: str) -> str | None:
     """Give the unit of what a number is the logarithm of; None where it is none."""
     kind, _, rest = name.partition(" ")
     return _NATURAL.get(kind, _NATURAL.get(f"{kind} {rest.rpartition(' ')[0]}"))

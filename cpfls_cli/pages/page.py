@@ -11,6 +11,7 @@ from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+from cpfls_cli.artifacts.trend import TrendRecord
 from cpfls_cli.pages.changed import changed_blocks
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
 from cpfls_cli.pages.diagnosis import diagnosis_blocks
@@ -34,6 +35,7 @@ from cpfls_cli.pages.summary import models_section, summary_section
 from cpfls_cli.pages.sweep import replicates_section
 from cpfls_cli.pages.tracking import tracking_section
 from cpfls_cli.pages.trajectory import path_blocks
+from cpfls_cli.pages.trend import trend_blocks
 from cpfls_cli.pages.uncertainty import uncertainty_blocks
 from cpfls_cli.pages.vehicle_model import found_vehicle_section
 from cpfls_cli.report.content import Block, Document, Section
@@ -94,6 +96,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | None]] = (
     prediction_section,
     response_section,
     replay_section,
+    _of_each("trend", "What changed over many flights", TrendRecord, trend_blocks),
     _of_each("changed", "What changed", ChangedRecord, changed_blocks),
     _of_each("flight-numbers", "What each flight tells", FlightNumbersRecord, flight_numbers_blocks),
     tracking_section,

@@ -20,6 +20,7 @@ from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import InputFile, Record
 from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+from cpfls_cli.artifacts.trend import TrendRecord
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.unknown import needs_numbers
 from cpfls_cli.pages.source import Source, Sources
@@ -97,6 +98,7 @@ _COMMANDS: dict[type[Record], _Command] = {
     DiagnosisRecord: _Command("diagnose", ("disagreement",), ("held-out",)),
     ExtendedRecord: _Command("extend", ("diagnosis",), ("model",)),
     ChangedRecord: _Command("changed", ("today",), ("since",)),
+    TrendRecord: _Command("trend", ("flight",)),
     VehicleRecord: _Command("vehicle", ("flight",), ("held-out",)),
 }
 _IMPORT = _Command("import", ("log",))

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.selection import SelectionRecord
     from cpfls_cli.artifacts.sweep import SweepRecord
     from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+    from cpfls_cli.artifacts.trend import TrendRecord
     from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
 R = TypeVar("R", bound=Record, default=Any)
@@ -96,6 +97,7 @@ class Sources:
     disagreements: ClassVar[_OfFormat[DisagreementRecord]] = _OfFormat("cpfls/disagreement")
     diagnoses: ClassVar[_OfFormat[DiagnosisRecord]] = _OfFormat("cpfls/diagnosis")
     vehicles: ClassVar[_OfFormat[VehicleRecord]] = _OfFormat("cpfls/model", "vehicle")
+    trends: ClassVar[_OfFormat[TrendRecord]] = _OfFormat("cpfls/trend")
     changes: ClassVar[_OfFormat[ChangedRecord]] = _OfFormat("cpfls/changed")
     extensions: ClassVar[_OfFormat[ExtendedRecord]] = _OfFormat("cpfls/model", "extended")
 
@@ -107,7 +109,7 @@ class Sources:
     @property
     def only_gap(self) -> bool:
         """Whether nothing else was given than how models and flights disagree, and what was found then."""
-        told = (self.gap, self.replays, self.responses, self.vehicles, self.changes)
+        told = (self.gap, self.replays, self.responses, self.vehicles, self.changes, self.trends)
         return sum(map(len, told)) == len(self.all)
 
     @property
@@ -117,7 +119,7 @@ class Sources:
             return self.settings.title
         if self.vehicles:
             return "A vehicle found in flights"
-        if self.changes:
+        if self.changes or self.trends:
             return "What changed about a vehicle"
         if self.gap:
             return "Where simulation and flight disagree"

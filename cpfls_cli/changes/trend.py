@@ -1,0 +1,292 @@
+"""When a vehicle changed: many flights in time, and the flights from which on their numbers are others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.changes.judge import FALSE_ALARM, Change, beyond_chance, judged
+from cpfls_cli.changes.numbers import FlightNumbers
+from cpfls_cli.changes.reference import FEWEST, Reference, expected_covariance, learned_covariance
+from cpfls_cli.errors import InputError, install_command
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+if TYPE_CHECKING:
+    from ruptures import KernelCPD
+
+_DRAWS = 1000
+"""Rows of unchanged flights that chance is told by."""
+
+_AT_ONCE = 3
+"""Change points whose gain is shared when a row is held against chance."""
+
+
+@dataclass(frozen=True)
+class Shift:
+    """A change point.
+
+    Attributes
+    ----------
+    start, end : int
+        Flights from which on and before which the vehicle is changed: up to the next change point.
+    change : Change
+        What these flights say beside those from the change point before.
+    """
+
+    start: int
+    end: int
+    change: Change
+
+
+@dataclass(frozen=True)
+class Trend:
+    """Numbers of flights in time.
+
+    Attributes
+    ----------
+    flights : tuple of FlightNumbers
+        In time order; those that tell all numbers.
+    left_out : tuple of str
+        Flights that lack some of the numbers.
+    reference : int
+        How many of the first flights are the reference.
+    mean : array, shape (number,)
+        Of the reference.
+    apart : array, shape (flight, number)
+        Less that mean, loads at its voltage.
+    deviation : array, shape (flight, number)
+        By which a flight of an unchanged vehicle differs from the reference.
+    limit : float
+        Deviations beyond which no number of an unchanged vehicle is in any flight after the reference, but for the rate
+        of false alarms.
+    p_value : float
+        Probability that a row of flights of an unchanged vehicle looks as much as if it had changed.
+    shifts : tuple of Shift
+    shows : mapping of str to float
+        Smallest size of each change that shows in one flight after the reference, as of `Change`.
+    """
+
+    names: tuple[str, ...]
+    flights: tuple[FlightNumbers, ...]
+    left_out: tuple[str, ...]
+    reference: int
+    mean: Array
+    apart: Array
+    deviation: Array
+    limit: float
+    p_value: float
+    shifts: tuple[Shift, ...]
+    shows: dict[str, float]
+
+
+def trend(
+    flights: Sequence[FlightNumbers],
+    vehicle: VehicleSettings,
+    rng: np.random.Generator,
+    reference: int | None = None,
+) -> Trend:
+    """Find the flights from which on a vehicle is another one.
+
+    Numbers are whitened by the covariance of flights that follow each other, which a change between two of them hardly
+    touches. Change points are those of least squares with a penalty for each (PELT), the one that rows of an unchanged
+    vehicle exceed at the rate of false alarms: the same number of flights, drawn, whitened and searched alike.
+
+    Parameters
+    ----------
+    flights : sequence of FlightNumbers
+        In time order.
+    reference : int, optional
+        How many of the first flights are the reference: by default half of them, or those before the first change, and
+        at least three.
+
+    Raises
+    ------
+    InputError
+        If there are fewer flights than the reference and one more, or ruptures is not installed.
+
+    References
+    ----------
+    Killick, Fearnhead and Eckley 2012, Optimal detection of changepoints with a linear computational cost, JASA
+    107(500). Truong, Oudre and Vayatis 2020, Selective review of offline change point detection methods, Signal
+    Processing 167.
+    """
+    names, kept = most_told(flights)
+    left_out = tuple(flight.name for flight in flights if not any(flight is each for each in kept))
+    if len(kept) < (reference or FEWEST) + 1:
+        raise InputError(
+            f"{len(kept)} flights tell the same numbers, and a trend needs {(reference or FEWEST) + 1} at least: those "
+            "of the reference and one more"
+        )
+    first = reference or max(FEWEST, len(kept) // 2)
+    learned = Reference.of(kept[:first], names, vehicle)
+    row = _Row.of(kept, learned, vehicle)
+    p_value, starts = _change_points(row, rng)
+    if reference is None and starts:
+        first = max(FEWEST, min(first, starts[0]))
+    held = Reference.of(kept[:first], names, vehicle)
+    apart, deviation = _apart(held, kept)
+    return Trend(
+        names,
+        tuple(kept),
+        left_out,
+        first,
+        held.mean,
+        apart,
+        deviation,
+        limit=_limit(held.freedom, apart[first:].size),
+        p_value=p_value,
+        shifts=tuple(_shifts(row, kept, starts, vehicle, rng)),
+        shows=judged(kept[first : first + 1], held, vehicle, rng).shows,
+    )
+
+
+def most_told(flights: Sequence[FlightNumbers]) -> tuple[tuple[str, ...], list[FlightNumbers]]:
+    """Choose the numbers and the flights that tell all of them such that they are the most together."""
+    told = list(dict.fromkeys(name for flight in flights for name in flight.values))
+    if {flight.commanded for flight in flights} == {True, False}:
+        told = [name for name in told if not name.startswith("load ")]
+    count = {name: sum(name in flight.values for flight in flights) for name in told}
+    best: tuple[tuple[str, ...], list[FlightNumbers]] = ((), [])
+    for least in sorted(set(count.values()), reverse=True):
+        names = tuple(name for name in told if count[name] >= least)
+        kept = [flight for flight in flights if all(name in flight.values for name in names)]
+        if len(names) * len(kept) > len(best[0]) * len(best[1]):
+            best = names, kept
+    if not best[0]:
+        raise InputError("the flights tell no number in common; import the same signals")
+    return best
+
+
+def _shifts(
+    row: _Row,
+    flights: Sequence[FlightNumbers],
+    starts: Sequence[int],
+    vehicle: VehicleSettings,
+    rng: np.random.Generator,
+) -> Iterator[Shift]:
+    """Judge the flights from each change point on beside those before, with the scatter that is left in all parts."""
+    inside = np.vstack([part - part.mean(axis=0) for part in np.split(row.values, starts)])
+    scatter, freedom = learned_covariance(inside, float(len(inside) - len(starts) - 1), row.expected, row.names)
+    bounds = [0, *starts, len(flights)]
+    for before, start, end in zip(bounds, bounds[1:], bounds[2:], strict=False):
+        # What flights after it have in common by chance, as those of one day, is no less than what one has.
+        covariance = scatter * (1 + 1 / (start - before))
+        own = replace(Reference.of(flights[before:start], row.names, vehicle), covariance=covariance, freedom=freedom)
+        yield Shift(start, end, judged(flights[start:end], own, vehicle, rng))
+
+
+def _apart(reference: Reference, flights: Sequence[FlightNumbers]) -> tuple[Array, Array]:
+    """Compute how far each flight is from the reference, and by how much one usually is, shape (flight, number)."""
+    each = [reference.apart([flight]) for flight in flights]
+    deviation = np.array([np.sqrt(np.diag(covariance)) for _, covariance in each])
+    return np.vstack([apart for apart, _ in each]), deviation
+
+
+def _limit(freedom: float, count: int) -> float:
+    # Slow to load, and who reads a record computes nothing.
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, 1 - 0.5 * FALSE_ALARM / count))
+
+
+@dataclass(frozen=True)
+class _Row:
+    """Flights one after another, and what is expected of such a row.
+
+    Attributes
+    ----------
+    values : array, shape (flight, number)
+    expected : array, shape (number, number)
+        Covariance of a flight before any is seen.
+    voltage : array, shape (flight, number)
+        Standard deviation of what all flights have in common by the voltage, whose effect is not known well.
+    noise : array, shape (flight, number)
+        Standard deviation of what a flight tells worse than others do.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    expected: Array
+    voltage: Array
+    noise: Array
+
+    @classmethod
+    def of(cls, flights: Sequence[FlightNumbers], reference: Reference, vehicle: VehicleSettings) -> _Row:
+        """Gather what a row is held against."""
+        names = reference.names
+        loads = np.array([name.startswith("load ") for name in names])
+        lower = np.log([flight.voltage / reference.voltage for flight in flights])
+        known = np.where(np.isfinite(lower), lower, 0.0)
+        expected = expected_covariance(flights, names, vehicle)
+        measured = np.array([[flight.errors[name] for name in names] for flight in flights]) ** 2
+        return cls(
+            names,
+            _apart(reference, flights)[0],
+            expected,
+            voltage=reference.voltage_error * np.outer(known, loads),
+            noise=np.sqrt(np.maximum(measured - measured.mean(axis=0), 0.0)),
+        )
+
+    def covariance(self, values: Array) -> tuple[Array, float]:
+        """Learn the covariance of a row from its differences, and give its degrees of freedom."""
+        steps = len(values) - 1
+        # Each flight is in two of them.
+        freedom = 2 * steps**2 / (3 * steps - 1)
+        differences = np.diff(values, axis=0) * np.sqrt(0.5 * freedom / steps)
+        return learned_covariance(differences, freedom, self.expected, self.names)
+
+    def whitened(self, values: Array) -> Array:
+        """Turn a row into one of numbers that do not go together, of variance 1."""
+        root = np.linalg.cholesky(self.covariance(values)[0])
+        return np.ascontiguousarray(np.linalg.solve(root, values.T).T)
+
+    def unchanged(self, rng: np.random.Generator, count: int) -> Iterator[Array]:
+        """Draw such rows of unchanged vehicles: of each its covariance (inverse Wishart), then its flights."""
+        covariance, freedom = self.covariance(self.values)
+        root, size = np.linalg.cholesky(covariance), len(covariance)
+        for _ in range(count):
+            # Bartlett's decomposition of a Wishart matrix.
+            lower = np.tril(rng.normal(size=(size, size)), -1)
+            lower += np.diag(np.sqrt(rng.chisquare(freedom + size - 1 - np.arange(size))))
+            drawn = np.linalg.solve(lower.T, rng.normal(size=(size, len(self.values))))
+            noise = rng.normal(size=self.noise.shape) * self.noise
+            yield np.sqrt(freedom) * (root @ drawn).T + rng.normal() * self.voltage + noise
+
+
+def _change_points(row: _Row, rng: np.random.Generator) -> tuple[float, list[int]]:
+    """Find change points, and how probable the clearest of them are where nothing changed."""
+    chance = np.array([_gain(row.whitened(drawn)) for drawn in row.unchanged(rng, _DRAWS)])
+    white = row.whitened(row.values)
+    p_value = beyond_chance(chance, _gain(white))
+    if p_value > FALSE_ALARM:
+        return p_value, []
+    penalty = float(np.quantile(chance, 1 - FALSE_ALARM))
+    return p_value, [int(each) for each in _search(white).predict(pen=penalty)[:-1]]
+
+
+def _gain(white: Array) -> float:
+    """Compute by how much change points lower the sum of squares, each: of one, two or three the most."""
+    search = _search(white)
+    sums = np.vstack([np.zeros(white.shape[1]), np.cumsum(white, axis=0)])
+
+    def explained(bounds: Sequence[int]) -> float:
+        """Give what means of parts take off the sum of squares about 0."""
+        ends = [0, *bounds]
+        return float(((np.diff(sums[ends], axis=0) ** 2).sum(axis=1) / np.diff(ends)).sum())
+
+    counts = range(min(_AT_ONCE, len(white) - 1), 0, -1)
+    whole = explained([len(white)])
+    return max((explained(search.predict(n_bkps=count)) - whole) / count for count in counts)
+
+
+def _search(white: Array) -> KernelCPD:
+    try:
+        from ruptures import KernelCPD
+    except ImportError:
+        raise InputError(f"a trend needs the package ruptures; {install_command('trend')}") from None
+    # Of a linear kernel: least squares.
+    return KernelCPD(kernel="linear", min_size=1).fit(white)

@@ -1,0 +1,187 @@
+"""`cpfls trend`: small logs of a vehicle that hovers, one of whose rotors pulls less at the end."""
+
+import csv
+import json
+import pickle
+import shutil
+from contextlib import nullcontext
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
+from cpfls_cli.artifacts.store import read_record, write_record
+from cpfls_cli.commands import trend as command
+from cpfls_cli.workers.employ import Serial
+from tests.builders.command_line import undrawn
+from tests.builders.studies import VEHICLE
+
+CONFIG = """
+seed: 1
+import:
+  time_column: t
+  signals:
+    acceleration: {columns: [fx, fy, fz], unit: m/s^2}
+    rotor_command: {columns: [c1, c2, c3, c4], unit: rad/s}
+    voltage: {columns: [volts], unit: V}
+  acceleration_frame: body-specific-force
+  torque_source: null
+"""
+HEADER = "t,fx,fy,fz,c1,c2,c3,c4,volts"
+HOVER = np.sqrt(6 * 9.81 / 4 / 121.5e-6)
+DAYS = 86400.0
+
+
+def write_log(path, seed, lacks=0.0):
+    """Write a flight of eight seconds; M3 is told to make up for what it lacks."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(800) / 100
+    force = np.array([0, 0, 9.81]) + rng.normal(0, 0.3, (800, 3))
+    share = np.exp(rng.normal(0, 0.01, 4)) / np.array([1, 1, 1 - lacks, 1])
+    told = HOVER * np.sqrt(share) * (1 + rng.normal(0, 0.01, (800, 4)))
+    table = np.column_stack([time, force, told, np.full(800, 15.0)])
+    np.savetxt(path, table, fmt="%.5f", delimiter=",", header=HEADER, comments="")
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    """Eight flights as they were and three with a weak M3, whose names are not in the order of text."""
+    folder = tmp_path_factory.mktemp("flights")
+    (folder / "study.yaml").write_text(CONFIG + VEHICLE)
+    (folder / "logs").mkdir()
+    for number in range(1, 12):
+        write_log(folder / "logs" / f"log{number}.csv", number, 0.2 if number > 8 else 0.0)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def told(cpfls, logs):
+    """The trend of the first ten, and of all with one that cannot be read."""
+    with undrawn():
+        out = logs / "trend"
+        ten = [logs / "logs" / f"log{number}.csv" for number in range(1, 11)]
+        first = cpfls("trend", logs / "study.yaml", *reversed(ten), "-o", out, "--json")
+        (logs / "logs" / "log12.csv").write_text("t,fx\n0,1\n")
+        shutil.copy(logs / "logs" / "log3.csv", logs / "logs" / "log13.csv")
+        second = cpfls("trend", logs / "study.yaml", logs / "logs", "-o", out)
+    assert first.exit_code == 0, first.stderr
+    assert second.exit_code == 0, second.stderr
+    return SimpleNamespace(first=json.loads(first.stdout), second=second, out=out)
+
+
+def test_a_rotor_is_named_since_its_flight(told):
+    (shift,) = told.first["shifts"]
+    assert (shift["since"], shift["flight"]) == ("log9.csv", 9)
+    (cause,) = shift["causes"]
+    assert (cause["name"], cause["named"]) == ("rotor M3", True)
+    assert cause["sizes"][0]["low"] < 0.2 < cause["sizes"][0]["high"]
+    assert told.first["reference_flights"] == [f"log{number}.csv" for number in range(1, 6)]
+    assert told.first["order"] == "name"
+    assert told.first["new"] == 10
+
+
+def test_the_first_screen(told):
+    lines = told.second.stdout.splitlines()
+    assert lines[0].startswith("CHANGED: Since log9.csv (flight 9 of 11): rotor M3 pulls ")
+    assert len(lines) <= 15
+    assert "11 in the order of their names; the first 5 are the reference." in told.second.stdout
+    assert "look at its propeller" in told.second.stdout.lower()
+
+
+def test_a_second_call_reads_what_is_new_and_names_what_cannot_be_read(told):
+    assert "1 of 11 flights were new, the others kept" in told.second.stdout
+    assert "left out, 1 flight: " in told.second.stderr
+    assert "log12.csv" in told.second.stderr
+    assert "log13.csv" in (told.out / "trend.json").read_text()
+    assert len(list((told.out / "flights").iterdir())) == 11
+
+
+def test_what_the_folder_holds(cpfls, told):
+    assert {path.name for path in told.out.iterdir()} == {*command.FILES, "flights"}
+    rows = list(csv.DictReader((told.out / "trend.csv").read_text().splitlines()))
+    assert [row["flight"] for row in rows] == [f"log{number}.csv" for number in range(1, 12)]
+    assert [row["part"] for row in rows] == ["1"] * 8 + ["2"] * 3
+    assert float(rows[-1]["load M3"]) - float(rows[0]["load M3"]) == pytest.approx(-np.log(0.8), abs=0.1)
+    summary = json.loads((told.out / "trend.json").read_text())
+    assert [row["flight"] for row in summary["flights"]] == [row["flight"] for row in rows]
+    assert cpfls("check", told.out / "trend.h5").exit_code == 0
+    assert "Since log9.csv" in cpfls("info", told.out / "trend.h5").stdout
+
+
+def test_dates_of_all_logs_order_them(cpfls, logs, told, tmp_path):
+    out = tmp_path / "trend"
+    shutil.copytree(told.out / "flights", out / "flights")
+    for path in (out / "flights").iterdir():
+        record = read_record(path, FlightNumbersRecord)
+        number = int(record.flight.removeprefix("log").removesuffix(".csv"))
+        path.unlink()
+        # The last was flown first.
+        write_record(path, replace(record, flown_at=1.7e9 - number * DAYS))
+    words = ("trend", logs / "study.yaml", logs / "logs", "-o", out)
+    with undrawn():
+        by_date, by_name = (cpfls(*words, *order, "--json") for order in ((), ("--order", "name")))
+    dated, named = (json.loads(each.stdout) for each in (by_date, by_name))
+    assert (dated["order"], named["order"]) == ("date", "name")
+    (shift,) = dated["shifts"]
+    assert (shift["since"], shift["flight"], shift["flown_at_s"]) == ("log8.csv", 4, 1.7e9 - 8 * DAYS)
+    assert shift["causes"][0]["sizes"][0]["value"] < 0
+    assert (out / "trend.csv").read_text().splitlines()[1].startswith("log1.csv,2023-11-13T22:13:20+00:00,")
+
+
+def test_workers_read_the_same(cpfls, logs, told, tmp_path, monkeypatch):
+    def employed(reading, *, count, scheduler):
+        assert (count, scheduler) == (2, None)
+        return nullcontext(Serial(pickle.loads(pickle.dumps(reading))))
+
+    monkeypatch.setattr(command, "employ", employed)
+    five = [logs / "logs" / f"log{number}.csv" for number in range(1, 6)]
+    with undrawn():
+        result = cpfls("trend", logs / "study.yaml", *five, "-o", tmp_path / "trend", "--workers", 2)
+    assert result.exit_code == 0, result.stderr
+    assert result.stdout.startswith("NO CHANGE: over 5 flights")
+    for path in (tmp_path / "trend" / "flights").iterdir():
+        assert path.read_bytes() == (told.out / "flights" / path.name).read_bytes()
+
+
+def test_an_interrupt_loses_nothing_that_was_read(cpfls, logs, tmp_path, monkeypatch):
+    read, kept_numbers = [], command.kept_numbers
+
+    def interrupted(flight, *words):
+        if len(read) == 2:
+            raise KeyboardInterrupt
+        read.append(flight)
+        return kept_numbers(flight, *words)
+
+    monkeypatch.setattr(command, "kept_numbers", interrupted)
+    words = ("trend", logs / "study.yaml", *(logs / "logs" / f"log{number}.csv" for number in range(1, 6)))
+    stopped = cpfls(*words, "-o", tmp_path / "trend")
+    assert stopped.exit_code == 130
+    assert f"what was read is kept in {tmp_path / 'trend' / 'flights'}" in stopped.stderr
+    monkeypatch.setattr(command, "kept_numbers", kept_numbers)
+    with undrawn():
+        assert json.loads(cpfls(*words, "-o", tmp_path / "trend", "--json").stdout)["new"] == 3
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["log1.csv", "log2.csv"], "2 flights tell the same numbers, and a trend needs 4 at least"),
+        (["log1.csv", "log2.csv", "log3.csv", "log4.csv", "--order", "date"], "no log tells when it was flown"),
+        (["log12.csv"], "log12.csv"),
+        (["empty"], "holds no flight and no log"),
+    ],
+)
+def test_what_is_refused(cpfls, logs, told, tmp_path, words, message):  # noqa: ARG001
+    (logs / "logs" / "empty").mkdir(exist_ok=True)
+    given = [logs / "logs" / word if word[0] in "le" else word for word in words]
+    result = cpfls("trend", logs / "study.yaml", *given, "-o", tmp_path / "trend")
+    assert result.exit_code == 2
+    assert message in result.stderr
+
+
+def test_a_folder_of_others_is_not_filled(refuse, logs, tmp_path):
+    (tmp_path / "own.txt").write_text("mine")
+    (message,) = refuse("trend", logs / "study.yaml", logs / "logs" / "log1.csv", "-o", tmp_path)
+    assert "exists already and is not empty" in message

@@ -1,0 +1,113 @@
+"""Change points of rows of numbers that were drawn: where there is none, one, two, and none that counts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.changes import trend as module
+from cpfls_cli.changes.judge import FALSE_ALARM
+from cpfls_cli.changes.reference import Reference
+from cpfls_cli.changes.trend import most_told, trend
+from cpfls_cli.errors import InputError
+from tests.builders.drawn_numbers import DEVIATION, NAMES, QUAD, flights
+
+
+@pytest.fixture(autouse=True)
+def _few_draws(monkeypatch):
+    """As many as a rate of false alarms of 0.01 needs to be told at all."""
+    monkeypatch.setattr(module, "_DRAWS", 150)
+
+
+def row_of(given):
+    return module._Row.of(given, Reference.of(given[: len(given) // 2], NAMES, QUAD), QUAD)
+
+
+def test_rows_of_an_unchanged_vehicle_seldom_look_changed():
+    """Twenty rows of thirty flights, whose scatter is half to twice the usual one: 0.2 false alarms are expected."""
+    rng = np.random.default_rng(1)
+    given = [flights(30, rng, scatter=scatter) for scatter in np.repeat([0.5, 1.0, 1.5, 2.0], 5)]
+    p = np.array([module._change_points(row_of(each), rng)[0] for each in given])
+    # Two and more happen once in sixty times.
+    assert (p <= FALSE_ALARM).sum() <= 1
+    assert p.max() > 0.5
+
+
+def test_a_step_is_found_at_its_flight():
+    """Of three deviations in one of ten numbers, in the middle of the flights after the reference."""
+    step = 3 * DEVIATION * (np.arange(10) == 7)
+    found = trend(flights(30, np.random.default_rng(3), step, since=20), QUAD, np.random.default_rng(1))
+    assert [shift.start for shift in found.shifts] == [20]
+    assert found.shifts[0].end == 30
+    assert found.p_value <= FALSE_ALARM
+    assert found.reference == 15
+
+
+def test_a_rotor_is_named_with_its_size():
+    """The others of the vehicle carry what it lacks by its size, so a row of the loads is what one rotor does."""
+    weak = 0.25 * (np.arange(10) == 2)
+    found = trend(flights(24, np.random.default_rng(4), weak, since=16), QUAD, np.random.default_rng(1))
+    (shift,) = found.shifts
+    (cause,) = shift.change.found
+    assert (shift.start, cause.cause.name) == (16, "rotor M3")
+    assert cause.belief > 0.9
+    assert cause.sizes[0].low < 0.25 < cause.sizes[0].high
+
+
+def test_a_change_that_is_taken_back_is_two():
+    rng = np.random.default_rng(5)
+    given = flights(30, rng)
+    moved = {name: 6 * own for name, own in zip(NAMES, DEVIATION, strict=True) if name.startswith("late")}
+    given[12:20] = [
+        replace(flight, values={name: value + moved.get(name, 0.0) for name, value in flight.values.items()})
+        for flight in given[12:20]
+    ]
+    found = trend(given, QUAD, rng)
+    assert [(shift.start, shift.end) for shift in found.shifts] == [(12, 20), (20, 30)]
+    # A reference that holds a change would tell of no limits.
+    assert found.reference == 12
+    late = [name.startswith("late") for name in NAMES]
+    beyond = (np.abs(found.apart) > found.limit * found.deviation)[:, late].any(axis=1)
+    assert beyond[12:20].any()
+    assert not beyond[20:].any()
+
+
+def test_a_battery_that_is_used_up_is_no_change():
+    """Commands of hover that go with a voltage which falls from flight to flight."""
+    rng = np.random.default_rng(6)
+    volts = np.linspace(1.0, 0.8, 20)
+    given = [
+        replace(
+            flight,
+            voltage=each,
+            values={name: x - np.log(each) * name.startswith("load") for name, x in flight.values.items()},
+        )
+        for flight, each in zip(flights(20, rng, scatter=0.5), volts.tolist(), strict=True)
+    ]
+    assert not trend(given, QUAD, rng).shifts
+    assert trend([replace(each, voltage=np.nan) for each in given], QUAD, rng).shifts
+
+
+def test_numbers_and_flights_that_are_the_most_together():
+    given = flights(6, np.random.default_rng(7))
+    few = {name: value for name, value in given[0].values.items() if name.startswith("load")}
+    names, kept = most_told([replace(given[0], values=few), *given[1:]])
+    assert (names, len(kept)) == (NAMES, 5)
+    speeds = [replace(flight, commanded=False) for flight in given[:2]]
+    assert not [name for name in most_told([*speeds, *given[2:]])[0] if name.startswith("load")]
+    with pytest.raises(InputError, match="no number in common"):
+        most_told([replace(given[0], values={})])
+
+
+def test_too_few_flights_are_refused():
+    given = flights(6, np.random.default_rng(8))
+    with pytest.raises(InputError, match="a trend needs 4 at least"):
+        trend(given[:3], QUAD, np.random.default_rng(1))
+    with pytest.raises(InputError, match="a trend needs 7 at least"):
+        trend(given, QUAD, np.random.default_rng(1), 6)
+
+
+def test_the_reference_that_is_asked_for_is_taken():
+    given = flights(8, np.random.default_rng(9))
+    assert trend(given, QUAD, np.random.default_rng(1), 5).reference == 5
+    assert trend(given, QUAD, np.random.default_rng(1)).reference == 4
