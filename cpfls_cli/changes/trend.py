@@ -123,8 +123,8 @@ def trend(
         )
     first = reference or max(FEWEST, len(kept) // 2)
     learned = Reference.of(kept[:first], names, vehicle)
-    row = _Row.of(kept, learned, vehicle)
-    p_value, starts = _change_points(row, rng)
+    row = Row.of(kept, learned, vehicle)
+    p_value, starts = change_points(row, rng)
     if reference is None and starts:
         first = max(FEWEST, min(first, starts[0]))
     held = Reference.of(kept[:first], names, vehicle)
@@ -162,7 +162,7 @@ def most_told(flights: Sequence[FlightNumbers]) -> tuple[tuple[str, ...], list[F
 
 
 def _shifts(
-    row: _Row,
+    row: Row,
     flights: Sequence[FlightNumbers],
     starts: Sequence[int],
     vehicle: VehicleSettings,
@@ -194,7 +194,7 @@ def _limit(freedom: float, count: int) -> float:
 
 
 @dataclass(frozen=True)
-class _Row:
+class Row:
     """Flights one after another, and what is expected of such a row.
 
     Attributes
@@ -215,7 +215,7 @@ class _Row:
     noise: Array
 
     @classmethod
-    def of(cls, flights: Sequence[FlightNumbers], reference: Reference, vehicle: VehicleSettings) -> _Row:
+    def of(cls, flights: Sequence[FlightNumbers], reference: Reference, vehicle: VehicleSettings) -> Row:
         """Gather what a row is held against."""
         names = reference.names
         lower = np.log([flight.voltage / reference.voltage for flight in flights])
@@ -256,7 +256,7 @@ class _Row:
             yield np.sqrt(freedom) * (root @ drawn).T + rng.normal() * self.voltage + noise
 
 
-def _change_points(row: _Row, rng: np.random.Generator) -> tuple[float, list[int]]:
+def change_points(row: Row, rng: np.random.Generator) -> tuple[float, list[int]]:
     """Find change points, and how probable the clearest of them are where nothing changed."""
     chance = np.array([_gain(row.whitened(drawn)) for drawn in row.unchanged(rng, _DRAWS)])
     white = row.whitened(row.values)

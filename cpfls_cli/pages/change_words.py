@@ -17,11 +17,11 @@ Sizes = Sequence[Size]
 _NAMES = {
     "mass": "another weight",
     "centre of mass": "a centre of mass elsewhere",
-    "hover": "another weight, or another thrust of all rotors",
-    "all motors": "the speed of all rotors",
+    "hover": "another thrust in hover",
+    "all motors": "the speeds of all rotors",
     "torque about z": "a torque about z",
-    "late": "another delay",
-    "answer": "rotors that follow their commands otherwise",
+    "late": "another delay of the body",
+    "answer": "another delay of the rotors",
     "gusts": "gusts",
     "lean": "steady wind or a tilted sensor",
     "drift": "an offset of the gyroscope",
@@ -35,6 +35,7 @@ _HEAVY = 1000.0
 _CHECKS = {
     "rotor": "look at its propeller for a cut, a chip or a bend; change it for a new one; turn the motor by hand",
     "rotors": "look at both propellers for cuts, chips or bends; change them for new ones; turn the motors by hand",
+    "weight": "see what is fixed there, and look at the propeller there: in hover both look nearly alike",
     "load": "see what hangs under it",
     "unbalance": "clean and balance its propeller; see that it sits straight; feel the bell of the motor for play",
     "mass": "weigh it, with battery and load",
@@ -42,11 +43,10 @@ _CHECKS = {
     "hover": "weigh it; see whether all propellers are of the usual kind; charge the battery",
     "torque about z": "see whether a motor stands askew: its screws, its arm, a twisted frame",
     "vibration": "balance the propellers; tighten the screws of motors and autopilot; look for tape and chips",
-    "all": "charge the battery; see whether the speed controllers' settings were changed",
-    "weight": "look for a load there, and at that rotor's propeller: in hover they look alike",
-    "answer": "see whether motors, propellers or the speed controllers' settings were changed",
-    "felt": "calibrate the accelerometer; see how the autopilot is mounted",
     "turn": "turn the motor by hand: its bearing, its cable, its speed controller",
+    "all": "charge the battery; see whether speed controllers or their settings were changed",
+    "answer": "see whether speed controllers, their settings or the propellers were changed",
+    "felt": "calibrate the accelerometer, and see how the autopilot is mounted",
     "follow": "see whether something sits further out or in than before, and whether all propellers are of one kind",
     "late": "see whether filters, speed controllers or the autopilot's settings were changed",
     "gusts": "fly again in still air; if it stays, look for what is loose",
@@ -62,14 +62,14 @@ def cause_name(cause: str) -> str:
     kind, _, of = cause.partition(" ")
     if kind == "turn":
         return f"the speed of rotor {of}"
+    if kind == "weight":
+        return f"a {cause}"
+    if kind == "felt":
+        return f"an offset of the accelerometer along {of}"
     if kind == "unbalance":
         return f"another balance of rotor {of}"
     if kind == "follow":
         return f"{of} that follows otherwise"
-    if kind == "felt":
-        return f"an offset of the accelerometer along {of}"
-    if kind == "weight":
-        return f"a {cause}"
     return _NAMES.get(cause, cause)
 
 
@@ -99,18 +99,18 @@ def change_words(
         "load": lambda: (
             f"{_amount(size, 1e3 * vehicle.mass_kg, ' g')} hang under it on a cable of {number(cable, 2)} m"
         ),
-        "hover": lambda: f"hover needs {_percent(size, ('more', 'less'))} thrust: {either_words(vehicle, size[0])}",
+        "weight": lambda: f"{_amount(size, *weight)} are fixed {of}",
+        "hover": lambda: f"hover needs {_percent(size, ('more', 'less'))} thrust: {_either(vehicle, size[0])}",
         "all": lambda: f"all rotors turn {_percent(_less_one(0.5, size), ('faster', 'slower'))} than they are told",
-        "weight": lambda: f"{_amount(size, *weight, ('hang', 'are missing'))} {of}",
         "centre": lambda: f"the centre of mass lies {_off_centre(sizes)}",
         "torque": lambda: f"a torque about z takes {_percent(size)} of the rotors' drag",
         "vibration": lambda: f"it vibrates {_times(size)}",
         "unbalance": lambda: f"what turns with rotor {of} shakes it {_times(size)}",
-        "answer": lambda: f"rotors follow their commands {_amount(size, 1e3, ' ms', ('later', 'earlier'))}",
-        "felt": lambda: f"the accelerometer is off by {number(size[0], 2)} m/s² along {of}",
         "turn": lambda: f"rotor {of} turns {_percent(_less_one(0.5, size), ('faster', 'slower'))} than it is told",
         "follow": lambda: f"{of} follows the rotors' torque {_percent(_less_one(1.0, size), ('more', 'less'))}",
         "late": lambda: f"rotation follows the rotors {_amount(size, 1e3, ' ms', ('later', 'earlier'))}",
+        "answer": lambda: f"rotors follow their commands {_amount(size, 1e3, ' ms', ('later', 'earlier'))}",
+        "felt": lambda: f"the accelerometer reads {_amount(size, 1.0, ' m/s²', ('more', 'less'))} along {of}",
         "gusts": lambda: f"what turns it beside the rotors, gusts, is {_times(size)}",
         "lean": lambda: f"it leans with {_each(sizes, axes, 'm/s²', 'along')} of the world, as against wind",
         "drift": lambda: f"the gyroscope is off by {_each(sizes, axes, 'rad/s', 'about')}",
@@ -129,17 +129,17 @@ def smallest_words(cause: str, size: float, vehicle: VehicleSettings) -> str:
         "mass": weight,
         "load": f"{weight} on a cable",
         "unbalance": f"{number(math.exp(size), 2)} times the unbalance of rotor {of}",
+        "weight": f"{weight} {of}",
         "hover": f"{number(100 * size, 2)} % of the thrust in hover",
         "all": f"{number(50 * size, 2)} % of the speed of all rotors",
-        "weight": f"{weight} {of}",
-        "answer": f"{number(1e3 * size, 2)} ms of the rotors' answer",
-        "felt": f"{number(size, 2)} m/s² of the accelerometer along {of}",
         "centre": f"{number(1e3 * size, 2)} mm of the centre of mass",
         "torque": f"{number(100 * size, 2)} % of the rotors' drag in yaw",
         "vibration": f"{number(math.exp(size), 2)} times the vibration",
         "turn": f"{number(50 * size, 2)} % of the speed of rotor {of}",
         "follow": f"{number(100 * math.expm1(size), 2)} % of {of} for the same torque",
         "late": f"{number(1e3 * size, 2)} ms of delay",
+        "answer": f"{number(1e3 * size, 2)} ms of the rotors' delay",
+        "felt": f"{number(size, 2)} m/s² of the accelerometer along {of}",
         "gusts": f"{number(math.exp(size), 2)} times the gusts",
         "lean": f"{number(size, 2)} m/s² of steady wind or a tilted sensor",
         "drift": f"{number(size, 2)} rad/s of the gyroscope",
@@ -148,10 +148,17 @@ def smallest_words(cause: str, size: float, vehicle: VehicleSettings) -> str:
     return words.get(kind, f"{cause}: {number(size, 2)}")
 
 
-def either_words(vehicle: VehicleSettings, share: float) -> str:
-    """Say what another thrust in hover can be, of a share of it."""
-    ways = ("heavier", "less") if share > 0 else ("lighter", "more")
-    return f"{weight_words(vehicle, share)} {ways[0]}, or all rotors pull {ways[1]}"
+def _either(vehicle: VehicleSettings, share: float) -> str:
+    """Say what it can be that hover needs another thrust."""
+    more = share > 0
+    weight = weight_words(vehicle, share)
+    return f"{weight} {'heavier' if more else 'lighter'}, or all rotors pull {'less' if more else 'more'}"
+
+
+def hover_words(vehicle: VehicleSettings, share: float, *, alone: bool) -> str:
+    """Say what hover needs, and where that is all that is known what it can be."""
+    needs = f"needs {number(100 * abs(share), 2)} % {'more' if share > 0 else 'less'} thrust"
+    return f"{needs}: {_either(vehicle, share)}" if alone else f"{needs} than in the reference"
 
 
 def weight_words(vehicle: VehicleSettings, share: float) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.changed import ChangedRecord, FoundRecord
-from cpfls_cli.pages.change_words import cause_name, change_words, either_words, smallest_words, what_to_check
+from cpfls_cli.pages.change_words import cause_name, change_words, hover_words, smallest_words, what_to_check
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, plot
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Plot, Table, Text
@@ -20,8 +20,8 @@ from cpfls_cli.words import joined
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_SHARES = {"mass", "hover"}
-"""Causes of which hover tells first, and nothing tells apart."""
+_OF_ALL = {"mass", "hover"}
+"""Causes that hover tells first, and nothing tells apart."""
 
 _NATURAL = {
     "load": "",
@@ -35,7 +35,7 @@ _NATURAL = {
 """Units of numbers that are logarithms, without their axis: of what they are the logarithm of."""
 
 _UNITS = {"m/s^2": "m/s²", "1": ""}
-_SHOWN_FIRST = ("rotor M1", "hover", "centre of mass", "vibration", "late", "gusts")
+_SHOWN_FIRST = ("rotor M1", "mass", "centre of mass", "vibration", "late", "gusts")
 """Of what would have shown, as much as a first screen has room for; of rotors the one that shows least."""
 
 _ALIKE = 3
@@ -99,8 +99,10 @@ def is_within(cause: str, other: str) -> bool:
 
 
 def _facts(record: ChangedRecord, vehicle: VehicleSettings) -> Iterator[tuple[str, str]]:
-    if record.hover_changed and record.changed:
-        yield "Hover", sentence(_hover(record, vehicle))
+    listed = {*record.found.cause, *record.alike.cause}
+    if record.hover_changed and record.changed and "hover" not in record.found.cause:
+        share = float(np.expm1(record.hover))
+        yield "Hover", sentence(hover_words(vehicle, share, alone=bool(listed & _OF_ALL)))
     if record.changed:
         yield "Since", sentence(_since(record))
         for index, cause in enumerate(record.found.cause):
@@ -117,15 +119,6 @@ def _facts(record: ChangedRecord, vehicle: VehicleSettings) -> Iterator[tuple[st
         of = "; loads are of commands" if record.commanded else "; loads are of measured speeds"
         yield "Compared", sentence(f"{kinds}{of if 'load' in kinds else ''}")
     yield "Chance", sentence(_chance(record))
-
-
-def _hover(record: ChangedRecord, vehicle: VehicleSettings) -> str:
-    """Say what hover needs, the plainest clue, and what that can be where nothing else is known."""
-    share = float(np.expm1(record.hover))
-    up = share > 0
-    listed = {*record.found.cause, *record.alike.cause}
-    tail = f": {either_words(vehicle, share)}" if listed & _SHARES else " than in the reference"
-    return f"needs {number(100 * abs(share), 2)} % {'more' if up else 'less'} thrust{tail}"
 
 
 def _since(record: ChangedRecord) -> str:

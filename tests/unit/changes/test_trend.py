@@ -20,14 +20,14 @@ def _few_draws(monkeypatch):
 
 
 def row_of(given):
-    return module._Row.of(given, Reference.of(given[: len(given) // 2], NAMES, QUAD), QUAD)
+    return module.Row.of(given, Reference.of(given[: len(given) // 2], NAMES, QUAD), QUAD)
 
 
 def test_rows_of_an_unchanged_vehicle_seldom_look_changed():
     """Twenty rows of thirty flights, whose scatter is half to twice the usual one: 0.2 false alarms are expected."""
     rng = np.random.default_rng(1)
     given = [flights(30, rng, scatter=scatter) for scatter in np.repeat([0.5, 1.0, 1.5, 2.0], 5)]
-    p = np.array([module._change_points(row_of(each), rng)[0] for each in given])
+    p = np.array([module.change_points(row_of(each), rng)[0] for each in given])
     # Two and more happen once in sixty times.
     assert (p <= FALSE_ALARM).sum() <= 1
     assert p.max() > 0.5
