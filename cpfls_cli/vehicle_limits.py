@@ -5,7 +5,7 @@ is an error and no matter of judgement. What only lies beyond what is usual, or 
 of logs to say.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from itertools import product
 from math import inf, isnan, log, nan, pi, sin, sqrt
 from typing import NamedTuple
@@ -276,7 +276,7 @@ def beyond_any_vehicle(figures: Figures) -> tuple[Beyond, ...]:
         first = {limit.of[0]: limit for limit in reversed(broken)}
         return tuple(Beyond(name, f"{_told(limit, figures)}{_look(limit)}") for name, limit in first.items())
     best, *others = readings
-    found = [_in_another_unit(figures, name, unit, broken) for name, unit in best.items()]
+    found = [_in_another_unit(figures, name, best) for name in best]
     also = "".join(f"; or {_in_words(figures, units)}" for units in others[:_MOST_READINGS])
     return (*found[:-1], found[-1]._replace(why=f"{found[-1].why}{also}"))
 
@@ -318,11 +318,16 @@ def _look(limit: Limit) -> str:
     return "; check the units of it and of what it is held against" if len(limit.of) > 1 else "; check its unit"
 
 
-def _in_another_unit(figures: Figures, name: str, unit: str, broken: Sequence[Limit]) -> Beyond:
-    concerned = next((f"{_told(limit, figures)}: " for limit in broken if name in limit.of), "with the others right, ")
+def _in_another_unit(figures: Figures, name: str, best: Mapping[str, str]) -> Beyond:
+    """Say what is impossible about a number once the others are read rightly, and what it was likely meant to be."""
+    unit, others = best[name], {other: own for other, own in best.items() if other != name}
+    read = _read(figures, others)
+    concerned = next((limit for limit in _broken(read) if name in limit.of), None)
+    given = "with the others right, " if concerned is None or others.keys() & {*concerned.of} else ""
+    told = "" if concerned is None else f"{_told(concerned, read)}: "
     quantity, value = _QUANTITIES[name], figures[name]
     meant = f"{value * quantity.units[unit]:.4g} {quantity.unit}? {value:.4g} is {quantity.words} in {unit}"
-    return Beyond(name, f"{concerned}{meant}")
+    return Beyond(name, f"{given}{told}{meant}")
 
 
 def _in_words(figures: Figures, units: Mapping[str, str]) -> str:

@@ -13,10 +13,11 @@ from cpfls_cli.playback.fit import fit
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.history_fit import fit_observer
+from cpfls_cli.playback.judging import parts_of
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import INERTIA
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.structure import Judged, Structure, fitted_to_all, parts_of
+from cpfls_cli.playback.structure import Judged, Structure, fitted_to_all
 from cpfls_cli.playback.vehicle import find_vehicle
 from cpfls_cli.vehicle.settings import VehicleSettings
 

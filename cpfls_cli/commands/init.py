@@ -44,15 +44,13 @@ def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
 
 
 def _next(job: Job, proposal: Proposal) -> Iterator[Command]:
-    """Give the commands that import all logs, and the one that learns from all but the last, which judges."""
-    logs = [Path(one.name) for one in proposal.logs]
+    """Give the commands that import logs of one mass, and the one that learns from all but the last, which judges."""
+    logs = [Path(name) for name in proposal.equal]
     # Many logs are taken as they are.
     as_logs = bool(proposal.rotors) and len(logs) > _IMPORTED
     flights = logs if as_logs else [job.beside(name) for name in _flight_names(logs)]
     for log, flight in zip([] if as_logs else logs, flights, strict=False):
-        crop = None if proposal.crop_s else proposal.crops.get(str(log))
-        own = () if crop is None else ("--set", f"import.crop_s=[{crop[0]:g},{crop[1]:g}]")
-        yield ("cpfls", "import", job.output, log, "-o", flight, *own)
+        yield ("cpfls", "import", job.output, log, "-o", flight)
     learned, judged = (flights[:-1], flights[-1:]) if len(flights) > 1 else (flights, [])
     if proposal.rotors:
         apart = [word for flight in judged for word in ("--held-out", flight)]

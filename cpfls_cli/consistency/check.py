@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from cpfls_cli.consistency.findings import Finding
+from cpfls_cli.consistency.motion import beside_lean
 from cpfls_cli.consistency.rotors import (
     IDLE,
     beyond_propellers,
@@ -16,10 +17,14 @@ from cpfls_cli.consistency.rotors import (
 )
 from cpfls_cli.consistency.sensors import Sensors, sensors_of
 from cpfls_cli.effects.signals import Signals, stretch_of
+from cpfls_cli.flightlog.flown import find_flown, rotor_level, turning_size
 from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, WindowSettings, fitting_windows
 
 _HANGS = -0.5
 """Mean upward part of body z below which an attitude is turned over; full rotations come to 0."""
+
+_SHORT_S = 5.0
+"""A shorter part is no log with a take-off and a landing."""
 
 ENOUGH = 50_000
 """Samples that tell units, axes and which rotor is where."""
@@ -28,6 +33,8 @@ ENOUGH = 50_000
 def check(parts: Sequence[Signals], settings: WindowSettings) -> tuple[Finding, ...]:
     """Hold the channels of a flight against each other and against its vehicle; nothing is set right.
 
+    What is not flown, where a touchdown is a motion of its own, tells nothing.
+
     Parameters
     ----------
     parts : sequence of Signals
@@ -35,11 +42,26 @@ def check(parts: Sequence[Signals], settings: WindowSettings) -> tuple[Finding, 
     settings : WindowSettings
         Of the section `gap`, as in the sensor audit.
     """
+    parts = [_flown(part) for part in parts]
     looked_at = _middle(parts)
     shared = fitting_windows(looked_at[0].period, settings)
     long = [part for part in looked_at if shared.count(len(part))]
     enough = sum(shared.count(len(part)) for part in long) >= FEWEST_WINDOWS
     return findings_of(parts, sensors_of(long, shared) if enough else None)
+
+
+def _flown(part: Signals) -> Signals:
+    """Cut off what is not flown; a part in which that cannot be told is taken as it is."""
+    if part.rotor_speed is None or len(part) * part.period < _SHORT_S:
+        return part
+    time = part.time - part.time[0]
+    height = None if part.position is None else part.position[:, 2]
+    level = rotor_level(part.rotor_speed, shares=False)
+    span = find_flown(time, level, height, turning_size(part.body_rate)).span_s
+    if span is None:
+        return part
+    first, after = np.searchsorted(time, [span[0], span[1] + part.period / 2])
+    return stretch_of(part, slice(int(first), int(after)))
 
 
 def findings_of(parts: Sequence[Signals], sensors: Sensors | None) -> tuple[Finding, ...]:
@@ -53,6 +75,8 @@ def _findings(parts: Sequence[Signals], sensors: Sensors | None) -> Iterator[Fin
     yield weighs if weighs is not None else beyond_propellers(parts)
     hangs = _upside_down(_middle(parts))
     yield hangs
+    if hangs is None:
+        yield from beside_lean(max(_middle(parts), key=len))
     if sensors is None or hangs is not None:
         return
     if not sensors.gyroscope.apart:

@@ -393,12 +393,19 @@ def _told(
     who = "the world of velocity and position" if others else f"the {channel.words}"
     finding = Finding(
         f"{who} {joined([*what, *clock])}, judged by the {joined(witnesses)}",
-        f"correct the log, or {channel.keys}",
+        _remedy(repair),
         (channel.words, *witnesses),
         contradiction=bool(what) and _grave(repair.channel, now.checks),
         repairable=True,
     )
     return (first.told(finding, _DONE), *others)
+
+
+def _remedy(repair: ChannelRepair) -> str:
+    """Say what mends a channel; no key takes gravity from an acceleration of the world."""
+    if repair.channel == "acceleration" and repair.gravity_m_s2 and not repair.in_body:
+        return "correct the log, or leave import.signals.acceleration out, since the import takes no gravity from it"
+    return f"correct the log, or {CHANNELS[repair.channel].keys}"
 
 
 def _contradicted(

@@ -5,12 +5,14 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.consistency.axes import AXES, SAME, TWICE, axes_apart
 from cpfls_cli.consistency.findings import Finding, off_clock
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.flightlog.agreement import Ground, first_derivative, fit_lean, second_derivative
 from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.weak_form.resampling import BLOCK_S, blocks_of
 from cpfls_cli.weak_form.windows import Windows
@@ -28,6 +30,9 @@ ANOTHER_NORTH = np.radians(20.0)
 
 # Share of what moves in both that agreement asks for, and the ratio within which scales of axes are one.
 _SHARED, _ONE_SCALE = 0.5, 1.05
+_ANOTHER_LENGTH, _LEAST_OF_LEAN_S = 10.0, 5.0
+"""Ratio to what the lean makes of gravity that wind and noise never make, and the length of a flight that tells it."""
+
 _UP = np.array([0.0, 0.0, 1.0])
 TINY = 1e-100
 """Square of what does not move."""
@@ -63,11 +68,15 @@ _ACCELERATIONS = {
 }
 _NO_FORCE = "the force is taken from other channels, if there are any"
 CHANNELS = {
-    "position": MotionChannel("position", "import.signals.position", {"mm": 0.001, "cm": 0.01, "ft": 0.3048}),
+    "position": MotionChannel(
+        "position",
+        "import.signals.position",
+        {"mm": 0.001, "cm": 0.01, "ft": 0.3048, "m where mm is stated": 1000.0},
+    ),
     "velocity": MotionChannel(
         "velocity",
         "import.signals.velocity and import.world_frame",
-        {"km/h": 1 / 3.6, "ft/s": 0.3048, "cm/s": 0.01, "mm/s": 0.001},
+        {"km/h": 1 / 3.6, "ft/s": 0.3048, "cm/s": 0.01, "mm/s": 0.001, "m/s where mm/s is stated": 1000.0},
         "effects of the air are not tested",
     ),
     "acceleration": MotionChannel(
@@ -175,6 +184,21 @@ def checked(flights: Sequence[Signals], windows: Windows, channel: str | None = 
     """
     pairs = [pair for pair in _PAIRS if channel is None or channel in pair]
     return tuple(check for pair in pairs if (check := _checked(pair, flights, windows)) is not None)
+
+
+def beside_lean(part: Signals) -> Iterator[Finding]:
+    """Say which of position and velocity no lean makes of gravity in their unit, where the lean explains them."""
+    if part.attitude is None or len(part) * part.period < _LEAST_OF_LEAN_S:
+        return
+    rotation, rate_hz = Rotation.from_matrix(part.rotation), 1 / part.period
+    for name, order in (("position", second_derivative), ("velocity", first_derivative)):
+        values = _reading(name, part)
+        if values is None:
+            continue
+        fit = fit_lean(rotation, Ground.of(order(values, rate_hz), rate_hz), rate_hz)
+        if fit.explained > _SHARED and not 1 / _ANOTHER_LENGTH < fit.gain < _ANOTHER_LENGTH:
+            what = f"the {CHANNELS[name].words} is {fit.gain:.3g} times what tilt and gravity make it"
+            yield Finding(what, f"check import.signals.{name}.unit", (CHANNELS[name].words, "attitude"), fit.gain)
 
 
 def by_thrust(checks: Sequence[PairCheck]) -> list[PairCheck]:

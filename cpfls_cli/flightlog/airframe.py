@@ -1,6 +1,6 @@
 """Where the rotors of a vehicle are and how they turn: from the parameters in a log, or from its motion."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import permutations
@@ -287,14 +287,7 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     """
     if speed.shape[1] != 4 or len(speed) < 5 * rate_hz or not speed.any():
         return None
-    cutoff = min(_ACCELERATION_HZ, rate_hz / 5)
-    rate = low_pass(body_rate, rate_hz, cutoff, 2)
-    acceleration = derivative(np.arange(len(rate)) / rate_hz, rate)
-    squared = (speed / np.mean(speed)) ** 2
-    # Motors follow a command late; stamps of a measured speed may be late or early.
-    moved = [lagged(squared, rate_hz * lag).start for lag in (_LAGS_S if is_command else _LAGS_S[:3])]
-    moved += [] if is_command else [delayed(squared, rate_hz * seconds) for seconds in _SHIFTS_S]
-    tried = [_shares(acceleration, rate, low_pass(own, rate_hz, cutoff, 2)) for own in moved]
+    tried = [_shares(*each) for each in _driven(body_rate, speed, rate_hz, is_command)]
     shares, weights = largest(tried, lambda found: max(sum(share) for _, share in found[0]))
     layout, explained, by_axes = _chosen(shares, ("X", "plus"))
     if not by_axes:
@@ -324,13 +317,54 @@ def _chosen(
     return layout, explained, clear
 
 
-def _shares(acceleration: Array, rate: Array, squared: Array) -> tuple[list[tuple[_RotorLayout, _Explained]], Array]:
-    """Tell what every layout explains, and how each rotor pushes where none ties them together, shape (axis, rotor)."""
+def explained_by_rotors(body_rate: Array, speed: Array, rate_hz: float, is_command: bool) -> float:
+    """Give the share of the angular acceleration that rotors explain, wherever they are.
+
+    Parameters
+    ----------
+    body_rate : array, shape (time, 3)
+        In any unit and axes.
+    speed, is_command
+        See `airframe_from_motion`.
+
+    Returns
+    -------
+    float
+        The mean of the three axes.
+    """
+    if not speed.any():
+        return 0.0
+    shares = [0.0]
+    for wanted, rotors in _driven(body_rate, speed, rate_hz, is_command):
+        left = wanted - rotors @ np.linalg.lstsq(rotors, wanted, rcond=None)[0]
+        total = (wanted**2).sum(axis=0)
+        shares.append(float(np.mean(1 - np.divide((left**2).sum(axis=0), total, out=np.ones(3), where=total > 0))))
+    return max(shares)
+
+
+def _driven(body_rate: Array, speed: Array, rate_hz: float, is_command: bool) -> Iterator[tuple[Array, Array]]:
+    """Give what is fast enough of the angular acceleration and what drives it, with every lag and shift of rotors."""
+    cutoff = min(_ACCELERATION_HZ, rate_hz / 5)
+    rate = low_pass(body_rate, rate_hz, cutoff, 2)
+    acceleration = derivative(np.arange(len(rate)) / rate_hz, rate)
+    squared = (speed / np.mean(speed)) ** 2
+    # Motors follow a command late; stamps of a measured speed may be late or early.
+    moved = [lagged(squared, rate_hz * lag).start for lag in (_LAGS_S if is_command else _LAGS_S[:3])]
+    moved += [] if is_command else [delayed(squared, rate_hz * seconds) for seconds in _SHIFTS_S]
     edge = max(1, len(rate) // 50)
     inner = slice(edge, len(rate) - edge)
     # What turning itself does to the acceleration, and a constant torque, are not the work of the rotors.
     basis = np.linalg.qr(np.column_stack([np.ones(len(rate[inner])), rate[inner]]))[0]
-    wanted, rotors = (values[inner] - basis @ (basis.T @ values[inner]) for values in (acceleration, squared))
+    for own in moved:
+        wanted, rotors = (
+            values[inner] - basis @ (basis.T @ values[inner])
+            for values in (acceleration, low_pass(own, rate_hz, cutoff, 2))
+        )
+        yield wanted, rotors
+
+
+def _shares(wanted: Array, rotors: Array) -> tuple[list[tuple[_RotorLayout, _Explained]], Array]:
+    """Tell what every layout explains, and how each rotor pushes where none ties them together, shape (axis, rotor)."""
     together, own, total = rotors.T @ wanted, rotors.T @ rotors, (wanted**2).sum(axis=0)
     results = []
     for layout, weights in _layouts():

@@ -1,7 +1,8 @@
 """The clock of a log: time stamps that increase, restarts, and the longest stretch without a long gap."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import floor, log10
 
 import numpy as np
 
@@ -14,6 +15,8 @@ _LARGEST_SHARE_BEHIND = 0.05
 
 SMALLEST_SHARE_KEPT = 0.1
 """Of a log, below which a crop that keeps it is not worth a word."""
+
+_SAME_RATE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,18 @@ def increasing_rows(time: Array) -> tuple[IntArray, dict[str, int]]:
         }
         kept = np.flatnonzero(finite & (time > before))
     return kept, {reason: int(rows.sum()) for reason, rows in dropped.items()}
+
+
+def same_rate(rates_hz: Sequence[float]) -> bool:
+    """Tell whether clocks are of one rate, so that one filter and one window suit them all."""
+    return max(rates_hz) - min(rates_hz) <= _SAME_RATE * min(rates_hz)
+
+
+def common_rate(rates_hz: Sequence[float]) -> float:
+    """Give a round rate, Hz, at which logs of several rates become flights of one and none is thinned much."""
+    slowest = (1 + _SAME_RATE) * min(rates_hz)
+    digit = 10.0 ** (floor(log10(slowest)) - 2)
+    return float(f"{floor(slowest / digit) * digit:.3g}")
 
 
 def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -> KeptRows:

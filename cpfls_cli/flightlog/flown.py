@@ -6,7 +6,11 @@ import numpy as np
 from scipy.ndimage import binary_closing, binary_opening, find_objects, label
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.errors import SettingError
+from cpfls_cli.flightlog.clock import increasing_rows
 from cpfls_cli.flightlog.names import BY_HAND
+from cpfls_cli.flightlog.repair import SignalTable, fill
+from cpfls_cli.flightlog.settings import ROTORS, ImportSettings
 
 _OF_HOVER = 0.6
 """Share of the level at hover below which rotors idle."""
@@ -35,6 +39,9 @@ _TURNS_RAD_S, _OF_TURNING = 0.2, 0.3
 _MOST_CLOCK_HZ = 50.0
 """Rate that is enough to find a flight."""
 
+_FEWEST_ROWS = 10
+"""Of which it can be told."""
+
 
 @dataclass(frozen=True)
 class FlownPart:
@@ -53,6 +60,48 @@ class FlownPart:
     span_s: tuple[float, float] | None
     reasons: tuple[str, ...]
     flies: bool = True
+
+
+def rotor_level(speeds: Array, *, shares: bool) -> Array:
+    """Average speeds or commands of rotors, shape (time, rotor), as a share of their largest unless they are shares."""
+    level = speeds.mean(axis=1)
+    return np.asarray(level if shares else level / max(1.0, float(np.quantile(level, 0.98))))
+
+
+def turning_size(body_rate: Array) -> Array:
+    """Give the size of a body rate, shape (time, 3), without what it reads at rest."""
+    return np.asarray(np.linalg.norm(body_rate - np.median(body_rate, axis=0), axis=1))
+
+
+def flown_crop(table: SignalTable, settings: ImportSettings) -> tuple[tuple[float, float] | None, tuple[str, ...]]:
+    """Find the longest stretch of a log that is flown, by the signals that a config maps, and say what that cuts.
+
+    Raises
+    ------
+    SettingError
+        If nothing in it flies.
+    """
+    rows, _ = increasing_rows(table.time)
+    table = table.rows(rows)
+    if len(table.time) < _FEWEST_ROWS:
+        return None, ()
+    step = max(float(np.median(np.diff(table.time))), 1 / _MOST_CLOCK_HZ)
+    clock = np.arange(table.time[0], table.time[-1], step)
+    known = {
+        name: fill(table.time, table.signals[name], clock)
+        for name in ("rotor_command", "rotor_speed", "position", "body_rate")
+        if name in table.signals and np.isfinite(table.signals[name]).any(axis=0).all()
+    }
+    level = height = None
+    name = next((name for name in ROTORS if name in known), None)
+    if name is not None:
+        level = rotor_level(known[name], shares=settings.signals[name].unit == "1")
+    if "position" in known:
+        height = known["position"][:, 2] * (1.0 if settings.world_frame == "ENU" else -1.0)
+    flown = find_flown(clock, level, height, turning_size(known["body_rate"]) if "body_rate" in known else None)
+    if not flown.flies:
+        raise SettingError("crop_s", f"flown: {flown.reasons[0]}")
+    return flown.span_s, flown.reasons
 
 
 def find_flown(time: Array, level: Array | None, height: Array | None, rate: Array | None) -> FlownPart:

@@ -19,6 +19,7 @@ from cpfls_cli.flightlog.conversion import (
     setpoints_to_program_frames,
     to_program_frames,
 )
+from cpfls_cli.flightlog.flown import flown_crop
 from cpfls_cli.flightlog.repair import (
     SignalTable,
     crop_and_order,
@@ -106,7 +107,7 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
     Raises
     ------
     SettingError
-        If the crop leaves fewer than two rows.
+        If the crop leaves fewer than two rows, or is to be what flies and nothing does.
     InputError
         If columns are missing, too few signals are left, a gap is too long, the clock goes backward and stays
         behind, or the pitch is larger than any pitch.
@@ -115,6 +116,8 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
     # What was asked for may be absent at any time: it decides on no row.
     settings = replace(mapped, signals={name: own for name, own in mapped.signals.items() if name not in SETPOINTS})
     read, broken = mask_impossible(SignalTable(*select_columns(columns, mapped)), mapped)
+    crop, cut = flown_crop(read, settings) if settings.crop_s == "flown" else (settings.crop_s, ())
+    settings = replace(settings, crop_s=crop)
     table, dropped = crop_and_order(read, settings)
     table, asked = _without_setpoints(table)
     table = make_continuous(table)
@@ -143,11 +146,13 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
         gaps=int((steps > 1.5 * np.median(steps)).sum()),
         longest_gap_s=float(steps.max()),
         span_s=(float(clock[0]), float(clock[-1])),
+        crop_s=crop,
         log_rate_hz=rate_hz,
         rate_hz=rate_hz,
         cut_off_hz=filtered,
         warnings=(
             *broken,
+            *cut,
             *warn_of_values(counts),
             *warn_of_dead(table, tuple(counts.saturated), settings),
             *warn_of_rest(table, resting, settings),

@@ -10,15 +10,18 @@ from cpfls_cli.flightlog.agreement import (
     AxisFit,
     Order,
     Sign,
+    body_rate_from,
     first_derivative,
     fit_axes,
     second_derivative,
     slow,
 )
+from cpfls_cli.flightlog.airframe import explained_by_rotors
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.readings import CLEAR, Reading
 from cpfls_cli.flightlog.recognised import Rival, Seen, Sure, called
 from cpfls_cli.flightlog.vocabulary import RATES, SENSED, Row
+from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
 
 GOOD = 0.6
@@ -30,8 +33,19 @@ _TOLERANCE, _TEN = 1.4, 10.0
 _RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
 """Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s."""
 
+_OVER_GROUND: Sequence[Row] = (
+    (1.0, "m/s^2", 1.0),
+    (1 / STANDARD_GRAVITY, "g", 1.0),
+    (1000.0, "m/s^2", 1e-3),
+)
+"""Sizes of an acceleration that holds no gravity, beside that over ground in m/s^2."""
+
 NEAR_GRAVITY, _WEIGHT = 1.3, 1.15
 """Ratios to gravity: of what is gravity in some unit, since a vehicle pushes, and of what is no more than that."""
+
+_FAST_HZ, _DERIVED = 10.0, 0.8
+"""Up to where a rate is compared with the attitude's derivative, and the share from which on it may be nothing else: of
+a gyroscope beside motion capture it is 0.1 to 0.4."""
 
 _CLOSER = 0.4
 """What is left of a velocity in body axes, as a share of what is left in those of the world, that tells the former."""
@@ -54,6 +68,46 @@ def over_ground(seen: Seen) -> Array | None:
 
 
 # The gyroscope.
+
+
+def gyroscope_first(seen: Seen, reading: Reading, rotors: tuple[Array, bool] | None) -> bool:
+    """Put a gyroscope before a rate that is the attitude's own derivative, where the rotors explain more of it.
+
+    Both are one motion where that is slow. Above, a derivative holds what noise and filter of the attitude make of it,
+    and a gyroscope what the rotors do.
+    """
+    first, *others = seen.candidates.get("body_rate", ()) or (None,)
+    fit = reading.rates
+    if first is None or first.known or rotors is None or fit is None or fit.explained < CLEAR:
+        return False
+    derived = body_rate_from(reading.attitude.rotation, seen.rate_hz)
+    if _fast_share(derived, seen.grid(first), seen.rate_hz) < _DERIVED:
+        return False
+    turning = slow(derived, seen.rate_hz)
+    driven = {first: explained_by_rotors(seen.grid(first), rotors[0], seen.rate_hz, rotors[1])}
+    for named in others:
+        own = fit_axes(turning, slow(seen.grid(named), seen.rate_hz))
+        if own.explained > GOOD and _fast_share(derived, seen.grid(named), seen.rate_hz) < _DERIVED:
+            driven[named] = explained_by_rotors(seen.grid(named), rotors[0], seen.rate_hz, rotors[1])
+    best = largest(driven, lambda named: driven[named])
+    if best is first:
+        return False
+    seen.candidates = {
+        **seen.candidates,
+        "body_rate": (best, *(own for own in (first, *others) if own is not best)),
+    }
+    seen.left_out.append(
+        f"{', '.join(first.group.columns)}: also a body rate, but the derivative of the attitude, of which the rotors"
+        f" explain {100 * driven[first]:.0f} % where they explain {100 * driven[best]:.0f} % of"
+        f" {', '.join(best.group.columns)}"
+    )
+    return True
+
+
+def _fast_share(derived: Array, measured: Array, rate_hz: float) -> float:
+    """Give the share of what is fast of a rate that the derivative of the attitude explains."""
+    fast = [slow(own, rate_hz, _FAST_HZ) - slow(own, rate_hz) for own in (derived, measured)]
+    return fit_axes(*fast).explained
 
 
 def tell_body_rate(seen: Seen, reading: Reading | None) -> None:
@@ -245,25 +299,21 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
         for weight in (carried, 1.0)
     )
     sensed = next((row for row in fitting if row[1] == (stated or row[1])), fitting[0] if fitting else None)
-    position, velocity = seen.first("position"), seen.guesses.get("velocity")
-    world = None
-    if velocity is not None:
-        world = first_derivative(seen.log.on_grid(velocity.columns.columns)[seen.part], seen.rate_hz)
-    elif position is not None:
-        world = second_derivative(seen.grid(position), seen.rate_hz)
+    world = _of_places(seen)
     along_world = None
     if world is not None:
         ground = np.array([1.0, 1.0, 0.0 if sensed else 1.0])
         along_world = fit_axes(slow(ground * world, seen.rate_hz, 1.0), slow(ground * values, seen.rate_hz, 1.0))
-    if sensed is not None:
-        # In body axes next to nothing is sensed along x and y in flight; over ground the world's axes have it all.
-        of_body = named.frame in ("FLU", "FRD")
-        if along_world is not None and along_world.as_named > GOOD and along_world.gain > 0.5 and not of_body:
-            seen.left_out.append(
-                f"{named.group.pattern}: an acceleration in world axes that includes gravity (the motion explains"
-                f" {100 * along_world.as_named:.0f} %), which import.signals cannot express"
-            )
+    # In body axes next to nothing is sensed along x and y in flight; over ground the world's axes have it all.
+    follows = along_world is not None and along_world.as_named > GOOD and named.frame not in ("FLU", "FRD")
+    if sensed is not None and follows and along_world is not None:
+        size = known_unit(sensed[1]).factor * sensed[2] * along_world.gain
+        if 0.5 < size < _TEN:
+            _leave_gravity_out(seen, named, along_world)
             return False
+        # By chance the middle of what moves in a far smaller unit is as large as gravity.
+        sensed = sensed if size < _TEN else None
+    if sensed is not None:
         _tell_sensed(seen, named, vertical, carried, sensed, reading)
         if at_hover and sensed not in at_hover:
             other = at_hover[0][1]
@@ -277,15 +327,36 @@ def _take_acceleration(seen: Seen, named: Named, reading: Reading | None) -> boo
             " over ground does not explain it"
         )
         return False
-    unit: UnitName = "g" if abs(np.log(along_world.gain * STANDARD_GRAVITY)) < np.log(2) else "m/s^2"
+    size, unit, scale = nearest(along_world.gain, _OVER_GROUND)
+    if abs(vertical) > GOOD * size * STANDARD_GRAVITY:
+        _leave_gravity_out(seen, named, along_world)
+        return False
+    unit, scale = (unit, scale) if stated is None else (stated, 1.0)
     reason = (
         f"{called(named)}; the motion over ground explains {100 * along_world.explained:.0f} %, in"
-        f" {stated or unit}, and it does not include gravity"
+        f" {'thousandths of ' if scale != 1.0 else ''}{unit}, and it does not include gravity"
     )
-    seen.tell(named, stated or unit, reason, "data")
+    seen.tell(named, unit, reason, "data", scale=scale)
     words = "the acceleration does not include gravity and follows the motion"
     seen.choose("acceleration_frame", "world", words, "data")
     return True
+
+
+def _of_places(seen: Seen) -> Array | None:
+    """Derive the acceleration of the world, m/s^2, from what is told of velocity or position, in their own axes."""
+    velocity, position = seen.guesses.get("velocity"), seen.guesses.get("position")
+    guess, derived = (position, second_derivative) if velocity is None else (velocity, first_derivative)
+    if guess is None:
+        return None
+    size = known_unit(guess.columns.unit).factor * guess.columns.scale
+    return derived(size * seen.log.on_grid(guess.columns.columns)[seen.part], seen.rate_hz)
+
+
+def _leave_gravity_out(seen: Seen, named: Named, fit: AxisFit) -> None:
+    seen.left_out.append(
+        f"{named.group.pattern}: an acceleration in world axes that includes gravity (the motion explains"
+        f" {100 * fit.as_named:.0f} %), which import.signals cannot express"
+    )
 
 
 def _carried(seen: Seen, reading: Reading | None) -> float:

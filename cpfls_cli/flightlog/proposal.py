@@ -3,14 +3,15 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from math import ceil, floor, log10
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import Airframe, Parameters, stated_airframe, usual_airframe
-from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Recognition, Rival
+from cpfls_cli.flightlog.clock import common_rate, same_rate
+from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Load, Recognition, Rival
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.settings import SETPOINTS, ColumnMap, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import Topics
@@ -19,9 +20,6 @@ from cpfls_cli.vehicle_limits import IN_ROOM, room, thrust_number
 from cpfls_cli.words import joined
 
 _SURENESS: Final = ("data", "named", "guess")
-_WORTH_IT = 0.8
-"""Share of every flight that a stretch common to all logs has to keep."""
-
 _STEPS_BRIDGED = 2.5
 """Steps of the slowest topic that a gap may have: one sample of it may be lost."""
 
@@ -91,10 +89,12 @@ class Proposal:
         The clock of all of them; None for that of each log's fastest topic.
     signals, choices : tuple
         That hold for all of them.
-    crop_s : tuple of float or None
-        That suits all logs; None where none is to be cut, or none suits all.
+    crop_s : tuple of float, "flown" or None
+        Of one log; of several each takes what flies in it. None where none is to be cut.
     crops : mapping from str to tuple of float or None
         Of each log.
+    rate_hz : float or None
+        One rate for all logs, Hz; None where they have one.
     gap_s : float
         Longest step that has to be bridged, s.
     airframe : Airframe or None
@@ -105,6 +105,8 @@ class Proposal:
         Round number above the largest rotor speed, rad/s.
     facts : tuple of str
         That the logs state beside.
+    equal : tuple of str
+        Names of the logs whose rotors carry what those of the first one do.
     """
 
     logs: tuple[KnownLog, ...]
@@ -112,13 +114,15 @@ class Proposal:
     time_unit: str
     signals: tuple[Guess, ...]
     choices: tuple[KeyChoice, ...]
-    crop_s: tuple[float, float] | None
+    crop_s: tuple[float, float] | Literal["flown"] | None
     crops: Mapping[str, tuple[float, float] | None]
+    rate_hz: float | None
     gap_s: float
     airframe: Airframe | None
     rotors: int
     speed_max: float
     facts: tuple[str, ...]
+    equal: tuple[str, ...]
     warnings: tuple[str, ...]
 
     @property
@@ -169,7 +173,9 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
     airframe, doubts = _airframe(logs)
     if airframe is not None and arm_m is not None:
         airframe = airframe.with_arm(arm_m)
-    crop, crops = _crops(logs)
+    rates = [one.recognition.rate_hz for one in logs]
+    apart = _of_other_load(logs)
+    crops = {one.name: one.recognition.flown.span_s for one in logs}
     warnings = [f"{one.name}: {warning}" for one in logs for warning in one.recognition.warnings]
     doubts = [*doubts, *_two_masses(logs, mass_kg)]
     return Proposal(
@@ -178,13 +184,15 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
         time_unit=logs[0].recognition.time_unit,
         signals=signals,
         choices=_merged_choices(logs),
-        crop_s=crop,
+        crop_s=crops[logs[0].name] if len(logs) == 1 else "flown" if any(crops.values()) else None,
         crops=crops,
+        rate_hz=None if same_rate(rates) else common_rate(rates),
         gap_s=max(_LEAST_GAP_S, _rounded_up(_STEPS_BRIDGED * slowest)),
         airframe=airframe,
         rotors=len(airframe.rotors) if airframe else max(one.recognition.rotors for one in logs),
         speed_max=_speed_max(logs, signals),
         facts=_facts(logs[0]),
+        equal=tuple(one.name for one in logs if all(one is not other for other in apart)),
         warnings=tuple(dict.fromkeys((*warnings, *doubts))),
     )
 
@@ -357,25 +365,47 @@ def _by_weight(guess: Guess, speeds: Array | None, mass_kg: float, arm_m: float)
 
 def _two_masses(logs: Sequence[KnownLog], mass_kg: float | None) -> list[str]:
     """Say where the rotors of two logs carry unlike loads: one mass suits only one of them."""
-    measured = [one.recognition.signal("rotor_speed") is not None for one in logs]
-    if not (all(measured) or not any(measured)):
-        return []
-    loads = sorted((load.size, one.name, load) for one in logs if (load := one.recognition.load) is not None)
+    loads = _by_load(logs)
     if len(loads) < 2:
         return []
-    (_, lighter, light), *_, (_, heavier, heavy) = loads
-    ratio = heavy.size / light.size
-    if ratio <= _ALIKE[measured[0] and light.sensed and heavy.sensed]:
+    (light, first), *_, (heavy, last) = loads
+    ratio, measured = heavy.size / light.size, first.recognition.signal("rotor_speed") is not None
+    if not _apart(light, heavy, measured):
         return []
+    lighter, heavier = first.name, last.name
     more = f"{100 * (ratio - 1):.0f} %"
     masses = "" if mass_kg is None else f", {mass_kg * ratio:.3g} kg if the other weighs {mass_kg:.3g} kg"
-    battery = "" if measured[0] else ", or its battery is lower"
-    what = "squared speeds" if measured[0] else "squared commands"
+    battery = "" if measured else ", or its battery is lower"
+    what = "squared speeds" if measured else "squared commands"
     return [
         f"{lighter} and {heavier}: in flight the {what} of the rotors are {more} higher in {heavier}, so with equal"
         f" propellers it weighs {more} more{masses}{battery}: one vehicle.mass_kg cannot suit both; run cpfls init"
         " for each of them with its own --mass"
     ]
+
+
+def _by_load(logs: Sequence[KnownLog]) -> list[tuple[Load, KnownLog]]:
+    """Sort logs by what their rotors carry; none where that is told by speeds of some and commands of others."""
+    measured = {one.recognition.signal("rotor_speed") is not None for one in logs}
+    known = [(load, one) for one in logs if (load := one.recognition.load) is not None]
+    return sorted(known, key=lambda each: (each[0].size, each[1].name)) if len(measured) == 1 else []
+
+
+def _apart(light: Load, heavy: Load, measured: bool) -> bool:
+    return heavy.size > _ALIKE[measured and light.sensed and heavy.sensed] * light.size
+
+
+def _of_other_load(logs: Sequence[KnownLog]) -> list[KnownLog]:
+    """List the logs whose loads a step parts from that of the first log; a battery that empties makes no step."""
+    measured = logs[0].recognition.signal("rotor_speed") is not None
+    groups: list[list[tuple[Load, KnownLog]]] = []
+    for load, one in _by_load(logs):
+        if groups and not _apart(groups[-1][-1][0], load, measured):
+            groups[-1].append((load, one))
+        else:
+            groups.append([(load, one)])
+    own = next((group for group in groups if any(one is logs[0] for _, one in group)), None)
+    return [] if own is None else [one for group in groups if group is not own for _, one in group]
 
 
 def _airframe(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
@@ -398,21 +428,6 @@ def _airframe(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
     orders = [[(rotor.name, rotor.spin) for rotor in found.rotors] for found in (taken, best.airframe)]
     differ = best.clear and orders[0] != orders[1] and all(rotor.name for rotor in taken.rotors)
     return taken, [f"the rotors are taken from {taken.reason}, which contradicts {says}"] if differ else []
-
-
-def _crops(
-    logs: Sequence[KnownLog],
-) -> tuple[tuple[float, float] | None, dict[str, tuple[float, float] | None]]:
-    """Find one stretch that suits all logs; None where there is none, or nothing is to be cut."""
-    crops = {one.name: one.recognition.flown.span_s for one in logs}
-    known = [crop for crop in crops.values() if crop is not None]
-    if not known:
-        return None, crops
-    if len(logs) == 1:
-        return known[0], crops
-    begin, end = max(crop[0] for crop in known), min(crop[1] for crop in known)
-    keeps = all(end - begin >= _WORTH_IT * (crop[1] - crop[0]) for crop in known)
-    return ((begin, end) if keeps and len(known) == len(logs) else None), crops
 
 
 def _speed_max(logs: Sequence[KnownLog], signals: Sequence[Guess]) -> float:

@@ -12,9 +12,15 @@ from cpfls_cli.flightlog.agreement import first_derivative, slow
 from cpfls_cli.flightlog.airframe import MovedBy, Parameters, airframe_from_motion
 from cpfls_cli.flightlog.attitude_columns import BODY_OF, doubt_reading, read_attitude
 from cpfls_cli.flightlog.conversion import as_mapped
-from cpfls_cli.flightlog.flown import FlownPart, find_flown
+from cpfls_cli.flightlog.flown import FlownPart, find_flown, rotor_level, turning_size
 from cpfls_cli.flightlog.log_table import LogTable, holding_values, make_grid, refuse_dead_rotors
-from cpfls_cli.flightlog.motion_columns import position_by_velocity, tell_acceleration, tell_body_rate, tell_places
+from cpfls_cli.flightlog.motion_columns import (
+    gyroscope_first,
+    position_by_velocity,
+    tell_acceleration,
+    tell_body_rate,
+    tell_places,
+)
 from cpfls_cli.flightlog.nameless import nameless_signals
 from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals
 from cpfls_cli.flightlog.readings import Reading
@@ -92,6 +98,8 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     seen.warnings += [] if log.time_doubt is None else [log.time_doubt]
     position_by_velocity(seen)
     verdict = read_attitude(seen)
+    if verdict is not None and gyroscope_first(seen, verdict.best, _flown_rotors(seen, rotors)):
+        verdict = read_attitude(seen)
     reading = None if verdict is None else verdict.best
     tell_places(seen, reading)
     tell_body_rate(seen, reading)
@@ -120,9 +128,13 @@ def _level(log: LogTable, rotors: RotorColumns) -> Array | None:
     if found is None:
         return None
     values = log.on_grid(found.columns.columns, spikes=False)
-    level = as_mapped(values, found.columns).mean(axis=1)
-    largest = max(1.0, float(np.quantile(level, 0.98))) if rotors.command is None else 1.0
-    return np.asarray(level / largest)
+    return rotor_level(as_mapped(values, found.columns), shares=found is rotors.command)
+
+
+def _flown_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array, bool] | None:
+    """Give the speeds of the rotors in flight, shape (time, rotor), and whether they are commands."""
+    found = rotors.speed or rotors.command
+    return None if found is None else (seen.mapped(found.guess), rotors.speed is None)
 
 
 def _find_flown(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], level: Array | None) -> FlownPart:
@@ -133,7 +145,7 @@ def _find_flown(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]],
     if gyro is not None:
         values = log.on_grid(gyro.group.columns)
         factor = gyro.scale / (_DEGREES if gyro.unit == "deg/s" else 1.0)
-        rate = factor * np.linalg.norm(values - np.median(values, axis=0), axis=1)
+        rate = factor * turning_size(values)
     return find_flown(log.grid - log.grid[0], level, height, rate)
 
 

@@ -66,7 +66,7 @@ def crop_and_order(table: SignalTable, settings: ImportSettings) -> tuple[Signal
     Parameters
     ----------
     settings : ImportSettings
-        `crop_s`.
+        `crop_s`, in numbers.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def crop_and_order(table: SignalTable, settings: ImportSettings) -> tuple[Signal
     InputError
         If the time stamps do, or go backward and stay behind, or a mapped column has fewer than two values there.
     """
-    begin, end = settings.crop_s or (-np.inf, np.inf)
+    begin, end = settings.crop_s if isinstance(settings.crop_s, tuple) else (-np.inf, np.inf)
     outside = (table.time < begin) | (table.time > end)
     inside = np.isfinite(table.time) & ~outside
     if settings.crop_s is not None and inside.sum() < 2:

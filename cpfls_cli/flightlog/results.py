@@ -66,6 +66,8 @@ class ImportReport:
         Longest step between time stamps in the part that is kept, s.
     span_s : tuple of float
         Begin and end of what is kept, s from the log's first time stamp.
+    crop_s : tuple of float or None
+        Begin and end of the crop, as asked for or found; None without one.
     log_rate_hz, rate_hz : float
         Median rate of the log, and rate of the result.
     lowpass_hz : float or None
@@ -90,6 +92,7 @@ class ImportReport:
     gaps: int
     longest_gap_s: float
     span_s: tuple[float, float]
+    crop_s: tuple[float, float] | None = None
     log_rate_hz: float
     rate_hz: float
     cut_off_hz: Mapping[str, float] = field(default_factory=dict)

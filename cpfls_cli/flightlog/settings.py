@@ -185,7 +185,10 @@ class ImportSettings(Settings):
             " 0..1 times vehicle.rotor_speed_max_rad_s, speeds as they are; null: no torque"
         ),
     ] = "column"
-    crop_s: Annotated[tuple[float, float] | None, Doc("begin and end that are kept, s from the first stamp")] = None
+    crop_s: Annotated[
+        tuple[float, float] | Literal["flown"] | None,
+        Doc("begin and end that are kept, s from the first stamp; flown: the longest stretch that flies, of each log"),
+    ] = None
     rate_hz: Annotated[
         Annotated[float, Gt(0)] | None, Doc("sampling rate of the flight, Hz; null: the log's median rate")
     ] = None
@@ -214,7 +217,7 @@ class ImportSettings(Settings):
 
     def __post_init__(self) -> None:
         """Check the rules between keys."""
-        if self.crop_s is not None and not 0 <= self.crop_s[0] < self.crop_s[1]:
+        if isinstance(self.crop_s, tuple) and not 0 <= self.crop_s[0] < self.crop_s[1]:
             raise SettingError("crop_s", "needs 0 <= begin < end")
         for name, signal in self.signals.items():
             _check_signal(name, signal)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import floor
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from cpfls_cli.consistency.findings import contradictions, doubts
 from cpfls_cli.consistency.numbers import beyond_belief
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import CpflsError, InputError
+from cpfls_cli.flightlog.clock import common_rate, same_rate
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flights.imported import imported
@@ -45,7 +45,6 @@ _STATE = ("body_rate", "attitude", "velocity", "position")
 _ACTUATION = ("rotor_speed", "rotor_command", "body_torque")
 _BESIDE = ("acceleration", "specific_force", "voltage", "thrust", "rotor_command")
 _MOST_PARTS = 50
-_SAME_PERIOD = 1e-3
 
 
 def flights_to_play(paths: Sequence[Path], study: Study, hold: Hold | None = None) -> tuple[LoggedFlight, ...]:
@@ -56,14 +55,13 @@ def flights_to_play(paths: Sequence[Path], study: Study, hold: Hold | None = Non
     ]
     flights = _of_full_battery([_flight(flight, study, hold) for flight in read], read)
     first = flights[0]
-    for flight in flights[1:]:
-        periods = [each.parts[0].period for each in (flight, first)]
-        if abs(periods[0] - periods[1]) > _SAME_PERIOD * periods[1]:
-            rates = [f"{1 / period:.4g} Hz" for period in periods]
-            one = max(1, floor((1 + _SAME_PERIOD) / max(each.parts[0].period for each in flights)))
+    rates = [1 / flight.parts[0].period for flight in flights]
+    for flight, rate in zip(flights[1:], rates[1:], strict=True):
+        if not same_rate([rates[0], rate]):
             raise InputError(
-                f"{flight.name}: sampled at {rates[0]}, {first.name} at {rates[1]}, but all flights need the same rate:"
-                f" use --set import.rate_hz={one} for logs, and import flights again with it"
+                f"{flight.name}: sampled at {rate:.4g} Hz, {first.name} at {rates[0]:.4g} Hz, but all flights need the"
+                f" same rate: use --set import.rate_hz={common_rate(rates):g} for logs, and import flights again with"
+                " it"
             )
     stated = doubts(beyond_belief(study.vehicle))
     return (replace(first, warnings=(*stated, *first.warnings)), *flights[1:])
@@ -75,7 +73,7 @@ def _parts(path: Path, study: Study) -> list[ImportedFlight]:
     first = imported(path, longest)
     # A delay that is estimated is estimated once, on the longest part.
     others = _importing(longest, delay_s=first.report.delay_s)
-    parts, left = [first], _around(first, study.import_.crop_s or (0.0, np.inf))
+    parts, left = [first], _around(first, first.report.crop_s or (0.0, np.inf))
     while left and len(parts) < _MOST_PARTS:
         begin, end = left.pop(0)
         try:

@@ -5,6 +5,7 @@ command line lists the formats in its help, so nothing heavy is imported here: a
 loaded when the first file of its format is read.
 """
 
+import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -116,6 +117,9 @@ class LogFormat:
         return line.startswith(self.magic) if self.magic else _is_header(line)
 
 
+_OLDER_USD = re.compile(rb"[\x01-\xff][A-Za-z]\w*(\.\w+)*\([BbHhIifd]\),")
+"""A count of names, and the first of them with the letter of its type."""
+
 _PYARROW = {"packages": ("pyarrow", "pyarrow.parquet"), "extra": "parquet"}
 _PYULOG = {"packages": ("pyulog",), "extra": "ulog"}
 _ROSBAGS = {"packages": ("rosbags",), "extra": "rosbag"}
@@ -170,6 +174,11 @@ def log_contents(path: Path, wanted: Collection[str] | None = None) -> LogConten
     form = _format_of(path)
     if _first_line(path).startswith(_ENCRYPTED_MAGIC):
         raise InputError(f"{path}: is encrypted: decrypt it first, as PX4's Tools/decrypt_ulog.py does")
+    if form is None and _OLDER_USD.match(_first_line(path)):
+        raise InputError(
+            f"{path}: a log of a Crazyflie's uSD card in its older format, which is not read; make a CSV of it"
+            " with the script of that firmware, and of a quaternion in one number four columns"
+        )
     if form is None:
         named = ", ".join(form.suffix for form in LOG_FORMATS if form.suffix)
         free = ", ".join(dict.fromkeys(form.name for form in LOG_FORMATS if form.by_content))

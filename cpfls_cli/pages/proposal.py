@@ -108,7 +108,10 @@ def _in_braces(names: Sequence[str]) -> str:
     begin = first[: next((place for place, letter in enumerate(first) if letter != last[place : place + 1]), None)]
     if len(names) < 2 or not begin:
         return ", ".join(names)
-    return f"{begin}{{{','.join(name.removeprefix(begin) for name in names)}}}"
+    rest = [name.removeprefix(begin) for name in names]
+    # An index is written whole within its bracket.
+    end = "]" if begin.endswith("[") and all(own.endswith("]") for own in rest) else ""
+    return f"{begin}{{{','.join(own.removesuffix(end) for own in rest)}}}{end}"
 
 
 def _reasons_table(proposal: Proposal) -> Table:
@@ -339,11 +342,11 @@ def _import(proposal: Proposal) -> Iterator[str]:
     for one in proposal.logs:
         for reason in one.recognition.flown.reasons:
             yield from _comment(reason if alone else f"{one.name}: {reason}", 2)
-    if proposal.crop_s is None and any(proposal.crops.values()):
-        yield from _comment("No one stretch suits all logs; each takes its own:", 2)
+    if proposal.crop_s == "flown":
+        yield from _comment("Each log is cut to what flies in it, a later one too; to s from the first stamp now:", 2)
         for name, crop in proposal.crops.items():
-            yield f"  # {name}: {'null' if crop is None else f'--set import.crop_s=[{crop[0]:g},{crop[1]:g}]'}"
-    yield f"  crop_s: {'null' if proposal.crop_s is None else _flow(list(proposal.crop_s))}"
+            yield f"  # {name}: {'all of it' if crop is None else f'[{crop[0]:g}, {crop[1]:g}]'}"
+    yield f"  crop_s: {_flow(list(proposal.crop_s) if isinstance(proposal.crop_s, tuple) else proposal.crop_s)}"
     yield f"  gap_s: {_flow(proposal.gap_s)}"
     yield "  gap_rule: longest-part"
     if first.rate_hz > _FASTEST_HZ:
@@ -353,6 +356,9 @@ def _import(proposal: Proposal) -> Iterator[str]:
         )
         yield f"  rate_hz: {_flow(_RATE_HZ)}"
         yield f"  lowpass_hz: {_flow(_LOWPASS_HZ)}"
+    elif proposal.rate_hz is not None:
+        yield from _comment("The logs are of several rates, and what learns from them takes flights of one.", 2)
+        yield f"  rate_hz: {_flow(proposal.rate_hz)}"
 
 
 def _entry(reason: str, rivals: Sequence[Rival], lines: Sequence[str], indent: int) -> Iterator[str]:

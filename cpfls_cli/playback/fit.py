@@ -29,7 +29,7 @@ _ROBUST = 0.5
 _LEAST = 0.1
 """Error at which the loss turns from square to absolute, in those of "rate stays"; at least a share of their mean."""
 
-_PRIOR = 1e-5
+PRIOR = 1e-5
 """Weight of what is believed before the flights, so small that it decides only what they do not tell."""
 
 
@@ -230,7 +230,7 @@ class FitPoint:
 
     @property
     def _belief(self) -> Array:
-        return np.asarray(_PRIOR / self.believed.spread**2)
+        return np.asarray(PRIOR / self.believed.spread**2)
 
     @property
     def _away(self) -> Array:
@@ -286,14 +286,14 @@ def fit_parts(
         own = [window for window, keep in zip(windows, kept, strict=True) if keep]
 
         def evaluated(values: Array) -> FitPoint:
-            return _Sums(free, own, values).mean()
+            return WindowSums(free, own, values).mean()
 
         return minimised(evaluated, point, free.scales, bounds, steps, tolerance)
 
-    start = _Sums(free, windows, np.clip(free.values(known), *bounds)).mean()
+    start = WindowSums(free, windows, np.clip(free.values(known), *bounds)).mean()
     if not np.isfinite(start.objective):
         raise ComputationError("the prediction error is not finite with the stated numbers; check the units of the log")
-    sums = _Sums(free, windows, best(place >= 0, start, steps).values)
+    sums = WindowSums(free, windows, best(place >= 0, start, steps).values)
     losses = sums.losses()
     whole = sums.mean(losses)
     # The derivatives along all windows are taken here, before threads ask for parts of them.
@@ -310,7 +310,7 @@ def fit_parts(
 
 
 @dataclass(frozen=True)
-class _Sums:
+class WindowSums:
     """Numbers at values, and what they come to along each of several windows."""
 
     free: JointNumbers
@@ -458,13 +458,13 @@ def uncertainty(fitted: Fitted, windows: Sequence[FitWindows]) -> Uncertainty:
     count = sum(len(window.starts) for window in windows)
     blocks = [max(2, round(BLOCKS * len(window.starts) / count)) for window in windows]
     groups = [contiguous(len(window.starts), own) for window, own in zip(windows, blocks, strict=True)]
-    sums = _Sums(free, windows, fitted.values).derivatives(groups)
+    sums = WindowSums(free, windows, fitted.values).derivatives(groups)
     gradient, hessian = (np.concatenate(each) for each in zip(*sums, strict=True))
     # The prior stays in the difference, so that it can be inverted whatever a block takes with it.
     without = fitted.hessian * count - hessian * scale[:, None] * scale
     moved = np.linalg.solve(without, (gradient * scale)[:, :, None])[:, :, 0]
     covariance = jackknife_covariance(moved * scale)
-    belief = _PRIOR / free.spreads**2
+    belief = PRIOR / free.spreads**2
     conditional = np.diag(fitted.hessian) - belief
     return Uncertainty(covariance, len(gradient), np.asarray(conditional > _INFORMED * belief))
 

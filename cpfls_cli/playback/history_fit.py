@@ -21,9 +21,10 @@ from cpfls_cli.playback.evaluation import Evaluated
 from cpfls_cli.playback.fit import Believed, FitPoint, Fitted, FittedNumbers, FitWindows, weighed, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.history import Observer, missed_wrench, past_of
+from cpfls_cli.playback.judging import block_errors, parts_of
 from cpfls_cli.playback.kernels import MeasuredMotion, Parameters, errors_of_runs, sensitivities
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.structure import Judged, block_errors, parts_of
+from cpfls_cli.playback.structure import Judged
 
 _AXES = np.array([0, 0, 1, 2, 2, 3])
 """Which numbers an axis of torque and force has: roll and pitch share theirs, so do ahead and left."""

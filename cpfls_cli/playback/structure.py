@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -29,6 +28,7 @@ from cpfls_cli.playback.fit import (
 )
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import Group, JointNumbers
+from cpfls_cli.playback.judging import Outlook, block_errors, parts_of
 from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.parameters import INERTIA, LEARNED, FreeNumbers, blocks_of, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
@@ -41,16 +41,21 @@ _SEARCH_STEPS, _SEARCH_TOLERANCE = 12, 1e-3
 _STEPS, _TOLERANCE = 60, 3e-5
 """Of the fit that is kept."""
 
-_FEWEST_BLOCKS = 8
-"""Pieces of the flights kept aside whose errors are compared: fewer say little of their scatter."""
-_UNSEEN = 3.0
-"""How many times as fast about an axis a part turns, at least, that is nothing like the others."""
-
 _VISIBLE = 0.02
 """Share of the error of the best that is worth a name: on long flights less is significant."""
 
 _VISIBLE_OF_STAYS = 0.002
 """Most that is asked of a name, as a share of the error of "rate stays"."""
+
+_FORETOLD = 2
+"""Blocks that are added for a trial at least: the best by what is foretold."""
+
+_HOPELESS = 2.0
+"""Times what may be given up for fewer numbers, from which on a structure that is foretold to be so bad is not fitted;
+what is foretold near the bound is right within a tenth or two."""
+
+_BENT = ("lag", "delay", "slow_actuation")
+"""Blocks whose gain is no square of their numbers by far, so that none is foretold."""
 
 _HALF = 2**15
 """Of a gene, from which on a block is in."""
@@ -172,6 +177,9 @@ class Solution(NamedTuple):
     hessian: Array
 
 
+Objectives = tuple[float, float, float]
+"""Error, numbers, and logarithm of the condition number."""
+
 Kept = Mapping[Structure, Solution]
 """Structures that a stopped search has judged."""
 
@@ -190,6 +198,7 @@ class _Bench:
     expected: int
     kept: Kept
     known: dict[Structure, Judged] = field(default_factory=dict)
+    foretold: dict[Structure, Objectives] = field(default_factory=dict)
 
     @cached_property
     def stays(self) -> float:
@@ -216,7 +225,7 @@ class _Bench:
             known |= free.named(fit(free, windows, known, _SEARCH_STEPS, _SEARCH_TOLERANCE).values)
         return fit_parts(structure.free(self.vehicle), self.parts, known, _SEARCH_STEPS, _SEARCH_TOLERANCE)
 
-    def _nearest(self, structure: Structure) -> Judged | None:
+    def nearest(self, structure: Structure) -> Judged | None:
         """Find the known structure that differs in the fewest blocks; the better one of two."""
         asked = set(structure.blocks)
 
@@ -230,13 +239,27 @@ class _Bench:
 
     def _known(self, structure: Structure) -> dict[str, float]:
         """Give the values that a fit starts from."""
-        near = self._nearest(structure)
+        near = self.nearest(structure)
         if near is None:
             return {}
         known = near.fit.free.named(near.fit.values)
         if near.structure.rules != structure.rules:
             known = {name: value for name, value in known.items() if name.split(".")[0] not in LEARNED}
         return known
+
+    def objectives(self, structure: Structure) -> Objectives:
+        """Give those of the fit, or as they are foretold of what is not fitted."""
+        known = self.known.get(structure)
+        return self.foretold[structure] if known is None else _objectives(known)
+
+    def outlook(self, near: Judged, asked: Sequence[Structure]) -> Outlook:
+        """Evaluate what foretells the errors of structures, as `Judged.by_block`, from the fit of another one."""
+        both = (near.structure, *asked)
+        blocks = tuple(dict.fromkeys(block for each in both for block in each.blocks))
+        rules = next((each.rules for each in both if each.learns), near.structure.rules)
+        union, known = Structure(blocks, rules).free(self.vehicle), near.fit.free.named(near.fit.values)
+        values = union.values({number.name: number.absent for number in union.numbers} | known)
+        return Outlook.of(union, values, self.parts)
 
     def _judged(self, structure: Structure, whole: Fitted, without: tuple[FittedNumbers, ...]) -> Judged:
         errors = [
@@ -250,12 +273,6 @@ class _Bench:
 def _rebuilt(free: JointNumbers, kept: Solution) -> tuple[Fitted, tuple[FittedNumbers, ...]]:
     whole, *without = (FittedNumbers(free, *each) for each in zip(kept.values, kept.losses, strict=True))
     return Fitted(free, whole.values, whole.loss, kept.hessian), tuple(without)
-
-
-def block_errors(errors: Sequence[Array]) -> Array:
-    """Take the means of errors by flight, which is what is independent; few of them are cut."""
-    pieces = -(-_FEWEST_BLOCKS // len(errors))
-    return np.array([piece.mean() for each in errors for piece in np.array_split(each, min(pieces, len(each)))])
 
 
 def tried_blocks(
@@ -293,7 +310,7 @@ def choose(
     """
     blocks = tried_blocks(vehicle, flights, settings)
     parts = parts_of(flights, settings)
-    expected = 3 * len(blocks) + settings.population * (1 + settings.generations) // 2
+    expected = 3 * len(blocks) + settings.population * (1 + settings.generations) // 4
     bench = _Bench(vehicle, parts, progress, expected, kept)
     nothing = bench.judge(Structure(()))
     # All blocks on the stated body first, or on a guessed one: a body that is free from the beginning is made so heavy
@@ -304,10 +321,10 @@ def choose(
     everything = bench.judge(Structure(blocks), guessed if INERTIA in vehicle.unknown else None)
     path, complete = [nothing], True
     try:
-        shrunk = [bench.judge(structure) for structure in _shrinking(everything)]
+        shrunk = _shrunk(bench, everything) if len(blocks) > 1 else []
         path.extend(_greedy(bench, blocks, nothing))
-        first = smallest(bench.known.values(), lambda each: each.error)
-        _evolve(bench, blocks, [*path, *shrunk, *_neighbours(bench, first)], settings, rng)
+        near = _neighbours(bench, smallest(bench.known.values(), lambda each: each.error))
+        _evolve(bench, blocks, [*(each.structure for each in path), *shrunk, *near], settings, rng)
         _refine(bench, blocks)
     except SearchStoppedError:
         complete = False
@@ -315,94 +332,68 @@ def choose(
     return Choice(chosen, best, path[-1], everything, nothing, _front(judged), len(judged), complete)
 
 
-def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> list[list[FitWindows]]:
-    """Split flights into parts that are kept aside in turn: neighbours in their order, or pieces of each.
-
-    Neighbours are kept aside together because flights of one kind usually stand side by side: what a model has to
-    predict is a kind of flight that it has not seen. Pieces are taken of a single flight, and where a part turns about
-    an axis about which hardly anything turns in the others: no model can be asked for what nothing tells.
-    """
-    flown = sum(len(flight) * flight.motion.period for flight in flights)
-    interval = max(settings.window_interval_s, flown / settings.search_windows)
-    windows = windows_of(flights, settings.horizon_s, interval)
-    count = min(settings.folds, len(windows))
-    ends = np.linspace(0, len(windows), count + 1).round().astype(int).tolist()
-    together = [windows[start:end] for start, end in pairwise(ends)]
-    if count > 1 and not _lacks_an_axis(together):
-        return together
-    cut = [_pieces(each, settings.folds) for each in windows]
-    return [part for pieces in zip(*cut, strict=True) if (part := [piece for piece in pieces if len(piece.starts)])]
-
-
-def _pieces(windows: FitWindows, count: int) -> list[FitWindows]:
-    """Cut the windows of a flight; those that reach into the next piece are left out, so that none shares a sample."""
-    pieces = np.array_split(windows.starts, count)
-    ends = [*(piece[0] if len(piece) else np.inf for piece in pieces[1:]), np.inf]
-    kept = [piece[piece + windows.horizon < end] for piece, end in zip(pieces, ends, strict=True)]
-    return [FitWindows(windows.flight, piece, windows.loss) for piece in kept]
-
-
-def _lacks_an_axis(parts: Sequence[Sequence[FitWindows]]) -> bool:
-    """Tell whether a part turns about an axis about which hardly anything turns in the others."""
-    squares = np.array([sum((each.motion.rate**2).sum(axis=0) for each in part) for part in parts])
-    samples = np.array([sum(len(each.motion.rate) for each in part) for part in parts])[:, None]
-    others = np.sqrt((squares.sum(axis=0) - squares) / (samples.sum() - samples))
-    return bool(np.any(np.sqrt(squares / samples) > _UNSEEN * others))
-
-
 def _greedy(bench: _Bench, blocks: tuple[str, ...], start: Judged) -> Iterator[Judged]:
     """Add the block that lowers the error most, until none lowers it by more than its standard error.
 
-    What a block gained before bounds what it may gain now, near enough, so that few are tried again; all of them are
-    before it ends, because some gain only beside others.
+    Fitted are those of which most is foretold. Of others nothing can be, and what such a block gained before bounds
+    what it may gain now, near enough; all of them are tried before it ends, because some gain only beside others.
     """
-    present, promise, all_tried = start, dict.fromkeys(blocks, np.inf), False
+    present, gained, all_tried = start, dict.fromkeys(_BENT, np.inf), False
     yield present
-    while promise:
-        best: Judged | None = None
-        for block in ascending(promise, lambda name: -promise[name]):
-            if best is not None and not all_tried and less(promise[block], present.error - best.error, present.error):
+    while promise := _promised(bench, present, gained, blocks):
+        best, foretold = None, 0
+        for block, gain in ascending(promise.items(), lambda each: -each[1]):
+            if best and foretold >= _FORETOLD and less(gain, present.error - best.error, present.error):
                 break
+            foretold += block not in _BENT
             tried = bench.judge(_with(present.structure, block, blocks))
-            promise[block] = present.error - tried.error
+            gained[block] = present.error - tried.error
             if best is None or less(tried.error, best.error):
                 best = tried
-        if best is None:
-            return
+        assert best is not None
         better, uncertain = present.worse_than(best)
-        if at_most(better, uncertain, present.error):
-            if all_tried:
-                return
-            all_tried = True
-            continue
-        all_tried = False
-        for block in set(best.structure.blocks) & promise.keys():
-            del promise[block]
-        present = best
-        yield present
+        if not at_most(better, uncertain, present.error):
+            present, all_tried = best, False
+            yield present
+        elif all_tried:
+            return
+        else:
+            gained, all_tried = dict.fromkeys(_BENT, np.inf), True
 
 
-def _shrinking(everything: Judged) -> Iterator[Structure]:
-    """Take out the block that the loss near the fit of all blocks misses least, one after another.
+def _promised(bench: _Bench, present: Judged, gained: Mapping[str, float], blocks: tuple[str, ...]) -> dict[str, float]:
+    """Say by how much each block that is not in lowers the error: as foretold, or what it gained where that is bent."""
+    absent = {
+        block: _with(present.structure, block, blocks) for block in blocks if block not in present.structure.blocks
+    }
+    asked = {block: each for block, each in absent.items() if block not in _BENT}
+    outlook = bench.outlook(present, list(asked.values()))
+    before = outlook.errors(present.structure.blocks).mean()
+    gains = {block: float(before - outlook.errors(each.blocks).mean()) for block, each in asked.items()}
+    return {block: gains.get(block, gained.get(block, np.inf)) for block in absent}
 
-    Without the numbers b the loss rises by ``1/2 b' ((H^-1)_bb)^-1 b``, the other numbers fitted again.
+
+def _shrunk(bench: _Bench, everything: Judged) -> list[Structure]:
+    """List structures without the block that is foretold to be missed least, one after another, and judge two of them.
+
+    These are the best as foretold, and the simplest that is hardly worse.
     """
-    structure, fitted = everything.structure, everything.fit
-    free, hessian = fitted.free, fitted.hessian
-    absent = np.array([number.absent for number in free.numbers])
-    away = (fitted.values - absent) / free.scales
-    inverse = np.linalg.inv(hessian)
-    place = {block: [i for i, n in enumerate(free.numbers) if n.block == block] for block in structure.blocks}
+    structure, outlook = everything.structure, bench.outlook(everything, [])
+    while len(structure.blocks) > 1:
+        structure = smallest(_fewer(structure), lambda each: outlook.error(each.blocks))
+        bench.foretold[structure] = outlook.objectives(structure.blocks)
+    path = list(bench.foretold)
+    errors = {each: outlook.errors(each.blocks) for each in path}
+    best = smallest(path, lambda each: bench.objectives(each)[0])
+    simplest = [each for each in path if _keeps_up(bench, errors[each], errors[best], 1.0)]
+    for each in (best, *simplest[-1:]):
+        bench.judge(each)
+    return path
 
-    def missed(blocks: Sequence[str]) -> float:
-        at = [index for block in blocks for index in place[block]]
-        return float(away[at] @ np.linalg.solve(inverse[np.ix_(at, at)], away[at]))
 
-    gone: list[str] = []
-    while len(gone) + 1 < len(structure.blocks):
-        kept = [block for block in structure.blocks if block not in gone]
-        gone.append(smallest(kept, lambda block: missed([*gone, block])))
-        yield Structure(tuple(block for block in structure.blocks if block not in gone), structure.rules)
+def _fewer(structure: Structure) -> list[Structure]:
+    """List the structures with one block less."""
+    return [_with(structure, block, structure.blocks) for block in structure.blocks]
 
 
 def _with(structure: Structure, block: str, order: Sequence[str]) -> Structure:
@@ -411,13 +402,35 @@ def _with(structure: Structure, block: str, order: Sequence[str]) -> Structure:
     return Structure(tuple(name for name in order if name in kept), structure.rules)
 
 
-def _neighbours(bench: _Bench, judged: Judged) -> list[Judged]:
-    """Judge the structures with one block less, or with other rules of what is learned."""
+def _neighbours(bench: _Bench, judged: Judged) -> list[Structure]:
+    """List the structures with one block less, or with other rules of what is learned, and judge the hopeful."""
     structure = judged.structure
-    fewer = [_with(structure, block, structure.blocks) for block in structure.blocks]
-    learned = any(block in LEARNED for block in structure.blocks)
-    other = [structure._replace(rules=rules) for rules in REMAINDERS] if learned else []
-    return [bench.judge(each) for each in (*fewer, *other)]
+    fewer = _fewer(structure)
+    other = [structure._replace(rules=rules) for rules in REMAINDERS] if structure.learns else []
+    _judge_hopeful(bench, judged, fewer)
+    for each in other:
+        bench.judge(each)
+    return [*fewer, *other]
+
+
+def _judge_hopeful(bench: _Bench, near: Judged, others: Sequence[Structure]) -> None:
+    """Judge those of some structures that are not foretold to be hopeless, from a near one that is judged."""
+    best = smallest(bench.known.values(), lambda each: each.error)
+    new = [each for each in others if each not in bench.known]
+    if not new:
+        return
+    outlook = bench.outlook(near, new)
+    for each in new:
+        if _keeps_up(bench, outlook.errors(each.blocks), best.by_block, _HOPELESS):
+            bench.judge(each)
+        else:
+            bench.foretold[each] = outlook.objectives(each.blocks)
+
+
+def _keeps_up(bench: _Bench, errors: Array, best: Array, most: float) -> bool:
+    """Tell by block whether errors are worse than the best by less than `most` times what fewer numbers may cost."""
+    worse, mean = errors - best, float(best.mean())
+    return bool(less(worse.mean(), most * max(float(mean_error(worse)), _visible(bench, mean)), mean))
 
 
 def _named_instead(bench: _Bench, judged: Judged, blocks: tuple[str, ...]) -> None:
@@ -428,15 +441,20 @@ def _named_instead(bench: _Bench, judged: Judged, blocks: tuple[str, ...]) -> No
     structure = judged.structure
     absent = [block for block in blocks if needs_velocity(block) and block not in (*structure.blocks, *LEARNED)]
     for learned in (block for block in structure.blocks if block in LEARNED):
-        for effect in absent:
-            bench.judge(_with(_with(structure, learned, blocks), effect, blocks))
+        named = [_with(_with(structure, learned, blocks), effect, blocks) for effect in absent]
+        _judge_hopeful(bench, judged, named)
 
 
 def _preferred(bench: _Bench) -> tuple[list[Judged], Judged, Judged]:
     """Sort what is judged by numbers, and give the best and the choice."""
     judged = sorted(ascending(bench.known.values(), lambda each: each.error), key=lambda each: each.numbers)
     best = smallest(judged, lambda each: each.error)
-    return judged, best, _simplest(judged, best, min(_VISIBLE * best.error, _VISIBLE_OF_STAYS * bench.stays))
+    return judged, best, _simplest(judged, best, _visible(bench, best.error))
+
+
+def _visible(bench: _Bench, best: float) -> float:
+    """Give how much worse than the best error is not visible."""
+    return min(_VISIBLE * best, _VISIBLE_OF_STAYS * bench.stays)
 
 
 def _refine(bench: _Bench, blocks: tuple[str, ...]) -> None:
@@ -463,7 +481,7 @@ def _refine(bench: _Bench, blocks: tuple[str, ...]) -> None:
 def _evolve(
     bench: _Bench,
     blocks: tuple[str, ...],
-    first: Sequence[Judged],
+    first: Sequence[Structure],
     settings: PlaybackSettings,
     rng: np.random.Generator,
 ) -> None:
@@ -476,16 +494,27 @@ def _evolve(
     )
 
     def evaluate(genes: IntArray) -> Evaluation:
-        judged = [bench.judge(_decoded(chromosome, blocks)) for chromosome in genes]
-        return Evaluation(genes, np.array([_objectives(each) for each in judged]))
+        return Evaluation(genes, np.array([_bred(bench, _decoded(chromosome, blocks)) for chromosome in genes]))
 
-    ranked = ascending({each.structure: each for each in first}.values(), lambda each: each.error)
-    initial = np.array([_encoded(each.structure, blocks) for each in ranked[: settings.population]], dtype=np.int64)
+    ranked = ascending(dict.fromkeys(first), lambda each: bench.objectives(each)[0])
+    initial = np.array([_encoded(each, blocks) for each in ranked[: settings.population]], dtype=np.int64)
     for _ in evolve(evaluate, len(blocks) + 1, evolution, rng, initial):
         pass
 
 
-def _objectives(judged: Judged) -> tuple[float, float, float]:
+def _bred(bench: _Bench, structure: Structure) -> Objectives:
+    """Give the objectives of a structure: of its fit, or as they are foretold where they are hopeless."""
+    near = bench.nearest(structure)
+    assert near is not None
+    bent = not set(_BENT).isdisjoint(set(structure.blocks) - set(near.structure.blocks))
+    if bent or (structure.learns and near.structure.learns and structure.rules != near.structure.rules):
+        bench.judge(structure)
+    else:
+        _judge_hopeful(bench, near, [structure])
+    return bench.objectives(structure)
+
+
+def _objectives(judged: Judged) -> Objectives:
     return judged.error, float(judged.numbers), float(np.log10(judged.condition_number))
 
 

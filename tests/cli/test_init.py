@@ -184,12 +184,37 @@ def test_logs_with_clocks_of_other_names_are_refused(refuse, tmp_path, own):
     ]
 
 
-def test_logs_that_are_cut_differently_each_get_their_own_cut(proposed, tmp_path, own):
+def test_logs_that_are_cut_differently_each_get_their_own_cut(cpfls, proposed, tmp_path, own):
     first = write_csv(tmp_path / "one.csv", flat_log(with_ground(own)))
     second = write_csv(tmp_path / "two.csv", flat_log(with_ground(own, before_s=15.0)))
-    _, text, data = proposed(first, second, "--mass", MASS, "--arm", ARM)
-    assert data["import"]["crop_s"] is None
-    assert re.search(r"two\.csv: --set import\.crop_s=\[15\.\d+,3\d\.\d+\]", text)
+    _, text, data = proposed(first, second, "--mass", MASS, "--arm", ARM, "--json")
+    assert data["import"]["crop_s"] == "flown"
+    begin, end = map(float, re.search(r"two\.csv: \[(15\.\d+), (3\d\.\d+)\]", text).groups())
+    made = cpfls("import", tmp_path / "study.yaml", second, "-o", tmp_path / "two.h5", "--json")
+    assert made.exit_code == 0, made.stderr
+    summary = json.loads(made.stdout)
+    assert summary["samples"] == pytest.approx(100 * (end - begin), abs=3)
+
+
+def test_a_touchdown_contradicts_nothing_in_the_log_that_leads(proposed, tmp_path, own):
+    """Of what jolts a vehicle that lands the accelerometer and the velocity, each filtered, show unlike parts."""
+    logs = []
+    for number, before in enumerate((5.0, 8.0)):
+        longer = with_ground(own, before_s=before)
+        landed = round(100 * (before + 20.0))
+        longer.velocity[landed : landed + 40, 2] -= 4.0
+        longer.specific_force[landed + 80 : landed + 120, 2] += 20.0
+        logs.append(write_csv(tmp_path / f"{number}.csv", flat_log(longer)))
+    result, _, _ = proposed(*logs, "--mass", MASS, "--arm", ARM)
+    assert "contradicts itself" not in result.stderr
+
+
+def test_logs_of_several_rates_are_imported_at_one(proposed, tmp_path, own):
+    first = write_csv(tmp_path / "one.csv", flat_log(own))
+    second = write_csv(tmp_path / "two.csv", flat_log(flight(seconds=20.0, rate_hz=99.6)))
+    _, _, data = proposed(first, second, "--mass", MASS, "--arm", ARM)
+    assert data["import"]["rate_hz"] == 99.6
+    assert "rate_hz" not in proposed(first, first, "--mass", MASS, "--arm", ARM, output="same.yaml")[2]["import"]
 
 
 def test_one_config_cannot_suit_logs_of_other_axes(refuse, tmp_path, own):
@@ -258,6 +283,7 @@ def test_a_log_of_px4_brings_its_rotors_along(proposed, tmp_path, own):
     path = tmp_path / "log.ulg"
     path.write_bytes(ulog_of_flight(own))
     result, text, data = proposed(path, "--mass", MASS)
+    assert "vehicle_attitude.q[{0,1,2,3}] " in result.stdout
     signals = data["import"]["signals"]
     assert signals["quaternion"]["columns"][0] == "vehicle_attitude.q[0]"
     assert signals["rotor_command"]["columns"] == [f"actuator_motors.control[{index}]" for index in range(4)]
@@ -361,6 +387,8 @@ def test_two_masses_in_one_config_are_said_by_how_much(proposed, tmp_path, own, 
         values |= {} if by == "accelerometer" else {"force": None}
         logs.append(write_csv(tmp_path / f"{number}.csv", flat_log(other, **values)))
     result, _, _ = proposed(*logs, "--mass", "0.037", "--arm", "0.05")
+    learns = next(line for line in result.stdout.splitlines() if "cpfls vehicle" in line)
+    assert ("1.h5" in learns) == (mass == 37.0)
     heavier = r"so with equal propellers it weighs (\d+) % more, (0\.\d+) kg if the other weighs"
     found = re.search(heavier, result.stderr)
     assert bool(found) == (mass == 44.0)

@@ -53,6 +53,25 @@ def test_nothing_is_said_of_a_flight_that_agrees_with_itself(flight):
     assert check([flight], SETTINGS) == ()
 
 
+def test_a_touchdown_is_no_flight(flight):
+    """Of what jolts a vehicle that lands the accelerometer and the velocity, each filtered, show unlike parts."""
+    rest, down = np.arange(1, 401), np.array([0.0, 0.0, 1.0])
+    fall, jolt = ((begin <= rest) & (rest < begin + 40) for begin in (1, 81))
+
+    def then(values, later):
+        return np.concatenate([values, np.broadcast_to(later, (len(rest), *values.shape[1:]))])
+
+    landed = replace(
+        flight,
+        time=np.concatenate([flight.time, flight.time[-1] + PERIOD * rest]),
+        **{name: then(getattr(flight, name), 0.0) for name in ("body_rate", "rotor_speed")},
+        **{name: then(getattr(flight, name), getattr(flight, name)[-1:]) for name in ("position", "attitude")},
+        velocity=then(flight.velocity, flight.velocity[-1:] - 4.0 * fall[:, None] * down),
+        acceleration=then(flight.acceleration, 20.0 * jolt[:, None] * down),
+    )
+    assert check([landed], SETTINGS) == ()
+
+
 @pytest.mark.parametrize("factor", [1e-3, 0.1, 30.0])
 def test_a_thrust_factor_that_is_a_guess_contradicts_nothing(flight, factor):
     assert check([guessed(flight, factor)], SETTINGS) == ()
@@ -61,6 +80,14 @@ def test_a_thrust_factor_that_is_a_guess_contradicts_nothing(flight, factor):
 FAULTS = {
     "velocity in km/h": (lambda s: replace(s, velocity=3.6 * s.velocity), "the velocity is in km/h"),
     "velocity in mm/s": (lambda s: replace(s, velocity=1e3 * s.velocity), "the velocity is in mm/s"),
+    "acceleration with gravity": (
+        lambda s: replace(s, acceleration=s.acceleration + np.array([0.0, 0.0, 9.80665])),
+        "or leave import.signals.acceleration out",
+    ),
+    "metres for millimetres": (
+        lambda s: replace(s, position=1e-3 * s.position, velocity=1e-3 * s.velocity),
+        "times what tilt and gravity make it: check import.signals.velocity.unit",
+    ),
     "velocity swapped": (
         lambda s: replace(s, velocity=s.velocity[:, [1, 0, 2]]),
         "the velocity has y, x, z where x, y, z should be",

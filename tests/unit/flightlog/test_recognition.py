@@ -154,6 +154,34 @@ def test_an_acceleration_of_the_world_is_told_from_what_is_sensed(own):
     assert "an acceleration in world axes that includes gravity" in with_gravity.left_out[0]
 
 
+def test_an_acceleration_of_the_world_in_thousandths_is_told_by_the_motion(own):
+    """As a Crazyflie estimates it: without gravity it is taken, with it there is no word for it."""
+    thousandths = {"position": named(1e3 * own.position, *PLACE), "velocity": named(1e3 * own.velocity, *SPEED)}
+    log = flat_log(own, force=named(1e3 * own.acceleration, "ax", "ay", "az"), **thousandths)
+    recognition = seen(log)
+    np.testing.assert_allclose(imported(log, recognition)["acceleration"], own.acceleration, atol=1e-9)
+    with_gravity = named(1e3 * (own.acceleration + np.array([0.0, 0.0, 9.81])), "ax", "ay", "az")
+    recognition = seen(flat_log(own, force=with_gravity, **thousandths))
+    assert recognition.signal("acceleration") is None
+    assert any("an acceleration in world axes that includes gravity" in words for words in recognition.left_out)
+
+
+def test_a_gyroscope_is_taken_before_what_is_derived_of_the_attitude(own):
+    """Motion capture is full of noise where that is fast, and so is its derivative, whatever it is called."""
+    jitter = np.random.default_rng(1).normal(size=(len(own.time), 3))
+    tracked = own.rotation * Rotation.from_rotvec(5e-3 * jitter)
+    steps = 100.0 * (tracked[:-1].inv() * tracked[1:]).as_rotvec()
+    derived = named(np.vstack([steps, steps[-1:]]), "wx", "wy", "wz")
+    angles = named(tracked.as_euler("ZYX")[:, ::-1], "roll", "pitch", "yaw")
+    gyroscope = named(own.rate, "imu_gyro_x", "imu_gyro_y", "imu_gyro_z")
+    log = flat_log(own, attitude=angles, rate=derived, sensed=gyroscope)
+    recognition = seen(log)
+    assert recognition.signal("body_rate").columns.columns == tuple(gyroscope)
+    assert any(words.startswith("wx, wy, wz: also a body rate, but the derivative") for words in recognition.left_out)
+    alone = seen(flat_log(own, attitude=angles, rate=derived))
+    assert alone.signal("body_rate").columns.columns == tuple(derived)
+
+
 def test_a_velocity_in_body_axes_is_left_out(own):
     body = own.rotation.inv().apply(own.velocity)
     recognition = seen(flat_log(own, velocity=named(body, *SPEED)))

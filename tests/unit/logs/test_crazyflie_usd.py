@@ -53,6 +53,14 @@ def test_a_check_sum_that_is_wrong_is_warned_of_and_what_is_whole_is_read(read, 
     assert warning.startswith("the checksum is wrong: the file is cut off or damaged")
 
 
+def test_an_older_card_is_named_and_not_read(tmp_path):
+    """A count of names, the names with their types, the samples."""
+    path = tmp_path / "cf50_04"
+    path.write_bytes(b"#tick(I),stateEstimateZ.x(h),stateEstimateZ.quat(I),*P\x0e")
+    with pytest.raises(InputError, match="cf50_04: a log of a Crazyflie's uSD card in its older format, which is not"):
+        log_contents(path)
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [

@@ -2,17 +2,20 @@
 
 from contextlib import suppress
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.checkpoint import VehicleCheckpointRecord
 from cpfls_cli.playback import structure
+from cpfls_cli.playback.judging import parts_of
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.structure import SearchStoppedError, Structure, choose, parts_of, tried_blocks
+from cpfls_cli.playback.structure import SearchStoppedError, Structure, choose, tried_blocks
 from cpfls_cli.search.vehicle_search import kept_of
 from tests.builders.playback_flights import MIDDLING, STATED, flown, truth
+from tests.builders.vehicle_search import WITHOUT_FORESIGHT
 
 TRIED = ("linear_damping", "rotor_drag", "flapping_moment", "quadratic_damping", "inertia")
 QUICK = PlaybackSettings(
@@ -29,8 +32,8 @@ def flights():
     return flown(truth(), ("figure", "steps"), duration_s=5.0, noise=MIDDLING, seed=2)
 
 
-def chosen(flights, progress=lambda *_: None, kept=None):
-    return choose(STATED, flights, QUICK, np.random.default_rng(0), progress, kept or {})
+def chosen(flights, progress=lambda *_: None, kept=None, settings=QUICK):
+    return choose(STATED, flights, settings, np.random.default_rng(0), progress, kept or {})
 
 
 def stopping_at(number):
@@ -52,9 +55,15 @@ def test_a_search_stopped_before_all_blocks_were_judged_has_nothing(flights):
         chosen(flights, stopping_at(2))
 
 
-def test_a_search_tells_how_far_it_is(flights):
+@pytest.fixture(scope="module")
+def searched(flights):
+    """Search to the end: what was chosen, and what was told on the way."""
     told = []
-    choice = chosen(flights, lambda judged, total: told.append((judged, total)))
+    return chosen(flights, lambda judged, total: told.append((judged, total))), told
+
+
+def test_a_search_tells_how_far_it_is(searched):
+    choice, told = searched
     assert choice.complete
     assert [len(judged) for judged, _ in told] == list(range(1, choice.evaluated + 1))
     assert all(len(judged) <= total for judged, total in told)
@@ -64,27 +73,61 @@ def test_a_search_tells_how_far_it_is(flights):
     assert choice.chosen.error < 0.3 * choice.nothing.error
 
 
+@pytest.mark.parametrize("tried", [(), ("rotor_drag",)])
+def test_a_search_among_hardly_anything_comes_to_its_end(flights, tried):
+    choice = chosen(flights, settings=replace(QUICK, leave_out=tuple(set(blocks_of(STATED)) - set(tried))))
+    assert choice.complete
+    assert set(choice.everything.structure.blocks) == set(tried)
+
+
 @pytest.mark.parametrize("number", [1, 7])
-def test_a_search_goes_on_from_what_was_kept(flights, number):
+def test_a_search_goes_on_from_what_was_kept(flights, searched, number):
     """Nothing is judged twice, and every fit starts from where it would have started."""
-    whole, parts = [], []
+    parts = []
 
     def stopping(judged, _):
         parts.append(judged)
         if len(judged) == number:
             raise SearchStoppedError
 
-    without = chosen(flights, lambda judged, _: whole.append(judged))
+    without, told = searched
     with suppress(SearchStoppedError):
         chosen(flights, stopping)
     kept = kept_of(VehicleCheckpointRecord.of(parts[-1]))
     resumed = chosen(flights, lambda judged, _: parts.append(judged), kept)
     assert [len(judged) for judged in parts] == list(range(1, without.evaluated + 1))
-    pairs = list(zip(whole[-1], parts[-1], strict=True))
+    pairs = list(zip(told[-1][0], parts[-1], strict=True))
     assert [one.structure for one, _ in pairs] == [other.structure for _, other in pairs]
     assert all(a.error == b.error and np.array_equal(a.by_block, b.by_block) for a, b in pairs)
     assert resumed.chosen.structure == without.chosen.structure
     assert resumed.complete
+
+
+def test_what_is_foretold_saves_fits_and_leads_to_the_same_structure(flights, searched, monkeypatch):
+    quick, _ = searched
+    for name, value in WITHOUT_FORESIGHT.items():
+        monkeypatch.setattr(structure, name, value)
+    whole = chosen(flights)
+    assert quick.chosen.structure == whole.chosen.structure
+    assert quick.chosen.error == pytest.approx(whole.chosen.error, rel=1e-3)
+    assert quick.evaluated < whole.evaluated
+
+
+def test_errors_are_foretold_near_a_fit(flights):
+    """A block less, and one more: fitted, both come to what was foretold from the fit between them."""
+    bench = structure._Bench(STATED, parts_of(flights, QUICK), lambda *_: None, 1, {})
+    base = ("inertia", "thrust_factor", "lag", "linear_damping", "rotor_drag", "flapping_moment")
+    judged = bench.judge(Structure(base))
+    asked = [Structure(base[:4] + base[5:]), Structure((*base, "drag_factor"))]
+    outlook = bench.outlook(judged, asked)
+    for each in asked:
+        fitted = bench.judge(each)
+        assert outlook.errors(each.blocks) == pytest.approx(fitted.by_block, rel=0.2)
+        assert outlook.errors(each.blocks).mean() == pytest.approx(fitted.by_block.mean(), rel=0.05)
+        error, numbers, condition = outlook.objectives(each.blocks)
+        assert error == pytest.approx(fitted.error, rel=0.05)
+        assert numbers == fitted.numbers
+        assert 10**condition == pytest.approx(fitted.condition_number, rel=0.5)
 
 
 class Bench:
@@ -93,12 +136,18 @@ class Bench:
     stays = 1.0
 
     def __init__(self, errors):
-        self.errors, self.known = errors, {}
+        self.errors, self.known, self.foretold = errors, {}, {}
 
     def judge(self, tried):
         error, count = self.errors["".join(tried.blocks)], len(tried.blocks)
-        by_block = error + 0.002 * (-1) ** count * np.array([-1.0, 1.0])
-        return self.known.setdefault(tried, structure.Judged(tried, error, by_block, count, 1.0, None, ()))
+        judged = structure.Judged(tried, error, self.by_block(tried.blocks), count, 1.0, None, ())
+        return self.known.setdefault(tried, judged)
+
+    def by_block(self, blocks):
+        return self.errors["".join(blocks)] + 0.002 * (-1) ** len(blocks) * np.array([-1.0, 1.0])
+
+    def outlook(self, near, asked):  # noqa: ARG002
+        return SimpleNamespace(errors=self.by_block, objectives=lambda _: (0.0, 0.0, 0.0))
 
 
 def test_blocks_that_gain_only_beside_others_are_added():
@@ -113,7 +162,7 @@ def test_no_block_can_be_left_out_of_the_choice():
     bench.judge(Structure(("a", "b", "c")))
     structure._refine(bench, ("a", "b", "c"))
     assert structure._preferred(bench)[2].structure.blocks == ("a", "b")
-    assert Structure(("a",)) in bench.known
+    assert Structure(("a",)) in (*bench.known, *bench.foretold)
 
 
 @pytest.mark.parametrize(

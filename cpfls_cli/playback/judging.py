@@ -1,0 +1,171 @@
+"""What structures of a vehicle are judged by: parts kept aside in turn, and the errors there, computed or foretold."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.gauss_newton import damped_step
+from cpfls_cli.playback.fit import PRIOR, Fitted, FittedNumbers, FitWindows, WindowSums, window_errors, windows_of
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.groups import JointNumbers
+from cpfls_cli.playback.parameters import SLOW
+from cpfls_cli.playback.settings import PlaybackSettings
+
+_FEWEST_BLOCKS = 8
+"""Pieces of the flights kept aside whose errors are compared: fewer say little of their scatter."""
+
+_UNSEEN = 3.0
+"""How many times as fast about an axis a part turns, at least, that is nothing like the others."""
+
+_DAMPING = 1e-3
+"""Share of the diagonal: that of the first step of a fit."""
+
+
+def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> list[list[FitWindows]]:
+    """Split flights into parts that are kept aside in turn: neighbours in their order, or pieces of each.
+
+    Neighbours are kept aside together because flights of one kind usually stand side by side: what a model has to
+    predict is a kind of flight that it has not seen. Pieces are taken of a single flight, and where a part turns about
+    an axis about which hardly anything turns in the others: no model can be asked for what nothing tells.
+    """
+    flown = sum(len(flight) * flight.motion.period for flight in flights)
+    interval = max(settings.window_interval_s, flown / settings.search_windows)
+    windows = windows_of(flights, settings.horizon_s, interval)
+    count = min(settings.folds, len(windows))
+    ends = np.linspace(0, len(windows), count + 1).round().astype(int).tolist()
+    together = [windows[start:end] for start, end in pairwise(ends)]
+    if count > 1 and not _lacks_an_axis(together):
+        return together
+    cut = [_pieces(each, settings.folds) for each in windows]
+    return [part for pieces in zip(*cut, strict=True) if (part := [piece for piece in pieces if len(piece.starts)])]
+
+
+def _pieces(windows: FitWindows, count: int) -> list[FitWindows]:
+    """Cut the windows of a flight; those that reach into the next piece are left out, so that none shares a sample."""
+    pieces = np.array_split(windows.starts, count)
+    ends = [*(piece[0] if len(piece) else np.inf for piece in pieces[1:]), np.inf]
+    kept = [piece[piece + windows.horizon < end] for piece, end in zip(pieces, ends, strict=True)]
+    return [FitWindows(windows.flight, piece, windows.loss) for piece in kept]
+
+
+def _lacks_an_axis(parts: Sequence[Sequence[FitWindows]]) -> bool:
+    """Tell whether a part turns about an axis about which hardly anything turns in the others."""
+    squares = np.array([sum((each.motion.rate**2).sum(axis=0) for each in part) for part in parts])
+    samples = np.array([sum(len(each.motion.rate) for each in part) for part in parts])[:, None]
+    others = np.sqrt((squares.sum(axis=0) - squares) / (samples.sum() - samples))
+    return bool(np.any(np.sqrt(squares / samples) > _UNSEEN * others))
+
+
+def block_errors(errors: Sequence[Array]) -> Array:
+    """Take the means of errors by flight, which is what is independent; few of them are cut."""
+    blocks = _blocks([len(each) for each in errors])
+    pairs = zip(errors, blocks, strict=True)
+    return np.array([each[own == block].mean() for each, own in pairs for block in range(own[-1] + 1)])
+
+
+def _blocks(counts: Sequence[int]) -> list[IntArray]:
+    """Say which block each window of a flight is in, from the numbers of the windows."""
+    pieces = -(-_FEWEST_BLOCKS // len(counts))
+    found = (np.array_split(np.zeros(count), min(pieces, count)) for count in counts)
+    return [np.repeat(np.arange(len(own)), [len(piece) for piece in own]) for own in found]
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """Loss of free runs near values of numbers, to second order, by pieces of the flights.
+
+    A model with fewer numbers has the others at where they are absent, and one with more has them there at first: both
+    are foretold by the step that a fit would take from there, without each part and then judged on it. Errors of the
+    step make what is foretold too large rather than too small, as the loss grows by less than the square.
+
+    Attributes
+    ----------
+    values : array, shape (number,)
+    loss : array, shape (piece,)
+        Sums, as are gradient, shape (piece, number), and Hessian, shape (piece, number, number), both in scales.
+    count : array, shape (piece,)
+        Windows.
+    part : array of int, shape (piece,)
+        That is kept aside with the piece.
+
+    References
+    ----------
+    Rao 1948 (score test); Lawless and Singhal 1978 (subsets from one fit by its Hessian).
+    """
+
+    free: JointNumbers
+    values: Array
+    loss: Array
+    gradient: Array
+    hessian: Array
+    count: IntArray
+    part: IntArray
+
+    @classmethod
+    def of(cls, free: JointNumbers, values: Array, parts: Sequence[Sequence[FitWindows]]) -> Outlook:
+        """Evaluate runs and their derivatives once; pieces are the blocks of `block_errors`."""
+        windows = [window for part in parts for window in part]
+        pieces = _blocks([len(each.starts) for each in windows])
+        gradient, hessian = zip(*WindowSums(free, windows, values).derivatives(pieces), strict=True)
+        fitted, scale = FittedNumbers(free, values, np.nan), free.scales
+        loss = [np.bincount(own, window_errors(fitted, each)) for own, each in zip(pieces, windows, strict=True)]
+        place = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+        return cls(
+            free,
+            values,
+            np.concatenate(loss),
+            np.concatenate(gradient) * scale,
+            np.concatenate(hessian) * scale[:, None] * scale,
+            np.concatenate([np.bincount(own) for own in pieces]),
+            np.repeat(place, [len(own) for own in loss]),
+        )
+
+    @cached_property
+    def _without(self) -> list[tuple[Array, Array]]:
+        """Gradient and Hessian of the mean objective without each part."""
+        scale, belief = self.free.scales, PRIOR / self.free.spreads**2
+        away, found = (self.values - self.free.starts) / scale, []
+        for part in range(int(self.part.max()) + 1):
+            kept = self.part != part
+            count = self.count[kept].sum()
+            gradient, hessian = self.gradient[kept].sum(axis=0), self.hessian[kept].sum(axis=0)
+            found.append((gradient / count + belief * away, hessian / count + np.diag(belief)))
+        return found
+
+    def errors(self, blocks: Collection[str]) -> Array:
+        """Foretell the mean errors of a model of some of the blocks, on each piece, shape (piece,)."""
+        free, scale, own = self.free, self.free.scales, self._own(blocks)
+        # Without shares of slow actuation its time constant says nothing.
+        absent = [value if n.name == SLOW else n.absent for n, value in zip(free.numbers, self.values, strict=True)]
+        low, high = ((bound - self.values) / scale for bound in (free.lows, free.highs))
+        move, errors = np.where(own, 0.0, (np.array(absent) - self.values) / scale), np.empty(len(self.loss))
+        for part, (gradient, hessian) in enumerate(self._without):
+            moved, aside = (gradient + hessian @ move)[own], self.part == part
+            step = move.copy()
+            room = np.minimum(low[own], 0.0), np.maximum(high[own], 0.0)
+            step[own] = damped_step(hessian[np.ix_(own, own)], moved, _DAMPING, *room)
+            square = 0.5 * np.einsum("i,pij,j->p", step, self.hessian[aside], step, optimize=True)
+            errors[aside] = (self.loss[aside] + self.gradient[aside] @ step + square) / self.count[aside]
+        return errors
+
+    def error(self, blocks: Collection[str]) -> float:
+        """Foretell the mean error of a model of some of the blocks."""
+        return float(np.average(self.errors(blocks), weights=self.count))
+
+    def objectives(self, blocks: Collection[str]) -> tuple[float, float, float]:
+        """Foretell mean error, numbers and logarithm of the condition number of the fit of some of the blocks."""
+        own = self._own(blocks)
+        hessian = self.hessian.sum(axis=0) / self.count.sum() + np.diag(PRIOR / self.free.spreads**2)
+        condition = Fitted(self.free, self.values, np.nan, hessian[np.ix_(own, own)]).condition_number
+        return self.error(blocks), float(own.sum()), float(np.log10(condition))
+
+    def _own(self, blocks: Collection[str]) -> BoolArray:
+        """Tell which numbers a model of some of the blocks has; what is not known of a vehicle every one has."""
+        held = {*blocks, *self.free.base.vehicle.unknown}
+        return np.array([number.block in held for number in self.free.numbers], dtype=bool)
