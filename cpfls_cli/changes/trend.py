@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.changes.judge import FALSE_ALARM, Change, beyond_chance, judged
 from cpfls_cli.changes.numbers import FlightNumbers
-from cpfls_cli.changes.reference import FEWEST, Reference, expected_covariance, learned_covariance
+from cpfls_cli.changes.reference import FEWEST, Reference, expected_covariance, kinds_of, learned_covariance
 from cpfls_cli.errors import InputError, install_command
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -203,7 +203,7 @@ class Row:
     expected : array, shape (number, number)
         Covariance of a flight before any is seen.
     voltage : array, shape (flight, number)
-        Standard deviation of what all flights have in common by the voltage, whose effect is not known well.
+        Standard deviation of what numbers of a kind have in common by the voltage, whose effect is not known well.
     noise : array, shape (flight, number)
         Standard deviation of what a flight tells worse than others do.
     """
@@ -247,13 +247,14 @@ class Row:
         """Draw such rows of unchanged vehicles: of each its covariance (inverse Wishart), then its flights."""
         covariance, freedom = self.covariance(self.values)
         root, size = np.linalg.cholesky(covariance), len(covariance)
+        kind = np.unique(kinds_of(self.names), return_inverse=True)[1]
         for _ in range(count):
             # Bartlett's decomposition of a Wishart matrix.
             lower = np.tril(rng.normal(size=(size, size)), -1)
             lower += np.diag(np.sqrt(rng.chisquare(freedom + size - 1 - np.arange(size))))
             drawn = np.linalg.solve(lower.T, rng.normal(size=(size, len(self.values))))
             noise = rng.normal(size=self.noise.shape) * self.noise
-            yield np.sqrt(freedom) * (root @ drawn).T + rng.normal() * self.voltage + noise
+            yield np.sqrt(freedom) * (root @ drawn).T + rng.normal(size=size)[kind] * self.voltage + noise
 
 
 def change_points(row: Row, rng: np.random.Generator) -> tuple[float, list[int]]:

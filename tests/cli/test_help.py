@@ -29,6 +29,7 @@ COMMANDS = (
     "extend",
     "gap",
     "changed",
+    "trend",
     "info",
     "check",
     "config",

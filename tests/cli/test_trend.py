@@ -47,24 +47,24 @@ def write_log(path, seed, lacks=0.0):
 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory):
-    """Eight flights as they were and three with a weak M3, whose names are not in the order of text."""
+    """Ten flights as they were and three with a weak M3, whose names are not in the order of text."""
     folder = tmp_path_factory.mktemp("flights")
     (folder / "study.yaml").write_text(CONFIG + VEHICLE)
     (folder / "logs").mkdir()
-    for number in range(1, 12):
-        write_log(folder / "logs" / f"log{number}.csv", number, 0.2 if number > 8 else 0.0)
+    for number in range(1, 14):
+        write_log(folder / "logs" / f"log{number}.csv", number, 0.2 if number > 10 else 0.0)
     return folder
 
 
 @pytest.fixture(scope="module")
 def told(cpfls, logs):
-    """The trend of the first ten, and of all with one that cannot be read."""
+    """The trend of the first twelve, and of all with one that cannot be read."""
     with undrawn():
         out = logs / "trend"
-        ten = [logs / "logs" / f"log{number}.csv" for number in range(1, 11)]
-        first = cpfls("trend", logs / "study.yaml", *reversed(ten), "-o", out, "--json")
-        (logs / "logs" / "log12.csv").write_text("t,fx\n0,1\n")
-        shutil.copy(logs / "logs" / "log3.csv", logs / "logs" / "log13.csv")
+        twelve = [logs / "logs" / f"log{number}.csv" for number in range(1, 13)]
+        first = cpfls("trend", logs / "study.yaml", *reversed(twelve), "-o", out, "--json")
+        (logs / "logs" / "log14.csv").write_text("t,fx\n0,1\n")
+        shutil.copy(logs / "logs" / "log3.csv", logs / "logs" / "log15.csv")
         second = cpfls("trend", logs / "study.yaml", logs / "logs", "-o", out)
     assert first.exit_code == 0, first.stderr
     assert second.exit_code == 0, second.stderr
@@ -73,41 +73,41 @@ def told(cpfls, logs):
 
 def test_a_rotor_is_named_since_its_flight(told):
     (shift,) = told.first["shifts"]
-    assert (shift["since"], shift["flight"]) == ("log9.csv", 9)
+    assert (shift["since"], shift["flight"]) == ("log11.csv", 11)
     (cause,) = shift["causes"]
     assert (cause["name"], cause["named"]) == ("rotor M3", True)
     assert cause["sizes"][0]["low"] < 0.2 < cause["sizes"][0]["high"]
-    assert told.first["reference_flights"] == [f"log{number}.csv" for number in range(1, 6)]
+    assert told.first["reference_flights"] == [f"log{number}.csv" for number in range(1, 7)]
     assert told.first["order"] == "name"
-    assert told.first["new"] == 10
+    assert told.first["new"] == 12
 
 
 def test_the_first_screen(told):
     lines = told.second.stdout.splitlines()
-    assert lines[0].startswith("CHANGED: Since log9.csv (flight 9 of 11): rotor M3 pulls ")
+    assert lines[0].startswith("CHANGED: Since log11.csv (flight 11 of 13): rotor M3 pulls ")
     assert len(lines) <= 15
-    assert "11 in the order of their names; the first 5 are the reference." in told.second.stdout
+    assert "13 in the order of their names; the first 6 are the reference." in told.second.stdout
     assert "look at its propeller" in told.second.stdout.lower()
 
 
 def test_a_second_call_reads_what_is_new_and_names_what_cannot_be_read(told):
-    assert "1 of 11 flights were new, the others kept" in told.second.stdout
+    assert "1 of 13 flights were new, the others kept" in told.second.stdout
     assert "left out, 1 flight: " in told.second.stderr
-    assert "log12.csv" in told.second.stderr
-    assert "log13.csv" in (told.out / "trend.json").read_text()
-    assert len(list((told.out / "flights").iterdir())) == 11
+    assert "log14.csv" in told.second.stderr
+    assert "log15.csv" in (told.out / "trend.json").read_text()
+    assert len(list((told.out / "flights").iterdir())) == 13
 
 
 def test_what_the_folder_holds(cpfls, told):
     assert {path.name for path in told.out.iterdir()} == {*command.FILES, "flights"}
     rows = list(csv.DictReader((told.out / "trend.csv").read_text().splitlines()))
-    assert [row["flight"] for row in rows] == [f"log{number}.csv" for number in range(1, 12)]
-    assert [row["part"] for row in rows] == ["1"] * 8 + ["2"] * 3
+    assert [row["flight"] for row in rows] == [f"log{number}.csv" for number in range(1, 14)]
+    assert [row["part"] for row in rows] == ["1"] * 10 + ["2"] * 3
     assert float(rows[-1]["load M3"]) - float(rows[0]["load M3"]) == pytest.approx(-np.log(0.8), abs=0.1)
     summary = json.loads((told.out / "trend.json").read_text())
     assert [row["flight"] for row in summary["flights"]] == [row["flight"] for row in rows]
     assert cpfls("check", told.out / "trend.h5").exit_code == 0
-    assert "Since log9.csv" in cpfls("info", told.out / "trend.h5").stdout
+    assert "Since log11.csv" in cpfls("info", told.out / "trend.h5").stdout
 
 
 def test_dates_of_all_logs_order_them(cpfls, logs, told, tmp_path):
@@ -125,7 +125,7 @@ def test_dates_of_all_logs_order_them(cpfls, logs, told, tmp_path):
     dated, named = (json.loads(each.stdout) for each in (by_date, by_name))
     assert (dated["order"], named["order"]) == ("date", "name")
     (shift,) = dated["shifts"]
-    assert (shift["since"], shift["flight"], shift["flown_at_s"]) == ("log8.csv", 4, 1.7e9 - 8 * DAYS)
+    assert (shift["since"], shift["flight"], shift["flown_at_s"]) == ("log10.csv", 4, 1.7e9 - 10 * DAYS)
     assert shift["causes"][0]["sizes"][0]["value"] < 0
     assert (out / "trend.csv").read_text().splitlines()[1].startswith("log1.csv,2023-11-13T22:13:20+00:00,")
 
@@ -169,7 +169,7 @@ def test_an_interrupt_loses_nothing_that_was_read(cpfls, logs, tmp_path, monkeyp
     [
         (["log1.csv", "log2.csv"], "2 flights tell the same numbers, and a trend needs 4 at least"),
         (["log1.csv", "log2.csv", "log3.csv", "log4.csv", "--order", "date"], "no log tells when it was flown"),
-        (["log12.csv"], "log12.csv"),
+        (["log14.csv"], "log14.csv"),
         (["empty"], "holds no flight and no log"),
     ],
 )
