@@ -122,6 +122,7 @@ def _of_changes(show, folder):
     before = [f"own/before{number}.csv" for number in range(1, 5)]
     show("changed", "changed", "own/study.yaml", "own/weak1.csv", "--since", *before, output="changed")
     show("not changed", "changed", "own/study.yaml", "own/same.csv", "--since", *before, output="unchanged")
+    show("trend", "trend", "own/study.yaml", *before, "own/weak1.csv", "--order", "given", output="trend")
 
 
 def _of_logs(show, folder):
@@ -160,7 +161,7 @@ NAMES = (
     *("trajectory", "mission", "simulate", "tracking", "reduce", "identify", "sweep", "response"),
     *("info flight", "info selection", "info diagnosis", "check", "effects", "effect payload", "effect flexible_mount"),
     *("effect linear_damping", "compare", "diagnose", "extend", "gap", "gap of nothing", "response of a model"),
-    *("changed", "not changed"),
+    *("changed", "not changed", "trend"),
     *("init", "init of one", "import"),
 )
 """Runs by name."""

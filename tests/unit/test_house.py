@@ -191,7 +191,6 @@ def test_tests_import_from_shared_builders_alone():
 ONE_OF_A_KIND = ("commands/", "effects/catalogue/", "export/simulators/", "logs/")
 SMALL_ALL_THE_SAME = {
     "cli/main.py": "runs before anything heavy is loaded",
-    "flights/kept_numbers.py": "of every command that compares flights by their numbers",
     "gap/next_flight/search.py": "what the room is for",
     "pages/flight_numbers.py": "the page of an artifact",
     "regressor/table.py": "loads without compiled loops",
