@@ -139,7 +139,7 @@ def _warnings(
     if len({own.commanded for own in flights}) > 1:
         speeds, commands = ([own.flight for own in flights if own.commanded == of] for of in (False, True))
         yield (
-            f"{joined(speeds)} log speeds of rotors, {joined(commands)} commands: loads are not compared; import the "
+            f"speeds of rotors in {joined(speeds)}, commands in {joined(commands)}: loads are not compared; import the "
             "same signal of all"
         )
     elif flights[0].commanded and not all(np.isfinite(own.voltage) for own in flights):

@@ -1,0 +1,138 @@
+"""`cpfls changed`: what it says of flights before and after a rotor became weak, what it keeps, and what it refuses."""
+
+import json
+
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts.changed import ChangedRecord
+from cpfls_cli.artifacts.store import read_record
+from tests.builders.changed_flights import HEADER, flight_table, save, write_flights
+
+pytestmark = pytest.mark.usefixtures("undrawn")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return write_flights(tmp_path_factory.mktemp("changed"))
+
+
+@pytest.fixture(scope="module")
+def changed(cpfls, folder):
+    """Run the command on flights of today by name; the numbers of all flights are kept in one folder."""
+
+    def call(*today, before=(1, 2, 3, 4, 5), options=()):
+        since = [folder / f"before{number}.csv" for number in before]
+        words = ["changed", folder / "study.yaml", *(folder / name for name in today), "--since", *since]
+        return cpfls(*words, "-o", folder / "out", "--force", *options)
+
+    return call
+
+
+def test_of_flights_as_before_nothing_is_named(changed):
+    result = changed("same.csv", options=["--fail-on-change"])
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith("NO CHANGE: ")
+    assert "a rotor that pulls" in result.stdout.lower()
+    assert " of the centre of mass" in result.stdout
+
+
+def test_a_weak_rotor_is_named_with_its_loss(changed, folder):
+    result = changed("weak1.csv", "weak2.csv", options=["--json", "--fail-on-change"])
+    assert result.exit_code == 1
+    told = json.loads(result.stdout)
+    assert told == json.loads((folder / "out" / "changed.json").read_text())
+    (cause,) = told["causes"]
+    assert (told["changed"], cause["name"], cause["named"]) == (True, "rotor M3", True)
+    (size,) = cause["sizes"]
+    assert size["low"] < 0.2 < size["high"]
+    assert told["since"] == "weak1.csv"
+    # Of a cross each rotor carries a quarter alone.
+    load = told["numbers"]["load M3"]
+    assert np.mean(load["today"]) - load["reference"] == pytest.approx(-np.log(0.8), abs=0.03)
+
+
+def test_the_flight_that_it_began_with_is_told(changed, folder):
+    # As weak that each flight shows it alone.
+    for number in (3, 4, 5):
+        save(folder / f"weak{number}.csv", flight_table(20 + number, (1.0, 1.0, 0.65, 1.0)), HEADER)
+    result = changed("same.csv", *(f"weak{number}.csv" for number in (3, 4, 5)))
+    assert "otor M3 pulls" in result.stdout.splitlines()[0]
+    assert "weak3.csv, number 2 of 4; those before do not show it alone" in result.stdout
+    after = result.stdout.partition("next:\n")[2]
+    assert "weak3.csv" in after
+    assert "same.csv" not in after
+
+
+def test_numbers_of_flights_are_kept(changed, folder, monkeypatch):
+    changed("same.csv")
+    kept = {path: path.read_bytes() for path in (folder / "out" / "flights").iterdir()}
+    monkeypatch.setattr("cpfls_cli.flights.kept_numbers.read_alone", None)
+    assert changed("same.csv").exit_code == 0
+    monkeypatch.undo()
+    # Of another vehicle they are others.
+    assert changed("same.csv", options=["--set", "vehicle.mass_kg=7"]).exit_code == 0
+    assert any(path.read_bytes() != content for path, content in kept.items())
+
+
+def test_values_of_an_option_follow_one_another_or_it_is_repeated(cpfls, changed, folder):
+    before = [folder / f"before{number}.csv" for number in (1, 2, 3)]
+    repeated = [word for path in before for word in ("--since", path)]
+    words = ("changed", folder / "study.yaml", *repeated, folder / "same.csv", "-o", folder / "out", "--force")
+    # What follows the last belongs to it.
+    assert cpfls(*words).exit_code == 2
+    again = cpfls(*words[:2], folder / "same.csv", *repeated, *words[-3:])
+    assert again.stdout == changed("same.csv", before=(1, 2, 3)).stdout
+
+
+def test_what_the_comparison_lacks_is_said(changed, folder, tmp_path):
+    assert "note: 2 reference flights: " in changed("same.csv", before=(1, 2)).stderr
+    slow = save(tmp_path / "slow.csv", flight_table(31, rate_hz=50.0), HEADER)
+    speeds = save(tmp_path / "speeds.csv", flight_table(32), HEADER.replace("c1,c2,c3,c4,volts", "om1,om2,om3,om4,no"))
+    short = save(tmp_path / "short.csv", flight_table(33, duration=2.0), HEADER)
+    notes = changed(slow, short, options=["-v"]).stderr
+    assert "another sampling rate than the usual one of the reference, 100 Hz: slow.csv (50 Hz)" in notes
+    assert "note: left out: short.csv: flies for " in notes
+    assert "not compared, for not all flights tell it: vibration gyroscope x" in notes
+    notes = changed(speeds, options=["-v"]).stderr
+    assert "speeds of rotors in speeds.csv, commands in before1.csv, " in notes
+    dead = save(tmp_path / "dead.csv", flight_table(34), HEADER.replace("volts", "no"))
+    without = "without the battery's voltage: dead.csv; an emptier battery looks like a heavier vehicle"
+    assert without in changed(dead, options=["-v"]).stderr
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes((folder / "same.csv").read_bytes())
+    assert "copy.csv: is given twice, also as same.csv; counted once" in changed("same.csv", copy).stderr
+
+
+def test_what_a_user_gets_wrong_is_refused(cpfls, refuse, folder, tmp_path):
+    study, same, before = folder / "study.yaml", folder / "same.csv", folder / "before1.csv"
+    (message,) = refuse("changed", study, same, before, "--since", before, "-o", tmp_path / "out")
+    assert message.endswith("is both a flight of today and one of the reference (--since); leave it out of one")
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "notes.txt").write_text("mine")
+    (message,) = refuse("changed", study, same, "--since", before, "-o", tmp_path / "full")
+    assert "exists already and is not empty" in message
+    short = save(tmp_path / "short.csv", flight_table(33, duration=2.0), HEADER)
+    result = cpfls("changed", study, short, "--since", before, "-o", tmp_path / "out")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "short.csv: flies for" in result.stderr
+
+
+def test_artifact_report_and_info_say_the_same(cpfls, changed, folder):
+    first = changed("weak1.csv", "weak2.csv").stdout.splitlines()[0]
+    made = folder / "out" / "changed.h5"
+    record = read_record(made, ChangedRecord)
+    assert (record.changed, record.since) == (True, 0)
+    assert cpfls("check", made).exit_code == 0
+    assert first in cpfls("info", made).stdout
+    assert first.partition(": ")[2].partition(";")[0] in (folder / "out" / "report.html").read_text()
+    page = folder / "page.md"
+    assert cpfls("report", folder / "study.yaml", made, "-o", page, "--force").exit_code == 0
+    assert "cpfls changed study-" in page.read_text()
+    assert "weak1.csv weak2.csv --since before1.csv --since before2.csv" in page.read_text()
+
+
+def test_nothing_is_written_when_dry(cpfls, folder, tmp_path):
+    words = ("changed", folder / "study.yaml", folder / "same.csv", "--since", folder / "before1.csv", "--dry-run")
+    assert cpfls(*words, "-o", tmp_path / "out").exit_code == 0
+    assert not list(tmp_path.iterdir())
