@@ -291,6 +291,13 @@ $(GAP_REPORT): $(GAP_CONFIG) $(GAP)/flight-1.h5 $(GAP)/flight-2.h5
 docs/gap-example.svg: $(GAP_REPORT)
 	sed -n '/<figure id="gap-picture-1">/,/<\/svg>/{/<figure/d;s/.*<svg/<svg/;s/<\/svg>.*/<\/svg>/;p}' $< > $@
 
+# Five flights from before, and two with a rotor that lost a fifth of its thrust.
+CHANGED := data/changed-example
+docs/changed.svg: tests/builders/changed_flights.py | $(INSTALLED)
+	$(BIN)/python -m tests.builders.changed_flights $(CHANGED)
+	$(CPFLS) changed $(CHANGED)/study.yaml $(CHANGED)/weak*.csv --since $(CHANGED)/before*.csv -o $(CHANGED)/changed --force
+	sed -n '/<figure id="changed-1">/,/<\/svg>/{/<figure/d;s/.*<svg/<svg/;s/<\/svg>.*/<\/svg>/;p}' $(CHANGED)/changed/report.html > $@
+
 # Flights of a vehicle that is not what its config states; the last is held out. Each has a path of its own.
 REPLAY := data/replay-example
 REPLAY_CONFIG := configs/replay-example.yaml
@@ -424,6 +431,6 @@ fuzz: $(INSTALLED_DEV)
 	$(BIN)/python -m benchmarks.fuzz --each $(EACH) --kills $(KILLS) $(FUZZ)
 
 clean:
-	rm -rf data/paper data/paper-gentle data/quick data/hexarotor data/full-circle data/crazyflie data/gap-example data/replay-example
+	rm -rf data/paper data/paper-gentle data/quick data/hexarotor data/full-circle data/crazyflie data/gap-example data/replay-example data/changed-example
 
 FORCE:

@@ -1,5 +1,8 @@
 """Logs of a vehicle that hovers and turns gently, and of the same one with something about it changed."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 from scipy.signal import lfilter
 
@@ -53,3 +56,8 @@ def write_flights(folder):
     for number in (1, 2):
         save(folder / f"weak{number}.csv", flight_table(20 + number, WEAK), HEADER)
     return folder
+
+
+if __name__ == "__main__":
+    Path(sys.argv[1]).mkdir(parents=True, exist_ok=True)
+    write_flights(Path(sys.argv[1]))
