@@ -2,13 +2,14 @@
 
 import json
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
 from tests.builders.command_line import run, undrawn
 from tests.builders.recorded_flights import path_of_log
-from tests.flights.gap.conftest import CONFIGS
 
+CONFIGS = Path(__file__).parents[3] / "configs" / "gap"
 NORMAL = [f"normal_flight__E8_log0{number}" for number in range(3)]
 CUT = {
     millimetres: [f"cut_propeller_M3_{millimetres}mm_{millimetres}mm_{left}mm__E8_log0{number}" for number in (0, 1)]
