@@ -295,6 +295,9 @@ class VehicleRecord(ModelRecord):
         units="rad/s",
         default=None,
     )
+    rotors_told: float | None = dataset(
+        "how often the logs tell the rotors, the slowest of them", units="Hz", default=None
+    )
     difference: DifferencesGroup | None = group(default=None)
     contradiction: tuple[str, ...] | None = dataset(
         "contradictions within the flights or with the vehicle", "contradiction", default=None
@@ -312,6 +315,7 @@ class VehicleRecord(ModelRecord):
         responses: Sequence[VehicleResponse] = (),
         *,
         fading_s: float | None = None,
+        rotors_told: float | None = None,
         commanded: bool,
         shares: bool = False,
     ) -> Self:
@@ -341,6 +345,7 @@ class VehicleRecord(ModelRecord):
             warning=tuple(warnings),
             guess=found.guessed or None,
             full_speed=found.model.vehicle.rotor_speed_max_rad_s if shares else None,
+            rotors_told=rotors_told,
             difference=columns_of(DifferencesGroup, found.differences) if found.differences else None,
             contradiction=None if contradictions is None else tuple(contradictions),
             disturbance=None if found.gusts is None else DisturbanceGroup.of(found.gusts),
@@ -450,6 +455,7 @@ class VehicleRecord(ModelRecord):
             "forecast_verdict": self.forecast_verdict,
             "not_determined": list(self.untold),
             "full_speed_rad_s": self.full_speed,
+            "rotors_told_hz": self.rotors_told,
             **self.provenance,
             "parameters": {row.pop("key"): row for row in (each._asdict() for each in parameters_of(self))},
             "numbers": numbers,

@@ -50,6 +50,8 @@ from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, sty
 from cpfls_cli.report.content import Block, Cell, Facts, Folded, Heading, Listing, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, number, percent, whole_percent
 from cpfls_cli.response.mismatch import ACCEPTABLE
+from cpfls_cli.trajectory.consistency import coarsest_excited
+from cpfls_cli.trajectory.settings import ExciteSettings
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import joined
 
@@ -89,6 +91,9 @@ _FLIGHTS = {
     **dict.fromkeys(CENTRE, "climb and descend with much and little thrust: what an offset turns grows with thrust"),
 }
 """What would tell a constant that the flights do not."""
+
+FASTER = "LOG_BITMASK of ArduPilot (fast attitude and IMU), SDLOG_PROFILE of PX4 (high rate)"
+"""What makes autopilots log faster."""
 
 _FAR = 3.0
 """Factor from the stated number from which on a found one is called effective, and no property of a part."""
@@ -165,6 +170,8 @@ def _against(record: VehicleRecord) -> Iterator[str]:
     if record.contradiction:
         yield from playback_words(Trust.DO_NOT_USE, None, record.contradiction)
         return
+    if record.trust in (Trust.LOOP, Trust.LACKING, Trust.NOT_DETERMINED):
+        yield from _slow_words(record)
     if record.trust == Trust.LOOP or (record.loop.shown and record.instruments is None):
         yield loop_words(record)
     heavy = too_heavy(record)
@@ -307,6 +314,17 @@ def _share_words(share: Array, error: Array) -> str:
         for value, within in zip(share[:2], error[:2], strict=True)
     )
     return f"{roll} of the roll and {pitch} of the pitch"
+
+
+def _slow_words(record: VehicleRecord) -> Iterator[str]:
+    """Say of logs too slow for what a flight is asked to show that no flight helps before they are faster."""
+    least = 1 / coarsest_excited(ExciteSettings())
+    if record.rotors_told is not None and round(record.rotors_told) < round(least):
+        yield (
+            f"The logs tell the rotors {number(record.rotors_told, 2)} times a second, and nothing of motion above "
+            f"{number(record.rotors_told / 2, 2)} Hz; another flight tells no more until rotors and body rates are "
+            f"logged {least:g} times a second or faster: {FASTER}."
+        )
 
 
 def loop_words(record: VehicleRecord) -> str:
