@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cpfls_cli.control.controllers import Plan
     from cpfls_cli.control.track import Scores
     from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-    from cpfls_cli.flightlog.results import ImportedFlight, ImportReport
+    from cpfls_cli.flightlog.results import ImportedFlight
     from cpfls_cli.simulation.model import SimulatedEffects
 
 MOTION = ("attitude", "attitude_rate", "attitude_acceleration")
@@ -44,9 +44,14 @@ class QualityGroup:
     updated: Array | None = dataset("updates a second of these", "slow", units="Hz", default=None)
 
     @classmethod
-    def of(cls, findings: Mapping[str, int], report: ImportReport) -> Self | None:
-        """Arrange what was found in a log and done about it, with how often, and its report; None if there is none."""
-        warnings, cut_off_hz, updated_hz = report.warnings, report.cut_off_hz, report.updated_hz
+    def of(
+        cls,
+        findings: Mapping[str, int],
+        warnings: Sequence[str],
+        cut_off_hz: Mapping[str, float],
+        updated_hz: Mapping[str, float],
+    ) -> Self | None:
+        """Arrange what was found in a log, how often, the warnings, and how fast it is; None where there is none."""
         if not findings and not warnings and not cut_off_hz and not updated_hz:
             return None
         return cls(
@@ -344,7 +349,7 @@ class FlightRecord(Record):
         return cls(
             **signals,
             **setpoints,
-            quality=QualityGroup.of(findings, report),
+            quality=QualityGroup.of(findings, report.warnings, report.cut_off_hz, report.updated_hz),
             delay=DelayGroup(
                 value=report.delay_s,
                 tried=None if estimate is None else estimate.delays,

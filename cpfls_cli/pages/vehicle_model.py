@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,8 +16,11 @@ from cpfls_cli.artifacts.parameters import (
     FOUND_AS,
     INERTIA,
     LAG,
+    OF_NONE,
     OF_TURNING,
+    ON_BOUND,
     THRUST,
+    THRUST_LAW,
     Parameter,
     excess,
     is_learned,
@@ -126,7 +129,8 @@ def _against_control(record: VehicleRecord, held: HeldOutGroup) -> str:
     """Say why no control may rest on its forecast."""
     said = lost_words(held)
     if record.unreal:
-        said.append(f"rests on {joined(map(name_of, record.unreal))}, which is on a bound or of no body")
+        limit = set(record.unreal) <= set(record.on_bound)
+        said.append(f"rests on {joined(map(name_of, record.unreal))} {ON_BOUND if limit else 'that no such body has'}")
     if record.responses is not None and record.responses.off:
         said.append("has a frequency response about roll or pitch that is off")
     return joined(said)
@@ -137,15 +141,13 @@ def _as_vehicle(record: VehicleRecord) -> str:
         return ""
     if record.trust == Trust.LOOP:
         return "its constants are those of vehicle and autopilot together"
-    if record.trust == Trust.LACKING:
-        return "an effect is missing besides its constants"
     if record.trust == Trust.NOT_DETERMINED and too_heavy(record):
         return "inertia and drag factor are not the body's"
-    open_ = dict.fromkeys((*record.untold, *record.unreal))
-    constants = [name_of(name) for name in open_ if name in FOUND_AS.values()]
+    constants = [name_of(name) for name in record.untold if name in FOUND_AS.values()]
+    lacks = ["an effect is missing besides its constants"] if record.trust == Trust.LACKING else []
     if constants:
-        return f"{joined(constants)} {'is' if len(constants) == 1 else 'are'} not the vehicle's own"
-    return "its constants are told"
+        lacks.append(f"{joined(constants)} {'is' if len(constants) == 1 else 'are'} not the vehicle's own")
+    return "; ".join(lacks) or "its constants are told"
 
 
 def grounds(record: VehicleRecord) -> Iterator[str]:
@@ -180,11 +182,15 @@ def _against(record: VehicleRecord) -> Iterator[str]:
     bound = [name_of(name) for name in record.on_bound]
     if bound:
         many = "they are no numbers" if len(bound) > 1 else "it is no number"
-        yield f"{joined(bound)}: on a bound of what is tried; the flights ask for more, so {many} of the vehicle."
+        yield f"{joined(bound)}: {ON_BOUND}; the flights ask for more, so {many} of the vehicle."
     too_much = {} if heavy else excess(record)
     for name, why in too_much.items():
         yield f"{name_of(name)}: {why}; a number that predicts, not the body's, and no config gets it."
     told = {*record.on_bound, *(OF_TURNING if heavy else too_much)}
+    others = [name_of(name) for name in record.impossible if name not in told]
+    if others:
+        yield f"{joined(others)}: {OF_NONE}."
+    told |= set(record.impossible)
     open_ = [name_of(name) for name in record.untold if name not in told]
     if open_ and record.trust != Trust.LOOP:
         yield f"Not determined, because the flights say too little about it: {joined(open_)}."
@@ -225,6 +231,7 @@ def details(vehicle: Source[VehicleRecord], index: int = 1) -> Iterator[Block]:
     """Say its constants first, then how well it predicts, its other numbers, and what to be careful with."""
     record = vehicle.record
     yield _constants_table(record, index)
+    yield from _differences_table(record, index)
     yield Folded("Errors of the forecast, by horizon", list(_forecast_blocks(record, index)), shown=True)
     yield Folded("Other numbers, and what would tell them", list(_number_blocks(vehicle, index)), shown=True)
     careful = [Text(each, "warning") for each in warnings(record)]
@@ -241,7 +248,6 @@ def _forecast_blocks(record: VehicleRecord, index: int) -> Iterator[Block]:
 
 def _number_blocks(vehicle: Source[VehicleRecord], index: int) -> Iterator[Block]:
     record = vehicle.record
-    yield from _differences_table(record, index)
     yield from _about_constants(record)
     yield from _numbers_table(vehicle, index)
     yield from gust_blocks(record, index)
@@ -287,7 +293,8 @@ def instrument_words(record: VehicleRecord, given: InstrumentsGroup) -> Iterator
     if record.responses is not None:
         yield from response_words(record.responses)
     if not record.tells_turning:
-        yield "They do not tell the moments of inertia about roll and pitch yet: fly more runs, or larger ones."
+        open_ = [name_of(FOUND_AS[key]) for key in INERTIA[:2] if FOUND_AS[key] in record.untold]
+        yield f"Other values of {joined(open_)} would explain about as much: fly more runs, or larger ones."
     elif record.trust == Trust.NOT_JUDGED:
         yield (
             "The flights do not show the frequency responses of roll and pitch clearly enough to judge the model by "
@@ -376,14 +383,17 @@ def warnings(record: VehicleRecord) -> list[str]:
 
 def _numbers_table(found: Source[VehicleRecord], index: int) -> Iterator[Table]:
     """Show what was found beside the constants, if anything was."""
-    numbers, constants = rows_of(found.record.found), FOUND_AS.values()
+    record, constants = found.record, FOUND_AS.values()
+    numbers = rows_of(record.found)
     rows = [
         [
             name_of(row["name"]),
             row["unit"],
-            Cell(number(row["value"]), "warning" if row["at_bound"] or not row["determined"] else "plain"),
-            number(row["low"], 3),
-            number(row["high"], 3),
+            Cell(
+                _or_unknown(_if_possible(record, row, "value"), 4),
+                "warning" if row["name"] in record.untold else "plain",
+            ),
+            *(_or_unknown(_if_possible(record, row, end), 3) for end in ("low", "high")),
         ]
         for row in numbers
         if row["name"] not in constants and not is_learned(row["name"])
@@ -394,6 +404,11 @@ def _numbers_table(found: Source[VehicleRecord], index: int) -> Iterator[Table]:
     header = ("Number", "Unit", "Value", "From", "To")
     if rows or learned:
         yield Table(f"vehicle-numbers-{index}", caption, header, rows, frozenset({0, 1}))
+
+
+def _if_possible(record: VehicleRecord, row: dict[str, Any], name: str) -> float | None:
+    """Give a value of a number that was found; None where no vehicle has the number."""
+    return None if row["name"] in record.impossible else row[name]
 
 
 def _about_constants(record: VehicleRecord) -> Iterator[Block]:
@@ -439,16 +454,25 @@ def _constants_table(record: VehicleRecord, index: int) -> Table:
     rows: list[list[str | Cell]] = [
         [
             f"{each.name}{full if each.key in (THRUST, DRAG) and each.determined else ''}, {each.unit}",
-            Cell(_or_unknown(each.value, 4), "warning" if _wanting(each) else "plain"),
-            *(_or_unknown(value, 3) for value in (each.low, each.high)),
+            Cell(_or_unknown(each.value if each.possible else None, 4), "warning" if _wanting(each) else "plain"),
+            *(_or_unknown(value if each.possible else None, 3) for value in (each.low, each.high)),
             *([_or_unknown(each.stated, 3)] if stated else []),
             each.told,
         ]
         for each in listed
     ]
-    caption = f"Constants with 95 % intervals{'; stated: in the config' if stated else ''}."
-    header = ("Constant", "Value", "From", "To", *(["Stated"] if stated else []), "Told")
+    caption = f"Constants with 95 % intervals.{_law_words(record)}"
+    header = ("Constant", "Value", "From", "To", *(["In the config"] if stated else []), "Flights tell it")
     return Table(f"vehicle-constants-{index}", caption, header, rows, frozenset({0, len(header) - 1}))
+
+
+def _law_words(record: VehicleRecord) -> str:
+    """Say of which law of the rotors the thrust factor is, where the square of the speed alone is not it."""
+    linear = {row["name"]: row["value"] for row in rows_of(record.found)}.get(THRUST_LAW, 0.0)
+    if not linear:
+        return ""
+    limit = f" ({ON_BOUND})" if THRUST_LAW in record.on_bound else ""
+    return f" Thrust is the thrust factor times w (w + {number(linear, 3)}{limit} w_h), with w_h the speed in hover."
 
 
 def _or_unknown(value: float | None, digits: int) -> str:
