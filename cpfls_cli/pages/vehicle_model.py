@@ -265,7 +265,9 @@ def worth(record: VehicleRecord) -> Iterator[str]:
     if record.instruments is not None and not record.contradiction:
         yield next(instrument_words(record, record.instruments))
     held = record.held_out
-    if held is not None:
+    if record.forecast is not None:
+        yield "These are its constants; its forecast, loop included, stays in the file, and the errors are those of it."
+    elif held is not None:
         last = {name: group.mae[played_row(held), -1] for name, group in held.errors.items() if group is not None}
         ends = joined(f"{number(last[name] * scale, 3)} {unit}" for name, unit, scale in _ENDS if name in last)
         after = f"{held.horizon_s[-1]:.3g} s"
@@ -276,13 +278,20 @@ def instrument_words(record: VehicleRecord, given: InstrumentsGroup) -> Iterator
     """Say what the constants rest on, how much of what comes again they explain, and where they lack something."""
     if given.kind == "repeats":
         alike = f"{number(float(given.likeness.min()), 2)} to {number(float(given.likeness.max()), 2)}"
-        told = f"{given.runs} runs that repeat each other (correlation {alike})"
+        told = (
+            f"{given.runs} runs that repeat each other (correlation {alike}): gusts do not come again, what the vehicle"
+        )
+        told += " does comes again"
+        of_it = "comes again"
     else:
-        told = f"what was asked for from outside of the loop ({joined(given.setpoint)})"
+        told = (
+            f"logged setpoints ({joined(given.setpoint)}): gusts do not follow them, what the vehicle does follows them"
+        )
+        of_it = "follows them"
     yield (
-        f"The constants rest on {told}: gusts do not come again, what the vehicle does comes again. From "
+        f"The constants rest on {told}. From "
         f"{number(float(given.low[given.used].min()), 2)} to {number(float(given.high[given.used].max()), 2)} Hz they "
-        f"explain {_share_words(given.total, given.error)} acceleration that comes again."
+        f"explain {_share_words(given.total, given.error)} acceleration that {of_it}."
     )
     below = given.lacks_below
     if below is not None:
@@ -311,7 +320,8 @@ def response_words(given: ResponsesGroup) -> Iterator[str]:
     ]
     if judged:
         off = "; it lacks an effect there, `cpfls response` shows where" if given.off else ""
-        yield f"Cost J of its frequency responses (up to {ACCEPTABLE:g} is acceptable): {', '.join(judged)}{off}."
+        limit = f"0 is none, up to {ACCEPTABLE:g} is acceptable"
+        yield f"Mismatch J of its frequency responses ({limit}): {', '.join(judged)}{off}."
 
 
 def _share_words(share: Array, error: Array) -> str:

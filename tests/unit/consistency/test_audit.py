@@ -195,7 +195,7 @@ def test_of_a_part_of_a_flight_the_rotors_are_held_against_the_whole():
     part = stretch_of(swapped, slice(0, 300))
     assert audit([part], WINDOWS).contradictions == ()
     (told,) = audit([part], WINDOWS, [swapped]).contradictions
-    assert told.startswith("by the motion the rotors are")
+    assert told.startswith("judged by the motion, the rotors are")
 
 
 def test_a_delay_that_runs_away_is_no_repair():

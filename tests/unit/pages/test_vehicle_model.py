@@ -263,7 +263,7 @@ def test_constants_that_repeats_tell_are_judged_by_what_comes_again_and_not_by_a
     first, cost, *_ = grounds(record)
     assert "3 runs that repeat each other (correlation 0.90 to 0.97)" in first
     assert "From 1.0 to 6.0 Hz they explain 98 % (± 1 %) of the roll" in first
-    assert cost.startswith("Cost J of its frequency responses (up to 100 is acceptable): roll 12")
+    assert cost.startswith("Mismatch J of its frequency responses (0 is none, up to 100 is acceptable): roll 12")
     said = [block.text for block in unfolded(answer(source_of_record(record))) if isinstance(block, Text)]
     assert any("`cpfls replay` plays" in line for line in said)
     assert not any("loop, not the vehicle" in line for line in said)
