@@ -38,11 +38,21 @@ class QualityGroup:
     cut_off: Array | None = dataset(
         "where that filter halves the amplitude, seen in the spectrum", "filtered", units="Hz", default=None
     )
+    slow: tuple[str, ...] | None = dataset(
+        "signals of the log that were updated slower than it has rows", "slow", default=None
+    )
+    updated: Array | None = dataset("updates a second of these", "slow", units="Hz", default=None)
 
     @classmethod
-    def of(cls, findings: Mapping[str, int], warnings: Sequence[str], cut_off_hz: Mapping[str, float]) -> Self | None:
-        """Arrange what was found in a log, with how often, the warnings and the cut-offs; None where there is none."""
-        if not findings and not warnings and not cut_off_hz:
+    def of(
+        cls,
+        findings: Mapping[str, int],
+        warnings: Sequence[str],
+        cut_off_hz: Mapping[str, float],
+        updated_hz: Mapping[str, float],
+    ) -> Self | None:
+        """Arrange what was found in a log, how often, the warnings, and how fast it is; None where there is none."""
+        if not findings and not warnings and not cut_off_hz and not updated_hz:
             return None
         return cls(
             reason=tuple(findings) if findings else None,
@@ -50,6 +60,8 @@ class QualityGroup:
             warning=tuple(warnings) if warnings else None,
             filtered=tuple(cut_off_hz) if cut_off_hz else None,
             cut_off=np.array(list(cut_off_hz.values())) if cut_off_hz else None,
+            slow=tuple(updated_hz) if updated_hz else None,
+            updated=np.array(list(updated_hz.values())) if updated_hz else None,
         )
 
     @property
@@ -58,6 +70,13 @@ class QualityGroup:
         if self.filtered is None or self.cut_off is None:
             return {}
         return dict(zip(self.filtered, self.cut_off.tolist(), strict=True))
+
+    @property
+    def updated_hz(self) -> dict[str, float]:
+        """Updates a second, by signal of `import.signals`; those that are as fast as the log lack."""
+        if self.slow is None or self.updated is None:
+            return {}
+        return dict(zip(self.slow, self.updated.tolist(), strict=True))
 
     @property
     def findings(self) -> dict[str, int]:
@@ -330,7 +349,7 @@ class FlightRecord(Record):
         return cls(
             **signals,
             **setpoints,
-            quality=QualityGroup.of(findings, report.warnings, report.cut_off_hz),
+            quality=QualityGroup.of(findings, report.warnings, report.cut_off_hz, report.updated_hz),
             delay=DelayGroup(
                 value=report.delay_s,
                 tried=None if estimate is None else estimate.delays,

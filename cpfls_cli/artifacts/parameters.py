@@ -30,6 +30,9 @@ FOUND_AS = {
 }
 """Numbers of a fit, by the keys under which people look for them."""
 
+THRUST_LAW = "thrust_law.linear"
+"""Number of a fit beside which the thrust factor is that of thrust."""
+
 _REMAINDER = "remainder"
 _NAMES = {
     THRUST: "thrust factor",
@@ -46,7 +49,8 @@ OF_TURNING = frozenset(FOUND_AS[key] for key in (DRAG, *INERTIA))
 """Numbers of a fit that are known only as far as the torques are that turn the vehicle."""
 
 _UNITS = {THRUST: "N s^2", DRAG: "N m s^2", LAG: "s", DELAY: "s", **dict.fromkeys(CENTRE, "m")}
-ON_BOUND = "on a bound of what is tried"
+ON_BOUND = "at the limit of the search"
+OF_NONE = "no such vehicle has it: a number that predicts, and none that is found"
 
 STATED = (THRUST, DRAG, *INERTIA)
 """What a config states, where it states anything."""
@@ -80,6 +84,8 @@ class Parameter(NamedTuple):
         In the config.
     determined : bool
         Whether the flights tell it.
+    possible : bool
+        Whether such a vehicle can have it.
     reason : str
         Why, or why not.
     """
@@ -92,6 +98,7 @@ class Parameter(NamedTuple):
     stated: float | None
     determined: bool
     reason: str
+    possible: bool = True
 
     @property
     def name(self) -> str:
@@ -106,8 +113,10 @@ class Parameter(NamedTuple):
         if self.value is None:
             return "a guess"
         if self.low is None:
-            return "as stated" if self.stated is not None else "not needed"
-        return "on a bound" if self.reason == ON_BOUND else "no"
+            return "as in the config" if self.stated is not None else "not needed"
+        if not self.possible:
+            return "no: impossible"
+        return f"no: {ON_BOUND}" if self.reason == ON_BOUND else "no"
 
     @property
     def needed(self) -> bool:
@@ -125,7 +134,8 @@ def parameters_of(record: VehicleRecord) -> Iterator[Parameter]:
             row = found[name]
             stated = row["stated"] if np.isfinite(row["stated"]) else None
             ends, reason = (row["low"], row["high"]), _reason(record, row)
-            yield Parameter(key, row["value"], unit, *ends, stated, not reason, reason or "found in flights")
+            why = reason or "found in flights"
+            yield Parameter(key, row["value"], unit, *ends, stated, not reason, why, name not in record.impossible)
         elif key in guesses:
             reason = "not known: neither velocity nor accelerometer tells thrust from weight"
             yield Parameter(key, None, unit, None, None, None, False, reason)
@@ -138,24 +148,26 @@ def parameters_of(record: VehicleRecord) -> Iterator[Parameter]:
 def _reason(record: VehicleRecord, row: dict[str, Any]) -> str:
     """Say why a number is not determined; empty where it is."""
     name = row["name"]
-    if row["at_bound"]:
+    if name not in record.untold:
+        return ""
+    if name in record.on_bound:
         return ON_BOUND
     others = [
         each["second"] if each["first"] == name else each["first"]
         for each in rows_of(record.trade)
         if name in (each["first"], each["second"])
     ]
-    if row["determined"]:
-        return ""
     if record.loop.shown and record.instruments is None and name != FOUND_AS[THRUST]:
         return "these flights show the loop, not the vehicle"
     if name in OF_TURNING and too_heavy(record):
         return too_heavy(record)
     if name in excess(record):
         return f"{excess(record)[name]}: a number that predicts, not the body's"
+    if name in record.impossible:
+        return OF_NONE
     if others:
         return f"only its ratio to {' and '.join(others)} is known: they trade against each other"
-    return "the flights say too little about it: its interval is too wide"
+    return "the flights say too little, the interval is too wide"
 
 
 def too_heavy(record: VehicleRecord) -> str:

@@ -43,6 +43,7 @@ class FoundNumbersGroup:
     stated: Array = dataset("in /config; not finite where no config does", "found", units="SI", gaps=True)
     determined: BoolArray = dataset("1 where the flights say more than what was believed before", "found")
     at_bound: BoolArray = dataset("1 where it lies on a bound, so the interval says little", "found")
+    possible: BoolArray | None = dataset("0 where no such vehicle has the estimate", "found", default=None)
 
 
 @record
@@ -263,6 +264,13 @@ class ObserverGroup:
         return {"past_s": self.past, "rate_1_s": self.rate.tolist(), "memory_s": self.memory.tolist()}
 
 
+def _of_no_body(vehicle: VehicleGroup) -> set[str]:
+    """Name the moments of inertia of a vehicle that are those of no body of its mass between its rotors."""
+    moments = {FOUND_AS[key]: float(value) for key, value in zip(INERTIA[:3], vehicle.inertia, strict=False)}
+    excess = {f"inertia.{name}" for name in more_than_others(list(moments.values()))}
+    return {*beyond_any_body(vehicle.mass, vehicle.rotor.position, moments), *excess}
+
+
 @record
 class VehicleRecord(ModelRecord):
     """The artifact `cpfls/model` of a vehicle found in flights."""
@@ -295,6 +303,9 @@ class VehicleRecord(ModelRecord):
         units="rad/s",
         default=None,
     )
+    rotors_told: float | None = dataset(
+        "how often the logs tell the rotors, the slowest of them", units="Hz", default=None
+    )
     difference: DifferencesGroup | None = group(default=None)
     contradiction: tuple[str, ...] | None = dataset(
         "contradictions within the flights or with the vehicle", "contradiction", default=None
@@ -312,6 +323,7 @@ class VehicleRecord(ModelRecord):
         responses: Sequence[VehicleResponse] = (),
         *,
         fading_s: float | None = None,
+        rotors_told: float | None = None,
         commanded: bool,
         shares: bool = False,
     ) -> Self:
@@ -341,6 +353,7 @@ class VehicleRecord(ModelRecord):
             warning=tuple(warnings),
             guess=found.guessed or None,
             full_speed=found.model.vehicle.rotor_speed_max_rad_s if shares else None,
+            rotors_told=rotors_told,
             difference=columns_of(DifferencesGroup, found.differences) if found.differences else None,
             contradiction=None if contradictions is None else tuple(contradictions),
             disturbance=None if found.gusts is None else DisturbanceGroup.of(found.gusts),
@@ -370,7 +383,7 @@ class VehicleRecord(ModelRecord):
         """
         against = self.contradiction or ()
         off = self.responses is not None and self.responses.off
-        told = self.tells_turning and not self.unreal and not set(FOUND_AS.values()) & set(self.on_bound)
+        told = self.tells_turning and not set(FOUND_AS.values()) & set(self.on_bound)
         if self.instruments is None:
             told = told and self.tells_yaw
             return capped(self._by_playback, against, loop=self.loop.shown, lacks=off, told=told)
@@ -405,19 +418,26 @@ class VehicleRecord(ModelRecord):
 
     @property
     def untold(self) -> tuple[str, ...]:
-        """Numbers that the flights do not tell: not determined, on a bound, or guesses still."""
-        open_ = {row["name"] for row in rows_of(self.found) if not row["determined"]} | set(self.on_bound)
+        """Numbers that the flights do not tell: not determined, on a bound, of no vehicle, or guesses still."""
+        open_ = {row["name"] for row in rows_of(self.found) if not row["determined"]}
+        open_ |= {*self.on_bound, *self.impossible}
         guessed = (FOUND_AS[key] for name in self.guess or () for key in GUESSES[name])
         return (*(name for name in self.named if name in open_), *(key for key in guessed if key not in self.named))
 
     @property
+    def impossible(self) -> tuple[str, ...]:
+        """Numbers that were found and that no such vehicle has."""
+        wrong = {row["name"] for row in rows_of(self.found) if not row.get("possible", True)} | _of_no_body(
+            self.vehicle
+        )
+        return tuple(name for name in self.named if name in wrong)
+
+    @property
     def unreal(self) -> tuple[str, ...]:
-        """Moments of inertia about roll and pitch that were found and are on a bound, or those of no body."""
-        played = self.forecast or self.vehicle
-        moments = {FOUND_AS[key]: float(value) for key, value in zip(INERTIA[:3], played.inertia, strict=False)}
-        wrong = {*self.on_bound, *beyond_any_body(played.mass, played.rotor.position, moments)}
-        wrong |= {f"inertia.{name}" for name in more_than_others(list(moments.values()))}
-        return tuple(name for name in list(moments)[:2] if name in wrong and name in self.named)
+        """Moments of inertia about roll and pitch that its forecast turns by and that are on a bound, or of no body."""
+        wrong = {*self.on_bound, *_of_no_body(self.forecast or self.vehicle)}
+        turning = (FOUND_AS[key] for key in INERTIA[:2])
+        return tuple(name for name in turning if name in wrong and name in self.named)
 
     @property
     def _by_playback(self) -> Trust:
@@ -450,6 +470,7 @@ class VehicleRecord(ModelRecord):
             "forecast_verdict": self.forecast_verdict,
             "not_determined": list(self.untold),
             "full_speed_rad_s": self.full_speed,
+            "rotors_told_hz": self.rotors_told,
             **self.provenance,
             "parameters": {row.pop("key"): row for row in (each._asdict() for each in parameters_of(self))},
             "numbers": numbers,

@@ -676,7 +676,7 @@ def verify_export(
     *,
     common: Common,
 ) -> None:
-    """Fly an exported vehicle along a flight, from measured states, and compare it with the playback of its model."""
+    """Export a model, fly that along a flight from measured states, and compare it with the model's own playback."""
     with messages_for_errors():
         command = _of("verify-export")
         options = command.Options(

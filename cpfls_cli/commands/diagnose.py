@@ -121,7 +121,8 @@ def diagnosed(
     """Diagnose flights; of a base with effects of its own, those that come on top."""
     model, settings = base.fuzzy, replace(study.gap, ignore=(*study.gap.ignore, *known_already(base)))
     rng = generator(study, "diagnose")
-    result = diagnose(split.training, split.held_out, settings, rng, model=model, progress=progress)
+    parts = split.training, split.held_out
+    result = diagnose(*parts, settings, rng, whole=split.whole, model=model, progress=progress)
     extended = result.model(model)
     change = before_after(split.training, split.held_out, result.held_out, extended, settings, base)
     flights = (split.training, split.held_out, split.sentence)

@@ -55,6 +55,7 @@ def _summary(report: ImportReport, record: FlightRecord) -> dict[str, Any]:
         "rate_hz": report.rate_hz,
         "log_rate_hz": report.log_rate_hz,
         "cut_off_hz": dict(report.cut_off_hz),
+        "updated_hz": dict(report.updated_hz),
         "lowpass_hz": report.lowpass_hz,
         "span_s": list(report.span_s),
         "gaps": report.gaps,

@@ -11,12 +11,16 @@ from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.check import why_no_body
 from cpfls_cli.errors import InputError
+from cpfls_cli.flights.inputs import log_formats
 from cpfls_cli.flights.models import is_vehicle, with_found_numbers
 from cpfls_cli.pages.model import cautions_of
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
 from cpfls_cli.report.outcome import Command
 from cpfls_cli.trajectory.consistency import coarsest_excited
 from cpfls_cli.words import joined
+
+_ARDUPILOT = "bin"
+"""Format of the logs that ArduPilot writes."""
 
 
 def with_numbers(job: Job, command: str, model: Path | None, *, whole: bool = False) -> Job:
@@ -78,4 +82,6 @@ def to_fly(job: Job, output: Path | None = None) -> Command:
     coarsest = coarsest_excited(planned.excite)
     # A config of coarser paths is refused an excitation.
     finer = ("--set", f"trajectory.sample_time_s={coarsest:g}") if planned.sample_time_s > coarsest else ()
-    return (*words[:-1], *finer, words[-1], output or job.beside("mission.h5"))
+    # Its autopilot sweeps by itself, from numbers in a file.
+    form = ("--format", "ardupilot") if log_formats(job.inputs) == {_ARDUPILOT} else ()
+    return (*words[:-1], *finer, *form, words[-1], output or job.beside("mission.h5"))

@@ -95,6 +95,7 @@ def run(
             parts,
             _responses(vehicle, training),
             fading_s=fading_s,
+            rotors_told=min(flight.told_hz for flight in training),
             commanded=commanded,
             shares=any(flight.shares for flight in training),
         )

@@ -8,7 +8,7 @@ from pathlib import Path
 from cpfls_cli.artifacts.job import input_file
 from cpfls_cli.commands.vehicle_sheets import sheet_of, study_of
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.registry import exported, require_package
+from cpfls_cli.export.registry import FORMS, exported, require_package
 from cpfls_cli.export.text import identifier
 from cpfls_cli.export.verify import verified
 from cpfls_cli.flights.models import read_model
@@ -19,6 +19,11 @@ from cpfls_cli.playback.player import made_ready
 from cpfls_cli.playback.rotors import Hold
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, caution_texts
+
+
+def is_export(path: Path) -> bool:
+    """Tell by its name whether a file is what `cpfls export` writes."""
+    return path.suffix in {ending for form in FORMS.values() for ending in (form.ending, form.also) if ending}
 
 
 @dataclass(frozen=True)
@@ -49,6 +54,10 @@ def run(model: Path, flight: Path, options: Options, *, force: bool, dry_run: bo
     for path in (model, flight):
         if not path.is_file():
             raise InputError(f"{path}: no such file")
+    if is_export(model):
+        raise InputError(
+            f"{model}: is an export; name the model that it was made from, which is exported again and flown"
+        )
     sheet = sheet_of(model, identifier(model.stem), input_file(model), force=force)
     made = exported(sheet, options.form, f"{sheet.name}.py")
     study = study_of(sheet)

@@ -29,11 +29,11 @@ _HOVER = 0.55
 """Rotor speed in hover, share of the largest: a vehicle lifts about three times its weight."""
 
 _OFF: Final[dict[Unknown, str]] = {
-    "thrust_factor": "0.5 to 2",
+    "thrust_factor": "0.35 to 2",
     "drag_factor": "0.2 to 3",
     "inertia": "0.8 to 4",
 }
-"""How many times a guess real vehicles have: by the ranges above, and hover at 0.4 to 0.8 of the largest speed."""
+"""How many times a guess real vehicles have: by the ranges above, and hover at 0.4 to 0.9 of the largest speed."""
 
 _TAKEN = frozenset({"import", "vehicle", "report", "export", "predict", "trajectory", "changed", "trend"})
 _GUESSED: Final = "guesses from mass and arms are used for what the config leaves open (--accept-guesses)"

@@ -97,26 +97,28 @@ def _corrected(reading: Array, time: Array, errors: Sequence[ReadingError]) -> A
     return np.asarray((shifted(reading, time, delay) - offset) @ np.linalg.inv(matrix).T)
 
 
-def audit(flights: Sequence[Signals], windows: Windows) -> Audit:
+def audit(flights: Sequence[Signals], windows: Windows, whole: Sequence[Signals] = ()) -> Audit:
     """Check the sensors of flights with the same hardware against each other.
 
     Parameters
     ----------
     flights : sequence of Signals
         At least one, with the sampling period of the windows.
+    whole : sequence of Signals
+        Those that rotors and attitude are held against the vehicle in, where `flights` are but a part of them.
 
     References
     ----------
     Weak form: Shinbrot 1957. Reverse regression and its bounds: Frisch 1934.
     """
-    key = (audit, tuple(flights), windows)
-    return flights[0].once(key, lambda: _audit(flights, windows))
+    key = (audit, tuple(flights), windows, tuple(whole))
+    return flights[0].once(key, lambda: _audit(flights, windows, whole or flights))
 
 
-def _audit(flights: Sequence[Signals], windows: Windows) -> Audit:
+def _audit(flights: Sequence[Signals], windows: Windows, whole: Sequence[Signals]) -> Audit:
     sensors = sensors_of(flights, windows)
     fit = sensors.gyroscope.fit
-    stays = [finding for finding in findings_of(flights, sensors) if not finding.repairable]
+    stays = [finding for finding in findings_of(whole, sensors) if not finding.repairable]
     return Audit(
         findings=findings([*sensors.gyroscope.faults, *_others(sensors.flights)], windows.period),
         untested=sensors.gyroscope.untested,

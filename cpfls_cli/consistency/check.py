@@ -81,7 +81,7 @@ def _findings(parts: Sequence[Signals], sensors: Sensors | None) -> Iterator[Fin
         return
     if not sensors.gyroscope.apart:
         # A gyroscope that the attitude contradicts tells of no rotor.
-        yield misplaced(max(_middle(parts), key=len))
+        yield misplaced(_middle(parts))
     yield from sensors.findings
     if tells_thrust(parts) and sensors.motion.against_thrust is None:
         yield lift(sensors.motion.checks, parts[0].vehicle)

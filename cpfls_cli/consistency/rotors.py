@@ -204,8 +204,17 @@ def lift(checks: Sequence[PairCheck], vehicle: VehicleSettings) -> Finding | Non
     return Finding(what, _REMEDY, ("rotors", "vehicle"), share, contradiction=False, repairable=True)
 
 
-def misplaced(part: Signals) -> Finding | None:
-    """Say where the motion puts rotors that the config has elsewhere, or turning the other way."""
+def misplaced(parts: Sequence[Signals]) -> Finding | None:
+    """Say where the motion puts rotors that the config has elsewhere, or turning the other way.
+
+    Of several flights or stretches one that says so clearly is enough; else the longest is asked.
+    """
+    found = [(part, _misplaced(part)) for part in sorted(parts, key=len, reverse=True)]
+    clear = (told for _, told in found if told is not None and told.contradiction)
+    return next(clear, found[0][1])
+
+
+def _misplaced(part: Signals) -> Finding | None:
     if part.rotor_speed is None:
         return None
     moved = airframe_from_motion(part.body_rate, part.rotor_speed, 1 / part.period, part.commanded)

@@ -366,11 +366,8 @@ def _driven(body_rate: Array, speed: Array, rate_hz: float, is_command: bool) ->
 def _shares(wanted: Array, rotors: Array) -> tuple[list[tuple[_RotorLayout, _Explained]], Array]:
     """Tell what every layout explains, and how each rotor pushes where none ties them together, shape (axis, rotor)."""
     together, own, total = rotors.T @ wanted, rotors.T @ rotors, (wanted**2).sum(axis=0)
-    results = []
-    for layout, weights in _layouts():
-        shares = []
-        for axis, weight in enumerate(weights):
-            along, power = float(weight @ together[:, axis]), float(weight @ own @ weight) * float(total[axis])
-            shares.append(along**2 / power if along > 0 and power > 0 else 0.0)
-        results.append((layout, (shares[0], shares[1], shares[2])))
+    weights = np.array([weight for _, weight in _layouts()])
+    along, power = np.einsum("lar,ra->la", weights, together), np.einsum("lar,rs,las->la", weights, own, weights)
+    shares = np.where(along > 0, along, 0.0) ** 2 / np.where(power * total > 0, power * total, np.inf)
+    results = [(layout, (x, y, z)) for (layout, _), (x, y, z) in zip(_layouts(), shares.tolist(), strict=True)]
     return results, np.asarray(np.linalg.lstsq(own, together, rcond=None)[0].T, dtype=float)

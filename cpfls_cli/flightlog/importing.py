@@ -150,6 +150,7 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
         log_rate_hz=rate_hz,
         rate_hz=rate_hz,
         cut_off_hz=filtered,
+        updated_hz={signal.name: signal.rate_hz for signal in slow},
         warnings=(
             *broken,
             *cut,

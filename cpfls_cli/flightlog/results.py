@@ -62,6 +62,8 @@ class ImportReport:
     cut_off_hz : mapping from str to float
         Cut-off of the low-pass filter that a signal of the log went through before it was logged, Hz, where one is
         seen; by the name in `import.signals`.
+    updated_hz : mapping from str to float
+        Updates a second of the signals that are updated slower than the log has rows; by the name in `import.signals`.
     longest_gap_s : float
         Longest step between time stamps in the part that is kept, s.
     span_s : tuple of float
@@ -96,6 +98,7 @@ class ImportReport:
     log_rate_hz: float
     rate_hz: float
     cut_off_hz: Mapping[str, float] = field(default_factory=dict)
+    updated_hz: Mapping[str, float] = field(default_factory=dict)
     lowpass_hz: float | None = None
     delay_s: float = 0.0
     delay: DelayEstimate | None = None

@@ -129,7 +129,9 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
     named = tuple(f"{flight.name}: {warning}" for warning in warnings)
     wrong = contradictions(finding.of(flight.name) for finding in findings)
     shares = actuation == "rotor_command" and flight.units.get(actuation) == "1"
-    return LoggedFlight(flight.name, parts, hold or usual, words[actuation], named, wrong, shares=shares)
+    updated = flight.updated_hz.get(actuation)
+    about = (words[actuation], named, wrong)
+    return LoggedFlight(flight.name, parts, hold or usual, *about, shares=shares, updated_hz=updated)
 
 
 def _known(flight: ReadFlight, actuation: str, part: slice) -> dict[str, Array]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -64,6 +64,8 @@ class ReadFlight:
         Of the import that made it.
     flown_at : float
         When the log begins, s since 1970 began (UTC); NaN where it does not tell, and of an artifact.
+    updated_hz : mapping of str to float
+        Updates a second of signals that its log has more rows than.
     """
 
     name: str
@@ -71,6 +73,7 @@ class ReadFlight:
     units: Mapping[str, str]
     warnings: tuple[str, ...]
     flown_at: float = nan
+    updated_hz: Mapping[str, float] = field(default_factory=dict)
 
 
 def read_flights(paths: Sequence[Path], study: Study) -> Recordings:
@@ -98,7 +101,8 @@ def read_flight(path: Path, study: Study) -> ReadFlight:
     if is_log(path):
         return read_import(path.name, [imported(path, study)], study)
     record = read_record(path, FlightRecord)
-    return ReadFlight(path.name, record.signals, units_of(path, record.origin, study), ())
+    updated = {} if record.quality is None else record.quality.updated_hz
+    return ReadFlight(path.name, record.signals, units_of(path, record.origin, study), (), updated_hz=updated)
 
 
 def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> ReadFlight:
@@ -106,15 +110,17 @@ def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> Rea
     for part in parts:
         _require_speeds(name, part, study)
     first = parts[0]
+    updated = min((part.report.updated_hz for part in parts), key=lambda each: min(each.values(), default=np.inf))
     done = tuple(f"{what} ({count})" for what, count in log_findings(first.report).items())
     signals = [FlightRecord.of_import(part, {}).signals for part in parts]
     if len(parts) == 1:
-        return ReadFlight(name, signals[0], _units(study), (*done, *first.report.warnings), first.report.flown_at)
+        notes = (*done, *first.report.warnings)
+        return ReadFlight(name, signals[0], _units(study), notes, first.report.flown_at, updated)
     shared = [each for each in signals[0] if all(each in own for own in signals)]
     for own, part in zip(signals, parts, strict=True):
         own["time"] = own["time"] + part.report.span_s[0]
     joined = {each: np.concatenate([own[each] for own in signals]) for each in shared}
-    return ReadFlight(name, joined, _units(study), (), first.report.flown_at)
+    return ReadFlight(name, joined, _units(study), (), first.report.flown_at, updated)
 
 
 def _require_speeds(log: str, part: ImportedFlight, study: Study) -> None:
@@ -325,11 +331,12 @@ def _share(recording: Recording, full: float) -> Recording:
 
 @dataclass(frozen=True)
 class FlightSplit:
-    """Flights to learn from, flights to judge on, and why."""
+    """Flights to learn from, flights to judge on, and why; all flights as they were given, whole."""
 
     training: tuple[Recording, ...]
     held_out: tuple[Recording, ...]
     sentence: str
+    whole: tuple[Recording, ...]
 
 
 def split_flights(given: Sequence[Recording], held_out: Sequence[Recording], settings: GapSettings) -> FlightSplit:
@@ -339,14 +346,14 @@ def split_flights(given: Sequence[Recording], held_out: Sequence[Recording], set
     """
     if held_out:
         common_windows([*given, *held_out], settings)
-        return FlightSplit(tuple(given), tuple(held_out), f"held out as asked: {_names(held_out)}")
+        sentence = f"held out as asked: {_names(held_out)}"
+        return FlightSplit(tuple(given), tuple(held_out), sentence, (*given, *held_out))
     if len(given) > 1:
         common_windows(given, settings)
         first = len(given) - max(1, len(given) // 3)
         training, last = tuple(given[:first]), tuple(given[first:])
-        return FlightSplit(
-            training, last, f"no flight was held out by name, so the last third of them was: {_names(last)}"
-        )
+        sentence = f"no flight was held out by name, so the last third of them was: {_names(last)}"
+        return FlightSplit(training, last, sentence, tuple(given))
     return _thirds(given[0], settings)
 
 
@@ -387,7 +394,8 @@ def _thirds(flight: Recording, settings: GapSettings) -> FlightSplit:
             f"{flight.name}: the only flight is too short to hold out a third of it; give more flights, or --held-out "
             f"FLIGHT: {error}"
         ) from None
-    return FlightSplit((training,), (last,), f"there is only one flight, so its last third was held out: {last.name}")
+    sentence = f"there is only one flight, so its last third was held out: {last.name}"
+    return FlightSplit((training,), (last,), sentence, (flight,))
 
 
 def _names(flights: Sequence[Recording]) -> str:

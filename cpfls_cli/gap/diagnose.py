@@ -86,6 +86,7 @@ def diagnose(
     settings: GapSettings,
     rng: np.random.Generator,
     *,
+    whole: Sequence[Recording] = (),
     model: InertiaModel | None = None,
     progress: Callable[[float, str], None] = lambda _done, _note: None,
 ) -> DiagnosisRun:
@@ -100,6 +101,8 @@ def diagnose(
     ----------
     training, held : sequence of Recording
         At least one each.
+    whole : sequence of Recording
+        The flights that these are parts of, where they are.
     model : InertiaModel or None
         None for the rigid body of the vehicle.
     progress : callable
@@ -112,7 +115,7 @@ def diagnose(
     """
     progress(0.0, "sensor audit")
     windows = common_windows([*training, *held], settings)
-    audited = audit([recording.signals for recording in training], windows)
+    audited = audit([each.signals for each in training], windows, [each.signals for each in whole])
     prepared = Preparation(windows, model, settings, audited)
     flights = _Flights(prepared.repaired(training), prepared.logged(held), prepared.repaired(held))
     named = _named(flights, settings, rng, progress)

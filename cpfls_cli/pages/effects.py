@@ -76,7 +76,7 @@ def capitalised(words: str) -> str:
 
 def closest_sentence(effect: NamedEffect) -> str:
     """Say which effect came closest to a gap that it does not explain."""
-    size = _size(effect, "what the fit explains")
+    size = _size(effect, "what the closest effects explain")
     return f"The closest was {effect_title(effect.name)}, which does not explain the gap: {effect.name}, {size}."
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.artifacts.diagnosis import KINDS, DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
-from cpfls_cli.artifacts.gap_effects import PlaybackChangeGroup
+from cpfls_cli.artifacts.gap_effects import PlaybackChangeGroup, above_noise
 from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.unknown import is_of_guesses
@@ -203,7 +203,7 @@ def _facts(record: DiagnosisRecord) -> Iterator[tuple[str, str]]:
     yield "Where", _where(record)
     left = [_unexplained(each) for each in record.unexplained.unexplained()]
     if left:
-        yield "Left", sentence("; ".join(left))
+        yield "Left", sentence(f"in what it was fitted to: {'; '.join(left)}")
     yield "Next", " ".join(next_steps(record))
 
 
@@ -226,14 +226,21 @@ def _taken_off(record: DiagnosisRecord) -> Iterator[str]:
     """Say how much of the gap is gone, and what else would do."""
     share = _gone(record)
     if record.effects.closest:
-        yield f"With the closest effects, of the held-out gap above the noise, {share} is gone"
+        yield f"With the closest effects, of the held-out gap above the noise{_beside_numbers(record)}, {share} is gone"
     elif record.effects_of_motion:
         alone = "" if record.alternative.name else "; each rival that could be tried leaves more"
-        yield f"Of the held-out gap above the noise, {share} is gone{alone}"
+        yield f"Of the held-out gap above the noise{_beside_numbers(record)}, {share} is gone{alone}"
     if record.verdict == GapVerdict.NO_GAP and record.gap.known:
         largest = number(float(record.gap.before_floors[record.gap.known].max()), 2)
         unseen = f"; not ruled out, as listed below: {len(record.not_excited.name)} of the catalogue"
         yield f"The largest gap is {largest} noise floors{unseen if record.not_excited.name else ''}"
+
+
+def _beside_numbers(record: DiagnosisRecord) -> str:
+    """Say that effects are credited with what the vehicle's own numbers, refitted, leave, where these take some off."""
+    left, given = (np.sqrt(np.nansum(rows**2, axis=0)) for rows in (record.residual.parameters, record.residual.before))
+    takes = (left < (1 - _VISIBLE) * given) & above_noise(record.gap.before_floors)
+    return " that is left when the vehicle's own numbers are refitted" if takes.any() else ""
 
 
 def _gone(record: DiagnosisRecord) -> str:

@@ -15,7 +15,7 @@ from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.pages.trajectory import attitude_figure, rotation_figure
 from cpfls_cli.report.canvas import line, plot, stacked, style_of
 from cpfls_cli.report.content import HASH_SHOWN, Block, Facts, Folded, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import UNKNOWN, count, number, plain
+from cpfls_cli.report.numbers import UNKNOWN, count, number, plain, whole_percent
 from cpfls_cli.units import SPEED_UNITS
 from cpfls_cli.words import joined
 
@@ -66,7 +66,11 @@ def missing_signals(flight: FlightRecord) -> tuple[str, ...]:
 
 def import_blocks(report: ImportReport) -> Iterator[Block]:
     """Say of an import what its flight does not hold: the rows of the log, and how well the delay is determined."""
-    yield Text(f"{report.samples} samples at {report.rate_hz:.4g} Hz from {report.samples_read} rows")
+    lost, cropped = (report.dropped.get(reason, 0) for reason in ("gap", "crop"))
+    share = whole_percent(lost / max(report.samples_read - cropped, 1))
+    kept = " of what import.crop_s keeps" if cropped else ""
+    left_out = f"; {lost} of these, {share}{kept}, are beyond a gap and left out" if lost else ""
+    yield Text(f"{report.samples} samples at {report.rate_hz:.4g} Hz from {report.samples_read} rows{left_out}")
     if report.delay is not None:
         r2 = " ".join(f"{value:.3f}" for value in report.delay.r2)
         yield Text(f"R² of the rigid body about the body axes at the delay that was estimated: {r2}")

@@ -196,7 +196,7 @@ def lost_words(held: ErrorsByHorizon) -> list[str]:
     ]
     if faded is not None and "body_rate" not in lost:
         beyond = _by_chance(held, "body_rate")
-        said.append(f"does not beat “{_WORDS[RATE_FADES]}” in body rate at {_seconds(faded)}{beyond}")
+        said.append(f"is no better in body rate at {_seconds(faded)} than “{_WORDS[RATE_FADES]}”{beyond}")
     behind = behind_both(held)
     if behind:
         motion = joined(_SIGNALS[signal][0] for signal in behind)
@@ -206,7 +206,7 @@ def lost_words(held: ErrorsByHorizon) -> list[str]:
 
 def _by_chance(held: ErrorsByHorizon, signal: str) -> str:
     group = held.errors[signal]
-    return "" if group is None or group.chance is None else " by more than chance"
+    return "" if group is None or group.chance is None else ", chance aside"
 
 
 def _between(low: float, high: float) -> str:

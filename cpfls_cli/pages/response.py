@@ -41,6 +41,7 @@ _REMEDY = (
     "Nothing in these flights moves the vehicle independently of the gusts. The curves are those of vehicle and "
     "autopilot together, and so is J; fly the same path several times, or log the setpoints of pilot or mission."
 )
+_MOVED_BY = {"repeats": "the paths that are flown again", "setpoints": "the logged setpoints"}
 _AUDIBLE_DB, _AUDIBLE_DEG = 1.0, 7.6
 """Differences that are told: with these J is 20 each."""
 _NAMED = 4
@@ -78,9 +79,8 @@ def response_box(record: ResponseRecord) -> Box:
     if not record.has_instruments:
         return Box("RESPONSE", sentence(f"{name}: {_LOOP}"), [_REMEDY, *told], "warning")
     if not judged:
-        return Box(
-            "RESPONSE", sentence(f"{name} cannot be judged: these flights excite no response enough"), told, "warning"
-        )
+        why = f"{_moved_by(record)} move no response clearly, and what moves by itself is of the loop"
+        return Box("RESPONSE", sentence(f"{name} cannot be judged: {why}"), told, "warning")
     if off:
         return Box(
             "RESPONSE", sentence(f"{name} does not answer as the vehicle does: {joined(off)}{open_}"), told, "warning"
@@ -101,9 +101,14 @@ def _told(record: ResponseRecord, index: int) -> str:
     parts = record.deviations(index)
     right = len(parts) == 1 and parts[0].right
     details = "right throughout" if right else ", ".join(map(_deviation, parts))
-    alone = "of the loop: " if not record.has_instruments else "not moved by the instruments, so of the loop: "
+    alone = "of the loop: " if not record.has_instruments else f"not moved by {_moved_by(record)}, so of the loop: "
     judged = f"{word_of(word)}, " if record.is_of_vehicle(index) else alone
     return f"{name}: {judged}J = {number(float(record.cost[index]), 3)} {where}; {details}"
+
+
+def _moved_by(record: ResponseRecord) -> str:
+    """Say what moves the vehicle and knows nothing of gusts; of a newer program that is what it calls it."""
+    return _MOVED_BY.get(record.instruments, record.instruments)
 
 
 def _behind(record: ResponseRecord, index: int) -> str:
@@ -165,7 +170,7 @@ def _table(record: ResponseRecord, index: int) -> Table:
         f"J adds up differences in decibels and degrees over the band of {_clear(record)} (Tischler and Remple): up to "
         f"{GOOD:g} is good, up to {ACCEPTABLE:g} acceptable."
     )
-    header = ("Response", "J", "The model", "Band, Hz", "Coherence", "Random error, %")
+    header = ("Response", "Mismatch J", "The model", "Band, Hz", "Coherence", "Random error, %")
     return Table(f"response-{index}", caption, header, rows, frozenset({0, 2}), legend=legend)
 
 

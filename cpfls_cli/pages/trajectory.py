@@ -98,7 +98,7 @@ def _excited_blocks(excited: ExcitedGroup) -> Iterator[Block]:
     )
     for limit in filter(None, dict.fromkeys(excited.limit)):
         axes = joined(axis for axis, reached in zip(excited.axis, excited.limit, strict=True) if reached == limit)
-        yield Text(f"The excitation of {axes} is smaller than asked for, at the limit of {limit}", "warning")
+        yield Text(f"{axes}: excited less than asked for, because more would pass the limit on {limit}", "warning")
 
 
 _VERTICAL = ", of vertical with as much acceleration as such a tilt"

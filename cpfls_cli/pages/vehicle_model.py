@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,8 +16,11 @@ from cpfls_cli.artifacts.parameters import (
     FOUND_AS,
     INERTIA,
     LAG,
+    OF_NONE,
     OF_TURNING,
+    ON_BOUND,
     THRUST,
+    THRUST_LAW,
     Parameter,
     excess,
     is_learned,
@@ -50,6 +53,8 @@ from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, sty
 from cpfls_cli.report.content import Block, Cell, Facts, Folded, Heading, Listing, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, number, percent, whole_percent
 from cpfls_cli.response.mismatch import ACCEPTABLE
+from cpfls_cli.trajectory.consistency import coarsest_excited
+from cpfls_cli.trajectory.settings import ExciteSettings
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import joined
 
@@ -90,6 +95,9 @@ _FLIGHTS = {
 }
 """What would tell a constant that the flights do not."""
 
+FASTER = "LOG_BITMASK of ArduPilot (fast attitude and IMU), SDLOG_PROFILE of PX4 (high rate)"
+"""What makes autopilots log faster."""
+
 _FAR = 3.0
 """Factor from the stated number from which on a found one is called effective, and no property of a part."""
 
@@ -121,7 +129,8 @@ def _against_control(record: VehicleRecord, held: HeldOutGroup) -> str:
     """Say why no control may rest on its forecast."""
     said = lost_words(held)
     if record.unreal:
-        said.append(f"rests on {joined(map(name_of, record.unreal))}, which is on a bound or of no body")
+        limit = set(record.unreal) <= set(record.on_bound)
+        said.append(f"rests on {joined(map(name_of, record.unreal))} {ON_BOUND if limit else 'that no such body has'}")
     if record.responses is not None and record.responses.off:
         said.append("has a frequency response about roll or pitch that is off")
     return joined(said)
@@ -132,15 +141,13 @@ def _as_vehicle(record: VehicleRecord) -> str:
         return ""
     if record.trust == Trust.LOOP:
         return "its constants are those of vehicle and autopilot together"
-    if record.trust == Trust.LACKING:
-        return "an effect is missing besides its constants"
     if record.trust == Trust.NOT_DETERMINED and too_heavy(record):
         return "inertia and drag factor are not the body's"
-    open_ = dict.fromkeys((*record.untold, *record.unreal))
-    constants = [name_of(name) for name in open_ if name in FOUND_AS.values()]
+    constants = [name_of(name) for name in record.untold if name in FOUND_AS.values()]
+    lacks = ["an effect is missing besides its constants"] if record.trust == Trust.LACKING else []
     if constants:
-        return f"{joined(constants)} {'is' if len(constants) == 1 else 'are'} not the vehicle's own"
-    return "its constants are told"
+        lacks.append(f"{joined(constants)} {'is' if len(constants) == 1 else 'are'} not the vehicle's own")
+    return "; ".join(lacks) or "its constants are told"
 
 
 def grounds(record: VehicleRecord) -> Iterator[str]:
@@ -165,6 +172,8 @@ def _against(record: VehicleRecord) -> Iterator[str]:
     if record.contradiction:
         yield from playback_words(Trust.DO_NOT_USE, None, record.contradiction)
         return
+    if record.trust in (Trust.LOOP, Trust.LACKING, Trust.NOT_DETERMINED):
+        yield from _slow_words(record)
     if record.trust == Trust.LOOP or (record.loop.shown and record.instruments is None):
         yield loop_words(record)
     heavy = too_heavy(record)
@@ -173,11 +182,15 @@ def _against(record: VehicleRecord) -> Iterator[str]:
     bound = [name_of(name) for name in record.on_bound]
     if bound:
         many = "they are no numbers" if len(bound) > 1 else "it is no number"
-        yield f"{joined(bound)}: on a bound of what is tried; the flights ask for more, so {many} of the vehicle."
+        yield f"{joined(bound)}: {ON_BOUND}; the flights ask for more, so {many} of the vehicle."
     too_much = {} if heavy else excess(record)
     for name, why in too_much.items():
         yield f"{name_of(name)}: {why}; a number that predicts, not the body's, and no config gets it."
     told = {*record.on_bound, *(OF_TURNING if heavy else too_much)}
+    others = [name_of(name) for name in record.impossible if name not in told]
+    if others:
+        yield f"{joined(others)}: {OF_NONE}."
+    told |= set(record.impossible)
     open_ = [name_of(name) for name in record.untold if name not in told]
     if open_ and record.trust != Trust.LOOP:
         yield f"Not determined, because the flights say too little about it: {joined(open_)}."
@@ -218,6 +231,7 @@ def details(vehicle: Source[VehicleRecord], index: int = 1) -> Iterator[Block]:
     """Say its constants first, then how well it predicts, its other numbers, and what to be careful with."""
     record = vehicle.record
     yield _constants_table(record, index)
+    yield from _differences_table(record, index)
     yield Folded("Errors of the forecast, by horizon", list(_forecast_blocks(record, index)), shown=True)
     yield Folded("Other numbers, and what would tell them", list(_number_blocks(vehicle, index)), shown=True)
     careful = [Text(each, "warning") for each in warnings(record)]
@@ -234,7 +248,6 @@ def _forecast_blocks(record: VehicleRecord, index: int) -> Iterator[Block]:
 
 def _number_blocks(vehicle: Source[VehicleRecord], index: int) -> Iterator[Block]:
     record = vehicle.record
-    yield from _differences_table(record, index)
     yield from _about_constants(record)
     yield from _numbers_table(vehicle, index)
     yield from gust_blocks(record, index)
@@ -252,7 +265,9 @@ def worth(record: VehicleRecord) -> Iterator[str]:
     if record.instruments is not None and not record.contradiction:
         yield next(instrument_words(record, record.instruments))
     held = record.held_out
-    if held is not None:
+    if record.forecast is not None:
+        yield "These are its constants; its forecast, loop included, stays in the file, and the errors are those of it."
+    elif held is not None:
         last = {name: group.mae[played_row(held), -1] for name, group in held.errors.items() if group is not None}
         ends = joined(f"{number(last[name] * scale, 3)} {unit}" for name, unit, scale in _ENDS if name in last)
         after = f"{held.horizon_s[-1]:.3g} s"
@@ -263,13 +278,20 @@ def instrument_words(record: VehicleRecord, given: InstrumentsGroup) -> Iterator
     """Say what the constants rest on, how much of what comes again they explain, and where they lack something."""
     if given.kind == "repeats":
         alike = f"{number(float(given.likeness.min()), 2)} to {number(float(given.likeness.max()), 2)}"
-        told = f"{given.runs} runs that repeat each other (correlation {alike})"
+        told = (
+            f"{given.runs} runs that repeat each other (correlation {alike}): gusts do not come again, what the vehicle"
+        )
+        told += " does comes again"
+        of_it = "comes again"
     else:
-        told = f"what was asked for from outside of the loop ({joined(given.setpoint)})"
+        told = (
+            f"logged setpoints ({joined(given.setpoint)}): gusts do not follow them, what the vehicle does follows them"
+        )
+        of_it = "follows them"
     yield (
-        f"The constants rest on {told}: gusts do not come again, what the vehicle does comes again. From "
+        f"The constants rest on {told}. From "
         f"{number(float(given.low[given.used].min()), 2)} to {number(float(given.high[given.used].max()), 2)} Hz they "
-        f"explain {_share_words(given.total, given.error)} acceleration that comes again."
+        f"explain {_share_words(given.total, given.error)} acceleration that {of_it}."
     )
     below = given.lacks_below
     if below is not None:
@@ -280,7 +302,8 @@ def instrument_words(record: VehicleRecord, given: InstrumentsGroup) -> Iterator
     if record.responses is not None:
         yield from response_words(record.responses)
     if not record.tells_turning:
-        yield "They do not tell the moments of inertia about roll and pitch yet: fly more runs, or larger ones."
+        open_ = [name_of(FOUND_AS[key]) for key in INERTIA[:2] if FOUND_AS[key] in record.untold]
+        yield f"Other values of {joined(open_)} would explain about as much: fly more runs, or larger ones."
     elif record.trust == Trust.NOT_JUDGED:
         yield (
             "The flights do not show the frequency responses of roll and pitch clearly enough to judge the model by "
@@ -297,7 +320,8 @@ def response_words(given: ResponsesGroup) -> Iterator[str]:
     ]
     if judged:
         off = "; it lacks an effect there, `cpfls response` shows where" if given.off else ""
-        yield f"Cost J of its frequency responses (up to {ACCEPTABLE:g} is acceptable): {', '.join(judged)}{off}."
+        limit = f"0 is none, up to {ACCEPTABLE:g} is acceptable"
+        yield f"Mismatch J of its frequency responses ({limit}): {', '.join(judged)}{off}."
 
 
 def _share_words(share: Array, error: Array) -> str:
@@ -307,6 +331,17 @@ def _share_words(share: Array, error: Array) -> str:
         for value, within in zip(share[:2], error[:2], strict=True)
     )
     return f"{roll} of the roll and {pitch} of the pitch"
+
+
+def _slow_words(record: VehicleRecord) -> Iterator[str]:
+    """Say of logs too slow for what a flight is asked to show that no flight helps before they are faster."""
+    least = 1 / coarsest_excited(ExciteSettings())
+    if record.rotors_told is not None and round(record.rotors_told) < round(least):
+        yield (
+            f"The logs tell the rotors {number(record.rotors_told, 2)} times a second, and nothing of motion above "
+            f"{number(record.rotors_told / 2, 2)} Hz; another flight tells no more until rotors and body rates are "
+            f"logged {least:g} times a second or faster: {FASTER}."
+        )
 
 
 def loop_words(record: VehicleRecord) -> str:
@@ -358,14 +393,17 @@ def warnings(record: VehicleRecord) -> list[str]:
 
 def _numbers_table(found: Source[VehicleRecord], index: int) -> Iterator[Table]:
     """Show what was found beside the constants, if anything was."""
-    numbers, constants = rows_of(found.record.found), FOUND_AS.values()
+    record, constants = found.record, FOUND_AS.values()
+    numbers = rows_of(record.found)
     rows = [
         [
             name_of(row["name"]),
             row["unit"],
-            Cell(number(row["value"]), "warning" if row["at_bound"] or not row["determined"] else "plain"),
-            number(row["low"], 3),
-            number(row["high"], 3),
+            Cell(
+                _or_unknown(_if_possible(record, row, "value"), 4),
+                "warning" if row["name"] in record.untold else "plain",
+            ),
+            *(_or_unknown(_if_possible(record, row, end), 3) for end in ("low", "high")),
         ]
         for row in numbers
         if row["name"] not in constants and not is_learned(row["name"])
@@ -376,6 +414,11 @@ def _numbers_table(found: Source[VehicleRecord], index: int) -> Iterator[Table]:
     header = ("Number", "Unit", "Value", "From", "To")
     if rows or learned:
         yield Table(f"vehicle-numbers-{index}", caption, header, rows, frozenset({0, 1}))
+
+
+def _if_possible(record: VehicleRecord, row: dict[str, Any], name: str) -> float | None:
+    """Give a value of a number that was found; None where no vehicle has the number."""
+    return None if row["name"] in record.impossible else row[name]
 
 
 def _about_constants(record: VehicleRecord) -> Iterator[Block]:
@@ -421,16 +464,25 @@ def _constants_table(record: VehicleRecord, index: int) -> Table:
     rows: list[list[str | Cell]] = [
         [
             f"{each.name}{full if each.key in (THRUST, DRAG) and each.determined else ''}, {each.unit}",
-            Cell(_or_unknown(each.value, 4), "warning" if _wanting(each) else "plain"),
-            *(_or_unknown(value, 3) for value in (each.low, each.high)),
+            Cell(_or_unknown(each.value if each.possible else None, 4), "warning" if _wanting(each) else "plain"),
+            *(_or_unknown(value if each.possible else None, 3) for value in (each.low, each.high)),
             *([_or_unknown(each.stated, 3)] if stated else []),
             each.told,
         ]
         for each in listed
     ]
-    caption = f"Constants with 95 % intervals{'; stated: in the config' if stated else ''}."
-    header = ("Constant", "Value", "From", "To", *(["Stated"] if stated else []), "Told")
+    caption = f"Constants with 95 % intervals.{_law_words(record)}"
+    header = ("Constant", "Value", "From", "To", *(["In the config"] if stated else []), "Flights tell it")
     return Table(f"vehicle-constants-{index}", caption, header, rows, frozenset({0, len(header) - 1}))
+
+
+def _law_words(record: VehicleRecord) -> str:
+    """Say of which law of the rotors the thrust factor is, where the square of the speed alone is not it."""
+    linear = {row["name"]: row["value"] for row in rows_of(record.found)}.get(THRUST_LAW, 0.0)
+    if not linear:
+        return ""
+    limit = f" ({ON_BOUND})" if THRUST_LAW in record.on_bound else ""
+    return f" Thrust is the thrust factor times w (w + {number(linear, 3)}{limit} w_h), with w_h the speed in hover."
 
 
 def _or_unknown(value: float | None, digits: int) -> str:

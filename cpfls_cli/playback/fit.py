@@ -179,7 +179,8 @@ class Fitted(FittedNumbers):
     def condition_number(self) -> float:
         """Of the numbers in their scales, prior included."""
         eigenvalues = np.linalg.eigvalsh(self.hessian) if len(self.hessian) else np.ones(1)
-        return float(eigenvalues[-1] / max(eigenvalues[0], np.finfo(float).tiny))
+        rounding = np.finfo(float)
+        return float(eigenvalues[-1] / max(eigenvalues[0], rounding.eps * eigenvalues[-1], rounding.tiny))
 
 
 class Believed(NamedTuple):

@@ -123,6 +123,8 @@ class LoggedFlight:
         See `PlaybackFlight`.
     shares : bool
         Whether its commands are shares of the full speed of the rotors.
+    updated_hz : float or None
+        How often the log tells what drives the playback; None where that is as often as there are samples.
     """
 
     name: str
@@ -133,6 +135,12 @@ class LoggedFlight:
     contradictions: tuple[str, ...] = ()
     group: str = ""
     shares: bool = False
+    updated_hz: float | None = None
+
+    @property
+    def told_hz(self) -> float:
+        """How often what drives the playback is known, Hz."""
+        return self.updated_hz or 1 / self.parts[0].period
 
     @classmethod
     def of(cls, name: str, signals: Signals) -> LoggedFlight:

@@ -128,7 +128,9 @@ def _factors(sums: Array) -> Array:
     # Blocks without motion hold noise alone, and less of it than is taken off.
     torque, turning = np.maximum(torque - noise_of_torque, _TINY), np.maximum(turning - noise_of_turning, _TINY)
     both = np.maximum(both, _TINY)
-    return np.asarray(np.clip([both / turning, torque / both], 1 / _ANY, _ANY))
+    # A divisor that small would make a factor beyond any, or beyond all numbers.
+    factors = [both / np.maximum(turning, both / _ANY), torque / np.maximum(both, torque / _ANY)]
+    return np.maximum(factors, 1 / _ANY)
 
 
 def _balanced(model: VehicleModel, flight: PlaybackFlight, stretch: slice) -> BalancedTorque:

@@ -43,7 +43,7 @@ inertia and not by that of the group; as numbers, or none where it is the stated
 LOG_MASS = "mass.log_mass"
 LOG_COUNTED = tuple(f"{COUNTED}.log_{name}" for name in INERTIA_PARAMETERS[:3])
 
-_ROOM = 10.0
+ROOM = 10.0
 """Bounds of a coefficient here, in multiples of those of the catalogue: an effective number may lie beyond them."""
 
 _TURNED, _PUSHED = 2.0, 0.5
@@ -273,7 +273,7 @@ class FreeNumbers:
         numbers = []
         for each in CATALOGUE[block].coefficients:
             scale, (low, high) = 1.0 if each.scale is None else each.scale(vehicle), each.bounds(vehicle)
-            numbers.append(Number(f"{block}.{each.name}", each.unit, 0.0, scale, _ROOM * low, _ROOM * high, 1.0))
+            numbers.append(Number(f"{block}.{each.name}", each.unit, 0.0, scale, ROOM * low, ROOM * high, 1.0))
         return tuple(numbers)
 
     def _remainder_numbers(self, block: str) -> tuple[Number, ...]:

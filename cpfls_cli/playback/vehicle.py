@@ -11,7 +11,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width, jackknife_error
-from cpfls_cli.inertia import INERTIA_PARAMETERS, KNOWN, beyond_any_body, more_than_others
+from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS
+from cpfls_cli.inertia import INERTIA_PARAMETERS, KNOWN, MEASURED, beyond_any_body, more_than_others
 from cpfls_cli.playback.constants import Constants, find_constants
 from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
 from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
@@ -22,7 +23,7 @@ from cpfls_cli.playback.history_fit import find_history
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.loop import LoopBounds, loop_bounds
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.parameters import Physical, needs_velocity
+from cpfls_cli.playback.parameters import ROOM, Physical, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Choice, Kept, Progress, choose, fitted_to_all
 from cpfls_cli.playback.table import wrench_of
@@ -50,6 +51,8 @@ class FoundNumber(NamedTuple):
     determined : bool
         Whether the flights say more of it than what was believed before: to a factor of two where it cannot be
         negative, else to its natural size. What turns torque into rotation is not where it makes a body that cannot be.
+    possible : bool
+        Whether a vehicle can have it, see `bodily`.
     """
 
     name: str
@@ -60,6 +63,7 @@ class FoundNumber(NamedTuple):
     stated: float
     determined: bool
     at_bound: bool
+    possible: bool = True
 
 
 class Difference(NamedTuple):
@@ -315,7 +319,9 @@ def bodily(vehicle: VehicleSettings, numbers: Sequence[FoundNumber]) -> Iterator
 
     Speeds that are partly noise state torques that turn nothing, and those that answer a gust turn nothing either: a
     fit then makes the body heavier, however narrow its intervals. All three moments and the drag factor share that. A
-    moment that is more than the other two together, stated ones included, is not determined itself.
+    moment that is more than the other two together, stated ones included, is not determined itself, and neither is what
+    no vehicle has: a centre of mass beyond the hubs, or a coefficient beyond all that a fit tries on such a vehicle,
+    which it comes to where it is counted by an inertia that is too large.
 
     Parameters
     ----------
@@ -327,9 +333,25 @@ def bodily(vehicle: VehicleSettings, numbers: Sequence[FoundNumber]) -> Iterator
     heavy = beyond_any_body(vehicle.mass_kg, hubs, values)
     pairs = zip(INERTIA_PARAMETERS[:3], vehicle.inertia_kg_m2, strict=False)
     excess = more_than_others([values.get(f"inertia.{name}", stated) for name, stated in pairs])
+    impossible = {*heavy, *(f"inertia.{name}" for name in excess), *_beyond_any(vehicle, numbers)}
     for number in numbers:
-        wrong = (heavy and number.name.startswith(_OF_TURNING)) or number.name.removeprefix("inertia.") in excess
-        yield number._replace(determined=False) if wrong else number
+        possible = number.name not in impossible
+        wrong = not possible or (heavy and number.name.startswith(_OF_TURNING))
+        yield number._replace(determined=False, possible=possible) if wrong else number
+
+
+def _beyond_any(vehicle: VehicleSettings, numbers: Sequence[FoundNumber]) -> Iterator[str]:
+    """Name the coefficients of effects that no such vehicle has."""
+    hubs = np.array([rotor.position_m for rotor in vehicle.rotors])
+    of_centre = (each.name for each in CENTRE_OF_MASS.coefficients)
+    farthest = dict(zip(of_centre, np.abs(hubs).max(axis=0).tolist(), strict=False))
+    for number in numbers:
+        block, _, name = number.name.partition(".")
+        known = CATALOGUE[block].coefficients if block in CATALOGUE else ()
+        for low, high in (each.bounds(vehicle) for each in known if each.name == name):
+            ends = (-farthest[name], farthest[name]) if block == CENTRE_OF_MASS.name else (ROOM * low, ROOM * high)
+            if not MEASURED * ends[0] <= number.value <= MEASURED * ends[1]:
+                yield number.name
 
 
 def beside_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterator[FoundNumber]:

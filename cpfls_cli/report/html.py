@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.report.canvas import evenly_spread
 from cpfls_cli.report.content import Document, Panel, Series, Table
 from cpfls_cli.report.numbers import number, plain
 
+_CODE = re.compile("`([^`]+)`")
 _COLUMNS = 12
 _DIGITS = 4
 _SMALL = 1e-4
@@ -36,8 +38,14 @@ def _template() -> Template:
     )
     # Figures are made here and hold only escaped text; everything else on the page is escaped by the template.
     environment.filters["figure"] = Markup
+    environment.filters["code"] = with_code
     environment.filters["figure_tables"] = figure_tables
     return environment.get_template("page.html")
+
+
+def with_code(text: str) -> Markup:
+    """Escape a sentence, and set what stands between backticks in it, a command or a key, as code."""
+    return Markup(_CODE.sub(r"<code>\1</code>", str(escape(text))))
 
 
 @dataclass

@@ -159,7 +159,7 @@ def _exceeded(
         share = f"{100 * ROTOR_SHARE:.0f} % of the square of vehicle.rotor_speed_max_rad_s"
         return f"rotor speed ({share} = {vehicle.rotor_speed_max_rad_s:g})"
     return (
-        f"rotor speed ({100 * (1 - ROTOR_SHARE):.0f} % of the square in hover, at least)"
+        f"rotor speed (each rotor keeps {100 * (1 - ROTOR_SHARE):.0f} % of its thrust in hover)"
         if load.slow > max(1.0, alone.slow)
         else ""
     )

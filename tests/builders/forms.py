@@ -41,8 +41,8 @@ def phrases(block):
 
 
 def words(text):
-    """Let case, spaces and the end of a sentence be."""
-    return " ".join(text.split()).lower().rstrip(".")
+    """Let case, spaces, the marks of what is code and the end of a sentence be."""
+    return " ".join(text.replace("`", "").split()).lower().rstrip(".")
 
 
 def in_all_forms(source, blocks, beside=()):

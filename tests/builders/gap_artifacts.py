@@ -217,7 +217,7 @@ def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), alo
         "residual/time": np.arange(WINDOWS) * 0.2,
         "residual/flight": np.zeros(WINDOWS),
         "residual/before": np.outer(np.arange(WINDOWS) < 0.75 * WINDOWS, sizes(force)["gap/before"]),
-        "residual/parameters": np.zeros((WINDOWS, 6)),
+        "residual/parameters": np.outer(np.arange(WINDOWS) < 0.75 * WINDOWS, sizes(force)["gap/before"]),
         "residual/after": np.zeros((WINDOWS, 6)),
         **pictures(),
         **table("not_excited", ("'name", "'reason"), [("ground_effect", "fly near the ground")]),

@@ -64,7 +64,7 @@ def test_a_vehicle_is_exported(cpfls, vehicle, tmp_path, form):
 def test_what_is_said_of_it(cpfls, vehicle, tmp_path):
     result = cpfls("export", vehicle, "-o", tmp_path / "quad.py")
     written, caution, about, effects, learned, judged, whole_of_it = result.stdout.splitlines()
-    assert caution.startswith("linear damping d_x: on a bound of what is tried")
+    assert caution.startswith("linear damping d_x: at the limit of the search")
     assert written.startswith(f"{tmp_path / 'quad.py'}: written (")
     assert about.startswith("Vehicle: 0.9 kg, 4 rotors; delay 0.013 s, lag 0.035 s, slow actuation -0.4 (roll, pitch)")
     assert effects == "Effects: linear rotational damping, quadratic rotational damping."

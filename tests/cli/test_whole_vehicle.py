@@ -368,6 +368,9 @@ def test_an_exported_vehicle_is_flown_back(cpfls, refuse, vehicle, flight, noisy
     for more in ([], ["--dry-run"]):
         (line,) = refuse("verify-export", vehicle, flight.with_name("none.h5"), "--format", "sdf", *more)
         assert line == f"{flight.with_name('none.h5')}: no such file"
+    (export := flight.with_name("exported.sdf")).write_text("<sdf/>")
+    (line,) = refuse("verify-export", export, flight, "--format", "sdf")
+    assert line.startswith(f"{export}: is an export; name the model that it was made from")
 
 
 @pytest.fixture(scope="module")

@@ -130,8 +130,14 @@ EFFECT = Effect(
     formula="dT_i = kappa_i T_i,  M = sum r_i x dT_i z,  M_z += sum (delta - s_i kappa_i) b_i w_i^2",
     sentence="One rotor pulls less than its opposite: a worn propeller, a weak motor.",
     coefficients=(
-        Coefficient("difference_1", "1", -0.5, 0.5, "kappa of the first opposite pair, first rotor less second"),
-        Coefficient("difference_2", "1", -0.5, 0.5, "kappa of the second opposite pair, first rotor less second"),
+        Coefficient(
+            "difference_1",
+            "1",
+            -0.5,
+            0.5,
+            "share of thrust that the first rotor of the first opposite pair pulls more than the other",
+        ),
+        Coefficient("difference_2", "1", -0.5, 0.5, "the same of the second opposite pair"),
         Coefficient(
             "drag_imbalance", "1", -0.5, 0.5, "clockwise rotors drag this much more than modelled, the others less"
         ),

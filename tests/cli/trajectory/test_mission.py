@@ -74,7 +74,10 @@ def test_a_repeated_path_says_how_long_it_takes_and_why(cpfls, config, tmp_path)
 def test_an_excitation_is_made_smaller_with_the_limit_that_it_reaches(cpfls, config, tmp_path):
     result = cpfls("trajectory", config, *HOVER, "--size", "20", "-o", tmp_path / "m.h5")
     assert result.exit_code == 0, result.output
-    assert "The excitation of roll and pitch is smaller than asked for, at the limit of rotor speed (" in result.stderr
+    assert (
+        "roll and pitch: excited less than asked for, because more would pass the limit on rotor speed ("
+        in result.stderr
+    )
 
 
 def test_files_for_autopilots_stand_beside_the_path(cpfls, config, tmp_path):

@@ -34,11 +34,12 @@ def test_a_flight_turns_where_roll_or_pitch_goes_round():
 
 
 def test_warnings_are_added_to_those_of_the_log():
-    quality = QualityGroup.of({"gaps: interpolated": 2}, ["a fault"], {"body_rate": 18.0})
+    quality = QualityGroup.of({"gaps: interpolated": 2}, ["a fault"], {"body_rate": 18.0}, {"rotor_command": 9.9})
     flight = FlightRecord(time=TIME, quality=quality).with_warnings(["no attitude"])
     assert flight.quality.warning == ("a fault", "no attitude")
     assert flight.quality.findings == {"gaps: interpolated": 2}
-    assert QualityGroup.of({}, [], {}) is None
+    assert flight.quality.updated_hz == {"rotor_command": 9.9}
+    assert QualityGroup.of({}, [], {}, {}) is None
     assert FlightRecord(time=TIME).with_warnings(["no attitude"]).quality.findings == {}
 
 

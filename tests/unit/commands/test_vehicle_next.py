@@ -7,8 +7,10 @@ from types import SimpleNamespace
 import pytest
 
 from cpfls_cli.artifacts.job import Job
+from cpfls_cli.commands.numbers import to_fly
 from cpfls_cli.commands.vehicle import next_commands
 from cpfls_cli.config.load import parse_config, validate
+from cpfls_cli.logs.formats import DATAFLASH_MAGIC
 from cpfls_cli.validation.trust import Trust
 from tests.builders.vehicle_search import CONFIG
 
@@ -25,3 +27,11 @@ def test_a_vehicle_that_nobody_should_use_is_flown_for_and_not_handed_over(trust
     coarse = replace(job, study=study.model_copy(update={"trajectory": replace(study.trajectory, sample_time_s=0.1)}))
     _, (*mission, _) = next_commands(coarse, SimpleNamespace(complete=True, trust=Trust.LOOP), [Path("f.h5")], ())
     assert "trajectory.sample_time_s=0.02" in mission
+
+
+def test_logs_of_ardupilot_are_followed_by_sweeps_of_its_own(tmp_path):
+    (log := tmp_path / "one.BIN").write_bytes(DATAFLASH_MAGIC)
+    study = validate(parse_config(CONFIG, "config"), "config")
+    job = Job(study, tmp_path / "found.h5", False, False, lambda *_: None, lambda _: None, inputs=[tmp_path / "c.yaml"])
+    assert "ardupilot" not in to_fly(job)
+    assert to_fly(replace(job, inputs=[*job.inputs, log]))[-4:-1] == ("--format", "ardupilot", "-o")

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from cpfls_cli.consistency.audit import audit
 from cpfls_cli.consistency.sensors import sensors_of
+from cpfls_cli.effects.signals import stretch_of
 from cpfls_cli.vehicle.rotors import body_wrench
 from cpfls_cli.weak_form.windows import windows
 from tests.builders.closed_loop_flights import COARSE, flown, signals_of
@@ -185,6 +186,16 @@ def test_rotors_that_hold_one_speed_are_named(turning):
     assert body_wrench(turning.vehicle, speed).thrust.std() == 0
     told = audit([replace(turning, rotor_speed=speed)], WINDOWS).warnings
     assert sum("rotor speed" in sentence for sentence in told) == 4
+
+
+def test_of_a_part_of_a_flight_the_rotors_are_held_against_the_whole():
+    """A third of a flight may leave open what all of it tells; `cpfls vehicle` looks at all of it."""
+    signals = signals_of(flown(12.0, integration_rate_hz=COARSE))
+    swapped = replace(signals, rotor_speed=signals.rotor_speed[:, [1, 0, 2, 3]])
+    part = stretch_of(swapped, slice(0, 300))
+    assert audit([part], WINDOWS).contradictions == ()
+    (told,) = audit([part], WINDOWS, [swapped]).contradictions
+    assert told.startswith("judged by the motion, the rotors are")
 
 
 def test_a_delay_that_runs_away_is_no_repair():

@@ -246,6 +246,14 @@ def test_each_stretch_is_looked_at(flight):
     assert "km/h" in " ".join(finding.what for finding in check(faulty, SETTINGS))
 
 
+def test_rotors_that_one_stretch_tells_clearly_are_told_of_all(flight):
+    swapped = FAULTS["rotors in another order"][0](flight)
+    steady = replace(flight, rotor_speed=np.full_like(flight.rotor_speed, flight.rotor_speed.mean()))
+    longer = [steady, cut(swapped, slice(0, len(flight) - 100))]
+    (found,) = [each for each in check(longer, SETTINGS) if "by the motion, the rotors are" in each.what]
+    assert found.contradiction
+
+
 CONTRADICTED = {
     "velocity in km/h",
     "velocity down",

@@ -39,7 +39,7 @@ def test_ends_of_an_interval_can_be_told_apart_and_rounding_makes_no_certainty()
         "The closest was offset of the centre of mass, which does not explain the gap: "
     )
     # Of an effect that is not the answer the share is none of the gap.
-    assert closest_sentence(OFFSET).endswith("(p < 10⁻⁶, more than 99 % of what the fit explains).")
+    assert closest_sentence(OFFSET).endswith("(p < 10⁻⁶, more than 99 % of what the closest effects explain).")
 
 
 def test_shares_of_effects_that_overlap_are_what_returns_without_each():

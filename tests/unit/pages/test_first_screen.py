@@ -257,7 +257,9 @@ def test_what_cannot_be_played_back_is_said():
     ],
 )
 def test_what_is_left_has_an_axis_a_cause_and_a_way_of_energy(left, said):
-    assert screen(diagnosis("UNEXPLAINED", named=(), unexplained=[left]))[1]["Left"] == said
+    assert screen(diagnosis("UNEXPLAINED", named=(), unexplained=[left]))[1]["Left"] == (
+        f"In what it was fitted to: {said[0].lower()}{said[1:]}"
+    )
     assert "Left" not in screen(diagnosis())[1]
 
 
@@ -293,6 +295,16 @@ def test_what_is_gone_is_said_of_torque_and_force_where_both_had_a_gap():
         "Of the held-out gap above the noise, 95 % of the torque and 41 % of the force is gone"
     )
     assert "noise, 97 % is gone" in screen(diagnosis("PARTIAL", share_by_kind=torque))[1]["How sure"]
+
+
+def test_effects_are_credited_with_what_the_vehicles_own_numbers_leave():
+    """A gap went from 7.7 to 1.3 floors by a number of the vehicle, and of it 3 % were said to be gone."""
+    record = diagnosis("PARTIAL")
+    left = replace(record.residual, parameters=0.2 * record.residual.before)
+    said = screen(replace(record, residual=left))[1]["How sure"]
+    assert said.startswith(
+        "Of the held-out gap above the noise that is left when the vehicle's own numbers are refitted, 97 % is gone"
+    )
 
 
 def test_what_differs_between_flights_stands_above_and_not_below():

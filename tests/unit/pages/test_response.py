@@ -80,7 +80,10 @@ def test_without_instruments_nothing_is_judged():
 
 def test_what_no_model_says_is_told_by_its_lag():
     box = response_box(record_of(roll_rate=estimate(lag_s=0.05, model=False), pitch_rate=estimate(model=False)))
-    assert box.title == "vehicle.h5 cannot be judged: these flights excite no response enough."
+    assert box.title == (
+        "vehicle.h5 cannot be judged: the paths that are flown again move no response clearly, and what moves by "
+        "itself is of the loop."
+    )
     # A lag of 50 ms is 45 degrees behind at 1 / (2 pi 50 ms).
     assert box.sentences[0] == "Roll rate: 45° behind what is asked at 3.2 Hz, seen from 0.18 to 15 Hz."
     assert box.sentences[1] == "Pitch rate: follows what is asked less than 45° behind from 0.18 to 15 Hz."
@@ -132,5 +135,5 @@ def test_a_response_that_one_flight_lacks_is_not_judged_beside_others():
     box = response_box(record)
     assert box.title == "vehicle.h5 answers its rotors as the vehicle does: roll; not judged: thrust."
     assert box.tone == "note"
-    assert box.sentences[1].startswith("Thrust: not moved by the instruments, so of the loop: J = ")
+    assert box.sentences[1].startswith("Thrust: not moved by the paths that are flown again, so of the loop: J = ")
     assert record.summary["responses"]["thrust"]["instrumented"] is False

@@ -107,8 +107,8 @@ def test_an_inertia_that_no_body_has_is_no_constant_however_narrow_its_interval(
     [
         ([False, False], [0.004, 0.004, 0.005]),
         ([False, True], [0.004, 0.004, 0.005]),
-        # What was stated does not go with what was found.
-        ([True, True], [0.03, 0.004, None]),
+        # Whatever a fit says of its intervals.
+        ([True, True], [0.004, 0.004, 0.005]),
     ],
 )
 def test_no_config_gets_a_moment_of_inertia_that_no_body_has(determined, section):
@@ -124,6 +124,69 @@ def test_no_config_gets_a_moment_of_inertia_that_no_body_has(determined, section
     moments = np.array([0.03, 0.004, 0.005, 0.0, 0.0, 0.0])
     record = replace(record, found=found, vehicle=replace(record.vehicle, inertia=moments))
     assert vehicle_section(record)["inertia_kg_m2"] == section
+
+
+def test_what_was_stated_and_does_not_go_with_what_was_found_is_to_be_found():
+    found = FoundNumbersGroup(
+        name=("inertia.Ixx", "inertia.Iyy", "inertia.Izz"),
+        unit=("kg m^2",) * 3,
+        value=np.array([0.008, 0.004, 0.009]),
+        low=np.array([0.007, 0.003, 0.001]),
+        high=np.array([0.009, 0.005, 0.050]),
+        stated=np.array([np.nan, np.nan, 0.003]),
+        determined=np.array([True, True, False]),
+        at_bound=np.zeros(3, dtype=bool),
+    )
+    record = _of_inertia(0.008, 0.004, 0.009)(replace(record_of(whole()), found=found))
+    assert vehicle_section(record)["inertia_kg_m2"] == [0.008, 0.004, None]
+
+
+def test_a_number_that_no_vehicle_has_is_not_told_and_no_value_in_a_table():
+    """A centre of mass beyond the hubs, and a damping beyond all that is tried, were printed as if found."""
+    record = record_of(whole())
+    names = ("inertia.Ixx", "com_offset.c_x", "linear_damping.d_x")
+    numbers = FoundNumbersGroup(
+        name=names,
+        unit=("kg m^2", "m", "N m s/rad"),
+        value=np.array([0.004, -0.83, 15.0]),
+        low=np.array([0.0039, -3.0, 1.0]),
+        high=np.array([0.0041, 2.0, 20.0]),
+        stated=np.full(3, np.nan),
+        determined=np.array([True, False, False]),
+        at_bound=np.zeros(3, dtype=bool),
+        possible=np.array([True, False, False]),
+    )
+    record = replace(record, found=numbers)
+    assert record.untold == names[1:]
+    tables = {block.name: block for block in unfolded(answer(source_of_record(record))) if isinstance(block, Table)}
+    rows = [
+        [cell.text for cell in row] for name in ("constants", "numbers") for row in tables[f"vehicle-{name}-1"].cells
+    ]
+    assert ["centre of mass along x, m", "—", "—", "—", "—", "no: impossible"] in rows
+    assert ["linear damping d_x", "N m s/rad", "—", "—", "—"] in rows
+    assert "centre of mass along x and linear damping d_x: no such vehicle has it" in " ".join(cautions(record))
+
+
+def test_headline_table_and_section_follow_from_one_judgement_of_what_is_told():
+    """Where instruments tell the constants, the body that a forecast turns by is no word against them."""
+    record = _told(record_of(whole()))
+    heavy = np.array([3.0, 3.0, 5.0, 0.0, 0.0, 0.0])
+    record = replace(record, forecast=replace(record.vehicle, inertia=heavy))
+    assert record.unreal == ("inertia.Ixx",)
+    assert record.untold == ()
+    assert title(record).endswith("its constants are told.")
+    assert all(each.determined for each in parameters_of(record) if each.low is not None)
+    assert vehicle_section(record)["inertia_kg_m2"][0] == record.vehicle.inertia[0]
+
+
+def test_logs_too_slow_for_what_is_flown_are_to_be_faster_before_another_flight():
+    record = record_of(whole())
+    record = replace(record, found=replace(record.found, determined=np.zeros(2, dtype=bool)))
+    assert record.verdict == Trust.NOT_DETERMINED
+    (said,) = [line for line in cautions(replace(record, rotors_told=9.9)) if "rotors" in line]
+    assert said.startswith("The logs tell the rotors 9.9 times a second, and nothing of motion above 5.0 Hz; another ")
+    assert "logged 50 times a second or faster: LOG_BITMASK of ArduPilot" in said
+    assert not any("logged" in line for line in cautions(replace(record, rotors_told=49.9)))
 
 
 def test_a_moment_that_no_body_has_is_said_with_its_reason():
@@ -200,7 +263,7 @@ def test_constants_that_repeats_tell_are_judged_by_what_comes_again_and_not_by_a
     first, cost, *_ = grounds(record)
     assert "3 runs that repeat each other (correlation 0.90 to 0.97)" in first
     assert "From 1.0 to 6.0 Hz they explain 98 % (± 1 %) of the roll" in first
-    assert cost.startswith("Cost J of its frequency responses (up to 100 is acceptable): roll 12")
+    assert cost.startswith("Mismatch J of its frequency responses (0 is none, up to 100 is acceptable): roll 12")
     said = [block.text for block in unfolded(answer(source_of_record(record))) if isinstance(block, Text)]
     assert any("`cpfls replay` plays" in line for line in said)
     assert not any("loop, not the vehicle" in line for line in said)
@@ -232,7 +295,7 @@ def test_constants_that_lack_something_are_not_good(given, found, trust):
     assert replace(record, contradiction=("rates are mirrored",)).verdict == Trust.DO_NOT_USE
     said = " ".join(grounds(record))
     assert ("Below 2.0 Hz they explain less" in said) == ("used" in given)
-    assert ("They do not tell the moments of inertia" in said) == (trust == Trust.NOT_DETERMINED)
+    assert ("Other values of Ixx would explain about as much" in said) == (trust == Trust.NOT_DETERMINED)
 
 
 def _held_out(velocity):
@@ -273,9 +336,9 @@ def _off(record):
 @pytest.mark.parametrize(
     ("changed", "velocity", "why"),
     [
-        (_on_bound, 1.0, "rests on Ixx, which is on a bound or of no body"),
-        (_of_inertia(0.03, 0.02, 0.02), 1.0, "rests on Ixx, which is on a bound or of no body"),
-        (_of_inertia(0.02, 0.004, 0.007), 1.0, "rests on Ixx, which is on a bound or of no body"),
+        (_on_bound, 1.0, "rests on Ixx at the limit of the search"),
+        (_of_inertia(0.03, 0.02, 0.02), 1.0, "rests on Ixx that no such body has"),
+        (_of_inertia(0.02, 0.004, 0.007), 1.0, "rests on Ixx that no such body has"),
         (_off, 1.0, "has a frequency response about roll or pitch that is off"),
         (replace, 2.1, "is worse in velocity than “nothing moves” and “rate stays” both"),
     ],

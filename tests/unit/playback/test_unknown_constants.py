@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.config.load import validate
-from cpfls_cli.playback.loop import LoopBounds
+from cpfls_cli.playback.fit import Fitted
+from cpfls_cli.playback.loop import LoopBounds, _factors
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.vehicle import FoundNumber, beside_loop, bodily, carrying_weight, find_vehicle
@@ -141,6 +142,22 @@ def test_a_moment_that_is_more_than_the_others_together_is_not_determined_and_th
     vehicle = replace(TRUE.vehicle, inertia_kg_m2=(0.003, 0.004, 0.005))
     assert [number.determined for number in bodily(vehicle, numbers)] == [True, False]
     assert all(number.determined for number in bodily(replace(vehicle, inertia_kg_m2=(0.003, 0.006, 0.005)), numbers))
+
+
+def test_no_vehicle_has_its_centre_of_mass_beyond_the_hubs_nor_a_damping_beyond_all_that_is_tried():
+    size = TRUE.vehicle.inertia_kg_m2[0]
+    values = {"com_offset.c_x": (0.05, -0.83), "linear_damping.d_x": (size, 1e3 * size)}
+    for place, possible in enumerate((True, False)):
+        numbers = [FoundNumber(name, "", own[place], 0, 1, np.nan, True, False) for name, own in values.items()]
+        told = list(bodily(TRUE.vehicle, numbers))
+        assert [(number.possible, number.determined) for number in told] == [(possible, possible)] * len(values)
+
+
+def test_where_nothing_turns_no_factor_of_the_loop_overflows():
+    """Warnings are errors here."""
+    sums = np.array([[1e200, 1e200, 0.0, 0.0, 0.0], [0.0, 0.0, 1e200, 0.0, 0.0]])
+    assert _factors(sums).tolist() == [[10.0, 0.1], [1.0, 1.0]]
+    assert Fitted(None, np.zeros(2), 0.0, np.diag([0.0, 1e300])).condition_number < 1e17
 
 
 LOOP = LoopBounds(np.array([0.8, 0.5, np.nan]), np.array([1.1, 1.6, np.nan]), np.array([0.95, 0.6, np.nan]))
