@@ -1,6 +1,6 @@
 """What is said of vehicles that nobody changed, and of fifteen changes at three sizes each, in flights with truth.
 
-    python benchmarks/changed_study.py nano|quadrotor|hexarotor [--draws N] [--trim SHARE] [--keep FOLDER]
+    python benchmarks/changed_study.py nano|quadrotor|hexarotor [--draws N] [--trim SHARE] [--of CHANGE...]
 
 Vehicles hover and fly gentle legs for 30 s in gusts, each day with another trim, battery, wind and gusts; their configs
 are off by what configs are off by. Numbers of flights are kept in a folder, so that they need not fly again.
@@ -168,12 +168,12 @@ def _fleet(kind: Kind, trim: Trim) -> Fleet:
     return Fleet(vehicles, days)
 
 
-def _cases(kind: Kind, trim: Trim, fleet: Fleet, draw: int) -> list[Case]:
+def _cases(kind: Kind, trim: Trim, fleet: Fleet, names: Sequence[str], draw: int) -> list[Case]:
     index = draw % VEHICLES
     vehicle, body = fleet.vehicles[index]
     cases = []
     for number, (name, sizes) in enumerate(SIZES.items()):
-        for step, size in enumerate(sizes):
+        for step, size in enumerate(sizes if name in names else ()):
             seed = [kind.rotors, 1000 + draw, number, step]
             now = altered(name, size, kind, day_of(kind, body, trim, np.random.default_rng(seed)), draw)
             told = _told(kind, vehicle, now.body, seed)
@@ -237,7 +237,8 @@ def _verdict(case: Case, run: Change) -> Verdict:
 def _changes(fleet: Fleet, cases: Sequence[Case], instrument: str) -> tuple[list[list[object]], list[list[object]]]:
     """Give a row a change and size, and one a change: the smallest that is found, and what the tool says would show."""
     rows, smallest = [], []
-    for name, sizes in SIZES.items():
+    for name in dict.fromkeys(case.name for case in cases):
+        sizes = SIZES[name]
         shares, shows, held = [], [], []
         for size in sizes:
             own = [case for case in cases if case.name == name and case.size == size]
@@ -279,6 +280,7 @@ def main() -> None:
     parser.add_argument("--trim", type=float, default=0.03)
     parser.add_argument("--keep", type=Path)
     parser.add_argument("--only", choices=["unchanged", "changes"])
+    parser.add_argument("--of", nargs="+", choices=SIZES, default=list(SIZES), metavar="CHANGE")
     given = parser.parse_args()
     kind, trim = KINDS[given.kind], Trim(given.trim, given.trim / 30)
     folder = given.keep and given.keep / f"{given.kind}-{given.trim:g}"
@@ -291,7 +293,7 @@ def main() -> None:
         return
     cases: list[Case] = []
     for draw in range(given.draws):
-        cases += _kept(folder and folder / f"draw-{draw}.pickle", partial(_cases, kind, trim, fleet, draw))
+        cases += _kept(folder and folder / f"draw-{draw}.pickle", partial(_cases, kind, trim, fleet, given.of, draw))
     for instrument in INSTRUMENTS:
         rows, smallest = _changes(fleet, cases, instrument)
         header = ["change", "size", "draws", "found", "right", "among those alike", "wrong name", "said otherwise"]
