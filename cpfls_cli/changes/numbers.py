@@ -183,6 +183,7 @@ def _told(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
         yield _averaged(
             [f"turn {name}" for name in rotors], both, flies, lambda means: np.log(means[:, 0] / means[:, 1])
         )
+        yield _answer(signals, flies, rotors)
     turns, feels = bool(signals.body_rate.any()), _felt(signals)
     for sensor, values in (("gyroscope", signals.body_rate if turns else None), ("accelerometer", feels)):
         if values is not None and (squares := _above(values, signals.period)) is not None:

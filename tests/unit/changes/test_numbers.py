@@ -9,6 +9,7 @@ from cpfls_cli.changes.judge import FALSE_ALARM, changed
 from cpfls_cli.changes.numbers import KINDS, flight_numbers, in_flight
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
+from cpfls_cli.lag import delayed
 from cpfls_cli.weak_form.windows import Recording
 from tests.builders.changed_flights import WEAK, flight_table
 from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, signals_of
@@ -153,3 +154,16 @@ def test_a_lean_against_wind_is_no_fault_of_the_accelerometer():
     )
     assert [calm[f"felt {axis}"] for axis in "xyz"] == pytest.approx(np.zeros(3), abs=1e-9)
     assert [biased[f"felt {axis}"] for axis in "xyz"] == pytest.approx([0.1, 0.2, 0.3], abs=0.06)
+
+
+def test_how_late_a_rotor_answers():
+    """Speeds that are those of the flight 24 ms ago, but of one rotor 34 ms."""
+    signals = recorded().signals
+    late = np.array([0.024, 0.024, 0.034, 0.024])
+    speed = np.stack(
+        [delayed(own[:, None], each / PERIOD)[:, 0] for own, each in zip(signals.speed.T, late, strict=True)], axis=1
+    )
+    told = flight_numbers(
+        Recording("flight.h5", replace(signals, rotor_speed=speed, rotor_command=signals.speed))
+    ).values
+    assert [told[f"answer M{index}"] for index in range(1, 5)] == pytest.approx(late, abs=0.002)
