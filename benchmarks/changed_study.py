@@ -1,6 +1,6 @@
 """What is said of vehicles that nobody changed, and of fifteen changes at three sizes each, in flights with truth.
 
-    python benchmarks/changed_study.py nano|quadrotor|hexarotor [--draws N] [--trim SHARE] [--of CHANGE...]
+    python benchmarks/changed_study.py quadrotor|hexarotor [--draws N] [--trim SHARE] [--of CHANGE...]
 
 Vehicles hover and fly gentle legs for 30 s in gusts, each day with another trim, battery, wind and gusts; their configs
 are off by what configs are off by. Numbers of flights are kept in a folder, so that they need not fly again.
@@ -25,12 +25,12 @@ pin_threads()
 
 import numpy as np
 
-from benchmarks.shared.changing_flights import HEXA, NANO, QUAD, Body, Kind, Trim, day_of, flown, vehicle_of
+from benchmarks.shared.changing_flights import HEXA, QUAD, Body, Kind, Trim, day_of, flown, vehicle_of
 from cpfls_cli.changes.judge import NAMED, Change, _Space, changed
 from cpfls_cli.changes.numbers import FlightNumbers, flight_numbers
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-KINDS = {"nano": NANO, "quadrotor": QUAD, "hexarotor": HEXA}
+KINDS = {"quadrotor": QUAD, "hexarotor": HEXA}
 INSTRUMENTS = ("commands", "speeds")
 VEHICLES, DAYS, A_DAY, THRICE = 6, 9, 3, 3
 """Of the first so many days three flights."""

@@ -44,8 +44,6 @@ class Kind(NamedTuple):
     volts: float
     by_voltage: float
     """Power of the voltage that thrust goes with."""
-    positioned: bool
-    """Whether position and velocity are in its log."""
 
     @property
     def places(self) -> Array:
@@ -64,22 +62,6 @@ class Kind(NamedTuple):
         return self.mass * GRAVITY / self.rotors / self.thrust_factor
 
 
-NANO = Kind(
-    "nano, 37 g",
-    4,
-    0.037,
-    (2.4e-5, 2.6e-5, 4.2e-5),
-    0.046,
-    2.0e-8,
-    1.2e-10,
-    0.03,
-    0.02,
-    (3.4, 5.1, 2.0),
-    0.1,
-    4.2,
-    1.5,
-    True,
-)
 QUAD = Kind(
     "quadrotor, 1.5 kg",
     4,
@@ -225,14 +207,14 @@ def flown(kind: Kind, vehicle: VehicleSettings, body: Body, seed: list[int]) -> 
         *(kind.mass, np.array(kind.inertia), unmix, kind.hover),
     )
     settled = log[round(SETTLES_S / STEP_S / EVERY) :]
-    return dict(_logged(kind, vehicle, body, places, settled, rng))
+    return dict(_logged(vehicle, body, places, settled, rng))
 
 
 def _logged(
-    kind: Kind, vehicle: VehicleSettings, body: Body, places: Array, log: Array, rng: np.random.Generator
+    vehicle: VehicleSettings, body: Body, places: Array, log: Array, rng: np.random.Generator
 ) -> list[tuple[str, Recording]]:
     """Log what was flown, with a vibration at the rotors' frequencies, after a rest on the ground."""
-    position, velocity, felt, rate = log[:, :3], log[:, 3:6], log[:, 15:18], log[:, 18:21]
+    felt, rate = log[:, 15:18], log[:, 18:21]
     attitude = euler_angles(log[:, 6:15].reshape(-1, 3, 3))
     speed, command, phase = np.split(log[:, 22:], 3, axis=1)
     force = body.unbalance * speed**2
@@ -260,9 +242,6 @@ def _logged(
         "specific_force": after(felt, [0.0, 0.0, GRAVITY]),
         "voltage": after(log[:, 21], body.charge),
     }
-    if kind.positioned:
-        common["velocity"] = after(velocity + 0.005 * rng.standard_normal(velocity.shape), still)
-        common["position"] = after(position, still)
     speeds, commands = after(speed, 0.0), after(command, 0.0)
     return [
         ("commands", Recording("flight", Signals(**common, rotor_speed=commands, commanded=True))),
