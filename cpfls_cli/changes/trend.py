@@ -284,9 +284,14 @@ def _gain(white: Array) -> float:
 
 
 def _search(white: Array) -> KernelCPD:
+    # Of a linear kernel: least squares.
+    return load_ruptures()(kernel="linear", min_size=1).fit(white)
+
+
+def load_ruptures() -> type[KernelCPD]:
+    """Load the search for change points, or refuse where it is not installed."""
     try:
         from ruptures import KernelCPD
     except ImportError:
         raise InputError(f"a trend needs the package ruptures; {install_command('trend')}") from None
-    # Of a linear kernel: least squares.
-    return KernelCPD(kernel="linear", min_size=1).fit(white)
+    return KernelCPD  # type: ignore[no-any-return]

@@ -23,7 +23,7 @@ from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import format_name, holds
 from cpfls_cli.artifacts.trend import TrendRecord
 from cpfls_cli.changes.judge import FALSE_ALARM, NAMED
-from cpfls_cli.changes.trend import trend
+from cpfls_cli.changes.trend import load_ruptures, trend
 from cpfls_cli.commands import report
 from cpfls_cli.commands.changed import units_of
 from cpfls_cli.config.study import Study, generator
@@ -69,6 +69,8 @@ class Options:
 
 def run(job: Job, given: Sequence[Path], options: Options) -> Outcome:
     """Hold the flights of a vehicle against each other in time, and say since when what is changed."""
+    # Before logs are read, which takes long.
+    load_ruptures()
     flights = numbered_roles("flight", list(_expanded(given, job.output)))
     inputs = take_inputs(job, flights)
     own = job.output / FILES[0]
@@ -187,9 +189,11 @@ def _told(
 
 
 def _left_out(refused: Sequence[Exception]) -> list[str]:
-    """Name flights that tell nothing, in one sentence: each says its own name and why."""
-    count = len(refused)
-    return [f"left out, {count} flight{'s' if count > 1 else ''}: {'; '.join(map(str, refused))}"] if refused else []
+    """Name flights that tell nothing, in one sentence: each says its own name and the first reason."""
+    if not refused:
+        return []
+    first = [str(error).splitlines()[0] for error in refused]
+    return [f"left out, {len(refused)} flight{'s' if len(refused) > 1 else ''}: {'; '.join(first)}"]
 
 
 def _share_out(job: Job, given: Mapping[str, Path], inputs: Mapping[str, InputFile], options: Options) -> None:

@@ -137,10 +137,11 @@ def _since(record: ChangedRecord) -> str:
     )
 
 
-def checks(record: FoundRecord) -> Iterator[tuple[str, str]]:
-    """Say what to look at by hand."""
+def checks(record: FoundRecord, among: Sequence[int] | None = None) -> Iterator[tuple[str, str]]:
+    """Say what to look at by hand, for all changes that were found or some of them."""
     looked: dict[str, str] = {}
-    for index, cause in enumerate(record.found.cause):
+    for index in range(len(record.found.cause)) if among is None else among:
+        cause = record.found.cause[index]
         for name in [cause, *(() if record.named[index] else (name for name, _ in record.others(index)))]:
             looked.setdefault(what_to_check(name), cause_name(name))
     for check, name in list(looked.items())[:_CHECKED]:

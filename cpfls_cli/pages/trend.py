@@ -93,7 +93,8 @@ def _facts(record: TrendRecord, vehicle: VehicleSettings) -> Iterator[tuple[str,
     rest = f" and {len(beyond) - _MOVED} more" if len(beyond) > _MOVED else ""
     yield "Beyond limits", sentence(f"{', '.join(beyond[:_MOVED])}{rest}" if beyond else "no flight")
     if len(record.shift.start):
-        yield from checks(record)
+        # Of the last change point that tells of something: the vehicle flies as that.
+        yield from checks(record, [] if not len(record.shifts) else record.causes(int(record.shifts.max())))
     else:
         yield (
             "Would have shown",
