@@ -9,10 +9,9 @@ from cpfls_cli.effects.effect import Coefficient, Columns
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming import search
 from cpfls_cli.gap.naming.ranking import rank_effects
 from cpfls_cli.gap.naming.scoring import Scored
-from cpfls_cli.gap.naming.search import alternatives, exchanged, simplest, unbeaten
+from cpfls_cli.gap.naming.search import alternatives, simplest, unbeaten
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import fly, weak
 
@@ -119,12 +118,3 @@ def test_one_block_cannot_tell():
 
 def test_systems_without_flights_of_the_signal_have_no_columns():
     assert system([weak(fly(1))]).columns(Candidate(CATALOGUE["battery_sag"], {"exponent": 1.0})).shape[2] == 0
-
-
-def test_an_effect_stays_where_only_others_have_moved(monkeypatch):
-    """What lies between command and rotors is compared alone: an effect that does not is none of these."""
-    truth = [(Candidate(SPECIAL, {}), [0.3]), (Candidate(OTHER, {}), [0.3])]
-    flights = [weak(fly(seed, truth, gyro=0.003, rotor=0.5)) for seed in (1, 2)]
-    monkeypatch.setattr(search, "moved", lambda _flights, _others, step: [of(step, "twin")])
-    chosen = [own for own, _ in truth]
-    assert exchanged(flights, chosen, [SPECIAL, TWIN, OTHER], SETTINGS) == tuple(chosen)
