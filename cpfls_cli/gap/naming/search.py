@@ -128,20 +128,22 @@ def grown_elsewhere(
     settings: GapSettings,
     off: float = 0.0,
 ) -> list[Scored]:
-    """List sets that grew from others than the best one, and that leave less than that with no more numbers, or enough.
+    """List sets that grew from others than the best one and leave less than that with no more numbers.
 
-    Nothing has to be looked for where the best one leaves nothing, unless it stands for two.
+    Where the best one leaves nothing, nothing is looked for. Two that a filter stands for may have a number more.
     """
     chosen = step.hypothesis.chosen
-    if not sets or not (step.above_floor > _enough(step) or stands_for_two(chosen, len(chosen) - 1)):
+    two = bool(sets) and stands_for_two(chosen, len(chosen) - 1)
+    if not sets or not (two or step.above_floor > _enough(step)):
         return []
+    most = _numbers(chosen) + two
     own, found = rescored(step.hypothesis, step, settings), list[Scored]()
     for other in sets:
         late = any(each.effect.actuation is not None for each in other)
         like = [each for each in effects if each.actuation is not None] if late else effects
         there = rank_effects(flights, other, like, settings, None, floor=step.floor)
         for scored in there.ranking[: _BEAM if late else 1]:
-            if _names(scored.chosen) != _names(chosen) and _may_be_better(_numbers(scored.chosen), own, step, off):
+            if _names(scored.chosen) != _names(chosen) and _numbers(scored.chosen) <= most:
                 grown = refined(flights, scored.chosen, step.floor) if late else system(flights, scored.chosen)
                 found.append(rescored(grown, step, settings))
     return [scored for scored in found if _is_better(scored, own, step, off)]
