@@ -18,7 +18,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, has_force
 from cpfls_cli.gap.balance.weak_flight import Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
-from cpfls_cli.gap.naming.by_instruments import by_instruments, told_apart
+from cpfls_cli.gap.naming.by_instruments import by_instruments, told_apart, untold_actuation
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     impossible_ratios,
@@ -185,13 +185,21 @@ def _gusts(named: _Named, given: Instruments, settings: GapSettings, rng: np.ran
 
 
 def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) -> _Named:
-    """Judge what was named with the numbers that instruments tell, without what is 0 by them."""
-    judge, refusals = named.judge, list(named.refusals)
-    found = by_instruments(named.judgement.found, given, judge.floor, settings)
-    while out := nothing_by_size(found):
-        refusals += [Refusal(name, "judged by what instruments tell, it may be 0") for name in out]
-        kept = [each for each in found.hypothesis.chosen if each.effect.name not in out]
-        found = by_instruments(fitted(judge.training, kept, judge.floor, settings), given, judge.floor, settings)
+    """Judge what was named with the numbers that instruments tell, without what is 0 by them or may be the loop."""
+    judge, refusals, fit = named.judge, list(named.refusals), named.judgement.found
+    while True:
+        found = by_instruments(fit, given, judge.floor, settings)
+        out = [Refusal(name, "judged by what instruments tell, it may be 0") for name in nothing_by_size(found)]
+        out += [
+            Refusal(name, "a loop that answers gusts looks as late, and instruments do not tell which it is")
+            for name in untold_actuation(fit, found)
+        ]
+        if not out:
+            break
+        refusals += out
+        names = {refused.name for refused in out}
+        kept = [each for each in found.hypothesis.chosen if each.effect.name not in names]
+        fit = fitted(judge.training, kept, judge.floor, settings)
     found, alike = told_apart(found, named.effects, given, judge.floor, settings)
     return named._replace(judgement=judge.judge(found), refusals=refusals, alike=alike)
 

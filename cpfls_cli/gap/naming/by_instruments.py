@@ -88,6 +88,12 @@ def by_instruments(found: NamedFit, given: Instruments, floor: Array, settings: 
     return NamedFit(there, found.block, _told(found, estimates_of(there, values, left_out), moving))
 
 
+def untold_actuation(before: NamedFit, after: NamedFit) -> list[str]:
+    """Name effects on the actuation whose numbers instruments hardly tell, and left as they were."""
+    numbers = zip(after.hypothesis.chosen, before.estimates.effects, after.estimates.effects, strict=True)
+    return [each.effect.name for each, was, now in numbers if each.effect.kind == "actuator" and was is now]
+
+
 def told_apart(
     found: NamedFit, effects: Sequence[Effect], given: Instruments, floor: Array, settings: GapSettings
 ) -> tuple[NamedFit, tuple[Alternative, ...]]:
