@@ -149,11 +149,6 @@ def grown_elsewhere(
     return [scored for scored in found if _is_better(scored, own, step, off)]
 
 
-def _may_be_better(numbers: int, own: Scored, step: RankedStep, off: float) -> bool:
-    """Tell whether what a set leaves is enough for one with more numbers."""
-    return numbers <= _numbers(own.chosen) or step.above_floor - own.gain > _more(own, step, off)
-
-
 def _is_better(scored: Scored, own: Scored, step: RankedStep, off: float) -> bool:
     """Tell whether a set leaves less than another one; with more numbers surely and by as much as is worth a name."""
     less = scored.gain - own.gain
@@ -186,15 +181,6 @@ def quiet_enough(gain: float, step: RankedStep, refitted: System) -> bool:
     Columns of rates hold the noise of the gyroscope, and so does the inertial torque: where rates about two axes go
     hand in hand, a fit can turn one against the other and be rid of noise. What an effect takes off the floor is
     therefore taken off its gain.
-
-    Parameters
-    ----------
-    gain : float
-        What it explains, in squared floors.
-    step : RankedStep
-        The look that chose it.
-    refitted : System
-        With the effect.
     """
     if not refitted.chosen[-1].effect.rate_derivative:
         return True
@@ -207,22 +193,10 @@ def quiet_enough(gain: float, step: RankedStep, refitted: System) -> bool:
 def in_place_of(
     flights: Sequence[WeakFlight], chosen: Sequence[Candidate], index: int, step: RankedStep, settings: GapSettings
 ) -> list[Scored]:
-    """Score an effect, and all that could stand in its place; what lies between command and rotors with shapes moved.
+    """Score an effect, and behind it all that could stand in its place, beside the look at the others and it.
 
-    Two of these, each with one shape, can stand for one with two; with more shapes than it has, only if they surely
-    leave less.
-
-    Parameters
-    ----------
-    index : int
-        Of the effect among them.
-    step : RankedStep
-        The look at the others without it, and with it.
-
-    Returns
-    -------
-    list of Scored
-        The effect first.
+    What lies between command and rotors is scored with shapes moved, and two of these can stand for one with two
+    shapes; more numbers than it has have to be worth it.
     """
     ranked = sorted(step.ranking, key=lambda scored: scored.candidate.effect.name != chosen[index].effect.name)
     if chosen[index].effect.actuation is None:
@@ -233,9 +207,10 @@ def in_place_of(
     sets: list[tuple[Candidate, ...]] = [(each,) for each in alike]
     if stands_for_two(chosen, index):
         sets += combinations(alike, 2)
-    sets = [each for each in sets if _may_be_better(_numbers([*others, *each]), own, step, off)]
+    numbers, worth = _numbers(own.chosen), step.above_floor - own.gain > _more(own, step, off)
+    sets = [each for each in sets if worth or _numbers([*others, *each]) <= numbers]
     moved = [rescored(refined(flights, [*others, *each], step.floor), step, settings) for each in sets]
-    fair = [each for each in moved if _numbers(each.chosen) <= _numbers(own.chosen) or _is_better(each, own, step, off)]
+    fair = [each for each in moved if _numbers(each.chosen) <= numbers or _is_better(each, own, step, off)]
     return [own, *fair, *(scored for scored in ranked[1:] if not _late(scored))]
 
 
@@ -263,13 +238,6 @@ def chance_beside_its_like(
     Shifted residuals cannot tell: each of these effects moves with the command, and so does what the others leave.
     Compared is therefore what all effects, and the others without it, leave of blocks that their fits did not see, both
     with all shapes moved, by the signed-rank test of Wilcoxon; times the number of effects that could have stood there.
-
-    Parameters
-    ----------
-    index : int
-        Of the effect among them.
-    effects : sequence of Effect
-        That the search tried.
     """
     together = system(flights, chosen)
     floor = best_floor(together)
