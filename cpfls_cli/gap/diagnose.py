@@ -36,7 +36,7 @@ from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.residual.air import Air, air, in_air, known_motion
-from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.settings import NOISE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.windows import Recording, common_windows
@@ -289,13 +289,15 @@ def _concluded(
     named = ascending((each.effect for each in judged), lambda effect: -effect.share)
     effects = [*faults, *named]
     floor = steps[-1].floor
-    numbers = wrong_numbers(estimates, effects, held_out.removed_by_numbers(), _pull(hypothesis, floor))
+    # In gusts instruments tell the numbers, and a gap need not stand out.
+    still = not any(flight.air.any() for flight in hypothesis.flights)
+    taken = held_out.removed_by_numbers(NOISE if still else 0.0)
+    numbers = wrong_numbers(estimates, effects, taken, _pull(hypothesis, floor))
     effects += [numbers] if numbers is not None else []
     removed = held_out.shares()
     if not named:
         # Faults and wrong numbers alone: of all the gap, where one is left, or numbers in still air are not most of it.
         removed = held_out.shares(as_given=True)
-        still = not any(flight.air.any() for flight in hypothesis.flights)
         by_numbers = numbers is not None and still and min(removed.values()) < settings.partial_share
         removed = removed if effects and (remainder.unexplained or by_numbers) else {}
     share = min(removed.values(), default=1.0)
