@@ -22,7 +22,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, has_force
 from cpfls_cli.gap.balance.weak_flight import Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
-from cpfls_cli.gap.naming.by_instruments import by_instruments
+from cpfls_cli.gap.naming.by_instruments import by_instruments, told_apart, untold_actuation
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     impossible_ratios,
@@ -37,10 +37,10 @@ from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.naming.leftover import Leftover, beside_the_unnamed, not_excited, untried
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
-from cpfls_cli.gap.naming.results import Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
+from cpfls_cli.gap.naming.results import Alternative, Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.residual.air import Air, air, in_air, known_motion
-from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.settings import NOISE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.windows import Recording, common_windows
@@ -129,7 +129,7 @@ def diagnose(
             flights = flights.in_air(gusts)
             named = _by_instruments(_named(flights, settings, rng, progress), given, settings)
             gusts = _gusts(named, given, settings, rng)
-    weak, (effects, steps, judge, judgement, refusals, differ) = flights.training, named
+    weak, (effects, steps, judge, judgement, refusals, differ, alike) = flights.training, named
     hypothesis, _, estimates = judgement.found
     progress(0.75, "rivals")
     effect_shares = shares(weak, hypothesis.chosen, estimates, judge.floor)
@@ -146,7 +146,7 @@ def diagnose(
     remainder = judge.remainder(judgement.found)
     excited = _excited(hypothesis, quiet)
     concluded = partial(_concluded, judged, faults, judgement, remainder)
-    further = (notes, steps, excited, settings, torque_alone, audited)
+    further = (notes, steps, excited, settings, torque_alone, audited, alike)
     diagnosis = concluded(differ, *further)
     if diagnosis.verdict in _OPEN and (between := _changed_between(training, held)):
         diagnosis = concluded(between, *further)
@@ -200,6 +200,7 @@ class _Named(NamedTuple):
     judgement: Judgement
     refusals: list[Refusal]
     differ: tuple[str, ...]
+    alike: tuple[Alternative, ...] = ()
 
 
 def _named(
@@ -222,14 +223,23 @@ def _gusts(named: _Named, given: Instruments, settings: GapSettings, rng: np.ran
 
 
 def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) -> _Named:
-    """Judge what was named with the numbers that instruments tell, without what is 0 by them."""
-    judge, refusals = named.judge, list(named.refusals)
-    found = by_instruments(named.judgement.found, given, judge.floor, settings)
-    while out := nothing_by_size(found):
-        refusals += [Refusal(name, "judged by what instruments tell, it may be 0") for name in out]
-        kept = [each for each in found.hypothesis.chosen if each.effect.name not in out]
-        found = by_instruments(fitted(judge.training, kept, judge.floor, settings), given, judge.floor, settings)
-    return named._replace(judgement=judge.judge(found), refusals=refusals)
+    """Judge what was named with the numbers that instruments tell, without what is 0 by them or may be the loop."""
+    judge, refusals, fit = named.judge, list(named.refusals), named.judgement.found
+    while True:
+        found = by_instruments(fit, given, judge.floor, settings)
+        out = [Refusal(name, "judged by what instruments tell, it may be 0") for name in nothing_by_size(found)]
+        out += [
+            Refusal(name, "a loop that answers gusts looks as late, and instruments do not tell which it is")
+            for name in untold_actuation(fit, found)
+        ]
+        if not out:
+            break
+        refusals += out
+        names = {refused.name for refused in out}
+        kept = [each for each in found.hypothesis.chosen if each.effect.name not in names]
+        fit = fitted(judge.training, kept, judge.floor, settings)
+    found, alike = told_apart(found, named.effects, given, judge.floor, settings)
+    return named._replace(judgement=judge.judge(found), refusals=refusals, alike=alike)
 
 
 def _excited(hypothesis: System, floor: Array) -> bool:
@@ -311,19 +321,27 @@ def _concluded(
     settings: GapSettings,
     torque_alone: tuple[tuple[str, float], ...],
     audited: Audit,
+    alike: Sequence[Alternative],
 ) -> Diagnosis:
     (hypothesis, _, estimates), held_out = judgement
     named = ascending((each.effect for each in judged), lambda effect: -effect.share)
     effects = [*faults, *named]
     floor = steps[-1].floor
-    numbers = wrong_numbers(estimates, effects, held_out.removed_by_numbers(), _pull(hypothesis, floor))
+    # In gusts instruments tell the numbers, and a gap need not stand out.
+    still = not any(flight.air.any() for flight in hypothesis.flights)
+    taken = held_out.removed_by_numbers(NOISE if still else 0.0)
+    numbers = wrong_numbers(estimates, effects, taken, _pull(hypothesis, floor))
     effects += [numbers] if numbers is not None else []
     removed = held_out.shares()
     if not named:
-        # Faults and wrong numbers alone: of all the gap, where one is left.
-        removed = held_out.shares(as_given=True) if effects and remainder.unexplained else {}
+        # Faults and wrong numbers alone: of all the gap, where one is left, or numbers in still air are not most of it.
+        removed = held_out.shares(as_given=True)
+        by_numbers = numbers is not None and still and min(removed.values()) < settings.partial_share
+        removed = removed if effects and (remainder.unexplained or by_numbers) else {}
     share = min(removed.values(), default=1.0)
-    rivals = (*(rival for each in judged for rival in each.alternatives), *untried(hypothesis, named, settings))
+    told = [*alike, *(rival for each in judged for rival in each.alternatives)]
+    once = {(rival.name, rival.instead_of, rival.beside): rival for rival in told}
+    rivals = (*once.values(), *untried(hypothesis, named, settings))
     gap = held_out.size(held_out.before).floors
     least = settings.named_share
     known = [each for each in remainder.unexplained if matters(each, gap, least)] if effects else remainder.unexplained

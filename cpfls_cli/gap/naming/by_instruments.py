@@ -10,11 +10,15 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
+from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, system
-from cpfls_cli.gap.balance.refine import fit_within_bounds, shape_columns
-from cpfls_cli.gap.naming.earned import NamedFit
+from cpfls_cli.gap.balance.refine import fit_within_bounds, refined, shape_columns
+from cpfls_cli.gap.naming.earned import NamedFit, fitted
 from cpfls_cli.gap.naming.estimate import Estimates, estimates_of
+from cpfls_cli.gap.naming.ranking import more_left, rank_effects, surely
+from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import information
+from cpfls_cli.gap.naming.search import alternative
 from cpfls_cli.gap.residual.air import foretold_rows
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.instruments import Instruments
@@ -82,6 +86,68 @@ def by_instruments(found: NamedFit, given: Instruments, floor: Array, settings: 
     values[moving] += change
     there = hypothesis.with_shapes(values[len(linear) :]) if len(hypothesis.shapes) else hypothesis
     return NamedFit(there, found.block, _told(found, estimates_of(there, values, left_out), moving))
+
+
+def untold_actuation(before: NamedFit, after: NamedFit) -> list[str]:
+    """Name effects on the actuation whose numbers instruments hardly tell, and left as they were."""
+    numbers = zip(after.hypothesis.chosen, before.estimates.effects, after.estimates.effects, strict=True)
+    return [each.effect.name for each, was, now in numbers if each.effect.kind == "actuator" and was is now]
+
+
+def told_apart(
+    found: NamedFit, effects: Sequence[Effect], given: Instruments, floor: Array, settings: GapSettings
+) -> tuple[NamedFit, tuple[Alternative, ...]]:
+    """Decide by instruments what lies between command and rotors, of effects with no more shapes than what was found.
+
+    In gusts a fit of all motion takes the loop for the rotors, and a lag for a delay. What the right one leaves has
+    nothing that instruments know. Of those that they cannot tell apart the first of the catalogue is the usual one.
+
+    Parameters
+    ----------
+    found : NamedFit
+        By instruments.
+    effects : sequence of Effect
+        That the search tried.
+
+    Returns
+    -------
+    NamedFit
+        With the effect that leaves least.
+    tuple of Alternative
+        Those that leave as little.
+    """
+    chosen, flights = found.hypothesis.chosen, found.hypothesis.flights
+    between = [each for each in chosen if each.effect.actuation is not None]
+    if len(between) != 1:
+        return found, ()
+    own, others = between[0].effect, [each for each in chosen if each is not between[0]]
+    fits = {own.order: found}
+    for effect in effects:
+        if effect.actuation is not None and effect is not own and len(effect.shapes) <= len(own.shapes):
+            for scored in rank_effects(flights, others, [effect], settings, None, floor=floor).ranking:
+                start = refined(flights, scored.chosen, floor).chosen
+                fits[effect.order] = by_instruments(fitted(flights, start, floor, settings), given, floor, settings)
+    left = {order: _reproduced(each, given, floor, settings) for order, each in sorted(fits.items())}
+    best, *_ = left
+    for order in left:
+        best = order if surely(more_left(left[best], left[order])) else best
+    named, alike = _between(fits[best]), [order for order in left if not surely(more_left(left[order], left[best]))]
+    return fits[best], tuple(alternative(named, _between(fits[order]), 1.0) for order in alike if order != best)
+
+
+def _between(found: NamedFit) -> Effect:
+    """Give the effect between command and rotors."""
+    return next(each.effect for each in found.hypothesis.chosen if each.effect.actuation is not None)
+
+
+def _reproduced(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> Array:
+    """Multiply what is left with what instruments know of it, by block: 0 but for chance where nothing is missing."""
+    total: dict[int, float] = {}
+    for run in _runs(found.hypothesis, found.estimates.linear, given, floor, settings):
+        for block in np.unique(run.block):
+            own = run.block == block
+            total[block] = total.get(block, 0.0) + float((run.rows[own, :, -1] * run.known[own, :, -1]).sum())
+    return np.array([total[block] for block in sorted(total)]) * (2 / _PER_WINDOW)
 
 
 def _movable(hypothesis: System, floor: Array) -> BoolArray:

@@ -16,12 +16,11 @@ from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.gap.balance.balance_system import is_free, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.actuation import beside_its_like, chance_beside_its_like, settled
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence
 from cpfls_cli.gap.naming.ranking import rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect
 from cpfls_cli.gap.naming.scoring import Scored
-from cpfls_cli.gap.naming.search import alternatives
+from cpfls_cli.gap.naming.search import alternatives, beside_its_like, chance_beside_its_like, in_place_of
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rounding import at_most
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -73,7 +72,7 @@ def judge_effect(
     others = [other for other in chosen if other is not candidate]
     among = beside_its_like(chosen, index)
     step = rank_effects(flights, others, effects, settings, None if among else rng, also=(candidate,))
-    own, *ranking = settled(flights, chosen, index, step)
+    own, *ranking = in_place_of(flights, chosen, index, step, settings)
     effect = NamedEffect(
         candidate.effect.name,
         candidate,

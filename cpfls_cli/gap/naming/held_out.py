@@ -86,8 +86,13 @@ class HeldOut:
         better = largest(of_kind, lambda name: of_kind[name])
         return clear or {better: of_kind[better]}
 
-    def removed_by_numbers(self) -> Array:
+    def removed_by_numbers(self, least: float) -> Array:
         """Compute the share of each channel's gap that refitted numbers of the vehicle remove; 0 below visibility.
+
+        Parameters
+        ----------
+        least : float
+            Mean square in squared floors that is no gap yet.
 
         Returns
         -------
@@ -97,7 +102,8 @@ class HeldOut:
         rows = np.maximum(self.known.sum(axis=0), 1)
         gone = ((before**2 - after**2) * self.known).sum(axis=0) / rows
         each = [share_removed(before[:, [c]], after[:, [c]], self.known[:, [c]]) for c in range(before.shape[1])]
-        return np.where(gone > VISIBLE**2, each, 0.0)
+        gap = (before**2 * self.known).sum(axis=0) / rows > least
+        return np.where(gap & (gone > VISIBLE**2), each, 0.0)
 
 
 def share_removed(before: Array, after: Array, known: Array) -> float:

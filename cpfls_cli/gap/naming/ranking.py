@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -86,6 +86,7 @@ def rank_effects(
     settings: GapSettings,
     rng: np.random.Generator | None,
     also: Sequence[Candidate] = (),
+    floor: Array | None = None,
 ) -> RankedStep:
     """Score all effects beside those chosen.
 
@@ -97,9 +98,11 @@ def rank_effects(
         Of the shifts; None for none.
     also : sequence of Candidate
         Tried beside the grids, with shapes of their own.
+    floor : array, shape (6,), or None
+        None: as the residual of the hypothesis shows it.
     """
     hypothesis = system(flights, chosen)
-    floor = best_floor(hypothesis)
+    floor = best_floor(hypothesis) if floor is None else floor
     names = {candidate.effect.name for candidate in chosen}
     listed = [*candidates_of([effect for effect in effects if effect.name not in names]), *also]
     tried = [candidate for candidate in listed if hypothesis.can(candidate)]
@@ -115,7 +118,7 @@ def rank_effects(
     above_floor = float(max(beside.before[:, 0].sum() - rows(hypothesis), 1e-9))
     once: dict[str, Scored] = {}
     for each in scored:
-        once.setdefault(each.candidate.effect.name, each)
+        once.setdefault(each.candidate.effect.name, replace(each, others=hypothesis.chosen))
     return RankedStep(hypothesis, floor, tuple(once.values()), chance, above_floor, block)
 
 
@@ -152,7 +155,11 @@ def rows(hypothesis: System) -> int:
 
 def surely_less(one: Scored, other: Scored) -> bool:
     """Tell whether one explanation leaves less than another, by more than the scatter over blocks."""
-    margin = more_left(other.block_error, one.block_error)
+    return surely(more_left(other.block_error, one.block_error))
+
+
+def surely(margin: Array) -> bool:
+    """Tell whether margins over blocks are above 0 by more than they scatter."""
     if len(margin) < 2 or margin.sum() <= 0:
         return False
     spread = len(margin) * float(mean_error(margin))

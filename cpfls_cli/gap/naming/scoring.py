@@ -37,8 +37,8 @@ class Scored:
         What is left on each block.
     coefficients : array, shape (coefficient,)
         Linear, of a fit on all blocks; 0 where a bound took one out.
-    beside : Effect or None
-        Another effect that was added with it.
+    others : tuple of Candidate
+        What it stands beside.
     """
 
     candidate: Candidate
@@ -46,7 +46,12 @@ class Scored:
     gain: float
     block_error: Array
     coefficients: Array
-    beside: Effect | None = None
+    others: tuple[Candidate, ...] = ()
+
+    @property
+    def chosen(self) -> tuple[Candidate, ...]:
+        """The whole set."""
+        return (*self.others, self.candidate)
 
 
 class PlacedCandidate(NamedTuple):

@@ -1,22 +1,25 @@
-"""Forward selection of the effects that explain a gap, tested against chance, with exchange and rivals."""
+"""A search over sets of effects: a beam, its sets compared by what they leave of blocks that no fit saw."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import combinations
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, floors, system
-from cpfls_cli.gap.balance.refine import fit, refined, weighted_residual
+from cpfls_cli.gap.balance.refine import compensation, fit, refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.actuation import late, moved, parted, without_companion
 from cpfls_cli.gap.naming.ranking import (
     CLOSE,
     LEAST_SHARE,
     NEAR,
     RankedStep,
+    best_floor,
+    block_index,
+    chance_of_ranks,
     least_gain,
     least_margin,
     more_left,
@@ -25,12 +28,20 @@ from cpfls_cli.gap.naming.ranking import (
     surely_less,
 )
 from cpfls_cli.gap.naming.results import Alternative
-from cpfls_cli.gap.naming.scoring import (
-    REFUSED,
-    Scored,
-)
+from cpfls_cli.gap.naming.scoring import REFUSED, Scored, normal_equations, scoring_matrix
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.rounding import largest, less
+from cpfls_cli.rounding import ascending
+
+_BEAM = 3
+"""Sets that are followed at once: a lag, a delay and a filter each do alone most of what two of them do."""
+
+
+_OFF = 1e-4
+"""Share of a gap, in squares, that sets of formulas for it leave: each is off by a hundredth of its torque or more."""
+
+_NUMBER = 8.0
+"""What a free number has to explain, in squared floors: the logarithm of the residuals of a few flights (Schwarz 1978).
+"""
 
 
 def forward_selection(
@@ -40,7 +51,7 @@ def forward_selection(
     rng: np.random.Generator,
     progress: Callable[[int], None] = lambda _: None,
 ) -> tuple[tuple[Candidate, ...], list[RankedStep]]:
-    """Add effects one at a time while each explains more than chance and a relevant part of the residual.
+    """Let sets grow by one effect at a time while the best explains more than chance and a relevant part of the gap.
 
     Parameters
     ----------
@@ -50,31 +61,35 @@ def forward_selection(
     Returns
     -------
     chosen : tuple of Candidate
-    steps : list of SearchStep
-        The last one has nothing to add.
+    steps : list of RankedStep
+        Of the best set of each size; the last one has nothing to add.
     """
-    chosen: tuple[Candidate, ...] = ()
+    beam: list[tuple[Candidate, ...]] = [()]
     steps: list[RankedStep] = []
     tried: set[frozenset[str]] = {frozenset()}
     while True:
+        chosen = beam[0]
         step = rank_effects(flights, chosen, effects, settings, rng)
         steps.append(step)
         progress(len(steps))
-        if len(chosen) >= settings.effects_max or not acceptable(step, settings):
+        if len(chosen) >= settings.effects_max:
             return chosen, steps
-        best = simplest(moved(flights, chosen, step), step.above_floor)
-        refitted = parted(refined(flights, [*chosen, best.candidate], step.floor), step)
+        off = _OFF * steps[0].above_floor
+        grown = _moved(flights, step, settings) if acceptable(step, settings) else []
+        grown += grown_elsewhere(flights, beam[1:], step, effects, settings, off)
+        if not grown:
+            return chosen, steps
+        best = simplest(ascending(grown, lambda scored: -scored.gain), step.above_floor, off)
+        refitted = refined(flights, best.chosen, step.floor)
         if not quiet_enough(best.gain, step, refitted):
             return chosen, steps
-        refitted = without_companion(refitted, step, settings)
-        kept = exchanged(flights, refitted.chosen, effects, settings) if len(refitted.chosen) > 1 else refitted.chosen
-        names = frozenset(candidate.effect.name for candidate in kept)
-        # An exchange can undo what was added; a set that was there before would come round again for ever.
-        if names in tried:
+        kept = needed(refitted, step, settings)
+        # What is dropped can undo what was added; a set that was there before would come round again for ever.
+        if _names(kept) in tried:
             return chosen, steps
-        tried.add(names)
-        chosen = kept
+        tried.add(_names(kept))
         step.hypothesis.cache.clear()
+        beam = [kept, *(scored.chosen for scored in grown if scored is not best)][:_BEAM]
 
 
 def acceptable(step: RankedStep, settings: GapSettings) -> bool:
@@ -90,21 +105,82 @@ def _enough(step: RankedStep) -> float:
     return least_gain(step.above_floor, len(step.hypothesis.residual))
 
 
+def _moved(flights: Sequence[WeakFlight], step: RankedStep, settings: GapSettings) -> list[Scored]:
+    """List the candidates that come near the best; those between command and rotors, if that is one, with shapes moved.
+
+    Between the points of a grid an effect with more shapes comes closer to what one with fewer is.
+    """
+    best = step.ranking[0]
+    near = [scored for scored in step.ranking if scored.gain > NEAR * best.gain]
+    alike = [scored for scored in near if _late(scored)]
+    beside_late = any(each.effect.actuation is not None for each in best.others)
+    if best not in alike or not (beside_late or len(alike) > 1):
+        return near
+    moved = [rescored(refined(flights, scored.chosen, step.floor), step, settings) for scored in alike]
+    return ascending(moved, lambda scored: -scored.gain)
+
+
+def grown_elsewhere(
+    flights: Sequence[WeakFlight],
+    sets: Sequence[Sequence[Candidate]],
+    step: RankedStep,
+    effects: Sequence[Effect],
+    settings: GapSettings,
+    off: float = 0.0,
+) -> list[Scored]:
+    """List sets that grew from others than the best one and leave less than that with no more numbers.
+
+    Where the best one leaves nothing, nothing is looked for. Two that a filter stands for may have a number more.
+    """
+    chosen = step.hypothesis.chosen
+    two = bool(sets) and stands_for_two(chosen, len(chosen) - 1)
+    if not sets or not (two or step.above_floor > _enough(step)):
+        return []
+    most = _numbers(chosen) + two
+    own, found = rescored(step.hypothesis, step, settings), list[Scored]()
+    for other in sets:
+        late = any(each.effect.actuation is not None for each in other)
+        like = [each for each in effects if each.actuation is not None] if late else effects
+        there = rank_effects(flights, other, like, settings, None, floor=step.floor)
+        for scored in there.ranking[: _BEAM if late else 1]:
+            if _names(scored.chosen) != _names(chosen) and _numbers(scored.chosen) <= most:
+                grown = refined(flights, scored.chosen, step.floor) if late else system(flights, scored.chosen)
+                found.append(rescored(grown, step, settings))
+    return [scored for scored in found if _is_better(scored, own, step, off)]
+
+
+def _is_better(scored: Scored, own: Scored, step: RankedStep, off: float) -> bool:
+    """Tell whether a set leaves less than another one; with more numbers surely and by as much as is worth a name."""
+    less = scored.gain - own.gain
+    more = _numbers(scored.chosen) > _numbers(own.chosen)
+    return less >= _more(own, step, off) and surely_less(scored, own) if more else less > 0
+
+
+def _more(own: Scored, step: RankedStep, off: float) -> float:
+    """Compute the least gain, in squared floors, of what is added to a set: more than formulas are off by."""
+    return max(least_gain(max(step.above_floor - own.gain, 0.0), len(step.hypothesis.residual)), off)
+
+
+def needed(refitted: System, step: RankedStep, settings: GapSettings) -> tuple[Candidate, ...]:
+    """Drop effects that the newest one made needless."""
+    kept = refitted
+    for candidate in refitted.chosen[:-1]:
+        index = [each.effect.name for each in kept.chosen].index(candidate.effect.name)
+        others = [each for place, each in enumerate(kept.chosen) if place != index]
+        alike = beside_its_like(kept.chosen, index)
+        without = refined(kept.flights, others, step.floor) if alike else system(kept.flights, others)
+        left, before = (rescored(each, step, settings).block_error.sum() for each in (without, kept))
+        if left - before < LEAST_SHARE * max(left - rows(kept), 0.0):
+            kept = refined(kept.flights, others, step.floor)
+    return kept.chosen
+
+
 def quiet_enough(gain: float, step: RankedStep, refitted: System) -> bool:
     """Tell whether an effect explains motion, not noise.
 
     Columns of rates hold the noise of the gyroscope, and so does the inertial torque: where rates about two axes go
     hand in hand, a fit can turn one against the other and be rid of noise. What an effect takes off the floor is
     therefore taken off its gain.
-
-    Parameters
-    ----------
-    gain : float
-        What it explains, in squared floors.
-    step : SearchStep
-        The look that chose it.
-    refitted : System
-        With the effect.
     """
     if not refitted.chosen[-1].effect.rate_derivative:
         return True
@@ -114,100 +190,151 @@ def quiet_enough(gain: float, step: RankedStep, refitted: System) -> bool:
     return gain - noise >= _enough(step)
 
 
-def exchanged(
-    flights: Sequence[WeakFlight], chosen: Sequence[Candidate], effects: Sequence[Effect], settings: GapSettings
-) -> tuple[Candidate, ...]:
-    """Drop effects that later ones made needless, and exchange those that another beats beside the rest."""
-    kept = list(chosen)
-    for candidate in list(chosen):
-        others = [other for other in kept if other is not candidate]
-        step = rank_effects(flights, others, effects, settings, None, also=(candidate,))
-        scored = next((each for each in step.ranking if each.candidate.effect.name == candidate.effect.name), None)
-        small = scored is None or scored.gain < LEAST_SHARE * step.above_floor
-        if scored is None or small or len(late(others)) > 1:
-            without = _do_without(flights, others, kept, step.floor)
-            kept = kept if without is None else without
-            if scored is None or small or without is not None:
-                continue
-        ranking = moved(flights, others, step)
-        best = simplest(ranking, step.above_floor)
-        # What has moved is all that lies between command and rotors; this one may not.
-        scored = next((each for each in ranking if each.candidate.effect.name == candidate.effect.name), scored)
-        rivals = unbeaten(best, [*ranking, scored], step.above_floor)
-        worse = best is not scored and (scored not in rivals or _numbers(best) < _numbers(scored))
-        # Beside other effects its own shape may be another one: a delay that is dropped leaves its time to a lag.
-        better = best.candidate if worse else scored.candidate
-        if better is not candidate:
-            kept = list(refined(flights, [*others, better], step.floor).chosen)
-    return tuple(kept)
+def in_place_of(
+    flights: Sequence[WeakFlight], chosen: Sequence[Candidate], index: int, step: RankedStep, settings: GapSettings
+) -> list[Scored]:
+    """Score an effect, and behind it all that could stand in its place, beside the look at the others and it.
+
+    What lies between command and rotors is scored with shapes moved, and two of these can stand for one with two
+    shapes; more numbers than it has have to be worth it.
+    """
+    ranked = sorted(step.ranking, key=lambda scored: scored.candidate.effect.name != chosen[index].effect.name)
+    if chosen[index].effect.actuation is None:
+        return ranked
+    others = [other for place, other in enumerate(chosen) if place != index]
+    own, off = rescored(system(flights, [*others, chosen[index]]), step, settings), _OFF * step.above_floor
+    alike = [each.candidate for each in ranked[1:] if _late(each) and np.isfinite(each.gain)]
+    sets: list[tuple[Candidate, ...]] = [(each,) for each in alike]
+    if stands_for_two(chosen, index):
+        sets += combinations(alike, 2)
+    numbers, worth = _numbers(own.chosen), step.above_floor - own.gain > _more(own, step, off)
+    sets = [each for each in sets if worth or _numbers([*others, *each]) <= numbers]
+    moved = [rescored(refined(flights, [*others, *each], step.floor), step, settings) for each in sets]
+    fair = [each for each in moved if _numbers(each.chosen) <= numbers or _is_better(each, own, step, off)]
+    return [own, *fair, *(scored for scored in ranked[1:] if not _late(scored))]
 
 
-def _do_without(
-    flights: Sequence[WeakFlight], others: list[Candidate], kept: Sequence[Candidate], floor: Array
-) -> list[Candidate] | None:
-    """Refine effects without one of them, if they then explain as much; None if they do not."""
-    if not any(candidate.effect.shapes for candidate in others):
-        return others
-    plain, without = system(flights), refined(flights, others, floor)
-    left, before = (
-        float((weighted_residual(there, floor, plain.rotor_wrench) ** 2).sum())
-        for there in (without, system(flights, kept))
-    )
-    needless = less(left - before, LEAST_SHARE * max(left - rows(plain), 0.0), left)
-    return list(without.chosen) if needless else None
+def stands_for_two(chosen: Sequence[Candidate], index: int) -> bool:
+    """Tell whether an effect is the only one between command and rotors and has as many shapes as two others."""
+    effect = chosen[index].effect
+    return effect.actuation is not None and len(effect.shapes) > 1 and not beside_its_like(chosen, index)
 
 
-def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Scored]:
+def beside_its_like(chosen: Sequence[Candidate], index: int) -> bool:
+    """Tell whether an effect and another one lie between command and rotors, where each can stand for the other."""
+    between = [each.effect.actuation is not None for each in chosen]
+    return between[index] and sum(between) > 1
+
+
+def chance_beside_its_like(
+    flights: Sequence[WeakFlight],
+    chosen: Sequence[Candidate],
+    index: int,
+    effects: Sequence[Effect],
+    settings: GapSettings,
+) -> float:
+    """Compute how likely it is that an effect between command and rotors adds nothing to its like.
+
+    Shifted residuals cannot tell: each of these effects moves with the command, and so does what the others leave.
+    Compared is therefore what all effects, and the others without it, leave of blocks that their fits did not see, both
+    with all shapes moved, by the signed-rank test of Wilcoxon; times the number of effects that could have stood there.
+    """
+    together = system(flights, chosen)
+    floor = best_floor(together)
+    without = refined(flights, [other for place, other in enumerate(chosen) if place != index], floor)
+    margin = more_left(_unseen(without, floor, settings), _unseen(together, floor, settings))
+    tried = sum(effect.actuation is not None for effect in effects)
+    return min(1.0, tried * chance_of_ranks(margin)) if len(margin) > 1 else 1.0
+
+
+def rescored(hypothesis: System, step: RankedStep, settings: GapSettings) -> Scored:
+    """Score a set, with its shapes where they are, by what it leaves of each block that no fit saw."""
+    plain, own = system(hypothesis.flights).rotor_wrench, step.hypothesis.rotor_wrench
+    # Beside the best set, whose rotor torque is what it is in the look. Shapes that are refined stay.
+    moving = all(each.effect.actuation is None for each in hypothesis.chosen)
+    error = _unseen(hypothesis, step.floor * compensation(plain, own), settings, moving=moving)
+    gain = step.above_floor + rows(hypothesis) - error.sum()
+    *others, newest = hypothesis.chosen
+    return Scored(newest, np.zeros(0, dtype=int), float(gain), error, np.zeros(0), tuple(others))
+
+
+def _unseen(hypothesis: System, floor: Array, settings: GapSettings, *, moving: bool = True) -> Array:
+    """Compute what a hypothesis leaves of each block that a fit of coefficients, and of moving shapes, did not see."""
+    weight = floor / compensation(system(hypothesis.flights).rotor_wrench, hypothesis.rotor_wrench)
+    arranged = scoring_matrix(hypothesis, (), weight)
+    normal = normal_equations(arranged, hypothesis.residual, weight, block_index(hypothesis, settings))
+    return np.asarray(normal.solve(arranged.base if moving else np.arange(hypothesis.base.shape[2]))[1][:, 0])
+
+
+def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float, off: float = 0.0) -> list[Scored]:
     """List the candidates that the chosen one does not beat.
 
-    Beaten is what leaves more by more than the scatter over blocks and by more than a few hundredths of the gap.
+    Beaten is what leaves more by more than the scatter over blocks, than next to nothing, and than formulas are off by.
     """
+    least = max(least_margin(above_floor, float(chosen.block_error.sum())), off)
     return [
         other
         for other in ranking
-        if other.candidate.effect.name != chosen.candidate.effect.name
+        if _names(other.chosen) != _names(chosen.chosen)
         and other.gain > NEAR * chosen.gain
-        and not (_clearly_less(chosen, other, above_floor) and surely_less(chosen, other))
+        and not (more_left(other.block_error, chosen.block_error).sum() > least and surely_less(chosen, other))
     ]
 
 
-def simplest(ranking: Sequence[Scored], above_floor: float) -> Scored:
+def simplest(ranking: Sequence[Scored], above_floor: float, off: float = 0.0) -> Scored:
     """Choose among the best candidates the one with the fewest free numbers.
 
     Parameters
     ----------
     ranking : sequence of Scored
         Best first.
+    off : float
+        What formulas are off by, in squared floors.
     """
     best = ranking[0]
-    rivals = [other for other in unbeaten(best, ranking, above_floor) if other.gain > (1 - CLOSE) * best.gain]
-    fewest = min(_numbers(each) for each in [best, *rivals])
-    return largest([each for each in [best, *rivals] if _numbers(each) == fewest], lambda scored: scored.gain)
+    as_good = max(CLOSE * best.gain, off)
+    rivals = [
+        other
+        for other in unbeaten(best, ranking, above_floor, off)
+        if best.gain - other.gain < max(as_good, _NUMBER * (_numbers(best.chosen) - _numbers(other.chosen)))
+    ]
+    fewest = min(_numbers(each.chosen) for each in [best, *rivals])
+    few = [each for each in [best, *rivals] if _numbers(each.chosen) == fewest]
+    most = max(each.gain for each in few)
+    # What no number could tell apart is told by what is usual: rotors always lag.
+    return min(
+        (each for each in few if most - each.gain < _NUMBER),
+        key=lambda scored: sorted(each.effect.order for each in scored.chosen),
+    )
 
 
 def alternatives(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Alternative]:
     """List the rivals of a chosen effect, without effects that hold it as a special case."""
-    effect = chosen.candidate.effect
-    return [
-        Alternative(
-            other.name,
-            effect.name,
-            float(scored.gain / chosen.gain),
-            effect.rivals.get(other.name) or other.rivals.get(effect.name) or effect.excitation,
-            "" if scored.beside is None else scored.beside.name,
-        )
-        for scored in unbeaten(chosen, ranking, above_floor)
-        if effect.name not in (other := scored.candidate.effect).holds
-    ]
+    effect, known = chosen.candidate.effect, _names(chosen.chosen)
+    found = []
+    for scored in unbeaten(chosen, ranking, above_floor):
+        *beside, other = (each.effect for each in scored.chosen if each.effect.name not in known)
+        if effect.name not in other.holds:
+            found.append(alternative(effect, other, float(scored.gain / chosen.gain), *(each.name for each in beside)))
+    return found
 
 
-def _clearly_less(chosen: Scored, other: Scored, above_floor: float) -> bool:
-    """Tell whether one explanation leaves less than another by more than next to nothing."""
-    margin = float(more_left(other.block_error, chosen.block_error).sum())
-    return margin > least_margin(above_floor, float(chosen.block_error.sum()))
+def alternative(effect: Effect, other: Effect, relative_gain: float, beside: str = "") -> Alternative:
+    """Say what tells an effect from another one."""
+    told = effect.rivals.get(other.name) or other.rivals.get(effect.name) or effect.excitation
+    return Alternative(other.name, effect.name, relative_gain, told, beside)
 
 
-def _numbers(scored: Scored) -> int:
-    """Count the numbers that a candidate is free to choose."""
-    effect = scored.candidate.effect
-    return len(effect.shapes) + (0 if effect.unit_coefficient else len(scored.coefficients))
+def _late(scored: Scored) -> bool:
+    """Tell whether a candidate lies between command and rotors."""
+    return scored.candidate.effect.actuation is not None
+
+
+def _names(chosen: Sequence[Candidate]) -> frozenset[str]:
+    return frozenset(each.effect.name for each in chosen)
+
+
+def _numbers(chosen: Sequence[Candidate]) -> int:
+    """Count the numbers that a set is free to choose."""
+    effects = [each.effect for each in chosen]
+    return sum(len(each.shapes) + (0 if each.unit_coefficient else len(each.coefficients)) for each in effects)

@@ -10,9 +10,8 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming.actuation import chance_beside_its_like, parted, settled, without_companion
 from cpfls_cli.gap.naming.ranking import rank_effects
-from cpfls_cli.gap.naming.search import alternatives, forward_selection
+from cpfls_cli.gap.naming.search import alternatives, chance_beside_its_like, forward_selection, in_place_of
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.rotors import body_wrench, rotor_demand
@@ -153,7 +152,7 @@ def rivals_of(flights, chosen, name):
     others = [each for each in chosen if each.effect.name != name]
     effects = [CATALOGUE[each] for each in STILL]
     step = rank_effects(flights, others, effects, SETTINGS, None, also=(chosen[index],))
-    own, *ranking = settled(flights, chosen, index, step)
+    own, *ranking = in_place_of(flights, chosen, index, step, SETTINGS)
     assert own.candidate.effect.name == name
     return {rival.name for rival in alternatives(own, ranking, step.above_floor)}
 
@@ -179,34 +178,17 @@ def test_a_lag_with_a_short_delay_is_a_rival_as_the_pair_that_it_is():
     low = Candidate(CATALOGUE["low_pass_filter"], {"frequency_hz": 6.0, "damping": 1.2})
     effects = [CATALOGUE[each] for each in (*STILL, "low_pass_filter")]
     step = rank_effects(flights, (), effects, SETTINGS, None, also=(low,))
-    own, *ranking = settled(flights, refined(flights, [low], step.floor).chosen, 0, step)
+    own, *ranking = in_place_of(flights, refined(flights, [low], step.floor).chosen, 0, step, SETTINGS)
     pairs = {frozenset((rival.name, rival.beside)) for rival in alternatives(own, ranking, step.above_floor)}
     assert pairs == {frozenset(("motor_lag", "command_delay"))}
 
 
-def test_a_search_that_begins_with_a_low_pass_ends_with_the_notch_and_the_lag():
-    flights = [late(seed, lambda s: lag(s) * notch(s, 0.8, 2 * np.pi * 6.5)) for seed in (1, 2)]
-    effects = [CATALOGUE[each] for each in (*STILL, "low_pass_filter")]
-    step = rank_effects(flights, (), effects, SETTINGS, None)
-    low = Candidate(CATALOGUE["low_pass_filter"], {"frequency_hz": 3.2, "damping": 0.9})
-    chosen = parted(refined(flights, [low], step.floor), step).chosen
+def test_a_notch_and_a_lag_are_no_low_pass_with_what_fills_in_beside_it():
+    flights = [late(seed, lambda s: lag(s) * notch(s, 0.8, 2 * np.pi * 6.5)) for seed in (1, 2, 3, 4)]
+    chosen = found(flights, (*STILL, "low_pass_filter"))
     assert names_of(chosen) == {"motor_lag", "notch_filter"}
     assert shape_of(chosen, "notch_filter")["frequency_hz"] == pytest.approx(6.5, rel=0.1)
     assert shape_of(chosen, "motor_lag")["time_constant_s"] == pytest.approx(0.05, rel=0.15)
-
-
-def test_what_fills_in_beside_a_low_pass_goes_where_a_notch_and_a_lag_need_it_not():
-    flights = [late(seed, lambda s: lag(s) * notch(s, 0.8, 2 * np.pi * 6.5)) for seed in (1, 2)]
-    effects = [CATALOGUE[each] for each in (*STILL, "low_pass_filter")]
-    low = Candidate(CATALOGUE["low_pass_filter"], {"frequency_hz": 3.2, "damping": 0.9})
-    mount = Candidate(CATALOGUE["flexible_mount"], {"frequency_hz": 3.0, "damping": 0.1})
-    beside = refined(flights, [low], rank_effects(flights, (), effects, SETTINGS, None).floor).chosen
-    step = rank_effects(flights, beside, effects, SETTINGS, None)
-    filled = refined(flights, [*beside, mount], step.floor)
-    assert names_of(without_companion(filled, step, SETTINGS).chosen) == {"motor_lag", "notch_filter"}
-    springs = [on_springs(seed, share=0.3, natural=2 * np.pi * 2.65, damping=0.1) for seed in (1, 2)]
-    alone = refined(springs, [mount], rank_effects(springs, (), effects, SETTINGS, None).floor)
-    assert without_companion(alone, step, SETTINGS) is alone
 
 
 def test_a_delay_that_is_not_there_is_chance_beside_a_lag():

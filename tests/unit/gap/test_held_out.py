@@ -9,7 +9,8 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.diagnose import not_judged
-from cpfls_cli.gap.naming.held_out import held_out, share_removed
+from cpfls_cli.gap.naming.held_out import HeldOut, held_out, share_removed
+from cpfls_cli.gap.settings import NOISE
 from tests.builders.gap_flights import candidate, fly, weak
 
 KNOWN = np.tile([True, True, True, False, False, False], (1000, 1))
@@ -33,6 +34,14 @@ def noise(*sizes):
 )
 def test_share_is_of_what_stands_above_the_floor(before, after, share):
     assert share_removed(noise(*before), noise(*after), KNOWN) == pytest.approx(share, abs=0.02)
+
+
+@pytest.mark.parametrize(("before", "taken"), [(1.1, False), (1.3, True)])
+def test_numbers_remove_a_gap_only_where_one_stands_above_the_noise(before, taken):
+    floor = np.ones((1000, 6))
+    found = HeldOut(noise(before, 1, 1), noise(1, 1, 1), noise(1, 1, 1), floor[0], KNOWN, floor, {})
+    assert (found.removed_by_numbers(NOISE)[0] > 0.9) == taken
+    assert found.removed_by_numbers(0.0)[0] > 0.9
 
 
 def training(chosen, seeds=(1, 2), **given):

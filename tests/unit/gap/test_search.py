@@ -9,10 +9,9 @@ from cpfls_cli.effects.effect import Coefficient, Columns
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming import search
 from cpfls_cli.gap.naming.ranking import rank_effects
 from cpfls_cli.gap.naming.scoring import Scored
-from cpfls_cli.gap.naming.search import alternatives, exchanged, simplest, unbeaten
+from cpfls_cli.gap.naming.search import alternatives, simplest, unbeaten
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import fly, weak
 
@@ -117,14 +116,24 @@ def test_one_block_cannot_tell():
     assert unbeaten(alone, [alone, with_errors("other", 90.0, [30.0])], 100.0)
 
 
+@pytest.mark.parametrize(("less", "wins"), [(0.5, "one number"), (2.5, "two numbers")])
+def test_a_number_more_has_to_explain_something(less, wins):
+    """Eight squared floors; six more are none, however certain they were."""
+    to_and_fro = 20.0 * (-1.0) ** np.arange(BLOCKS)
+    two = Scored(Candidate(replace(GENERAL, name="two numbers"), {}), np.arange(2), 100.0, OWN.block_error, np.ones(2))
+    one = with_errors("one number", 100.0 - BLOCKS * less, OWN.block_error + to_and_fro + less)
+    assert simplest([two, one], 100.0).candidate.effect.name == wins
+
+
+@pytest.mark.parametrize(("less", "wins"), [(0.5, "usual"), (1.0, "best")])
+def test_what_no_number_tells_apart_is_what_is_usual(less, wins):
+    to_and_fro = 20.0 * (-1.0) ** np.arange(BLOCKS)
+    best = with_errors("best", 1e4, OWN.block_error)
+    effect = replace(hand_made("usual", (1.3, 0)), order=SPECIAL.order - 1)
+    gain, errors = 1e4 - BLOCKS * less, OWN.block_error + to_and_fro + less
+    usual = Scored(Candidate(effect, {}), np.array([0]), gain, errors, np.ones(1))
+    assert simplest([best, usual], 1e4).candidate.effect.name == wins
+
+
 def test_systems_without_flights_of_the_signal_have_no_columns():
     assert system([weak(fly(1))]).columns(Candidate(CATALOGUE["battery_sag"], {"exponent": 1.0})).shape[2] == 0
-
-
-def test_an_effect_stays_where_only_others_have_moved(monkeypatch):
-    """What lies between command and rotors is compared alone: an effect that does not is none of these."""
-    truth = [(Candidate(SPECIAL, {}), [0.3]), (Candidate(OTHER, {}), [0.3])]
-    flights = [weak(fly(seed, truth, gyro=0.003, rotor=0.5)) for seed in (1, 2)]
-    monkeypatch.setattr(search, "moved", lambda _flights, _others, step: [of(step, "twin")])
-    chosen = [own for own, _ in truth]
-    assert exchanged(flights, chosen, [SPECIAL, TWIN, OTHER], SETTINGS) == tuple(chosen)

@@ -1,0 +1,69 @@
+"""What lies between command and rotors in gusts is what instruments say, and no name where they say nothing."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.gap.naming import by_instruments
+from cpfls_cli.gap.naming.by_instruments import told_apart, untold_actuation
+from cpfls_cli.gap.settings import GapSettings
+from tests.builders.gap_flights import candidate
+
+LATE = ("motor_lag", "command_delay", "notch_filter")
+BLOCKS = 12
+LITTLE = np.tile([1.0, -1.0], BLOCKS // 2)
+
+
+def found_with(*chosen):
+    hypothesis = SimpleNamespace(chosen=tuple(chosen), flights=())
+    return SimpleNamespace(hypothesis=hypothesis, estimates=SimpleNamespace(effects=[object() for _ in chosen]))
+
+
+def apart(monkeypatch, own, **left):
+    """Judge effects that leave so much, block by block, of what instruments know."""
+    tried = []
+
+    def rank(_flights, others, effects, *_args, **_kwargs):
+        (effect,) = effects
+        tried.append(effect.name)
+        shape = {shape.name: shape.grid[0] for shape in effect.shapes}
+        return SimpleNamespace(ranking=[SimpleNamespace(chosen=(*others, candidate(effect.name, **shape)))])
+
+    monkeypatch.setattr(by_instruments, "rank_effects", rank)
+    monkeypatch.setattr(by_instruments, "refined", lambda _flights, chosen, _floor: SimpleNamespace(chosen=chosen))
+    monkeypatch.setattr(by_instruments, "fitted", lambda _flights, chosen, *_: found_with(*chosen))
+    monkeypatch.setattr(by_instruments, "by_instruments", lambda found, *_: found)
+    names = lambda found: {each.effect.name for each in found.hypothesis.chosen}  # noqa: E731
+    monkeypatch.setattr(
+        by_instruments, "_reproduced", lambda found, *_: left[next(iter(names(found) & set(LATE)))] * np.ones(BLOCKS)
+    )
+    start = found_with(candidate("com_offset"), candidate(own, **{s.name: s.grid[0] for s in CATALOGUE[own].shapes}))
+    effects = [CATALOGUE[name] for name in (*LATE, "com_offset")]
+    found, rivals = told_apart(start, effects, None, np.ones(6), GapSettings())
+    return names(found) - {"com_offset"}, {(each.name, each.instead_of) for each in rivals}, tried
+
+
+@pytest.mark.parametrize(
+    ("own", "lag", "delay", "name", "rivals"),
+    [
+        ("command_delay", LITTLE, 9.0, "motor_lag", set()),
+        ("motor_lag", 9.0, LITTLE, "command_delay", set()),
+        ("command_delay", LITTLE, LITTLE[::-1], "motor_lag", {("command_delay", "motor_lag")}),
+        ("motor_lag", LITTLE, LITTLE[::-1], "motor_lag", {("command_delay", "motor_lag")}),
+    ],
+    ids=["it is the lag", "it is the delay", "the usual one of two", "the other one is a rival"],
+)
+def test_what_leaves_nothing_that_instruments_know_is_named(own, lag, delay, name, rivals, monkeypatch):
+    found, alike, tried = apart(monkeypatch, own, motor_lag=lag, command_delay=delay)
+    assert (found, alike) == ({name}, rivals)
+    # A filter has a number more.
+    assert "notch_filter" not in tried
+
+
+def test_an_effect_on_the_actuation_that_instruments_do_not_tell_is_what_a_loop_does_too():
+    before = found_with(candidate("channel_delay", delay_s=0.03), candidate("com_offset"))
+    assert untold_actuation(before, before) == ["channel_delay"]
+    told = found_with(*before.hypothesis.chosen)
+    assert untold_actuation(before, told) == []
