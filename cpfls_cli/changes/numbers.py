@@ -11,7 +11,7 @@ from scipy.ndimage import binary_erosion
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.blocks import contiguous, jackknife_error
-from cpfls_cli.effects.catalogue.payload import EFFECT
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.filters import parabolas
@@ -19,9 +19,10 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.lag import delayed
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, FEWEST_WINDOWS, Recording, Windows, windows
 
-_SHAPES = {shape.name: shape for shape in EFFECT.shapes}
+_LOAD = next(effect for effect in CATALOGUE.values() if "length_m" in {shape.name for shape in effect.shapes})
+_SHAPES = {shape.name: shape for shape in _LOAD.shapes}
 CABLES = _SHAPES["length_m"].grid
-_MASS = [each.name for each in EFFECT.coefficients].index("mass")
+_MASS = [each.name for each in _LOAD.coefficients].index("mass")
 (_USUAL_DAMPING,) = _SHAPES["damping_1_s"].tried
 """Of a load on a cable: lengths that are tried, m, and a damping, 1/s."""
 
@@ -384,7 +385,7 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     block = contiguous(len(left), _BLOCKS)
     kept = [block >= 0, *(block != number for number in range(_BLOCKS))]
 
-    columns = EFFECT.columns
+    columns = _LOAD.columns
     assert columns is not None, "the load pulls"
 
     def pull(length: float, damping: float) -> Array:

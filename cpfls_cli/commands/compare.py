@@ -27,6 +27,7 @@ from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import KnownBy, seen_warnings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.outcome import Command, Outcome, nothing_written
+from cpfls_cli.weak_form.windows import Recording
 from cpfls_cli.words import did_you_mean
 
 
@@ -86,10 +87,14 @@ def finish_disagreement(
 
 
 def compared(
-    study: Study, given: Recordings, model: VehicleModel, progress: Callable[[float, str], None]
+    study: Study,
+    given: Recordings,
+    model: VehicleModel,
+    progress: Callable[[float, str], None],
+    whole: Sequence[Recording] = (),
 ) -> DisagreementRecord:
-    """Compare a model with flights."""
-    disagreement = compare(given.recordings, model, study.gap, generator(study, "compare"), progress)
+    """Compare a model with flights; rotors are held against `whole` ones, where there are more than these."""
+    disagreement = compare(given.recordings, model, study.gap, generator(study, "compare"), progress, whole=whole)
     return DisagreementRecord.of(disagreement, given.recordings, given.warnings, model)
 
 

@@ -134,7 +134,7 @@ def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: P
 
 def _answers(job: Job, given: _Given) -> _Answers:
     study, base, split = job.study, given.base, given.split
-    disagreement = compared(study, given.flights, base, progress_of(job.progress, 0.0, 0.15))
+    disagreement = compared(study, given.flights, base, progress_of(job.progress, 0.0, 0.15), split.whole)
     diagnosis, record = diagnosed(study, split, given.flights.warnings, base, progress_of(job.progress, 0.15, 0.85))
     job.progress(0.85, 1, "extend")
     try:

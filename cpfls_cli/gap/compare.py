@@ -90,6 +90,8 @@ def compare(
     settings: GapSettings,
     rng: np.random.Generator,
     progress: Callable[[float, str], None] = lambda _done, _note: None,
+    *,
+    whole: Sequence[Recording] = (),
 ) -> Disagreement:
     """Compare a model with flights.
 
@@ -103,6 +105,8 @@ def compare(
         Of the shifts that say what chance explains.
     progress : callable
         Takes the share of the work that is done and a note.
+    whole : sequence of Recording
+        Flights that rotors and attitude are held against, where there are more than these, or longer ones.
 
     Raises
     ------
@@ -112,7 +116,8 @@ def compare(
     windows = common_windows(recordings, settings)
     progress(0.0, "sensor audit")
     extended = with_effects(model)
-    audited = model.repairs or audit([recording.signals for recording in recordings], windows)
+    own = [recording.signals for recording in recordings]
+    audited = model.repairs or audit(own, windows, [recording.signals for recording in whole])
     flights = [
         weak_flight(r.name, audited.repaired(r.signals), windows, model.fuzzy, settings.force, settings.axes)
         for r in recordings

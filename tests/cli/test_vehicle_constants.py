@@ -128,7 +128,8 @@ def test_constants_are_found_and_written_into_a_config(cpfls, flights, folder):
     assert f"{copy}: written, the config with these constants" in result.stdout
     parameters = read_record(folder / "v.h5", VehicleRecord).summary["parameters"]
     assert set(parameters) == KEYS
-    assert set(parameters["motor_lag_s"]) == {"value", "unit", "low", "high", "stated", "determined", "reason"}
+    told = {"value", "unit", "low", "high", "stated", "determined", "reason", "possible"}
+    assert set(parameters["motor_lag_s"]) == told
     thrust = parameters["rotors.thrust_factor_n_s2"]
     stated = yaml.safe_load(CONFIG)["vehicle"]["rotors"][0]["thrust_factor_n_s2"]
     assert thrust["low"] < thrust["value"] < thrust["high"]
