@@ -32,6 +32,8 @@ class Cause:
         Of the first so many sizes: nearly always above 0. What is damaged pulls less, and no load is lighter than none.
     told : int
         Of the first so many sizes: they have the unit of the cause.
+    ratio : int
+        1 where what is told shows as the logarithm of 1 more than that, -1 where of 1 less; 0 where as it is.
     """
 
     name: str
@@ -41,6 +43,11 @@ class Cause:
     prior: float = 1.0
     losses: int = 0
     told: int = 1
+    ratio: int = 0
+
+    def size(self, shown: float) -> float:
+        """Turn what shows of it into its size, in its unit."""
+        return float(self.ratio * np.expm1(self.ratio * shown)) if self.ratio else float(shown)
 
     @property
     def rotors(self) -> frozenset[str]:
@@ -139,17 +146,17 @@ def _of_loads(numbers: _Numbers, vehicle: VehicleSettings) -> Iterator[Cause]:
         # It turns the body less too, as far as it drives roll and pitch.
         weaker = numbers.direction({"follow roll": -roll, "follow pitch": -pitch})
         single.append(_LOSS * (loads(own.rotor[index]) + weaker))
-        yield Cause(f"rotor M{index + 1}", np.stack([single[-1], *beside], axis=1), _LOSS, "1", losses=1)
+        yield Cause(f"rotor M{index + 1}", np.stack([single[-1], *beside], axis=1), _LOSS, "1", losses=1, ratio=-1)
     for one, other in combinations(range(len(single)), 2):
         columns = np.stack([single[one], single[other], *beside], axis=1)
-        yield Cause(f"rotors M{one + 1} and M{other + 1}", columns, _LOSS, "1", _RARER, losses=2, told=2)
+        yield Cause(f"rotors M{one + 1} and M{other + 1}", columns, _LOSS, "1", _RARER, losses=2, told=2, ratio=-1)
     moved, heavier = [_OFF_CENTRE * arm * loads(each) for each in own.offset], _HEAVIER * loads(own.mass)
-    yield Cause("mass", np.stack([heavier, *moved], axis=1), _HEAVIER, "1")
+    yield Cause("mass", np.stack([heavier, *moved], axis=1), _HEAVIER, "1", ratio=1)
     if numbers.of_kind("swing"):
         hangs = heavier + _HEAVIER * numbers.direction({"swing": 1.0})
         yield Cause("load on a cable", np.stack([hangs, *moved], axis=1), _HEAVIER, "1", losses=1)
     yield Cause("centre of mass", np.stack(moved, axis=1), _OFF_CENTRE * arm, "m", told=2)
-    yield Cause("hover", heavier[:, None], _HEAVIER, "1")
+    yield Cause("hover", heavier[:, None], _HEAVIER, "1", ratio=1)
     for index, (x, y) in enumerate(arms):
         # In hover hardly another thing than a rotor that pulls less.
         hangs = heavier + _HEAVIER * loads(x * own.offset[0] + y * own.offset[1])

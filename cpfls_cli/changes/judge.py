@@ -248,11 +248,9 @@ class _Space:
         share /= share.sum()
         mean = (share * means).sum(axis=0)
         error = np.sqrt((share * (np.array(variances) + (np.array(means) - mean) ** 2)).sum(axis=0))
-        unit = _ANY * self.listed[of].usual
-        return tuple(
-            Size(float(unit * value), float(unit * (value - half)), float(unit * (value + half)))
-            for value, half in zip(mean, _HALF_WIDTH * error, strict=True)
-        )
+        cause = self.listed[of]
+        shown = _ANY * cause.usual * (mean + np.outer([0.0, -_HALF_WIDTH, _HALF_WIDTH], error))
+        return tuple(Size(*map(cause.size, each)) for each in shown.T)
 
     def shows(self, index: int, threshold: float, drawn: Array) -> float:
         """Find the smallest size of a change that shows with 90 %, in its unit; infinite beyond eight times usual."""
@@ -261,7 +259,7 @@ class _Space:
         evidence = self._density(rows, own, slice(0, cause.losses)) - self._density(rows, own[:, :0])
         power = (evidence + self.prior[index] >= threshold).reshape(len(_SIZES), -1).mean(axis=1)
         enough = np.flatnonzero(power >= _POWER)
-        return float(_SIZES[enough[0]] * cause.usual) if len(enough) else float("inf")
+        return cause.size(_SIZES[enough[0]] * cause.usual) if len(enough) else float("inf")
 
 
 def _found(space: _Space, apart: Array, chance: Array) -> tuple[Found, ...]:

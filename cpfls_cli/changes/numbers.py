@@ -21,12 +21,12 @@ from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, FEWEST_WINDOWS, Recordin
 
 _LOAD = next(effect for effect in CATALOGUE.values() if "length_m" in {shape.name for shape in effect.shapes})
 _SHAPES = {shape.name: shape for shape in _LOAD.shapes}
-CABLES = _SHAPES["length_m"].grid
+_CABLES = _SHAPES["length_m"].grid
 _MASS = [each.name for each in _LOAD.coefficients].index("mass")
 (_USUAL_DAMPING,) = _SHAPES["damping_1_s"].tried
 """Of a load on a cable: lengths that are tried, m, and a damping, 1/s."""
 
-AXES, ROTATIONS = ("x", "y", "z"), ("roll", "pitch", "yaw")
+_AXES, _ROTATIONS = ("x", "y", "z"), ("roll", "pitch", "yaw")
 
 
 @dataclass(frozen=True)
@@ -40,30 +40,40 @@ class Kind:
     apart, together : float
         Standard deviations from day to day of a vehicle that nobody changed: of each number by itself, and of all
         numbers of the kind alike. What is usual where reference flights are too few to tell it themselves.
-    words : str
-        What it is.
     """
 
     unit: str
     apart: float
     together: float
-    words: str
 
 
 KINDS: dict[str, Kind] = {
-    "load": Kind("1", 0.02, 0.02, "thrust that a rotor is asked for over its share of the weight, logarithm"),
-    "turn": Kind("1", 0.02, 0.02, "squared speed of a rotor over what it is commanded, logarithm"),
-    "answer": Kind("s", 0.002, 0.002, "time by which a rotor's speed follows its command"),
-    "vibration": Kind("1", 0.1, 0.25, "root mean square above 20 Hz, logarithm"),
-    "unbalance": Kind("1", 0.3, 0.2, "acceleration that turns with a rotor, amplitude, logarithm"),
-    "follow": Kind("1", 0.05, 0.03, "angular acceleration over that of the rotors' torque, logarithm"),
-    "late": Kind("s", 0.002, 0.003, "time by which the body's rotation follows the rotors"),
-    "gusts": Kind("1", 0.2, 0.6, "angular acceleration that the rotors do not explain, root mean square, logarithm"),
-    "lean": Kind("m/s^2", 0.3, 0.0, "mean horizontal thrust over mass, world axes"),
-    "felt": Kind("m/s^2", 0.05, 0.0, "mean of the accelerometer, along z less gravity"),
-    "drift": Kind("rad/s", 0.01, 0.0, "mean rate of the gyroscope beside the attitude's"),
-    "swing": Kind("1", 0.02, 0.0, "mass that swings on a cable over that of the vehicle"),
-    "battery": Kind("1", 0.02, 0.0, "voltage that flight draws from the battery, share of a full one"),
+    # Thrust that a rotor is asked for over its share of the weight, logarithm.
+    "load": Kind("1", 0.02, 0.02),
+    # Squared speed of a rotor over what it is commanded, logarithm.
+    "turn": Kind("1", 0.02, 0.02),
+    # Time by which a rotor's speed follows its command.
+    "answer": Kind("s", 0.002, 0.002),
+    # Root mean square above 20 Hz, logarithm.
+    "vibration": Kind("1", 0.1, 0.25),
+    # Acceleration that turns with a rotor, amplitude, logarithm.
+    "unbalance": Kind("1", 0.3, 0.2),
+    # Angular acceleration over that of the rotors' torque, logarithm.
+    "follow": Kind("1", 0.05, 0.03),
+    # Time by which the body's rotation follows the rotors.
+    "late": Kind("s", 0.002, 0.003),
+    # Angular acceleration that the rotors do not explain, root mean square, logarithm.
+    "gusts": Kind("1", 0.2, 0.6),
+    # Mean horizontal thrust over mass, world axes.
+    "lean": Kind("m/s^2", 0.3, 0.0),
+    # Mean of the accelerometer, along z less gravity.
+    "felt": Kind("m/s^2", 0.05, 0.0),
+    # Mean rate of the gyroscope beside the attitude's.
+    "drift": Kind("rad/s", 0.01, 0.0),
+    # Mass that swings on a cable over that of the vehicle.
+    "swing": Kind("1", 0.02, 0.0),
+    # Voltage that flight draws from the battery, share of a full one.
+    "battery": Kind("1", 0.02, 0.0),
 }
 """Of each number the first word of its name."""
 
@@ -188,10 +198,10 @@ def _told(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
     turns, feels = bool(signals.body_rate.any()), _felt(signals)
     for sensor, values in (("gyroscope", signals.body_rate if turns else None), ("accelerometer", feels)):
         if values is not None and (squares := _above(values, signals.period)) is not None:
-            names = [f"vibration {sensor} {axis}" for axis in AXES]
+            names = [f"vibration {sensor} {axis}" for axis in _AXES]
             yield _averaged(names, squares, flies, lambda means: 0.5 * np.log(means))
     if signals.specific_force is not None:
-        yield _averaged([f"felt {axis}" for axis in AXES], _beside_gravity(signals), flies, lambda means: means)
+        yield _averaged([f"felt {axis}" for axis in _AXES], _beside_gravity(signals), flies, lambda means: means)
     if feels is not None and not signals.commanded:
         yield _unbalance(signals, feels, flies)
     if signals.attitude is not None:
@@ -284,7 +294,7 @@ def _answer(signals: Signals, flies: BoolArray, rotors: list[str]) -> _Numbers:
     assert signals.rotor_command is not None, "asked for"
     found = _followed(own, inside, own.average(signals.speed), signals.rotor_command, signals.period)
     told = _STEP_S * found[:, 1]
-    return [f"answer {name}" for name in rotors], told[0], jackknife_error(told[1:])
+    return [f"answer {name}" for name in rotors], told[0], _delay_error(told[1:])
 
 
 def _windows(signals: Signals, flies: BoolArray, length_s: float) -> tuple[Windows, BoolArray]:
@@ -308,9 +318,15 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
     moments = np.diag(inertia)
     told = np.stack([np.log(found[:, 0]), _STEP_S * found[:, 1], np.log(found[:, 2] / moments)], axis=1)
     for kind, values in zip(("follow", "late", "gusts"), told.transpose(1, 0, 2), strict=True):
-        yield [f"{kind} {axis}" for axis in ROTATIONS], values[0], jackknife_error(values[1:])
+        error = _delay_error(values[1:]) if kind == "late" else jackknife_error(values[1:])
+        yield [f"{kind} {axis}" for axis in _ROTATIONS], values[0], error
     if signals.attitude is not None:
         yield _drift(signals, flies)
+
+
+def _delay_error(left_out: Array) -> Array:
+    """Compute the error of delays: at the end of what is tried all blocks give the same, which says nothing."""
+    return np.asarray(np.hypot(jackknife_error(left_out), _STEP_S / np.sqrt(12)))
 
 
 def _followed(own: Windows, inside: BoolArray, turned: Array, drives: Array, period: float) -> Array:
@@ -362,7 +378,7 @@ def _drift(signals: Signals, flies: BoolArray) -> _Numbers:
     )
     middle = 0.5 * (signals.body_rate[:-1] + signals.body_rate[1:])
     apart = middle - vector / signals.period
-    return _averaged([f"drift {axis}" for axis in AXES], apart, flies[1:] & flies[:-1], lambda means: means)
+    return _averaged([f"drift {axis}" for axis in _AXES], apart, flies[1:] & flies[:-1], lambda means: means)
 
 
 def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
@@ -396,7 +412,7 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     def unexplained(place: Array) -> Any:
         return -_pulled(left, drag, pull(*np.exp(place)))[1]
 
-    start = min((np.log([length, _USUAL_DAMPING]) for length in CABLES), key=unexplained)
+    start = min((np.log([length, _USUAL_DAMPING]) for length in _CABLES), key=unexplained)
     possible = [_SHAPES[name].bounds(vehicle) for name in ("length_m", "damping_1_s")]
     bounds = [(float(np.log(low)), float(np.log(high))) for low, high in possible]
     found = minimize(

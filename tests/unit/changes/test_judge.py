@@ -109,8 +109,8 @@ def test_unchanged_flights_seldom_look_changed():
 @pytest.mark.parametrize(
     ("cause", "change", "size"),
     [
-        ("rotor M3", 0.3 * np.eye(10)[2], 0.3),
-        ("hover", 0.3 * (np.arange(10) < 4), 0.3),
+        ("rotor M3", -np.log(0.7) * np.eye(10)[2], 0.3),
+        ("hover", np.log(1.3) * (np.arange(10) < 4), 0.3),
         ("late", 0.04 * (np.arange(10) > 6), 0.04),
         ("vibration", 2.5 * ((np.arange(10) > 3) & (np.arange(10) < 7)), 2.5),
     ],
@@ -144,7 +144,7 @@ def test_what_shows_does():
     reference = Reference.of(before[1:], NAMES, QUAD)
     own = _Space(reference.covariance, reference.freedom, kinds_of(NAMES), causes(NAMES, QUAD))
     threshold = np.quantile(own.evidence(own.drawn(rng)).max(axis=0), 1 - FALSE_ALARM)
-    rows = own.drawn(rng, 400) + size * np.eye(10)[2]
+    rows = own.drawn(rng, 400) - np.log(1 - size) * np.eye(10)[2]
     assert np.mean(own.evidence(rows).max(axis=0) >= threshold) > 0.8
 
 
