@@ -37,7 +37,7 @@ def numbers_of(study: object, paths: list[Path], keep: Path | None) -> dict[str,
         if name in known:
             continue
         try:
-            recording, volts, _ = read_alone(path, study)
+            recording, volts, *_ = read_alone(path, study)
             known[name] = flight_numbers(recording, volts)
         except CpflsError as error:
             print(f"{name}: {error}", file=sys.stderr)

@@ -30,7 +30,7 @@ from cpfls_cli.gap.naming.ranking import (
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import REFUSED, Scored, normal_equations, scoring_matrix
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.rounding import ascending
+from cpfls_cli.rounding import ascending, less
 
 _BEAM = 3
 """Sets that are followed at once: a lag, a delay and a filter each do alone most of what two of them do."""
@@ -151,9 +151,11 @@ def grown_elsewhere(
 
 def _is_better(scored: Scored, own: Scored, step: RankedStep, off: float) -> bool:
     """Tell whether a set leaves less than another one; with more numbers surely and by as much as is worth a name."""
-    less = scored.gain - own.gain
+    gain = scored.gain - own.gain
     more = _numbers(scored.chosen) > _numbers(own.chosen)
-    return less >= _more(own, step, off) and surely_less(scored, own) if more else less > 0
+    if more:
+        return gain >= _more(own, step, off) and surely_less(scored, own)
+    return bool(less(0.0, gain, step.above_floor))
 
 
 def _more(own: Scored, step: RankedStep, off: float) -> float:
@@ -170,7 +172,7 @@ def needed(refitted: System, step: RankedStep, settings: GapSettings) -> tuple[C
         alike = beside_its_like(kept.chosen, index)
         without = refined(kept.flights, others, step.floor) if alike else system(kept.flights, others)
         left, before = (rescored(each, step, settings).block_error.sum() for each in (without, kept))
-        if left - before < LEAST_SHARE * max(left - rows(kept), 0.0):
+        if less(left - before, LEAST_SHARE * max(left - rows(kept), 0.0), left):
             kept = refined(kept.flights, others, step.floor)
     return kept.chosen
 
