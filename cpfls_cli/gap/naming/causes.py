@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,12 +17,12 @@ from cpfls_cli.gap.balance.balance_system import is_free, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence
-from cpfls_cli.gap.naming.ranking import rank_effects
-from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect
+from cpfls_cli.gap.naming.ranking import least_margin, likely, more_left, rank_effects
+from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
 from cpfls_cli.gap.naming.scoring import Scored
 from cpfls_cli.gap.naming.search import alternatives, beside_its_like, chance_beside_its_like, in_place_of
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.rounding import at_most
+from cpfls_cli.rounding import ascending, at_most
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _MATTERS = 0.02
@@ -41,12 +41,23 @@ _PULLS = 2.0
 """Multiple of the pull of noise that an error has to exceed."""
 
 
+_TOLD = 0.01
+"""Probability from which on a set is listed."""
+
+
 @dataclass(frozen=True)
 class JudgedEffect:
-    """A chosen effect and its rivals."""
+    """A chosen effect and its rivals.
+
+    Attributes
+    ----------
+    odds : mapping of tuple of str to array, shape (block,)
+        Of each set with others in its place, beside the chosen one: logarithm of the predictive density of each block.
+    """
 
     effect: NamedEffect
     alternatives: tuple[Alternative, ...]
+    odds: Mapping[tuple[str, ...], Array]
 
 
 def judge_effect(
@@ -83,7 +94,31 @@ def judge_effect(
         _frequency(own, ranking),
         effect_sentence(candidate.effect, estimates.effects[index], flights[0].signals.vehicle),
     )
-    return JudgedEffect(effect, tuple(alternatives(own, ranking, step.above_floor)))
+    rivals = tuple(alternatives(own, ranking, step.above_floor))
+    return JudgedEffect(effect, rivals, _odds(own, ranking, step.above_floor))
+
+
+def _odds(own: Scored, ranking: Sequence[Scored], above_floor: float) -> dict[tuple[str, ...], Array]:
+    """Compare sets by what they leave of unseen blocks, beside what their formulas are off by."""
+    noise = 1.0 + least_margin(above_floor, float(own.block_error.sum()))
+    return {
+        tuple(each.effect.name for each in other.chosen): -0.5 * more_left(other.block_error, own.block_error) / noise
+        for other in ranking
+        if np.isfinite(other.gain) and own.candidate.effect.name not in other.candidate.effect.holds
+    }
+
+
+def likely_sets(judged: Sequence[JudgedEffect]) -> tuple[LikelySet, ...]:
+    """List the chosen set and those with others in the place of one of its effects, most likely first."""
+    if not judged:
+        return ()
+    chosen = tuple(each.effect.name for each in judged)
+    others = {frozenset(names): (names, odds) for each in judged for names, odds in each.odds.items()}
+    others.pop(frozenset(chosen), None)
+    weights = likely([odds for _, odds in others.values()]).tolist()
+    listed = zip([chosen, *(names for names, _ in others.values())], weights, strict=True)
+    sets = ascending((LikelySet(names, weight) for names, weight in listed), lambda each: -each.likely)
+    return tuple(each for each in sets if each.likely >= _TOLD)
 
 
 def _frequency(chosen: Scored, ranking: Sequence[Scored]) -> float:

@@ -39,6 +39,9 @@ _OF_THE_REST = 0.25
 _CHANCE = 0.02
 """Probability of ranks up to which one is better: of fewer than six blocks none can be."""
 
+_DRAWS = 1000
+"""Of weights of blocks: what is likely is known to a hundredth or two."""
+
 
 @dataclass(frozen=True)
 class RankedStep:
@@ -213,3 +216,31 @@ def least_margin(above_floor: float, left: float) -> float:
         What the better one leaves, in squared floors.
     """
     return min(CLOSE * above_floor, _OF_THE_REST * left / len(CHANNELS))
+
+
+def likely(odds: Sequence[Array]) -> Array:
+    """Compute how likely a set of effects is beside others, from how well each foretells blocks that no fit saw.
+
+    Sets differ in some blocks and not in others, and no formula is exact, so blocks are weighed at random.
+
+    Parameters
+    ----------
+    odds : sequence of array, shape (block,)
+        Logarithm of the predictive density of each block under another set, less that under the first one.
+
+    Returns
+    -------
+    array, shape (1 + other,)
+        Of the first one and of the others; they add up to 1.
+
+    References
+    ----------
+    Yao, Vehtari, Simpson and Gelman 2018, Using stacking to average Bayesian predictive distributions (pseudo-BMA+).
+    """
+    if not odds:
+        return np.ones(1)
+    blocks = len(odds[0])
+    weight = blocks * np.random.default_rng(0).dirichlet(np.ones(blocks), _DRAWS)
+    total = weight @ np.stack([np.zeros(blocks), *odds], axis=1)
+    density = np.exp(total - total.max(axis=1, keepdims=True))
+    return np.asarray((density / density.sum(axis=1, keepdims=True)).mean(axis=0))

@@ -96,6 +96,14 @@ class Alternative:
 
 
 @dataclass(frozen=True)
+class LikelySet:
+    """A set of effects with how likely it is among those compared."""
+
+    effects: tuple[str, ...]
+    likely: float
+
+
+@dataclass(frozen=True)
 class Unexplained:
     """A channel with a gap that nothing in the catalogue explains; other fields are described at `UnexplainedGroup`.
 
@@ -161,6 +169,8 @@ class Diagnosis:
         What differs between the flights that were learned from and those held out, in sentences.
     shares : mapping of str to float
         The share of ``torque`` and of ``force``, where they have a gap.
+    sets : tuple of LikelySet
+        The set that the search chose, and those with another effect in the place of one of it; most likely first.
     """
 
     verdict: GapVerdict
@@ -179,6 +189,7 @@ class Diagnosis:
     contradictions: tuple[str, ...] = ()
     differences: tuple[str, ...] = ()
     shares: Mapping[str, float] = field(default_factory=dict)
+    sets: tuple[LikelySet, ...] = ()
 
 
 def verdict_of(
