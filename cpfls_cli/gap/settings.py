@@ -36,7 +36,13 @@ ERRORS = 2.0
 """Standard errors by which a difference is sure, 95 % two-sided."""
 
 COUNTS = 0.05
-"""Share of the whole gap, in squared floors, from which on a part of it is judged on its own."""
+"""Share of a gap, in squares, from which on a part of it counts: an effect, a channel, what follows a signal."""
+
+CHANCE = 0.05
+"""Probability of chance up to which something makes an answer more careful: as usual, since no name hangs on it."""
+
+FEWEST_BLOCKS = 4
+"""Blocks that tell an error, if a wide one."""
 
 
 @dataclass(frozen=True, kw_only=True)

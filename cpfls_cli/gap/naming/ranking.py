@@ -20,15 +20,12 @@ from cpfls_cli.gap.naming.scoring import (
     score,
     scoring_matrix,
 )
-from cpfls_cli.gap.settings import ERRORS, VISIBLE, GapSettings
+from cpfls_cli.gap.settings import COUNTS, ERRORS, VISIBLE, GapSettings
 from cpfls_cli.rounding import tied
 from cpfls_cli.weak_form.resampling import blocks_of, mirror_shifted
 
 NEAR = 0.6
 """Share of what the best one explains from which on another one is compared with it."""
-
-LEAST_SHARE = 0.05
-"""Share of the remaining gap above the floor that an effect has to explain."""
 
 CLOSE = 0.01
 """Share of the gap by which two explanations are as good as each other."""
@@ -200,7 +197,7 @@ def least_gain(above_floor: float, windows: int) -> float:
     above_floor : float
         The gap, in squared floors.
     """
-    return max(LEAST_SHARE * above_floor, VISIBLE**2 * windows)
+    return max(COUNTS * above_floor, VISIBLE**2 * windows)
 
 
 def least_margin(above_floor: float, left: float) -> float:

@@ -14,7 +14,6 @@ from cpfls_cli.gap.balance.refine import compensation, fit, refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.ranking import (
     CLOSE,
-    LEAST_SHARE,
     NEAR,
     RankedStep,
     best_floor,
@@ -29,7 +28,7 @@ from cpfls_cli.gap.naming.ranking import (
 )
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import REFUSED, Scored, normal_equations, scoring_matrix
-from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.settings import COUNTS, GapSettings
 from cpfls_cli.rounding import ascending, less
 
 _BEAM = 3
@@ -172,7 +171,7 @@ def needed(refitted: System, step: RankedStep, settings: GapSettings) -> tuple[C
         alike = beside_its_like(kept.chosen, index)
         without = refined(kept.flights, others, step.floor) if alike else system(kept.flights, others)
         left, before = (rescored(each, step, settings).block_error.sum() for each in (without, kept))
-        if less(left - before, LEAST_SHARE * max(left - rows(kept), 0.0), left):
+        if less(left - before, COUNTS * max(left - rows(kept), 0.0), left):
             kept = refined(kept.flights, others, step.floor)
     return kept.chosen
 
