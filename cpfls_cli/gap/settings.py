@@ -20,8 +20,8 @@ Without a gap half of the channels exceed 1 floor, and floors of coloured noise 
 NOISE = 1.25
 """Mean square in squared floors up to which a residual counts as noise: what an estimate of the floor is off by."""
 
-LARGE = 3.0
-"""Root mean square in floors that no name for a gap may leave behind, twice what is clear."""
+OFF = 0.1
+"""Share of its torque and force that a formula may be off by: laws of drag, lift and rotors are known to a tenth."""
 
 VISIBLE = 0.3
 """Root mean square in floors of one channel from which on an effect shows.

@@ -17,7 +17,7 @@ from cpfls_cli.gap.balance.balance_system import is_free, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence
-from cpfls_cli.gap.naming.ranking import least_margin, likely, more_left, rank_effects
+from cpfls_cli.gap.naming.ranking import likely, more_left, off_by, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
 from cpfls_cli.gap.naming.scoring import Scored
 from cpfls_cli.gap.naming.search import alternatives, beside_its_like, chance_beside_its_like, in_place_of
@@ -100,7 +100,7 @@ def judge_effect(
 
 def _odds(own: Scored, ranking: Sequence[Scored], above_floor: float) -> dict[tuple[str, ...], Array]:
     """Compare sets by what they leave of unseen blocks, beside what their formulas are off by."""
-    noise = 1.0 + least_margin(above_floor, float(own.block_error.sum()))
+    noise = 1.0 + off_by(above_floor, float(own.block_error.sum()))
     return {
         tuple(each.effect.name for each in other.chosen): -0.5 * more_left(other.block_error, own.block_error) / noise
         for other in ranking

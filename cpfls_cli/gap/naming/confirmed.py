@@ -18,14 +18,8 @@ from cpfls_cli.gap.naming.estimate import channel_weight, estimates
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out, share_removed
 from cpfls_cli.gap.naming.leftover import Leftover, leftover
 from cpfls_cli.gap.naming.ranking import RankedStep, block_index
-from cpfls_cli.gap.settings import CLEAR, ERRORS, VISIBLE, WORSE, GapSettings
+from cpfls_cli.gap.settings import CLEAR, ERRORS, NOISE, OFF, VISIBLE, WORSE, GapSettings
 from cpfls_cli.rounding import ascending, largest, levelled, smallest
-
-_FILLS = 0.01
-"""Share of what the largest effect takes off, in squares, below which another may fill what its formula is off by."""
-
-_BESIDE = 0.7
-"""Root mean square in floors of one channel that an effect so much smaller has to take off."""
 
 
 class Judgement(NamedTuple):
@@ -178,17 +172,18 @@ def _elsewhere(judgement: Judgement, compared: dict[str, Without]) -> Refusal | 
 
 
 def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | None:
-    """Find an effect that may fill what the formula of one a hundred times as large, in squares, is off by.
+    """Find an effect that may fill what the formula of a larger one is off by, `OFF` of it.
 
-    Where the large one acts; elsewhere what it is off by is of second order, and a hundred times as small again.
+    Where the large one acts; elsewhere what it is off by is of second order. Where all fits to the noise, formulas are
+    off by no more than an error of the floor hides.
     """
     floors = judgement.held_out.size(judgement.held_out.after).floors
-    beyond = _FILLS * max((one.visibly for one in compared.values()), default=0.0)
+    beyond = OFF**2 * max((one.visibly for one in compared.values()), default=0.0)
     for name in ascending(compared, lambda each: compared[each].visibly):
         channel, off = compared[name].channel, compared[name].visibly
         left = float(floors[channel])
         beside = max(beyond, *(one.seen[channel] for one in compared.values()))
-        if off < _FILLS * beside and (left > CLEAR or off < _BESIDE**2):
+        if off < OFF**2 * beside and (left > CLEAR or off < ERRORS * (NOISE - 1)):
             told = f"{left:.2g} floors are left with it" if left > CLEAR else f"it is {off**0.5:.2g} floors large"
             return Refusal(
                 name,

@@ -20,18 +20,12 @@ from cpfls_cli.gap.naming.scoring import (
     score,
     scoring_matrix,
 )
-from cpfls_cli.gap.settings import COUNTS, ERRORS, VISIBLE, GapSettings
+from cpfls_cli.gap.settings import COUNTS, ERRORS, NOISE, OFF, VISIBLE, GapSettings
 from cpfls_cli.rounding import tied
 from cpfls_cli.weak_form.resampling import blocks_of, mirror_shifted
 
 NEAR = 0.6
 """Share of what the best one explains from which on another one is compared with it."""
-
-CLOSE = 0.01
-"""Share of the gap by which two explanations are as good as each other."""
-
-_OF_THE_REST = 0.25
-"""Share of what the better one leaves of a channel up to which another one is as good, in squares."""
 
 _CHANCE = 0.02
 """Probability of ranks up to which one is better: of fewer than six blocks none can be."""
@@ -200,19 +194,21 @@ def least_gain(above_floor: float, windows: int) -> float:
     return max(COUNTS * above_floor, VISIBLE**2 * windows)
 
 
-def least_margin(above_floor: float, left: float) -> float:
-    """Compute the difference of two explanations up to which they are as good as each other.
+def off_by(explained: float, left: float) -> float:
+    """Bound what formulas are off by, in squared floors: two explanations differ by more or are alike.
 
-    It is next to nothing of a large gap, or next to nothing beside what the better one leaves itself.
+    No formula is exact. Beside sensors and air it leaves noise of its own in proportion to its torque and force, the
+    same in all flights: up to a tenth of these, `OFF`. Where all fits to the noise it is no more than an error of the
+    floor hides in one channel.
 
     Parameters
     ----------
-    above_floor : float
-        The gap, in squared floors.
+    explained : float
+        The gap that formulas are asked to explain, in squared floors.
     left : float
         What the better one leaves, in squared floors.
     """
-    return min(CLOSE * above_floor, _OF_THE_REST * left / len(CHANNELS))
+    return min(OFF**2 * explained, (NOISE - 1) * left / len(CHANNELS))
 
 
 def likely(odds: Sequence[Array]) -> Array:

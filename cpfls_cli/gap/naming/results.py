@@ -10,13 +10,10 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.settings import CLEAR, COUNTS, LARGE, GapSettings
+from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, OFF, GapSettings
 
 _SECOND_CAUSE = 0.03
 """Share of the gap, in squared floors, from which on what is left is a cause of its own."""
-
-_REST = 0.1
-"""Root mean square that is left, as a share of the gap, that no name for the gap may leave behind."""
 
 _MAIN = 0.1
 """Share of the gap from which on an effect that cannot be told from another makes the whole answer ambiguous."""
@@ -247,7 +244,7 @@ def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> 
     filled = effects > 1 and bool((after > CLEAR).any())
     largest = np.repeat([np.nanmax(before[kind], initial=0.0) for kind in (slice(0, 3), slice(3, 6))], 3)
     clear = (before > CLEAR) & (before**2 > COUNTS * largest**2)
-    large = (after > LARGE) & (after > _REST * before)
+    large = (after > ERRORS * CLEAR) & (after > OFF * before)
     return filled or bool((clear & (_is_left(after, before, named_share) | large)).any())
 
 

@@ -13,22 +13,21 @@ from cpfls_cli.gap.balance.balance_system import System, floors, system
 from cpfls_cli.gap.balance.refine import compensation, fit, refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.ranking import (
-    CLOSE,
     NEAR,
     RankedStep,
     best_floor,
     block_index,
     chance_of_ranks,
     least_gain,
-    least_margin,
     more_left,
+    off_by,
     rank_effects,
     rows,
     surely_less,
 )
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import REFUSED, Scored, normal_equations, scoring_matrix
-from cpfls_cli.gap.settings import COUNTS, GapSettings
+from cpfls_cli.gap.settings import COUNTS, OFF, GapSettings
 from cpfls_cli.rounding import ascending, less
 
 _BEAM = 3
@@ -272,7 +271,7 @@ def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float, off:
 
     Beaten is what leaves more by more than the scatter over blocks, than next to nothing, and than formulas are off by.
     """
-    least = max(least_margin(above_floor, float(chosen.block_error.sum())), off)
+    least = max(off_by(above_floor, float(chosen.block_error.sum())), off)
     return [
         other
         for other in ranking
@@ -293,7 +292,7 @@ def simplest(ranking: Sequence[Scored], above_floor: float, off: float = 0.0) ->
         What formulas are off by, in squared floors.
     """
     best = ranking[0]
-    as_good = max(CLOSE * best.gain, off)
+    as_good = max(OFF**2 * best.gain, off)
     rivals = [
         other
         for other in unbeaten(best, ranking, above_floor, off)
