@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
-from cpfls_cli.gap.balance.balance_system import is_free, relative_scatter, system
+from cpfls_cli.gap.balance.balance_system import relative_scatter, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.naming.earned import NamedFit, Refusal, fitted, on_bound
@@ -93,7 +93,7 @@ class Judge:
         least = smallest(compared, lambda each: compared[each].visibly)
         if compared[least].visibly < VISIBLE**2:
             return Refusal(least, "on the held-out flights the gap is as small without it")
-        return _elsewhere(judgement, compared) or _filling(judgement, compared)
+        return _filling(judgement, compared)
 
     def _without(self, judgement: Judgement, name: str) -> Without:
         """Leave an effect out and refit the others."""
@@ -146,29 +146,6 @@ class Without(NamedTuple):
         surely = -self.raised > ERRORS * self.error
         worse = (after > CLEAR) & (after > WORSE * self.left) & surely
         return np.where(worse, after / np.maximum(self.left, 1e-9), 0.0)
-
-
-def _elsewhere(judgement: Judgement, compared: dict[str, Without]) -> Refusal | None:
-    """Find an effect that is not known to end where it should, beside one that takes off more where it shows.
-
-    Its free coefficients follow any curve, that of a larger effect whose formula is off too, and only its shape says
-    that it acts where no other does.
-    """
-    for candidate, numbers in zip(judgement.found.hypothesis.chosen, judgement.found.estimates.effects, strict=True):
-        ends = {shape.name: shape.grid[-1] for shape in candidate.effect.shapes}
-        reaching = [number.name for number in numbers if number.name in ends and number.high >= ends[number.name]]
-        if len(ends) != 1 or not reaching or not is_free(candidate):
-            continue
-        channel = compared[candidate.effect.name].channel
-        seen = {name: one.seen[channel] for name, one in compared.items()}
-        most = largest(seen, seen.__getitem__)
-        if most != candidate.effect.name:
-            return Refusal(
-                candidate.effect.name,
-                f"its {reaching[0]} may be at the bound of what is possible, and the error of the formula of"
-                f" {most} in the {CHANNELS[channel]} would then look the same",
-            )
-    return None
 
 
 def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | None:
