@@ -35,6 +35,9 @@ WORSE = 1.1
 ERRORS = 2.0
 """Standard errors by which a difference is sure, 95 % two-sided."""
 
+SURE = 3.0
+"""Standard errors by which one of several numbers is sure: three or four are asked, on few blocks."""
+
 COUNTS = 0.05
 """Share of a gap, in squares, from which on a part of it counts: an effect, a channel, what follows a signal."""
 

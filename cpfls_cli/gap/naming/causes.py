@@ -21,24 +21,18 @@ from cpfls_cli.gap.naming.ranking import likely, more_left, off_by, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
 from cpfls_cli.gap.naming.scoring import Scored
 from cpfls_cli.gap.naming.search import alternatives, beside_its_like, chance_beside_its_like, in_place_of
-from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.settings import ERRORS, SURE, GapSettings
 from cpfls_cli.rounding import ascending, at_most
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _MATTERS = 0.02
 """Relative error of a moment of inertia or of the thrust from which on it is told."""
 
-_SURE = 1.5
-"""Half widths of its interval that an error exceeds: four numbers are asked."""
-
 _LEAST_SHARE = 0.2
 """Share of the gap of its own channel that a refitted number of the vehicle has to take off unseen flights."""
 
 # In which a number of the vehicle shows.
 _CHANNEL = {"inertia_x": 0, "inertia_y": 1, "inertia_z": 2, "thrust_scale": 5}
-
-_PULLS = 2.0
-"""Multiple of the pull of noise that an error has to exceed."""
 
 
 _TOLD = 0.01
@@ -183,7 +177,7 @@ def wrong_numbers(
     wrong = [
         number
         for number, drawn in pairs
-        if abs(number.value) > _PULLS * drawn
+        if abs(number.value) > ERRORS * drawn
         and _is_wrong(number, effects)
         and removed[_CHANNEL[number.name]] >= _LEAST_SHARE
     ]
@@ -216,7 +210,7 @@ def _is_wrong(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
         accounts = CATALOGUE[effect.name].accounts
         if accounts is not None:
             accounted += accounts(number.name, {c.name: c.value for c in effect.coefficients})
-    return abs(number.value) > max(_SURE * half, _MATTERS) and abs(number.value) > accounted
+    return abs(number.value) > max(SURE / ERRORS * half, _MATTERS) and abs(number.value) > accounted
 
 
 def sensor_fault(

@@ -25,14 +25,11 @@ from cpfls_cli.gap.residual.dependence import (
     without_actuation,
 )
 from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
-from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, FEWEST_BLOCKS, NOISE, VISIBLE, GapSettings
+from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, FEWEST_BLOCKS, NOISE, SURE, VISIBLE, GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _PER_WINDOW = 6
 """Hops in a window where bands are looked for: ten samples of the fastest wave that a window passes."""
-
-_SURE = 3.0
-"""Standard errors by which power flows: more than for one number, because three axes are asked on few blocks."""
 
 _USUAL_OF_BOUND = 0.2
 """A coefficient that is large but not unheard of, as a share of its bound."""
@@ -150,7 +147,7 @@ def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[
     power = (torque - torque.mean(axis=0)) * (body_rate - body_rate.mean(axis=0))
     means = np.array([power[block == number].mean(axis=0) for number in numbers])
     mean, error = means.mean(axis=0), mean_error(means)
-    sure = np.abs(mean) > _SURE * error
+    sure = np.abs(mean) > SURE * error
     return ["neither" if not s else "feeds" if m > 0 else "drains" for m, s in zip(mean, sure, strict=True)]
 
 

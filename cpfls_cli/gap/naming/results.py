@@ -15,9 +15,6 @@ from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, OFF, GapSettings
 _SECOND_CAUSE = 0.03
 """Share of the gap, in squared floors, from which on what is left is a cause of its own."""
 
-_MAIN = 0.1
-"""Share of the gap from which on an effect that cannot be told from another makes the whole answer ambiguous."""
-
 
 class GapVerdict(StrEnum):
     """Verdict on a gap."""
@@ -223,7 +220,8 @@ def verdict_of(
     by_chance = any(effect.p_value > settings.significance for effect in effects)
     if min(shares) < settings.named_share or unexplained or stays or by_chance:
         return GapVerdict.PARTIAL
-    main = {effect.name for effect in effects if effect.share >= _MAIN}
+    # What may be left without a name may be called by another one.
+    main = {effect.name for effect in effects if effect.share >= 1 - settings.named_share}
     return GapVerdict.AMBIGUOUS if any(rival.instead_of in main for rival in alternatives) else GapVerdict.NAMED
 
 
