@@ -230,9 +230,10 @@ def likely(odds: Sequence[Array]) -> Array:
     ----------
     Yao, Vehtari, Simpson and Gelman 2018, Using stacking to average Bayesian predictive distributions (pseudo-BMA+).
     """
-    if not odds:
-        return np.ones(1)
-    blocks = len(odds[0])
+    blocks = len(odds[0]) if odds else 0
+    if blocks < 2:
+        # One block tells nothing of how far blocks differ.
+        return np.full(len(odds) + 1, 1 / (len(odds) + 1))
     weight = blocks * np.random.default_rng(0).dirichlet(np.ones(blocks), _DRAWS)
     total = weight @ np.stack([np.zeros(blocks), *odds], axis=1)
     density = np.exp(total - total.max(axis=1, keepdims=True))

@@ -19,6 +19,7 @@ from cpfls_cli.gap.naming.ranking import (
     block_index,
     chance_of_ranks,
     least_gain,
+    likely,
     more_left,
     off_by,
     rank_effects,
@@ -27,15 +28,12 @@ from cpfls_cli.gap.naming.ranking import (
 )
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import REFUSED, Scored, normal_equations, scoring_matrix
-from cpfls_cli.gap.settings import COUNTS, OFF, GapSettings
+from cpfls_cli.gap.settings import CHANCE, COUNTS, OFF, GapSettings
 from cpfls_cli.rounding import ascending, less
 
 _BEAM = 3
 """Sets that are followed at once: a lag, a delay and a filter each do alone most of what two of them do."""
 
-
-_OFF = 1e-4
-"""Share of a gap, in squares, that sets of formulas for it leave: each is off by a hundredth of its torque or more."""
 
 _NUMBER = 8.0
 """What a free number has to explain, in squared floors: the logarithm of the residuals of a few flights (Schwarz 1978).
@@ -72,12 +70,11 @@ def forward_selection(
         progress(len(steps))
         if len(chosen) >= settings.effects_max:
             return chosen, steps
-        off = _OFF * steps[0].above_floor
         grown = _moved(flights, step, settings) if acceptable(step, settings) else []
-        grown += grown_elsewhere(flights, beam[1:], step, effects, settings, off)
+        grown += grown_elsewhere(flights, beam[1:], step, effects, settings)
         if not grown:
             return chosen, steps
-        best = simplest(ascending(grown, lambda scored: -scored.gain), step.above_floor, off)
+        best = simplest(ascending(grown, lambda scored: -scored.gain), step.above_floor)
         refitted = refined(flights, best.chosen, step.floor)
         if not quiet_enough(best.gain, step, refitted):
             return chosen, steps
@@ -124,7 +121,6 @@ def grown_elsewhere(
     step: RankedStep,
     effects: Sequence[Effect],
     settings: GapSettings,
-    off: float = 0.0,
 ) -> list[Scored]:
     """List sets that grew from others than the best one and leave less than that with no more numbers.
 
@@ -144,21 +140,23 @@ def grown_elsewhere(
             if _names(scored.chosen) != _names(chosen) and _numbers(scored.chosen) <= most:
                 grown = refined(flights, scored.chosen, step.floor) if late else system(flights, scored.chosen)
                 found.append(rescored(grown, step, settings))
-    return [scored for scored in found if _is_better(scored, own, step, off)]
+    return [scored for scored in found if _is_better(scored, own, step)]
 
 
-def _is_better(scored: Scored, own: Scored, step: RankedStep, off: float) -> bool:
-    """Tell whether a set leaves less than another one; with more numbers surely and by as much as is worth a name."""
-    gain = scored.gain - own.gain
-    more = _numbers(scored.chosen) > _numbers(own.chosen)
-    if more:
-        return gain >= _more(own, step, off) and surely_less(scored, own)
+def _is_better(scored: Scored, own: Scored, step: RankedStep) -> bool:
+    """Tell whether a set leaves less than another one.
+
+    With more numbers surely, by as much as is worth a name, and by more than its own formulas are seen to be off by.
+    """
+    gain, off = scored.gain - own.gain, step.above_floor - scored.gain
+    if _numbers(scored.chosen) > _numbers(own.chosen):
+        return gain >= max(_more(own, step), off) and surely_less(scored, own)
     return bool(less(0.0, gain, step.above_floor))
 
 
-def _more(own: Scored, step: RankedStep, off: float) -> float:
-    """Compute the least gain, in squared floors, of what is added to a set: more than formulas are off by."""
-    return max(least_gain(max(step.above_floor - own.gain, 0.0), len(step.hypothesis.residual)), off)
+def _more(own: Scored, step: RankedStep) -> float:
+    """Compute the least gain, in squared floors, of what is added to a set."""
+    return least_gain(max(step.above_floor - own.gain, 0.0), len(step.hypothesis.residual))
 
 
 def needed(refitted: System, step: RankedStep, settings: GapSettings) -> tuple[Candidate, ...]:
@@ -202,15 +200,15 @@ def in_place_of(
     if chosen[index].effect.actuation is None:
         return ranked
     others = [other for place, other in enumerate(chosen) if place != index]
-    own, off = rescored(system(flights, [*others, chosen[index]]), step, settings), _OFF * step.above_floor
+    own = rescored(system(flights, [*others, chosen[index]]), step, settings)
     alike = [each.candidate for each in ranked[1:] if _late(each) and np.isfinite(each.gain)]
     sets: list[tuple[Candidate, ...]] = [(each,) for each in alike]
     if stands_for_two(chosen, index):
         sets += combinations(alike, 2)
-    numbers, worth = _numbers(own.chosen), step.above_floor - own.gain > _more(own, step, off)
+    numbers, worth = _numbers(own.chosen), step.above_floor - own.gain > _more(own, step)
     sets = [each for each in sets if worth or _numbers([*others, *each]) <= numbers]
     moved = [rescored(refined(flights, [*others, *each], step.floor), step, settings) for each in sets]
-    fair = [each for each in moved if _numbers(each.chosen) <= numbers or _is_better(each, own, step, off)]
+    fair = [each for each in moved if _numbers(each.chosen) <= numbers or _is_better(each, own, step)]
     return [own, *fair, *(scored for scored in ranked[1:] if not _late(scored))]
 
 
@@ -266,37 +264,41 @@ def _unseen(hypothesis: System, floor: Array, settings: GapSettings, *, moving: 
     return np.asarray(normal.solve(arranged.base if moving else np.arange(hypothesis.base.shape[2]))[1][:, 0])
 
 
-def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float, off: float = 0.0) -> list[Scored]:
-    """List the candidates that the chosen one does not beat.
-
-    Beaten is what leaves more by more than the scatter over blocks, than next to nothing, and than formulas are off by.
-    """
-    least = max(off_by(above_floor, float(chosen.block_error.sum())), off)
+def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Scored]:
+    """List the candidates that the chosen one does not beat: beside it alone they are likely enough to matter."""
+    beside = ((other, odds(chosen, other, above_floor)) for other in ranking if np.isfinite(other.gain))
     return [
         other
-        for other in ranking
-        if _names(other.chosen) != _names(chosen.chosen)
-        and other.gain > NEAR * chosen.gain
-        and not (more_left(other.block_error, chosen.block_error).sum() > least and surely_less(chosen, other))
+        for other, of_blocks in beside
+        if _names(other.chosen) != _names(chosen.chosen) and likely([of_blocks])[1] >= CHANCE
     ]
 
 
-def simplest(ranking: Sequence[Scored], above_floor: float, off: float = 0.0) -> Scored:
+def odds(own: Scored, other: Scored, above_floor: float) -> Array:
+    """Compare two sets by what they leave of unseen blocks, beside what their formulas are off by.
+
+    Returns
+    -------
+    array, shape (block,)
+        Logarithm of the predictive density under the other one less that under the first.
+    """
+    noise = 1.0 + off_by(above_floor, float(own.block_error.sum()))
+    return np.asarray(-0.5 * more_left(other.block_error, own.block_error) / noise)
+
+
+def simplest(ranking: Sequence[Scored], above_floor: float) -> Scored:
     """Choose among the best candidates the one with the fewest free numbers.
 
     Parameters
     ----------
     ranking : sequence of Scored
         Best first.
-    off : float
-        What formulas are off by, in squared floors.
     """
     best = ranking[0]
-    as_good = max(OFF**2 * best.gain, off)
     rivals = [
         other
-        for other in unbeaten(best, ranking, above_floor, off)
-        if best.gain - other.gain < max(as_good, _NUMBER * (_numbers(best.chosen) - _numbers(other.chosen)))
+        for other in unbeaten(best, ranking, above_floor)
+        if best.gain - other.gain < max(OFF**2 * best.gain, _NUMBER * (_numbers(best.chosen) - _numbers(other.chosen)))
     ]
     fewest = min(_numbers(each.chosen) for each in [best, *rivals])
     few = [each for each in [best, *rivals] if _numbers(each.chosen) == fewest]
