@@ -76,7 +76,7 @@ def forward_selection(
             return chosen, steps
         best = simplest(ascending(grown, lambda scored: -scored.gain), step.above_floor)
         refitted = refined(flights, best.chosen, step.floor)
-        if not quiet_enough(best.gain, step, refitted):
+        if of_motion(best.gain, step, refitted) < _enough(step):
             return chosen, steps
         kept = needed(refitted, step, settings)
         # What is dropped can undo what was added; a set that was there before would come round again for ever.
@@ -173,19 +173,18 @@ def needed(refitted: System, step: RankedStep, settings: GapSettings) -> tuple[C
     return kept.chosen
 
 
-def quiet_enough(gain: float, step: RankedStep, refitted: System) -> bool:
-    """Tell whether an effect explains motion, not noise.
+def of_motion(gain: float, step: RankedStep, with_it: System) -> float:
+    """Take off a gain what of it is noise, in squared floors.
 
     Columns of rates hold the noise of the gyroscope, and so does the inertial torque: where rates about two axes go
     hand in hand, a fit can turn one against the other and be rid of noise. What an effect takes off the floor is
     therefore taken off its gain.
     """
-    if not refitted.chosen[-1].effect.rate_derivative:
-        return True
-    after = floors(refitted, fit(refitted, step.floor))
-    rows = np.sum([len(flight) * flight.known for flight in refitted.flights], axis=0)
-    noise = float((rows * np.maximum(1 - (after / step.floor) ** 2, 0.0)).sum())
-    return gain - noise >= _enough(step)
+    if not with_it.chosen[-1].effect.rate_derivative:
+        return gain
+    after = floors(with_it, fit(with_it, step.floor))
+    rows = np.sum([len(flight) * flight.known for flight in with_it.flights], axis=0)
+    return gain - float((rows * np.maximum(1 - (after / step.floor) ** 2, 0.0)).sum())
 
 
 def in_place_of(
