@@ -194,21 +194,21 @@ def least_gain(above_floor: float, windows: int) -> float:
     return max(COUNTS * above_floor, VISIBLE**2 * windows)
 
 
-def off_by(explained: float, left: float) -> float:
-    """Bound what formulas are off by, in squared floors: two explanations differ by more or are alike.
+def off_by(explained: float, left: float, above: float = 0.0) -> float:
+    """Estimate how much formulas are off by at most, in squared floors.
 
     No formula is exact. Beside sensors and air it leaves noise of its own in proportion to its torque and force, the
-    same in all flights: up to a tenth of these, `OFF`. Where all fits to the noise it is no more than an error of the
-    floor hides in one channel.
+    same in all flights. By likelihood that is what is left above the floor, and an error of the floor in one channel;
+    before any flight it is known to be a tenth of torque and force at most, `OFF`.
 
     Parameters
     ----------
     explained : float
         The gap that formulas are asked to explain, in squared floors.
-    left : float
-        What the better one leaves, in squared floors.
+    left, above : float
+        What the better one leaves, and what of that is above the floor, in squared floors.
     """
-    return min(OFF**2 * explained, (NOISE - 1) * left / len(CHANNELS))
+    return min(OFF**2 * explained, max(above, 0.0) + (NOISE - 1) * left / len(CHANNELS))
 
 
 def likely(odds: Sequence[Array]) -> Array:

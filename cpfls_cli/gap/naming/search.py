@@ -28,7 +28,7 @@ from cpfls_cli.gap.naming.ranking import (
 )
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import REFUSED, Scored, normal_equations, scoring_matrix
-from cpfls_cli.gap.settings import CHANCE, COUNTS, OFF, GapSettings
+from cpfls_cli.gap.settings import CHANCE, COUNTS, GapSettings
 from cpfls_cli.rounding import ascending, less
 
 _BEAM = 3
@@ -281,8 +281,12 @@ def odds(own: Scored, other: Scored, above_floor: float) -> Array:
     array, shape (block,)
         Logarithm of the predictive density under the other one less that under the first.
     """
-    noise = 1.0 + off_by(above_floor, float(own.block_error.sum()))
-    return np.asarray(-0.5 * more_left(other.block_error, own.block_error) / noise)
+    return np.asarray(-0.5 * more_left(other.block_error, own.block_error) / (1.0 + _off(own, above_floor)))
+
+
+def _off(scored: Scored, above_floor: float) -> float:
+    """Estimate what the formulas of a set are off by, in squared floors."""
+    return off_by(above_floor, float(scored.block_error.sum()), above_floor - scored.gain)
 
 
 def simplest(ranking: Sequence[Scored], above_floor: float) -> Scored:
@@ -293,11 +297,11 @@ def simplest(ranking: Sequence[Scored], above_floor: float) -> Scored:
     ranking : sequence of Scored
         Best first.
     """
-    best = ranking[0]
+    best, off = ranking[0], _off(ranking[0], above_floor)
     rivals = [
         other
         for other in unbeaten(best, ranking, above_floor)
-        if best.gain - other.gain < max(OFF**2 * best.gain, _NUMBER * (_numbers(best.chosen) - _numbers(other.chosen)))
+        if best.gain - other.gain < max(off, _NUMBER * (_numbers(best.chosen) - _numbers(other.chosen)))
     ]
     fewest = min(_numbers(each.chosen) for each in [best, *rivals])
     few = [each for each in [best, *rivals] if _numbers(each.chosen) == fewest]
