@@ -24,9 +24,6 @@ from cpfls_cli.gap.settings import COUNTS, ERRORS, NOISE, OFF, VISIBLE, GapSetti
 from cpfls_cli.rounding import tied
 from cpfls_cli.weak_form.resampling import blocks_of, mirror_shifted
 
-NEAR = 0.6
-"""Share of what the best one explains from which on another one is compared with it."""
-
 _CHANCE = 0.02
 """Probability of ranks up to which one is better: of fewer than six blocks none can be."""
 
@@ -145,11 +142,6 @@ def block_index(hypothesis: System, settings: GapSettings) -> IntArray:
 def rows(hypothesis: System) -> int:
     """Count the residuals of a hypothesis, over windows and known channels."""
     return sum(len(flight) * int(flight.known.sum()) for flight in hypothesis.flights)
-
-
-def surely_less(one: Scored, other: Scored) -> bool:
-    """Tell whether one explanation leaves less than another, by more than the scatter over blocks."""
-    return surely(more_left(other.block_error, one.block_error))
 
 
 def surely(margin: Array) -> bool:

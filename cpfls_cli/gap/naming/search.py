@@ -13,7 +13,6 @@ from cpfls_cli.gap.balance.balance_system import System, floors, system
 from cpfls_cli.gap.balance.refine import compensation, fit, refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.ranking import (
-    NEAR,
     RankedStep,
     best_floor,
     block_index,
@@ -24,7 +23,6 @@ from cpfls_cli.gap.naming.ranking import (
     off_by,
     rank_effects,
     rows,
-    surely_less,
 )
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import REFUSED, Scored, normal_equations, scoring_matrix
@@ -101,12 +99,12 @@ def _enough(step: RankedStep) -> float:
 
 
 def _moved(flights: Sequence[WeakFlight], step: RankedStep, settings: GapSettings) -> list[Scored]:
-    """List the candidates that come near the best; those between command and rotors, if that is one, with shapes moved.
+    """List the candidates that explain something; those between command and rotors, if the best is, with shapes moved.
 
     Between the points of a grid an effect with more shapes comes closer to what one with fewer is.
     """
     best = step.ranking[0]
-    near = [scored for scored in step.ranking if scored.gain > NEAR * best.gain]
+    near = [scored for scored in step.ranking if scored.gain > 0]
     alike = [scored for scored in near if _late(scored)]
     beside_late = any(each.effect.actuation is not None for each in best.others)
     if best not in alike or not (beside_late or len(alike) > 1):
@@ -146,11 +144,11 @@ def grown_elsewhere(
 def _is_better(scored: Scored, own: Scored, step: RankedStep) -> bool:
     """Tell whether a set leaves less than another one.
 
-    With more numbers surely, by as much as is worth a name, and by more than its own formulas are seen to be off by.
+    With more numbers it has to beat that one, by as much as is worth a name and by more than it leaves above the floor.
     """
     gain, off = scored.gain - own.gain, step.above_floor - scored.gain
     if _numbers(scored.chosen) > _numbers(own.chosen):
-        return gain >= max(_more(own, step), off) and surely_less(scored, own)
+        return gain >= max(_more(own, step), off) and not unbeaten(scored, [own], step.above_floor)
     return bool(less(0.0, gain, step.above_floor))
 
 
