@@ -42,7 +42,7 @@ COUNTS = 0.05
 """Share of a gap, in squares, from which on a part of it counts: an effect, a channel, what follows a signal."""
 
 CHANCE = 0.05
-"""Probability of chance from which on something makes an answer more careful: a rival, an unnamed effect, a gust."""
+"""Probability of chance, and of a rival over that of a name, from which on they make an answer more careful."""
 
 FEWEST_BLOCKS = 4
 """Blocks that tell an error, if a wide one."""

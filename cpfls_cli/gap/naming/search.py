@@ -262,13 +262,10 @@ def _unseen(hypothesis: System, floor: Array, settings: GapSettings, *, moving: 
 
 
 def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Scored]:
-    """List the candidates that the chosen one does not beat: beside it alone they are likely enough to matter."""
-    beside = ((other, odds(chosen, other, above_floor)) for other in ranking if np.isfinite(other.gain))
-    return [
-        other
-        for other, of_blocks in beside
-        if _names(other.chosen) != _names(chosen.chosen) and likely([of_blocks])[1] >= CHANCE
-    ]
+    """List the candidates that the chosen one does not beat: of all, those not much less likely than it."""
+    others = [each for each in ranking if np.isfinite(each.gain) and _names(each.chosen) != _names(chosen.chosen)]
+    own, *weights = likely([odds(chosen, other, above_floor) for other in others])
+    return [other for other, weight in zip(others, weights, strict=True) if weight >= CHANCE * own]
 
 
 def odds(own: Scored, other: Scored, above_floor: float) -> Array:
