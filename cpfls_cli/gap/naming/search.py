@@ -26,7 +26,7 @@ from cpfls_cli.gap.naming.ranking import (
 )
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import REFUSED, Scored, normal_equations, scoring_matrix
-from cpfls_cli.gap.settings import CHANCE, COUNTS, GapSettings
+from cpfls_cli.gap.settings import COUNTS, RARE, GapSettings
 from cpfls_cli.rounding import ascending, less
 
 _BEAM = 3
@@ -265,7 +265,7 @@ def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> l
     """List the candidates that the chosen one does not beat: of all, those not much less likely than it."""
     others = [each for each in ranking if np.isfinite(each.gain) and _names(each.chosen) != _names(chosen.chosen)]
     own, *weights = likely([odds(chosen, other, above_floor) for other in others])
-    return [other for other, weight in zip(others, weights, strict=True) if weight >= CHANCE * own]
+    return [other for other, weight in zip(others, weights, strict=True) if weight >= RARE * own]
 
 
 def odds(own: Scored, other: Scored, above_floor: float) -> Array:
