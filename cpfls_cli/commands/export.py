@@ -76,7 +76,7 @@ def _form_of(output: Path) -> str:
     for form, ending in ENDINGS.items():
         told.setdefault(ending, form)
     endings = ", ".join(f"{ending} ({form})" for ending, form in told.items())
-    raise InputError(f"{output}: the ending tells no form; end the name in one of {endings}")
+    raise InputError(f"{output}: its suffix names no form; give the name one of the suffixes {endings}")
 
 
 def _prefix_of(output: Path, form: str, name: str | None) -> str:
