@@ -27,6 +27,7 @@ from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     impossible_ratios,
     judge_effect,
+    likely_sets,
     sensor_fault,
     shares,
     wrong_numbers,
@@ -373,6 +374,7 @@ def _concluded(
         wrong,
         differ,
         removed,
+        likely_sets(judged),
     )
 
 

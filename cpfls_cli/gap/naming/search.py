@@ -13,23 +13,21 @@ from cpfls_cli.gap.balance.balance_system import System, floors, system
 from cpfls_cli.gap.balance.refine import compensation, fit, refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.ranking import (
-    CLOSE,
-    LEAST_SHARE,
     NEAR,
     RankedStep,
     best_floor,
     block_index,
     chance_of_ranks,
     least_gain,
-    least_margin,
     more_left,
+    off_by,
     rank_effects,
     rows,
     surely_less,
 )
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import REFUSED, Scored, normal_equations, scoring_matrix
-from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.settings import COUNTS, OFF, GapSettings
 from cpfls_cli.rounding import ascending, less
 
 _BEAM = 3
@@ -172,7 +170,7 @@ def needed(refitted: System, step: RankedStep, settings: GapSettings) -> tuple[C
         alike = beside_its_like(kept.chosen, index)
         without = refined(kept.flights, others, step.floor) if alike else system(kept.flights, others)
         left, before = (rescored(each, step, settings).block_error.sum() for each in (without, kept))
-        if less(left - before, LEAST_SHARE * max(left - rows(kept), 0.0), left):
+        if less(left - before, COUNTS * max(left - rows(kept), 0.0), left):
             kept = refined(kept.flights, others, step.floor)
     return kept.chosen
 
@@ -273,7 +271,7 @@ def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float, off:
 
     Beaten is what leaves more by more than the scatter over blocks, than next to nothing, and than formulas are off by.
     """
-    least = max(least_margin(above_floor, float(chosen.block_error.sum())), off)
+    least = max(off_by(above_floor, float(chosen.block_error.sum())), off)
     return [
         other
         for other in ranking
@@ -294,7 +292,7 @@ def simplest(ranking: Sequence[Scored], above_floor: float, off: float = 0.0) ->
         What formulas are off by, in squared floors.
     """
     best = ranking[0]
-    as_good = max(CLOSE * best.gain, off)
+    as_good = max(OFF**2 * best.gain, off)
     rivals = [
         other
         for other in unbeaten(best, ranking, above_floor, off)
