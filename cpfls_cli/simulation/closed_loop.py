@@ -12,7 +12,6 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.motors import Motors
-from cpfls_cli.dynamics.equations_of_motion import identified_turning, rigid_turning
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.playback.model import VehicleModel
@@ -27,8 +26,7 @@ from cpfls_cli.simulation.plant import (
     VEHICLE_STATES,
     VELOCITY,
     Plant,
-    effect_wrench,
-    instant,
+    plant_of,
 )
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.trajectory.planning import sample_interval
@@ -533,13 +531,8 @@ def _loop(
     push: Array | None,
 ) -> Loop:
     """Set up the loop at a state, shape (12,), with the rotors at a speed that they were commanded to."""
-    flown = vehicle if model is None else model.vehicle
-    carried = tuple(one.effect.carried(flown, one.values) for one in effects.ordered if one.effect.carried is not None)
-    state = np.concatenate([state, *(body.start for body in carried)])
-    fuzzy = None if model is None else model.fuzzy
-    turning = rigid_turning(inertia_tensor(flown)) if fuzzy is None else identified_turning(fuzzy)
-    wrench = effect_wrench(effects, instant(flown, state, speed))
-    plant = Plant(flown, turning, wrench, carried, None if model is None or model.is_rigid_body else model)
+    plant = plant_of(vehicle, model, effects, state, speed)
+    state = np.concatenate([state, *(body.start for body in plant.carried)])
     push = np.zeros((clock.steps, 6)) if push is None else push
     change = plant.derivative(state, Rotors.settled(speed), push[0])
     response = RotorResponse() if model is None else model.response
