@@ -252,8 +252,8 @@ def write_text(path: Path, text: str) -> None:
     write_texts({path: text})
 
 
-def write_texts(texts: Mapping[Path, str]) -> None:
-    """Write text files under temporary names, then move them in place when all of them are complete.
+def write_texts(texts: Mapping[Path, str | bytes]) -> None:
+    """Write files of text or bytes under temporary names, then move them in place when all of them are complete.
 
     What is no character, such as a byte of a file name that is not UTF-8, is written as a question mark.
     """
@@ -262,7 +262,7 @@ def write_texts(texts: Mapping[Path, str]) -> None:
         for path, text in texts.items():
             written[path] = temporary = stack.enter_context(atomic_path(path))
             with _writing(path), temporary.open("wb") as file:
-                file.write(text.encode("utf-8", "replace"))
+                file.write(text if isinstance(text, bytes) else text.encode("utf-8", "replace"))
                 file.flush()
                 os.fsync(file.fileno())
         _refuse_appeared(written)

@@ -75,6 +75,14 @@ LogsArgument = Annotated[
 ModelArgument = Annotated[
     Path, typer.Argument(metavar="MODEL", help="Made by `cpfls identify`, `extend` or `vehicle`.")
 ]
+ExportedArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="MODEL",
+        help="Made by `cpfls identify`, `extend` or `vehicle`; for .mcap and .csv a flight, prediction, replay, "
+        "disagreement, diagnosis or response.",
+    ),
+]
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Any artifact.")]
 ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT...", help="Artifacts to report on.")]
 FlightsArgument = Annotated[
@@ -212,6 +220,8 @@ class ExportFormat(StrEnum):
     ROTORPY = "rotorpy"
     CASADI = "casadi"
     JAX = "jax"
+    MCAP = "mcap"
+    CSV = "csv"
 
 
 class Flown(StrEnum):
@@ -635,7 +645,7 @@ def trend(
 
 @_command()
 def export(
-    model: ModelArgument,
+    model: ExportedArgument,
     output: OutputOption,
     form: Annotated[
         ExportFormat | None,
@@ -643,7 +653,9 @@ def export(
             "--format",
             help="json: every parameter, with names and units; c: C99 source and header, no dependencies; python: a "
             "module that needs NumPy only; sdf (Gazebo), mjcf (MuJoCo), rotorpy, casadi, jax: the vehicle for a "
-            "simulator or a library; default: by the suffix of FILE (.json, .c, .py, .xml, .sdf).",
+            "simulator or a library; mcap (Foxglove), csv (PlotJuggler): what a flight, prediction, replay, gap or "
+            "response holds, on the log's own clock; default: by the suffix of FILE (.json, .c, .py, .xml, .sdf, "
+            ".mcap, .csv).",
         ),
     ] = None,
     name: Annotated[
@@ -657,7 +669,7 @@ def export(
     *,
     common: Common,
 ) -> None:
-    """Write a model as JSON, C or Python that computes on its own, or as a vehicle for a simulator or a library."""
+    """Write a model as code or for a simulator; flights, replays, gaps and others for Foxglove or PlotJuggler."""
     with messages_for_errors():
         chosen = form and form.value
         _run_without_config("export", output, common, lambda command, job: command.run(job, model, chosen, name))

@@ -6,6 +6,7 @@ import keyword
 import re
 import sys
 from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,9 @@ from cpfls_cli.export.text import checked_identifier, identifier
 from cpfls_cli.pages.export import export_answer
 from cpfls_cli.report.outcome import Outcome
 
-ENDINGS = {form: chosen.ending for form, chosen in FORMS.items()}
+VIEWERS = {"mcap": ".mcap", "csv": ".csv"}
+"""What is drawn by other programs, which is no model."""
+ENDINGS = {form: chosen.ending for form, chosen in FORMS.items()} | VIEWERS
 # What the module imports beside the standard library: under such a name it would import itself.
 _IMPORTED = ("casadi", "jax", "numpy", "rotorpy")
 
@@ -29,6 +32,8 @@ _IMPORTED = ("casadi", "jax", "numpy", "rotorpy")
 def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     """Write a model in another form."""
     form = form or _form_of(job.output)
+    if form in VIEWERS:
+        return import_module("cpfls_cli.commands.viewers").run(job, model, form)  # type: ignore[no-any-return]
     prefix = _prefix_of(job.output, form, name)
     outputs = _outputs_of(job.output, form)
     source = take_inputs(job, {"model": model})["model"]

@@ -86,7 +86,8 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         # As the log begins.
         parameters.setdefault(_text(name), float(value))
     broken = (f"{lost} bytes belong to no message: the file is damaged in places; what could be read is used",)
-    return LogContents(topics, units, parameters, _system(tables), broken if lost else (), flown_at)
+    begins = {"": float(origin)}
+    return LogContents(topics, units, parameters, _system(tables), broken if lost else (), flown_at, begins)
 
 
 def _find_messages(content: bytes) -> tuple[dict[int, _Kind], int]:
