@@ -253,16 +253,21 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_texts(texts: Mapping[Path, str]) -> None:
-    """Write text files under temporary names, then move them in place when all of them are complete.
+    """Write text files, as `write_files`.
 
     What is no character, such as a byte of a file name that is not UTF-8, is written as a question mark.
     """
+    write_files({path: text.encode("utf-8", "replace") for path, text in texts.items()})
+
+
+def write_files(contents: Mapping[Path, bytes]) -> None:
+    """Write files under temporary names, then move them in place when all of them are complete."""
     with ExitStack() as stack:
         written = {}
-        for path, text in texts.items():
+        for path, content in contents.items():
             written[path] = temporary = stack.enter_context(atomic_path(path))
             with _writing(path), temporary.open("wb") as file:
-                file.write(text.encode("utf-8", "replace"))
+                file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
         _refuse_appeared(written)
