@@ -675,6 +675,20 @@ def export(
         _run_without_config("export", output, common, lambda command, job: command.run(job, model, chosen, name))
 
 
+@_command()
+def spread(
+    model: Annotated[Path, typer.Argument(metavar="VEHICLE", help="Made by `cpfls vehicle`.")],
+    output: OutputOption,
+    count: Annotated[int, typer.Option("-n", "--count", metavar="N", min=2, help="Vehicles to draw.")] = 1000,
+    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Of the draws.")] = 1,
+    *,
+    common: Common,
+) -> None:
+    """Draw vehicles from what the flights of one tell, for simulators that fly many: .yaml, .json or .npz."""
+    with messages_for_errors():
+        _run_without_config("spread", output, common, lambda command, job: command.run(job, model, count, seed))
+
+
 @_command("verify-export")
 def verify_export(
     model: ModelArgument,
