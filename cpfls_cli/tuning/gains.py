@@ -8,7 +8,6 @@ from math import floor, inf
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.law import AXES, AxisLaw, Law
 from cpfls_cli.autopilots.parameters import Autopilot, Parameter
 from cpfls_cli.tuning.margins import axis_loops, disk_of, frequencies, is_stable
@@ -16,6 +15,8 @@ from cpfls_cli.tuning.plant import AxisPlant, HoverPlant
 
 _BELOW_CROSSOVER = 5.0
 """The integral takes over so much below what the rate follows: it costs about 11 degrees of phase there."""
+_ANGLE_BELOW = 3.0
+"""While the rate is tuned the angle is as much slower; then it gets what is left."""
 _LEADS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 """Derivative over proportional gain that is tried, in lags and delays of the loop."""
 _WORTH = 1.03
@@ -101,7 +102,8 @@ def tuned(autopilot: Autopilot, values: Mapping[str, float], hover: HoverPlant, 
         angle = _angle_gain(law, axis, kept, plants, asked.disk)
         roles |= {"angle": angle, "angle_i": angle * _ratio(law.axes[axis])}
         for role, value in roles.items():
-            found = autopilot.by_role(f"{name}.{role}") or autopilot.by_role(f"all.{role}")
+            shared = "all" if axis == 2 else "tilt"
+            found = autopilot.by_role(f"{name}.{role}") or autopilot.by_role(f"{shared}.{role}")
             if found is not None:
                 wanted.setdefault(found.name, []).append(value / found.scale)
     # A parameter of several axes suits the one that bears the least.
@@ -137,7 +139,7 @@ def _with(law: Law, axis: int, own: AxisLaw) -> Law:
 
 def _rate_gains(law: Law, axis: int, plants: list[AxisPlant], disk: float) -> AxisLaw:
     """Find the proportional, integral and derivative gains of one axis."""
-    found, frequency = plants[0], frequencies(law)
+    found = plants[0]
     late = found.lag + found.delay + 1.5 * law.period
     # Yaw by reaction torque is slow and noisy; its derivative stays 0, as all autopilots have it.
     leads = _LEADS if axis < 2 else _LEADS[:1]
@@ -146,12 +148,13 @@ def _rate_gains(law: Law, axis: int, plants: list[AxisPlant], disk: float) -> Ax
 
         def own(gain: float, lead: float = lead) -> AxisLaw:
             slope = gain * lead * late
-            integral = gain * _follows(gain, slope, found) / _BELOW_CROSSOVER
-            return replace(law.axes[axis], p=gain, i=integral, d=slope)
+            fast = _follows(gain, slope, found)
+            angle = fast / _ANGLE_BELOW
+            whole = replace(law.axes[axis], p=gain, i=gain * fast / _BELOW_CROSSOVER, d=slope)
+            return replace(whole, angle=angle, angle_integral=angle * _ratio(law.axes[axis]))
 
         def bears(gain: float) -> bool:
-            tried = _with(law, axis, own(gain))
-            return _bears([axis_loops(tried, axis, each, frequency).rate for each in plants], disk)
+            return _bears(_with(law, axis, own(gain)), axis, plants, disk)
 
         gain = _largest(bears, 1e-3 / (late * _torque(found)), 10.0 / (late * _torque(found)))
         tried = own(gain)
@@ -172,19 +175,27 @@ def _torque(plant: AxisPlant) -> float:
 
 
 def _angle_gain(law: Law, axis: int, rate: AxisLaw, plants: list[AxisPlant], disk: float) -> float:
-    frequency, ratio = frequencies(law), _ratio(law.axes[axis])
+    ratio = _ratio(law.axes[axis])
 
     def bears(gain: float) -> bool:
         tried = _with(law, axis, replace(rate, angle=gain, angle_integral=ratio * gain))
-        loops = [axis_loops(tried, axis, each, frequency) for each in plants]
-        calm = all(np.abs(each.angle_closed).max() <= _OVERSHOOT for each in loops)
-        return calm and _bears([each.angle for each in loops], disk)
+        return _bears(tried, axis, plants, disk)
 
     return _largest(bears, 0.05, 50.0)
 
 
-def _bears(loops: list[Array], disk: float) -> bool:
-    return all(is_stable(each) and disk_of(each) >= disk for each in loops)
+def _bears(law: Law, axis: int, plants: list[AxisPlant], disk: float) -> bool:
+    """Tell whether all loops of an axis have a disk margin with all plants, and pass a step by little."""
+    frequency = frequencies(law)
+    for plant in plants:
+        loops = axis_loops(law, axis, plant, frequency)
+        if np.abs(loops.angle_closed).max() > _OVERSHOOT:
+            return False
+        if not all(
+            is_stable(frequency, each) and disk_of(each) >= disk for each in (loops.rate, loops.command, loops.angle)
+        ):
+            return False
+    return True
 
 
 def _largest(bears: Callable[[float], bool], low: float, high: float) -> float:

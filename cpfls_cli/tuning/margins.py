@@ -52,18 +52,16 @@ class AxisLoops:
     Attributes
     ----------
     frequency : array, Hz
-    rate, angle : array
-        Gains of the rate loop, cut at the command, and of the angle loop around it, cut at the angle.
+    rate : array
+        Gain of the rate loop alone, as it flies where rates are asked for.
+    command, angle : array
+        With the angle loop around it, cut at the command, and at the measured angle.
     """
 
     frequency: Array
     rate: Numbers
+    command: Numbers
     angle: Numbers
-
-    @property
-    def rate_closed(self) -> Numbers:
-        """Body rate by what is asked, without the angle loop; of one that is cut at the command about the same."""
-        return np.asarray(self.rate / (1 + self.rate))
 
     @property
     def angle_closed(self) -> Numbers:
@@ -84,8 +82,8 @@ def axis_loops(law: Law, axis: int, plant: AxisPlant, frequency: Array) -> AxisL
     own = law.axes[axis]
     rate = moved * (control.feedback + own.angle_slope * control.forward)
     # The angle follows the rate, of which the law asks.
-    angle = own.angle_response(frequency, period) * moved * control.forward / (1 + rate) / s
-    return AxisLoops(frequency, rate, angle)
+    around = own.angle_response(frequency, period) * moved * control.forward / s
+    return AxisLoops(frequency, rate, rate + around, around / (1 + rate))
 
 
 def margins(frequency: Array, loop: Numbers) -> Margins:
@@ -97,7 +95,7 @@ def margins(frequency: Array, loop: Numbers) -> Margins:
     """
     from control import FRD, stability_margins
 
-    stable, disk = is_stable(loop), disk_of(loop)
+    stable, disk = is_stable(frequency, loop), disk_of(loop)
     system = FRD(loop, 2 * np.pi * frequency)
     gain, phase, _, _, crossover, _ = (float(each) for each in stability_margins(system))
     in_db = abs(20 * np.log10(gain)) if np.isfinite(gain) and gain > 0 else inf
@@ -115,14 +113,15 @@ def disk_of(loop: Numbers) -> float:
     return float(1 / np.abs(0.5 * (1 - loop) / (1 + loop)).max())
 
 
-def is_stable(loop: Numbers) -> bool:
+def is_stable(frequency: Array, loop: Numbers) -> bool:
     """Tell whether a closed loop is stable whose open one is, but for integrators, by Nyquist.
 
-    Seen from -1 the loop, from the last frequency back to the first, turns to where an integrator or two begin, and
-    not round once more.
+    Seen from -1 the loop, from the last frequency back to the first, turns to the phase of as many integrators as it
+    falls with there, and not round once more.
     """
     turned = np.unwrap(np.angle(1 + loop[::-1]))
-    return bool(-np.pi - 0.8 < turned[-1] - turned[0] < 0.8 and np.abs(turned[0]) < 0.5 * np.pi)
+    steep = np.diff(np.log(np.abs(loop[:2]))) / np.diff(np.log(frequency[:2]))
+    return bool(abs(turned[-1] - turned[0] - 0.5 * np.pi * steep[0]) < 0.75 * np.pi and abs(turned[0]) < 0.5 * np.pi)
 
 
 @dataclass(frozen=True)
@@ -198,9 +197,9 @@ class Evaluation:
 
     Attributes
     ----------
-    rate, angle : list of Margins
-        Of the plant that was found.
-    rate_worst, angle_worst : list of Margins
+    command, angle : list of Margins
+        Of the plant that was found, cut at the command and at the angle.
+    command_worst, angle_worst : list of Margins
         The smallest of each margin over all plants that are possible.
     bandwidth_hz : array, shape (3,)
         Frequency at which the angle follows its setpoint at half power.
@@ -211,9 +210,9 @@ class Evaluation:
         Of the plants that were found, then of the softest and the sharpest ones.
     """
 
-    rate: list[Margins]
+    command: list[Margins]
     angle: list[Margins]
-    rate_worst: list[Margins]
+    command_worst: list[Margins]
     angle_worst: list[Margins]
     bandwidth_hz: Array
     loops: list[AxisLoops]
@@ -225,14 +224,14 @@ def evaluate(law: Law, hover: HoverPlant) -> Evaluation:
     """Evaluate a law with a vehicle in hover."""
     frequency = frequencies(law)
     corners = [[axis_loops(law, axis, each, frequency) for each in hover.corners(axis)] for axis in range(3)]
-    rates = [[margins(frequency, each.rate) for each in own] for own in corners]
+    commands = [[margins(frequency, each.command) for each in own] for own in corners]
     angles = [[margins(frequency, each.angle) for each in own] for own in corners]
     every = [hover.corners(axis) for axis in range(3)]
     ends = [hover.axes, tuple(own[min(1, len(own) - 1)] for own in every), tuple(own[-1] for own in every)]
     return Evaluation(
-        rate=[own[0] for own in rates],
+        command=[own[0] for own in commands],
         angle=[own[0] for own in angles],
-        rate_worst=[_worst(own) for own in rates],
+        command_worst=[_worst(own) for own in commands],
         angle_worst=[_worst(own) for own in angles],
         bandwidth_hz=np.array([_bandwidth(own[0]) for own in corners]),
         loops=[own[0] for own in corners],

@@ -1,5 +1,15 @@
-"""A quadrotor of a common size, to be flown by the control laws of autopilots."""
+"""A quadrotor of a common size, flown by the control laws of autopilots, and what their loops do in flight."""
 
+import numpy as np
+from control import FRD, stability_margins
+
+from cpfls_cli.autopilots.motors import Motors
+from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.simulation.closed_loop import Setpoints, clock_of, fly_setpoints
+from cpfls_cli.simulation.law_pilot import GyroscopeNoise
+from cpfls_cli.simulation.model import SimulatedEffects
+from cpfls_cli.simulation.settings import ClosedLoopSettings
+from cpfls_cli.tuning.margins import StepAnswer
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 ARM = 0.16
@@ -15,3 +25,71 @@ CROSS = VehicleSettings(
     rotor_speed_max_rad_s=900.0,
 )
 """An X of 450 mm: 1.2 kg, hovers at 0.36 of its full thrust."""
+
+
+def flown_step(autopilot, values, vehicle, lag, axis, *, gusts, noise, seed=1, steps=6, size=0.1, seconds=1.2):
+    """Step the asked angle about one axis there and back, in gusts: the mean answer, in parts of the step."""
+    law = AUTOPILOTS[autopilot].law(values)
+    count = round(seconds * law.rate_hz)
+    time = np.arange(2 * steps * count + 1) / law.rate_hz
+    wanted = np.where((np.arange(len(time)) // count) % 2 == 1, size, 0.0)
+    flight = _flown(autopilot, values, vehicle, lag, time, wanted[:, None] * np.eye(3)[axis], gusts, noise, seed)
+    angle = flight.state[: 2 * steps * count, 6 + axis].reshape(steps, 2, count)
+    # There and back are the same but for their sign; before the first there was no step.
+    there, back = angle[:, 1].mean(axis=0), size - angle[1:, 0].mean(axis=0)
+    return StepAnswer(time[:count], 0.5 * (there + back)[:, None] / size)
+
+
+def flown_margins(
+    autopilot, values, vehicle, lag, axis, *, gusts, noise, lowest_hz, seed=1, periods=5, seconds=2.0, size=0.05
+):
+    """Measure the loop by sines that are added to its command in flight, and compute its margins, dB and degrees."""
+    law = AUTOPILOTS[autopilot].law(values)
+    count = round(seconds * law.rate_hz)
+    bins = np.unique(np.geomspace(2, min(0.4 * law.rate_hz, 60.0) * seconds, 45).round().astype(int))
+    phases = np.random.default_rng(0).uniform(0, 2 * np.pi, len(bins))
+    one = np.cos(2 * np.pi * np.outer(np.arange(count), bins) / count + phases).sum(axis=1)
+    one *= size / np.abs(one).max()
+    time = np.arange((periods + 1) * count + 1) / law.rate_hz
+    added = np.zeros((len(time), 3))
+    added[:, axis] = np.resize(one, len(time))
+    level = np.zeros((len(time), 3))
+    flight = _flown(autopilot, values, vehicle, lag, time, level, gusts, noise, seed, added)
+    motors = Motors.of(law.mixer, law.curve, vehicle)
+    sent = (np.linalg.pinv(motors.mix) @ motors.curve.thrust(flight.command / motors.speed_max).T)[1 + axis]
+    # A command acts a step late and is logged as the mean of two: so is what was added.
+    late = np.roll(one, 1)
+    heard = 0.5 * (late + np.roll(late, 1))
+    whole = sent[count : (periods + 1) * count].reshape(periods, count).mean(axis=0)
+    total, put = np.fft.fft(whole)[bins], np.fft.fft(heard)[bins]
+    loop = (put - total) / total
+    # Below, gusts are larger than what was added, and the loop is far from -1.
+    shown = bins / seconds >= lowest_hz
+    gain, phase, *_ = stability_margins(FRD(loop[shown], 2 * np.pi * bins[shown] / seconds))
+    return abs(20 * np.log10(gain)), abs(phase)
+
+
+def _flown(autopilot, values, vehicle, lag, time, attitude, gusts, noise, seed, added=None):
+    rng = np.random.default_rng(seed)
+    settings = ClosedLoopSettings(
+        autopilot=autopilot, autopilot_parameters=values, rotor_time_constant_s=lag, integration_rate_hz=1.0
+    )
+    law = settings.law
+    clock = clock_of(time, settings)
+    push = gusts.drawn(rng, clock.step, clock.steps)
+    motors = Motors.of(law.mixer, law.curve, vehicle)
+    lift = sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors)
+    share = motors.share_of(float(np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / lift)))
+    setpoints = Setpoints(attitude, None, np.full(len(time), share))
+    return fly_setpoints(
+        time,
+        setpoints,
+        np.zeros(12),
+        vehicle,
+        settings,
+        None,
+        SimulatedEffects(),
+        push,
+        GyroscopeNoise(noise, rng),
+        injected=added,
+    )
