@@ -257,7 +257,7 @@ def _mixer_notes(autopilot: Autopilot, vehicle: VehicleSettings) -> Iterator[str
     if wrong:
         yield (
             f"mixer: rotors {joined([str(each) for each in wrong])} of the config do not stand where those of "
-            f"{autopilot.title} do ({_places(autopilot.cross)}): assign its outputs so, or the config's order is another"
+            f"{autopilot.title} do ({_places(autopilot.cross)}): assign its outputs so, or order the config so"
         )
     if all(turned):
         yield f"mixer: all rotors turn the other way round than those of {autopilot.title}; tell it, or yaw runs away"

@@ -191,9 +191,8 @@ def _bears(law: Law, axis: int, plants: list[AxisPlant], disk: float) -> bool:
         loops = axis_loops(law, axis, plant, frequency)
         if np.abs(loops.angle_closed).max() > _OVERSHOOT:
             return False
-        if not all(
-            is_stable(frequency, each) and disk_of(each) >= disk for each in (loops.rate, loops.command, loops.angle)
-        ):
+        cut = (loops.rate, loops.command, loops.angle)
+        if not all(is_stable(frequency, each) and disk_of(each) >= disk for each in cut):
             return False
     return True
 
