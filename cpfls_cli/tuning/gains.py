@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from math import floor, inf
+from math import floor
 
 import numpy as np
 
@@ -23,7 +23,7 @@ _WORTH = 1.03
 """A longer lead has to be worth this: it brings noise."""
 _OVERSHOOT = 1.1
 """Largest gain from asked angle to angle: a step is passed by about as much less 1."""
-_ROUNDS = 40
+_ROUNDS = 24
 
 
 @dataclass(frozen=True)
@@ -92,26 +92,32 @@ def tuned(autopilot: Autopilot, values: Mapping[str, float], hover: HoverPlant, 
     whole = dict(values) | {each.name: 1.0 for each in autopilot.parameters if each.role.endswith(".k")}
     law = autopilot.law(whole)
     wanted: dict[str, list[float]] = {}
-    for axis, name in enumerate(AXES):
+    for axis in range(len(AXES)):
         plants = hover.corners(axis)
-        rate = _rate_gains(law, axis, plants, asked.disk)
+        # What no parameter sets stays as the law has it.
+        has_angle = _parameter(autopilot, axis, "angle") is not None
+        rate = _rate_gains(law, axis, plants, asked.disk, has_angle=has_angle)
         roles = {"p": rate.p, "i": rate.i, "d": rate.d, "k": 1.0, "d_raised": rate.d}
         # What the ranges leave of the rate control is what the angle is controlled through.
-        p, i, d = (_kept(autopilot, name, each, roles[each]) for each in ("p", "i", "d"))
+        p, i, d = (_kept(_parameter(autopilot, axis, each), roles[each]) for each in ("p", "i", "d"))
         kept = replace(rate, p=p, i=i, d=d)
         angle = _angle_gain(law, axis, kept, plants, asked.disk)
         roles |= {"angle": angle, "angle_i": angle * _ratio(law.axes[axis])}
         for role, value in roles.items():
-            shared = "all" if axis == 2 else "tilt"
-            found = autopilot.by_role(f"{name}.{role}") or autopilot.by_role(f"{shared}.{role}")
+            found = _parameter(autopilot, axis, role)
             if found is not None:
                 wanted.setdefault(found.name, []).append(value / found.scale)
     # A parameter of several axes suits the one that bears the least.
     return [_proposal(autopilot.named(name), min(each)) for name, each in wanted.items()]
 
 
-def _kept(autopilot: Autopilot, axis: str, role: str, value: float) -> float:
-    parameter = autopilot.by_role(f"{axis}.{role}")
+def _parameter(autopilot: Autopilot, axis: int, role: str) -> Parameter | None:
+    """Find the parameter of an axis, or the one that several share."""
+    groups = (AXES[axis], "tilt", "all") if axis < 2 else (AXES[axis], "all")
+    return next((found for group in groups if (found := autopilot.by_role(f"{group}.{role}")) is not None), None)
+
+
+def _kept(parameter: Parameter | None, value: float) -> float:
     return value if parameter is None else parameter.scale * _proposal(parameter, value / parameter.scale).value
 
 
@@ -137,7 +143,7 @@ def _with(law: Law, axis: int, own: AxisLaw) -> Law:
     return replace(law, axes=(axes[0], axes[1], axes[2]))
 
 
-def _rate_gains(law: Law, axis: int, plants: list[AxisPlant], disk: float) -> AxisLaw:
+def _rate_gains(law: Law, axis: int, plants: list[AxisPlant], disk: float, *, has_angle: bool) -> AxisLaw:
     """Find the proportional, integral and derivative gains of one axis."""
     found = plants[0]
     late = found.lag + found.delay + 1.5 * law.period
@@ -149,14 +155,14 @@ def _rate_gains(law: Law, axis: int, plants: list[AxisPlant], disk: float) -> Ax
         def own(gain: float, lead: float = lead) -> AxisLaw:
             slope = gain * lead * late
             fast = _follows(gain, slope, found)
-            angle = fast / _ANGLE_BELOW
+            angle = fast / _ANGLE_BELOW if has_angle else law.axes[axis].angle
             whole = replace(law.axes[axis], p=gain, i=gain * fast / _BELOW_CROSSOVER, d=slope)
             return replace(whole, angle=angle, angle_integral=angle * _ratio(law.axes[axis]))
 
-        def bears(gain: float) -> bool:
-            return _bears(_with(law, axis, own(gain)), axis, plants, disk)
+        def held(gain: float, own: Callable[[float], AxisLaw] = own) -> float:
+            return _held(_with(law, axis, own(gain)), axis, plants, disk)
 
-        gain = _largest(bears, 1e-3 / (late * _torque(found)), 10.0 / (late * _torque(found)))
+        gain = _largest(held, disk, 1e-3 / (late * _torque(found)), 10.0 / (late * _torque(found)))
         tried = own(gain)
         if best is None or _follows(tried.p, tried.d, found) > _WORTH * _follows(best.p, best.d, found):
             best = tried
@@ -177,34 +183,36 @@ def _torque(plant: AxisPlant) -> float:
 def _angle_gain(law: Law, axis: int, rate: AxisLaw, plants: list[AxisPlant], disk: float) -> float:
     ratio = _ratio(law.axes[axis])
 
-    def bears(gain: float) -> bool:
+    def held(gain: float) -> float:
         tried = _with(law, axis, replace(rate, angle=gain, angle_integral=ratio * gain))
-        return _bears(tried, axis, plants, disk)
+        return _held(tried, axis, plants, disk)
 
-    return _largest(bears, 0.05, 50.0)
+    return _largest(held, disk, 0.05, 50.0)
 
 
-def _bears(law: Law, axis: int, plants: list[AxisPlant], disk: float) -> bool:
-    """Tell whether all loops of an axis have a disk margin with all plants, and pass a step by little."""
-    frequency = frequencies(law)
+def _held(law: Law, axis: int, plants: list[AxisPlant], disk: float) -> float:
+    """Give the least disk margin of all loops of an axis with all plants, as far as `disk`; less at an overshoot."""
+    frequency, least = frequencies(law), disk
     for plant in plants:
         loops = axis_loops(law, axis, plant, frequency)
-        if np.abs(loops.angle_closed).max() > _OVERSHOOT:
-            return False
-        cut = (loops.rate, loops.command, loops.angle)
-        if not all(is_stable(frequency, each) and disk_of(each) >= disk for each in cut):
-            return False
-    return True
+        passed = float(np.abs(loops.angle_closed).max()) / _OVERSHOOT
+        for cut in (loops.rate, loops.command, loops.angle):
+            if not is_stable(frequency, cut):
+                return 0.0
+            least = min(least, disk_of(cut) / max(passed, 1.0), disk / max(passed, 1.0))
+    return least
 
 
-def _largest(bears: Callable[[float], bool], low: float, high: float) -> float:
-    """Find the largest value that a condition bears, on a logarithmic scale; the lowest where it bears none."""
+def _largest(held: Callable[[float], float], disk: float, low: float, high: float) -> float:
+    """Find the largest gain that holds a margin, on a logarithmic scale; where none does the one that holds most."""
     steps = np.geomspace(low, high, _ROUNDS)
-    borne = [step for step in steps if bears(step)]
-    if not borne:
-        return low
-    below, above = borne[-1], min(borne[-1] * steps[1] / steps[0], inf)
+    margins = np.array([held(step) for step in steps])
+    borne = np.flatnonzero(margins >= disk)
+    if not len(borne):
+        return float(steps[np.argmax(margins)])
+    below = float(steps[borne[-1]])
+    above = below * float(steps[1] / steps[0])
     for _ in range(8):
         middle = float(np.sqrt(below * above))
-        below, above = (middle, above) if bears(middle) else (below, middle)
-    return float(below)
+        below, above = (middle, above) if held(middle) >= disk else (below, middle)
+    return below

@@ -11,7 +11,7 @@ from cpfls_cli.arrays import Array, Numbers
 from cpfls_cli.autopilots.law import Controller, Law
 from cpfls_cli.tuning.plant import AxisPlant, HoverPlant
 
-_LOWEST_HZ, _POINTS, _OF_NYQUIST = 0.1, 400, 0.98
+_LOWEST_HZ, _POINTS, _OF_NYQUIST = 0.1, 300, 0.98
 _STEP_S = 1.2
 STEP_RAD = np.radians(10.0)
 """Size of the step of the asked attitude that is shown."""
@@ -172,6 +172,8 @@ def step_answer(law: Law, plants: tuple[AxisPlant, ...], step: float = STEP_RAD)
     whole = np.floor(late).astype(int)
     share = late - whole
     axes = np.arange(3)
+    # At rest before the step.
+    controller.command(np.zeros(3), np.zeros(3))
     for number in range(count):
         shown[number] = angle
         sent[number] = controller.command(controller.asked_rate(step - angle, rate), rate)

@@ -97,7 +97,7 @@ BETAFLIGHT = Autopilot(
         Parameter("thrust_linear", "motors.expo", 0.0, 0.0, 150.0, "thrust curve of the motors", "%", 0.01, 1.0),
     ),
     # A pilot holds the heading; here its error asks for a rate.
-    fixed={"motors.low": 0.055, "yaw.angle": 2.0},
+    fixed={"motors.low": 0.055, "yaw.angle": 1.0},
     logged_as={
         "rollPID": ("p_roll", "i_roll", "d_roll"),
         "pitchPID": ("p_pitch", "i_pitch", "d_pitch"),
@@ -120,7 +120,7 @@ BETAFLIGHT = Autopilot(
         "feedforward of the sticks",
         "D that grows in fast moves (d_max), filters that rise with throttle, TPA, anti-gravity",
         "smoothing of the angle at 50 Hz",
-        "the pilot, who holds the heading: here its error asks for a rate, 2 1/s",
+        "the pilot, who holds the heading: here its error asks for a rate, 1 1/s",
     ),
     holds_integral=False,
     series=True,
