@@ -12,18 +12,18 @@ from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.tuning.margins import StepAnswer
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
-ARM = 0.16
-CROSS = VehicleSettings(
-    mass_kg=1.2,
-    inertia_kg_m2=(0.011, 0.012, 0.02),
-    rotors=tuple(
-        RotorSettings(
-            position_m=(x * ARM, y * ARM, 0.0), spin=spin, thrust_factor_n_s2=1.0e-5, drag_factor_n_m_s2=1.6e-7
-        )
-        for x, y, spin in ((1, -1, 1), (-1, 1, 1), (1, 1, -1), (-1, -1, -1))
-    ),
-    rotor_speed_max_rad_s=900.0,
-)
+
+def crossed(mass, arm, inertia, thrust, drag, speed_max):
+    """An X quadrotor in the order of PX4: kg, m to each hub along x and y, kg m^2, N s^2, N m s^2, rad/s."""
+    places = ((1, -1, 1), (-1, 1, 1), (1, 1, -1), (-1, -1, -1))
+    rotors = [
+        RotorSettings(position_m=(x * arm, y * arm, 0.0), spin=spin, thrust_factor_n_s2=thrust, drag_factor_n_m_s2=drag)
+        for x, y, spin in places
+    ]
+    return VehicleSettings(mass_kg=mass, inertia_kg_m2=inertia, rotors=tuple(rotors), rotor_speed_max_rad_s=speed_max)
+
+
+CROSS = crossed(1.2, 0.16, (0.011, 0.012, 0.02), 1.0e-5, 1.6e-7, 900.0)
 """An X of 450 mm: 1.2 kg, hovers at 0.36 of its full thrust."""
 
 
