@@ -101,18 +101,23 @@ def _trusted(job: Job, model: Path) -> VehicleRecord:
         what = "an identified model" if holds(model, ModelRecord) else "no model"
         raise InputError(f"{model}: is {what}; gains need a vehicle that `cpfls vehicle` found")
     record = read_record(model, VehicleRecord)
-    if record.verdict is not Trust.SIMULATION or record.instruments is None:
+    if record.verdict is not Trust.SIMULATION:
         good = trust_words(Trust.SIMULATION).short
         untold = f"; not told: {joined(record.untold)}" if record.untold else ""
-        judged = trust_words(record.verdict).short
-        if record.verdict is Trust.SIMULATION:
-            judged = "good by playback alone, of flights that hold no instrument"
         raise InputError(
-            f"{model}: {judged}{untold}. Gains need a vehicle that is {good}: a body that is too heavy gives gains "
-            f"that are too high. The flight that is missing: {' '.join(map(str, to_fly(job)))}, flown in still air, "
-            "then `cpfls vehicle` again"
+            f"{model}: {trust_words(record.verdict).short}{untold}. Gains need a vehicle that is {good}: a body "
+            f"that is too heavy gives gains that are too high. {_missing(job, record)}"
         )
     return record
+
+
+def _missing(job: Job, record: VehicleRecord) -> str:
+    """Say which flight would make a vehicle good."""
+    judged = record.held_out is not None or record.instruments is not None
+    if record.verdict is Trust.NOT_JUDGED and not judged:
+        return "The flight that is missing: one that is kept aside to judge it, `cpfls vehicle` with --held-out FLIGHT"
+    planned = " ".join(map(str, to_fly(job)))
+    return f"The flight that is missing: {planned}, flown in still air, then `cpfls vehicle` again"
 
 
 @dataclass

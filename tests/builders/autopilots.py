@@ -1,16 +1,22 @@
 """A quadrotor of a common size, flown by the control laws of autopilots, and what their loops do in flight."""
 
+from dataclasses import replace
+
 import numpy as np
 from control import FRD, stability_margins
 
+from cpfls_cli.artifacts.vehicle_model import FoundNumbersGroup, InstrumentsGroup, ResponsesGroup
 from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulation.closed_loop import Setpoints, clock_of, fly_setpoints
 from cpfls_cli.simulation.law_pilot import GyroscopeNoise
 from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.tuning.margins import StepAnswer
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from tests.builders.vehicle_models import record_of
 
 
 def crossed(mass, arm, inertia, thrust, drag, speed_max):
@@ -92,4 +98,56 @@ def _flown(autopilot, values, vehicle, lag, time, attitude, gusts, noise, seed, 
         push,
         GyroscopeNoise(noise, rng),
         injected=added,
+    )
+
+
+STUDY = """
+vehicle:
+  mass_kg: 1.2
+  inertia_kg_m2: [0.011, 0.012, 0.02]
+  rotor_speed_max_rad_s: 900.0
+  rotors:
+    - {position_m: [0.16, -0.16, 0.0], spin: 1, thrust_factor_n_s2: 1.0e-5, drag_factor_n_m_s2: 1.6e-7}
+    - {position_m: [-0.16, 0.16, 0.0], spin: 1, thrust_factor_n_s2: 1.0e-5, drag_factor_n_m_s2: 1.6e-7}
+    - {position_m: [0.16, 0.16, 0.0], spin: -1, thrust_factor_n_s2: 1.0e-5, drag_factor_n_m_s2: 1.6e-7}
+    - {position_m: [-0.16, -0.16, 0.0], spin: -1, thrust_factor_n_s2: 1.0e-5, drag_factor_n_m_s2: 1.6e-7}
+"""
+"""Config of `CROSS`."""
+
+
+def found_vehicle(vehicle=CROSS, config=STUDY, *, commanded=True, instrumented=True):
+    """The artifact of a vehicle that is good for simulation and control, as if flights had told it."""
+    model = VehicleModel(vehicle=vehicle, response=RotorResponse(lag_s=0.03), commanded=commanded)
+    names = ("inertia.Ixx", "inertia.Iyy", "inertia.Izz", "lag.time_constant_s")
+    value = np.array([*vehicle.inertia_kg_m2, 0.03])
+    ends = np.array([0.05, 0.05, 0.08, 0.1]) * value
+    count = len(names)
+    instruments = InstrumentsGroup(
+        kind="repeats",
+        setpoint=(),
+        first=np.array([0]),
+        second=np.array([1]),
+        likeness=np.array([0.95]),
+        low=np.array([1.0]),
+        high=np.array([4.0]),
+        explained=np.full((1, 3), 0.98),
+        total=np.full(3, 0.98),
+        error=np.full(3, 0.01),
+        used=np.array([True]),
+    )
+    responses = ResponsesGroup(name=("roll", "pitch"), cost=np.full(2, 20.0), low=np.ones(2), high=np.full(2, 5.0))
+    return replace(
+        record_of(model, config),
+        found=FoundNumbersGroup(
+            name=names,
+            unit=("kg m^2",) * 3 + ("s",),
+            value=value,
+            low=value - ends,
+            high=value + ends,
+            stated=np.array([*vehicle.inertia_kg_m2, np.nan]),
+            determined=np.ones(count, dtype=bool),
+            at_bound=np.zeros(count, dtype=bool),
+        ),
+        instruments=instruments if instrumented else None,
+        responses=responses,
     )
