@@ -4,7 +4,7 @@
 
 Three vehicles of 35 g, 1.2 kg and 4.5 kg, each flown by the control laws of the autopilots: with their defaults, which
 is the baseline, and with gains for 45 degrees over intervals of 10 % of inertia and 20 % of the rotors' lag. Flown are
-steps of 0.1 rad in roll there and back (the mean of six), and sines that are added to the command, by which the loop is
+steps of 0.1 rad in roll there and back (the mean of four), and sines that are added to the command, by which the loop is
 measured. Gusts of 2 rad/s^2 (0.3 s), gyroscope noise of 0.01 rad/s at each step of the law. Predictions know the
 vehicle and not the gusts; a law that loses the vehicle is told as lost.
 """
@@ -27,7 +27,7 @@ import numpy as np
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.playback.gusts import Gusts
-from cpfls_cli.tuning.gains import AskedMargins, tuned
+from cpfls_cli.tuning.gains import AskedMargins, with_filters
 from cpfls_cli.tuning.margins import evaluate
 from cpfls_cli.tuning.plant import Spread, hover_plant
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -56,7 +56,7 @@ def flown(name: str, label: str) -> Iterator[list[str]]:
         GUST * np.array([*vehicle.inertia_kg_m2[:2], 0.1 * vehicle.inertia_kg_m2[2], 0, 0, 0]), MEMORY_S * np.ones(6)
     )
     hover = replace(hover_plant(autopilot.law(), vehicle, None, lag), spreads=(SPREAD,) * 3)
-    found = tuned(autopilot, autopilot.defaults(), hover, AskedMargins())
+    found = with_filters(autopilot, autopilot.defaults(), hover, AskedMargins()).proposals
     own = autopilot.defaults() | {each.parameter.name: each.value for each in found}
     for gains, values in (("default", autopilot.defaults()), ("tuned", own)):
         told = evaluate(autopilot.law(values), hover)
@@ -74,7 +74,7 @@ def flown(name: str, label: str) -> Iterator[list[str]]:
 def _seen(
     name: str, values: dict[str, float], vehicle: VehicleSettings, lag: float, gusts: Gusts, crossover: float
 ) -> tuple[float, float, float, float]:
-    lowest = max(0.4 * crossover, 1.0) if np.isfinite(crossover) else 1.0
+    lowest = max(0.5 * crossover, 1.0) if np.isfinite(crossover) else 1.0
     same = {"gusts": gusts, "noise": NOISE}
     try:
         gain, phase = flown_margins(name, values, vehicle, lag, 0, lowest_hz=lowest, **same)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.gains import DEFAULT, PROPOSED, TODAY, GainsRecord, NoiseGroup
+from cpfls_cli.artifacts.gains import AXES, DEFAULT, PROPOSED, TODAY, GainsRecord, NoiseGroup
 from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.output import refuse_own, write_text
@@ -32,7 +32,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.numbers import number, percent
 from cpfls_cli.report.outcome import Outcome, nothing_written
-from cpfls_cli.tuning.gains import AskedMargins, Proposal, proposal_of, tuned
+from cpfls_cli.tuning.gains import AskedMargins, Proposal, proposal_of, with_filters
 from cpfls_cli.tuning.margins import evaluate
 from cpfls_cli.tuning.noise import Line, Noise, noise_of
 from cpfls_cli.tuning.plant import HoverPlant, Spread, hover_plant, spread_of
@@ -70,9 +70,9 @@ def run(
     sets = {PROPOSED: evaluate(own.law(chosen), hover)}
     sets[TODAY if today else DEFAULT] = evaluate(own.law(values), work.hover(values))
     warnings = [
-        *work.notes,
         *_mixer_notes(own, vehicle.vehicle),
         *_hover_notes(own, today, hover, record),
+        *work.notes,
         *([] if today or not flights else [f"no log tells parameters of {own.title}; its defaults stand beside"]),
     ]
     heard = None if noise is None else _heard(own, noise, work.lines, (chosen, values))
@@ -141,11 +141,18 @@ class _Work:
         others = [*_curve(self.autopilot, self.model, self.study), *_notches(self.autopilot, self.lines)]
         whole = {**values, **{each.parameter.name: each.value for each in others}}
         hover = self.hover(whole)
-        gains = tuned(self.autopilot, whole, hover, self.asked)
+        found = with_filters(self.autopilot, whole, hover, self.asked, self.noise)
+        if any(found.quieter):
+            axes = joined([name for name, held in zip(AXES, found.quieter, strict=True) if held])
+            why = "noise" if self.noise is not None else "noise that no log tells"
+            self.notes.append(
+                f"{axes}: held back by {why}; commands jitter at most twice as much as with the gains before: load "
+                "these, fly, and tune again with that log"
+            )
         held = self.autopilot.by_role("motors.hover")
         if held is not None:
             others.append(proposal_of(held, hover.share))
-        return [*gains, *others], hover
+        return [*found.proposals, *others], hover
 
     def hover(self, values: Mapping[str, float]) -> HoverPlant:
         """Linearise the vehicle under a law."""

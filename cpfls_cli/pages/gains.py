@@ -40,11 +40,11 @@ def gains_box(record: GainsRecord) -> Box:
     fast = joined(f"{name} {number(float(record.bandwidth[own, axis]), 2)} Hz" for axis, name in enumerate(record.axis))
     title = f"{record.title}: the angle follows to {fast}"
     asked = f"{number(record.required, 3)}° of phase in a disk with gain"
-    held = f"each of {record.plants} vehicles that the flights leave possible"
+    plants = f"{record.plants} vehicles that the flights leave possible"
     if short:
-        told = f"{joined(short)}: less than the asked margin ({asked}) with some of {held}, see below"
+        told = f"{joined(short)}: less than the asked margin ({asked}) with some of {plants}"
     else:
-        told = f"all axes keep the asked margins ({asked}) with {held}"
+        told = f"all axes keep the asked margin ({asked}) with all {plants}"
     return Box("GAINS", sentence(title), [sentence(told), sentence(_beside(record))], "warning" if short else "good")
 
 

@@ -7,7 +7,7 @@ from math import inf, nan
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, Numbers
+from cpfls_cli.arrays import Array, BoolArray, Numbers
 from cpfls_cli.autopilots.law import Controller, Law
 from cpfls_cli.tuning.plant import AxisPlant, HoverPlant
 
@@ -47,14 +47,14 @@ class Margins:
 
 @dataclass(frozen=True)
 class AxisLoops:
-    """Loops of one axis with one plant, shape (frequency,) each.
+    """Loops of one axis with one plant or several.
 
     Attributes
     ----------
-    frequency : array, Hz
-    rate : array
+    frequency : array, shape (frequency,), Hz
+    rate : array, shape (..., frequency)
         Gain of the rate loop alone, as it flies where rates are asked for.
-    command, angle : array
+    command, angle : array, shape (..., frequency)
         With the angle loop around it, cut at the command, and at the measured angle.
     """
 
@@ -74,15 +74,26 @@ def frequencies(law: Law) -> Array:
     return np.geomspace(_LOWEST_HZ, _OF_NYQUIST * 0.5 * law.rate_hz, _POINTS)
 
 
-def axis_loops(law: Law, axis: int, plant: AxisPlant, frequency: Array) -> AxisLoops:
-    """Evaluate the loops of an axis: sampled, a step late, with a command that stays from step to step."""
+def moved_by(law: Law, plant: AxisPlant, frequency: Array) -> Numbers:
+    """Give body rate by command as the law meets it: sampled, a step late, held from step to step."""
     s, period = 2j * np.pi * frequency, law.period
     held = (1 - np.exp(-s * period)) / (s * period) * np.exp(-s * period)
-    moved, control = held * plant.response(frequency), law.response(axis, frequency)
+    return np.asarray(held * plant.response(frequency))
+
+
+def axis_loops(law: Law, axis: int, moved: Numbers, frequency: Array) -> AxisLoops:
+    """Evaluate the loops of an axis.
+
+    Parameters
+    ----------
+    moved : array, shape (..., frequency)
+        Of one plant or several, as `moved_by` gives it.
+    """
+    s, control = 2j * np.pi * frequency, law.response(axis, frequency)
     own = law.axes[axis]
     rate = moved * (control.feedback + own.angle_slope * control.forward)
     # The angle follows the rate, of which the law asks.
-    around = own.angle_response(frequency, period) * moved * control.forward / s
+    around = moved * (own.angle_response(frequency, law.period) * control.forward / s)
     return AxisLoops(frequency, rate, rate + around, around / (1 + rate))
 
 
@@ -95,7 +106,7 @@ def margins(frequency: Array, loop: Numbers) -> Margins:
     """
     from control import FRD, stability_margins
 
-    stable, disk = is_stable(frequency, loop), disk_of(loop)
+    stable, disk = bool(is_stable(frequency, loop)), float(disk_of(loop))
     system = FRD(loop, 2 * np.pi * frequency)
     gain, phase, _, _, crossover, _ = (float(each) for each in stability_margins(system))
     in_db = abs(20 * np.log10(gain)) if np.isfinite(gain) and gain > 0 else inf
@@ -108,20 +119,25 @@ def margins(frequency: Array, loop: Numbers) -> Margins:
     )
 
 
-def disk_of(loop: Numbers) -> float:
-    """Give the disk margin of a stable loop, balanced: 1 over the largest half of ``|S - T|``."""
-    return float(1 / np.abs(0.5 * (1 - loop) / (1 + loop)).max())
+def disk_of(loop: Numbers) -> Array:
+    """Give the disk margins of stable loops, shape (..., frequency), balanced: 1 over the largest half of |S - T|."""
+    return np.asarray(1 / np.abs(0.5 * (1 - loop) / (1 + loop)).max(axis=-1))
 
 
-def is_stable(frequency: Array, loop: Numbers) -> bool:
-    """Tell whether a closed loop is stable whose open one is, but for integrators, by Nyquist.
+def is_stable(frequency: Array, loop: Numbers) -> BoolArray:
+    """Tell whether closed loops are stable whose open ones are, but for integrators, by Nyquist.
 
     Seen from -1 the loop, from the last frequency back to the first, turns to the phase of as many integrators as it
     falls with there, and not round once more.
+
+    Parameters
+    ----------
+    loop : array, shape (..., frequency)
     """
-    turned = np.unwrap(np.angle(1 + loop[::-1]))
-    steep = np.diff(np.log(np.abs(loop[:2]))) / np.diff(np.log(frequency[:2]))
-    return bool(abs(turned[-1] - turned[0] - 0.5 * np.pi * steep[0]) < 0.75 * np.pi and abs(turned[0]) < 0.5 * np.pi)
+    turned = np.unwrap(np.angle(1 + loop[..., ::-1]), axis=-1)
+    steep = np.log(np.abs(loop[..., 1] / loop[..., 0])) / np.log(frequency[1] / frequency[0])
+    back = np.abs(turned[..., -1] - turned[..., 0] - 0.5 * np.pi * steep) < 0.75 * np.pi
+    return np.asarray(back & (np.abs(turned[..., 0]) < 0.5 * np.pi))
 
 
 @dataclass(frozen=True)
@@ -225,7 +241,10 @@ class Evaluation:
 def evaluate(law: Law, hover: HoverPlant) -> Evaluation:
     """Evaluate a law with a vehicle in hover."""
     frequency = frequencies(law)
-    corners = [[axis_loops(law, axis, each, frequency) for each in hover.corners(axis)] for axis in range(3)]
+    corners = [
+        [axis_loops(law, axis, moved_by(law, each, frequency), frequency) for each in hover.corners(axis)]
+        for axis in range(3)
+    ]
     commands = [[margins(frequency, each.command) for each in own] for own in corners]
     angles = [[margins(frequency, each.angle) for each in own] for own in corners]
     every = [hover.corners(axis) for axis in range(3)]

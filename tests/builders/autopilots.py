@@ -33,21 +33,21 @@ CROSS = crossed(1.2, 0.16, (0.011, 0.012, 0.02), 1.0e-5, 1.6e-7, 900.0)
 """An X of 450 mm: 1.2 kg, hovers at 0.36 of its full thrust."""
 
 
-def flown_step(autopilot, values, vehicle, lag, axis, *, gusts, noise, seed=1, steps=6, size=0.1, seconds=1.2):
+def flown_step(autopilot, values, vehicle, lag, axis, *, gusts, noise, seed=1, steps=4, size=0.1, held_s=3.0):
     """Step the asked angle about one axis there and back, in gusts: the mean answer, in parts of the step."""
     law = AUTOPILOTS[autopilot].law(values)
-    count = round(seconds * law.rate_hz)
-    time = np.arange(2 * steps * count + 1) / law.rate_hz
+    count, shown = round(held_s * law.rate_hz), round(1.2 * law.rate_hz)
+    time = np.arange((2 * steps + 1) * count + 1) / law.rate_hz
     wanted = np.where((np.arange(len(time)) // count) % 2 == 1, size, 0.0)
     flight = _flown(autopilot, values, vehicle, lag, time, wanted[:, None] * np.eye(3)[axis], gusts, noise, seed)
-    angle = flight.state[: 2 * steps * count, 6 + axis].reshape(steps, 2, count)
-    # There and back are the same but for their sign; before the first there was no step.
-    there, back = angle[:, 1].mean(axis=0), size - angle[1:, 0].mean(axis=0)
-    return StepAnswer(time[:count], 0.5 * (there + back)[:, None] / size)
+    angle = flight.state[count:-1, 6 + axis].reshape(steps, 2, count)[..., :shown]
+    # There and back are the same but for their sign.
+    mean = 0.5 * (angle[:, 0] + size - angle[:, 1]).mean(axis=0)
+    return StepAnswer(time[:shown], mean[:, None] / size)
 
 
 def flown_margins(
-    autopilot, values, vehicle, lag, axis, *, gusts, noise, lowest_hz, seed=1, periods=5, seconds=2.0, size=0.05
+    autopilot, values, vehicle, lag, axis, *, gusts, noise, lowest_hz, seed=1, periods=8, seconds=2.0, size=0.1
 ):
     """Measure the loop by sines that are added to its command in flight, and compute its margins, dB and degrees."""
     law = AUTOPILOTS[autopilot].law(values)

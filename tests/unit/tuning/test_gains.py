@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.autopilots.registry import AUTOPILOTS
-from cpfls_cli.tuning.gains import AskedMargins, proposal_of, tuned
+from cpfls_cli.tuning.gains import AskedMargins, proposal_of, with_filters
 from cpfls_cli.tuning.margins import evaluate
 from cpfls_cli.tuning.noise import noise_of
 from cpfls_cli.tuning.plant import Spread, hover_plant
@@ -22,7 +22,7 @@ USUAL = AskedMargins()
 def found(name, spread=CERTAIN, asked=USUAL, lag=0.03):
     autopilot = AUTOPILOTS[name]
     hover = replace(hover_plant(autopilot.law(), CROSS, None, lag), spreads=(spread,) * 3)
-    proposals = tuned(autopilot, autopilot.defaults(), hover, asked)
+    proposals = with_filters(autopilot, autopilot.defaults(), hover, asked).proposals
     values = autopilot.defaults() | {each.parameter.name: each.value for each in proposals}
     return {each.parameter.name: each for each in proposals}, evaluate(autopilot.law(values), hover)
 

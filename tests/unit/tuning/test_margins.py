@@ -11,7 +11,16 @@ from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.tuning.margins import axis_loops, disk_of, evaluate, frequencies, is_stable, margins, step_answer
+from cpfls_cli.tuning.margins import (
+    axis_loops,
+    disk_of,
+    evaluate,
+    frequencies,
+    is_stable,
+    margins,
+    moved_by,
+    step_answer,
+)
 from cpfls_cli.tuning.plant import AxisPlant, Spread, hover_plant, spread_of
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from tests.builders.autopilots import CROSS
@@ -93,7 +102,8 @@ def test_the_answer_to_a_step_is_that_of_the_closed_loop(name):
     answer = step_answer(law, hover.axes)
     # A square wave of 20 s as the sum of its odd parts, each through the closed loop.
     count = np.arange(1, 4000, 2)
-    closed = axis_loops(law, 0, hover.axes[0], count / 20.0).angle_closed
+    frequency = count / 20.0
+    closed = axis_loops(law, 0, moved_by(law, hover.axes[0], frequency), frequency).angle_closed
     waves = np.exp(2j * np.pi * np.outer(answer.time[::40], count) / 20.0)
     expected = 0.5 + 2 / np.pi * (waves * closed / (1j * count)).real.sum(axis=1)
     np.testing.assert_allclose(answer.angle[::40, 0], expected, atol=0.03)
