@@ -4,9 +4,9 @@
 
 Three vehicles of 35 g, 1.2 kg and 4.5 kg, each flown by the control laws of the autopilots: with their defaults, which
 is the baseline, and with gains for 45 degrees over intervals of 10 % of inertia and 20 % of the rotors' lag. Flown are
-steps of 0.1 rad in roll there and back (the mean of four), and sines that are added to the command, by which the loop is
-measured. Gusts of 2 rad/s^2 (0.3 s), gyroscope noise of 0.01 rad/s at each step of the law. Predictions know the
-vehicle and not the gusts; a law that loses the vehicle is told as lost.
+steps of 0.1 rad in roll there and back (the mean of four), and sines that are added to the command, by which the loop
+is measured. Gusts of 2 rad/s^2 (0.3 s), gyroscope noise of 0.01 rad/s at each step of the law. Predictions know the
+vehicle and not the gusts. A dash: predicted unstable, or lost in flight.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.autopilots import CROSS, crossed, flown_margins, flown_step
 
 VEHICLES = {
-    "35 g": (crossed(0.035, 0.033, (1.6e-5, 1.7e-5, 2.9e-5), 1.8e-8, 1.1e-10, 2700.0), 0.03),
+    "35 g": (crossed(0.035, 0.033, (1.6e-5, 1.7e-5, 2.9e-5), 1.8e-8, 1.1e-10, 3300.0), 0.03),
     "1.2 kg": (CROSS, 0.04),
     "4.5 kg": (crossed(4.5, 0.33, (0.12, 0.13, 0.21), 9.0e-5, 2.2e-6, 620.0), 0.06),
 }
@@ -85,7 +85,7 @@ def _seen(
 
 
 def _number(value: float) -> str:
-    return f"{value:.1f}" if np.isfinite(value) else "lost"
+    return f"{value:.1f}" if np.isfinite(value) else "—"
 
 
 if __name__ == "__main__":
