@@ -171,7 +171,8 @@ def _numbers_drawn(
     # In units of half an interval: of a t of so many blocks, 95 % lie between -1 and 1.
     unit = float(half_width(np.ones(()), known.blocks))
     shares = normal / np.sqrt(rng.chisquare(freedom, (count, 1)) / freedom) / unit
-    loop = np.exp(rng.uniform(*np.log(known.loop), (count, 3)))
+    least, most = np.log(known.loop)
+    loop = np.exp(rng.uniform(least, most, (count, 3)))
     widened = _of_loop(known.loop)
     values = np.empty_like(shares)
     for place, number in enumerate(numbers):

@@ -1,0 +1,260 @@
+"""How often 1000 closed-loop flights of vehicles that were drawn hold the rates of a flight that was held out.
+
+    python benchmarks/spread.py simulated
+    python benchmarks/spread.py real DATA
+
+simulated: two vehicles of 45 g and 1.5 kg in gusts, whose truth is known. A path with sines of up to 5 Hz is flown four
+times, 20 s each; the constants, how they go together, and the gusts are found in these flights as `cpfls vehicle` does
+where flights repeat each other. Drawn vehicles then fly another path in closed loop, under the autopilot and with the
+motors that flew, each in gusts of its own and with the noise of the gyroscope: in JAX by one batched function of the
+export, which takes the samples as they are. Counted is how often the rates of flights that were held out, in gusts of
+their own, lie between the 2.5th and the 97.5th percentile of the 1000 at that instant.
+
+Beside it: all vehicles the estimate, in gusts; vehicles drawn, in still air; numbers drawn from their ranges each by
+itself; and the truth in its true gusts, which is what can be had.
+
+real: the nano-drone benchmark (see nanodrone.py for DATA). Constants and gusts are found in its training flights, each
+path of which was flown three or four times. The law of its autopilot is not known: how torque and thrust answer is
+found in how runs of one path differ. Vehicles drawn fly the test flights in closed loop, asked what the flight was
+asked: their rotors turn as logged, and answer the difference to the logged state by that law.
+
+Needs jax (extra `simulators`); real needs pyarrow (extra `parquet`) too.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.shared.measure import pin_threads, table
+
+pin_threads()
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.export.registry import exported
+from cpfls_cli.export.source import executed, jax_parameters
+from cpfls_cli.playback.constants import find_constants
+from cpfls_cli.playback.disturbance import find_gusts
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.gusts import Gusts
+from cpfls_cli.playback.instruments import Instruments, instruments
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.player import rotation_vectors
+from cpfls_cli.playback.settings import PlaybackSettings
+from cpfls_cli.playback.spread import Estimates, GustRanges, drawn
+from cpfls_cli.playback.vehicle import FoundNumber, bodily, estimate_correlation, found_numbers
+from cpfls_cli.vehicle.settings import VehicleSettings
+from tests.builders.exported_vehicles import sheet_of_vehicle
+from tests.builders.gusty_flights import (
+    EVERY,
+    GRAVITY,
+    GUSTS,
+    LARGE,
+    MEMORY_S,
+    SMALL,
+    STEP_S,
+    Flight,
+    Truth,
+    gusty_flights,
+    path_of,
+)
+
+COUNT, RUNS, HELD_OUT, SECONDS, REACH_HZ = 1000, 4, 5, 20.0, 5.0
+SHOVE, SHOVE_MEMORY_S = 0.06, 1.0
+"""Of the flights of gusty_flights: acceleration by the largest gust, and its memory."""
+ENDS = (2.5, 97.5)
+VEHICLES = {"45 g": SMALL, "1.5 kg": LARGE}
+
+
+class Found(NamedTuple):
+    """What flights tell: a model with its gusts, and how sure its numbers are."""
+
+    model: VehicleModel
+    known: Estimates
+
+
+def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
+    """Find constants and gusts by instruments, as `cpfls vehicle` does."""
+    given = instruments(flights)
+    constants = find_constants(vehicle, flights, given, PlaybackSettings().leave_out)
+    assert constants is not None
+    assert constants.tells, "instruments tell the body of these flights"
+    solved, spread = constants.fitted, constants.spread
+    numbers = tuple(bodily(vehicle, tuple(found_numbers(solved, spread))))
+    gusts = find_gusts(solved.model, given, {each.name: each.determined for each in numbers}, told=True)
+    held = None if gusts is None or gusts.gusts is None else gusts.gusts
+    model = replace(solved.model, gusts=held)
+    return Found(
+        model,
+        Estimates(
+            numbers=numbers,
+            correlation=estimate_correlation(solved, spread),
+            blocks=spread.blocks,
+            loop=np.ones((2, 3)),
+            gusts=None if held is None else gust_ranges(gusts),
+        ),
+    )
+
+
+def gust_ranges(found: Any) -> GustRanges:
+    """Take the gusts that are known, and none on other axes."""
+    there = np.isfinite(found.size)
+    full = [np.full(6, none) for none in (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)]
+    for values, name in zip(full, GustRanges._fields, strict=True):
+        values[: len(there)][there] = getattr(found, name)[there]
+    return GustRanges(*full)
+
+
+class Fleet(NamedTuple):
+    """Vehicles side by side: parameters of the functions in JAX, and gusts."""
+
+    module: Mapping[str, Any]
+    parameters: Array
+    gusts: Array
+    inertia: Array
+    mass: Array
+
+
+def fleet(nominal: VehicleModel, models: Sequence[VehicleModel], *, still: bool = False) -> Fleet:
+    """Export a vehicle once, and take the samples as they are."""
+    sheet = sheet_of_vehicle(replace(nominal, gusts=None))
+    module = executed(exported(sheet, "jax", "v.py").text)
+    none = Gusts(np.zeros(6), np.ones(6))
+    gusts = np.array([none if still or each.gusts is None else each.gusts for each in models])
+    return Fleet(
+        module,
+        jax_parameters(sheet, models),
+        gusts,
+        np.array([each.body.inertia for each in models]),
+        np.array([each.body.mass for each in models]),
+    )
+
+
+def pushed(fleet: Fleet, state: Any, gust: Any, step: float) -> Any:
+    """Add what gusts do in a step to velocity and rate, as docs/simulators.md says."""
+    rotation = state[:, 6:15].reshape(-1, 3, 3)
+    faster = jnp.einsum("nij,nj->ni", rotation, gust[:, 3:]) / fleet.mass[:, None]
+    spun = jnp.linalg.solve(fleet.inertia, gust[:, :3, None])[..., 0]
+    return state.at[:, 3:6].add(step * faster).at[:, 15:].add(step * spun)
+
+
+def share_inside(flown: Array, measured: Array) -> Array:
+    """Tell how often what was measured lies between the percentiles, shape (..., 3)."""
+    low, high = np.percentile(flown, ENDS, axis=0)
+    return np.asarray(((low <= measured) & (measured <= high)).mean(axis=-2))
+
+
+# Simulated flights
+
+
+def simulated() -> None:
+    rows = []
+    for name, truth in VEHICLES.items():
+        training = gusty_flights([Flight(truth, GUSTS, 0, run, reach=REACH_HZ) for run in range(RUNS)], SECONDS)
+        told = found(unknown(truth), [replace(flight, setpoints={}) for flight in training])
+        aside = [Flight(truth, GUSTS, 7, 100 + run, reach=REACH_HZ) for run in range(HELD_OUT)]
+        measured = np.stack([flight.motion.rate for flight in gusty_flights(aside, SECONDS)])
+        for kind, own in fleets(told, truth).items():
+            flown = closed_loop(truth, own, aside[0])
+            rows.append(row(name, kind, share_inside(flown, measured)))
+    header = ("vehicle", "flown", "roll", "pitch", "yaw", "all", "one flight, least to most")
+    table("spread_simulated", header, rows)
+
+
+def row(name: str, kind: str, shares: Array) -> tuple[str, ...]:
+    """Write shares of flights, shape (flight, 3), in per cent."""
+    each = 100 * shares.mean(axis=1)
+    mean = [f"{value:.1f}" for value in 100 * shares.mean(axis=0)]
+    return name, kind, *mean, f"{each.mean():.1f}", f"{each.min():.1f} to {each.max():.1f}"
+
+
+def unknown(truth: Truth) -> VehicleSettings:
+    """State what anybody knows: the mass, the rotors, and an inertia that is off by a third."""
+    vehicle = truth.vehicle
+    moments = tuple(1.3 * moment for moment in vehicle.inertia_kg_m2[:3])
+    return replace(vehicle, inertia_kg_m2=moments)
+
+
+def fleets(told: Found, truth: Truth) -> dict[str, Fleet]:
+    """Make what is flown: the spread, and what it has to be better than."""
+    rng = np.random.default_rng(1)
+    together = drawn(told.model, told.known, COUNT, rng)
+    alone = replace(told.known, correlation=np.eye(len(told.known.numbers)))
+    by_itself = drawn(told.model, alone, COUNT, rng)
+    for number in told.known.numbers:
+        print(f"  {number.name} {number.value:.3g} ({number.low:.3g} to {number.high:.3g}) {number.unit}", file=sys.stderr)
+    true = VehicleModel(vehicle=truth.vehicle, gusts=true_gusts(truth))
+    return {
+        f"spread, {len(together.rejected)} reasons for {together.tried - COUNT} rejected": fleet(told.model, together.models),
+        "the estimate, in gusts": fleet(told.model, [told.model] * COUNT),
+        "spread, still air": fleet(told.model, together.models, still=True),
+        "each number by itself": fleet(told.model, by_itself.models),
+        "the true vehicle, true gusts": fleet(true, [true] * COUNT),
+    }
+
+
+def true_gusts(truth: Truth) -> Gusts:
+    """Give what blew."""
+    size = np.array([*(np.array(truth.inertia) * GUSTS), *[truth.mass * SHOVE * max(GUSTS)] * 3])
+    return Gusts(size, np.array([*MEMORY_S, *[SHOVE_MEMORY_S] * 3]))
+
+
+def closed_loop(truth: Truth, flying: Fleet, asked: Flight) -> Array:
+    """Fly all vehicles on a path under the autopilot of the truth; rates as a gyroscope reads them, (flight, time, 3)."""
+    path = jnp.asarray(path_of(asked, round(SECONDS / STEP_S)))
+    count, module = len(flying.parameters), flying.module
+    hover, unmix = truth.mass * GRAVITY / 4 / truth.thrust_factor, np.linalg.inv(truth.mixer)
+    outer, loop = min(2.0, asked.bandwidth / 6), asked.bandwidth * np.array([1.0, 1.0, 0.4])
+    keep = jnp.exp(-STEP_S / flying.gusts[:, 1])
+    fresh = flying.gusts[:, 0] * jnp.sqrt(1 - keep**2)
+    terms = jax.vmap(lambda now, then: module["steady"](jnp.sqrt(0.5 * (now**2 + then**2))))
+    move = jax.vmap(lambda state, rotor, own: module["step"](state, rotor, STEP_S, own))
+
+    def autopilot(state: Any, wanted_at: Any, measured: Any) -> Any:
+        rotation = state[:, 6:15].reshape(-1, 3, 3)
+        wanted = wanted_at[6:] + outer**2 * (wanted_at[:3] - state[:, :3]) + 1.6 * outer * (wanted_at[3:6] - state[:, 3:6])
+        wanted = jnp.clip(wanted, -6.0, 6.0) + jnp.array([0.0, 0.0, GRAVITY])
+        up = wanted / jnp.linalg.norm(wanted, axis=1, keepdims=True)
+        error = -jnp.einsum("nji,nj->ni", rotation, jnp.cross(up, rotation[:, :, 2]))
+        error = error.at[:, 2].set(-rotation[:, 1, 0])
+        torque = jnp.array(truth.inertia) * (loop**2 * error - 1.4 * loop * measured)
+        thrust = truth.mass * (wanted * rotation[:, :, 2]).sum(axis=1, keepdims=True)
+        squared = jnp.concatenate([thrust, torque], axis=1) @ unmix.T
+        return jnp.sqrt(jnp.clip(squared, 0.05 * hover, 4 * hover))
+
+    def along(carried: Any, given: Any) -> Any:
+        state, speed, gust = carried
+        wanted_at, key = given
+        noise, new = jnp.split(jax.random.normal(key, (count, 9)), [3], axis=1)
+        measured = state[:, 15:] + truth.gyro_noise * noise
+        after = speed + STEP_S / truth.lag_s * (autopilot(state, wanted_at, measured) - speed)
+        moved = move(pushed(flying, state, gust, STEP_S), terms(speed, after), flying.parameters)
+        return (moved, after, keep * gust + fresh * new), measured
+
+    begun = jnp.concatenate([path[0, :6], jnp.eye(3).ravel(), jnp.zeros(3)])
+    first = jax.random.normal(jax.random.key(1), (count, 6)) * flying.gusts[:, 0]
+    start = jnp.tile(begun, (count, 1)), jnp.full((count, 4), jnp.sqrt(hover)), first
+    keys = jax.random.split(jax.random.key(2), len(path))
+
+    def ten(carried: Any, given: Any) -> Any:
+        moved, measured = jax.lax.scan(along, carried, given)
+        return moved, measured[0]
+
+    chunks = path.reshape(-1, EVERY, path.shape[1]), keys.reshape(-1, EVERY)
+    return np.asarray(jax.jit(lambda: jax.lax.scan(ten, start, chunks)[1])()).swapaxes(0, 1)
+
+
+PARTS: dict[str, Callable[..., None]] = {"simulated": simulated}
+
+if __name__ == "__main__":
+    with jax.enable_x64(True):
+        PARTS[sys.argv[1] if len(sys.argv) > 1 else "simulated"](*sys.argv[2:])
