@@ -32,6 +32,7 @@ from typing import Any, NamedTuple
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.shared.measure import pin_threads, table
+from benchmarks.shared.nanodrone_files import TEST, TRAINING, VEHICLE, flights
 
 pin_threads()
 
@@ -51,7 +52,8 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import rotation_vectors
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.spread import Estimates, GustRanges, drawn
-from cpfls_cli.playback.vehicle import FoundNumber, bodily, estimate_correlation, found_numbers
+from cpfls_cli.playback.vehicle import bodily, estimate_correlation, found_numbers
+from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.exported_vehicles import sheet_of_vehicle
 from tests.builders.gusty_flights import (
@@ -68,7 +70,7 @@ from tests.builders.gusty_flights import (
     path_of,
 )
 
-COUNT, RUNS, HELD_OUT, SECONDS, REACH_HZ = 1000, 4, 5, 20.0, 5.0
+COUNT, RUNS, HELD_OUT, SECONDS, REACH_HZ, SWING = 1000, 4, 5, 20.0, 5.0, 0.2
 SHOVE, SHOVE_MEMORY_S = 0.06, 1.0
 """Of the flights of gusty_flights: acceleration by the largest gust, and its memory."""
 ENDS = (2.5, 97.5)
@@ -159,9 +161,11 @@ def share_inside(flown: Array, measured: Array) -> Array:
 def simulated() -> None:
     rows = []
     for name, truth in VEHICLES.items():
-        training = gusty_flights([Flight(truth, GUSTS, 0, run, reach=REACH_HZ) for run in range(RUNS)], SECONDS)
+        training = gusty_flights(
+            [Flight(truth, GUSTS, 0, run, reach=REACH_HZ, swing=SWING) for run in range(RUNS)], SECONDS
+        )
         told = found(unknown(truth), [replace(flight, setpoints={}) for flight in training])
-        aside = [Flight(truth, GUSTS, 7, 100 + run, reach=REACH_HZ) for run in range(HELD_OUT)]
+        aside = [Flight(truth, GUSTS, 7, 100 + run, reach=REACH_HZ, swing=SWING) for run in range(HELD_OUT)]
         measured = np.stack([flight.motion.rate for flight in gusty_flights(aside, SECONDS)])
         for kind, own in fleets(told, truth).items():
             flown = closed_loop(truth, own, aside[0])
@@ -191,10 +195,14 @@ def fleets(told: Found, truth: Truth) -> dict[str, Fleet]:
     alone = replace(told.known, correlation=np.eye(len(told.known.numbers)))
     by_itself = drawn(told.model, alone, COUNT, rng)
     for number in told.known.numbers:
-        print(f"  {number.name} {number.value:.3g} ({number.low:.3g} to {number.high:.3g}) {number.unit}", file=sys.stderr)
+        print(
+            f"  {number.name} {number.value:.3g} ({number.low:.3g} to {number.high:.3g}) {number.unit}", file=sys.stderr
+        )
     true = VehicleModel(vehicle=truth.vehicle, gusts=true_gusts(truth))
     return {
-        f"spread, {len(together.rejected)} reasons for {together.tried - COUNT} rejected": fleet(told.model, together.models),
+        f"spread, {len(together.rejected)} reasons for {together.tried - COUNT} rejected": fleet(
+            told.model, together.models
+        ),
         "the estimate, in gusts": fleet(told.model, [told.model] * COUNT),
         "spread, still air": fleet(told.model, together.models, still=True),
         "each number by itself": fleet(told.model, by_itself.models),
@@ -209,7 +217,7 @@ def true_gusts(truth: Truth) -> Gusts:
 
 
 def closed_loop(truth: Truth, flying: Fleet, asked: Flight) -> Array:
-    """Fly all vehicles on a path under the autopilot of the truth; rates as a gyroscope reads them, (flight, time, 3)."""
+    """Fly all vehicles on a path under the autopilot of the truth; give rates as read, shape (flight, time, 3)."""
     path = jnp.asarray(path_of(asked, round(SECONDS / STEP_S)))
     count, module = len(flying.parameters), flying.module
     hover, unmix = truth.mass * GRAVITY / 4 / truth.thrust_factor, np.linalg.inv(truth.mixer)
@@ -221,11 +229,15 @@ def closed_loop(truth: Truth, flying: Fleet, asked: Flight) -> Array:
 
     def autopilot(state: Any, wanted_at: Any, measured: Any) -> Any:
         rotation = state[:, 6:15].reshape(-1, 3, 3)
-        wanted = wanted_at[6:] + outer**2 * (wanted_at[:3] - state[:, :3]) + 1.6 * outer * (wanted_at[3:6] - state[:, 3:6])
+        wanted = (
+            wanted_at[6:9] + outer**2 * (wanted_at[:3] - state[:, :3]) + 1.6 * outer * (wanted_at[3:6] - state[:, 3:6])
+        )
         wanted = jnp.clip(wanted, -6.0, 6.0) + jnp.array([0.0, 0.0, GRAVITY])
         up = wanted / jnp.linalg.norm(wanted, axis=1, keepdims=True)
         error = -jnp.einsum("nji,nj->ni", rotation, jnp.cross(up, rotation[:, :, 2]))
-        error = error.at[:, 2].set(-rotation[:, 1, 0])
+        error = error.at[:, 2].set(
+            jnp.sin(wanted_at[9]) * rotation[:, 0, 0] - jnp.cos(wanted_at[9]) * rotation[:, 1, 0]
+        )
         torque = jnp.array(truth.inertia) * (loop**2 * error - 1.4 * loop * measured)
         thrust = truth.mass * (wanted * rotation[:, :, 2]).sum(axis=1, keepdims=True)
         squared = jnp.concatenate([thrust, torque], axis=1) @ unmix.T
@@ -253,7 +265,142 @@ def closed_loop(truth: Truth, flying: Fleet, asked: Flight) -> Array:
     return np.asarray(jax.jit(lambda: jax.lax.scan(ten, start, chunks)[1])()).swapaxes(0, 1)
 
 
-PARTS: dict[str, Callable[..., None]] = {"simulated": simulated}
+# Real flights
+
+
+AXES = ("roll", "pitch", "yaw")
+ANSWERS = {"thrust": (8, 11), "roll": (0, 3, 7, 10), "pitch": (1, 4, 6, 9), "yaw": (2, 5)}
+"""What each answers of a difference of states: rotation, rate, velocity and position along the body axes."""
+
+
+class Law(NamedTuple):
+    """How thrust and torque answer a difference between two states, as accelerations.
+
+    Attributes
+    ----------
+    keep : array, shape (4,)
+        Share of an answer that is left a sample later.
+    gain : array, shape (4, 12)
+    """
+
+    keep: Array
+    gain: Array
+
+
+def real(folder: str) -> None:
+    training = flights(Path(folder), TRAINING)
+    told = found(VEHICLE, training)
+    for number in told.known.numbers:
+        print(
+            f"  {number.name} {number.value:.3g} ({number.low:.3g} to {number.high:.3g}) {number.unit}", file=sys.stderr
+        )
+    law = law_of(told.model, instruments(training))
+    print(f"  law: {law}", file=sys.stderr)
+    together = drawn(told.model, told.known, COUNT, np.random.default_rng(1))
+    flown = {
+        "spread": fleet(told.model, together.models),
+        "the estimate, in gusts": fleet(told.model, [told.model] * COUNT),
+        "spread, still air": fleet(told.model, together.models, still=True),
+    }
+    rows = []
+    for kind, own in flown.items():
+        shares = [
+            share_inside(twins(told.model, own, law, flight), flight.motion.rate[1:])
+            for flight in flights(Path(folder), TEST)
+        ]
+        rows.append(row("nano-drone", kind, np.array(shares)))
+    table("spread_real", ("vehicle", "flown", *AXES, "all", "one flight, least to most"), rows)
+
+
+def answers(model: VehicleModel, speed: Array) -> Array:
+    """Give thrust and torque of rotors as accelerations of the body, shape (time, 4)."""
+    return np.asarray(speed**2 @ allocation_matrix(model.vehicle).T / sizes(model))
+
+
+def sizes(model: VehicleModel) -> Array:
+    return np.append(model.body.mass, np.diag(model.body.inertia))
+
+
+def law_of(model: VehicleModel, given: Instruments) -> Law:
+    """Regress how answers differ between runs of a path on how their states did a sample before, by least squares.
+
+    What was asked of them is the same. An offset between two runs is that of their trims.
+    """
+    before, after = [], []
+    for number, run in enumerate(given.flown):
+        for other, place in given.repeats.beside[number].items():
+            known = np.isfinite(place)
+            there = known[1:] & known[:-1]
+            rows = np.hstack([answers(model, run.speed), states(run)]) - given.repeats.at(
+                number, other, np.hstack([answers(model, given.flown[other].speed), states(given.flown[other])])
+            )
+            turned = rotation_vectors(
+                np.where(known[:, None, None], nearest(given, number, other), np.eye(3)), run.motion.rotation
+            )
+            rows[:, 4:7] = turned
+            for part in (slice(7, 10), slice(10, 13), slice(13, 16)):
+                rows[:, part] = (
+                    rows[:, part] if part.start == 7 else np.einsum("tji,tj->ti", run.motion.rotation, rows[:, part])
+                )
+            centred = rows - rows[known].mean(axis=0)
+            before.append(centred[:-1][there])
+            after.append(centred[1:][there])
+    x, y = np.vstack(before), np.vstack(after)
+    keep, gain = np.zeros(4), np.zeros((4, 12))
+    for row_, columns in enumerate(ANSWERS.values()):
+        own = x[:, [row_, *(4 + column for column in columns)]]
+        solved = np.linalg.lstsq(own, y[:, row_], rcond=None)[0]
+        keep[row_], gain[row_, list(columns)] = solved[0], solved[1:]
+    return Law(keep, gain)
+
+
+def states(flight: PlaybackFlight) -> Array:
+    """Arrange place for a rotation, rate, velocity and position, shape (time, 12)."""
+    motion = flight.motion
+    return np.hstack([np.zeros_like(motion.rate), motion.rate, motion.velocity, motion.position])
+
+
+def nearest(given: Instruments, number: int, other: int) -> Array:
+    """Give rotations of another run at the same places of the path."""
+    mean = given.repeats.at(number, other, given.flown[other].motion.rotation.reshape(-1, 9)).reshape(-1, 3, 3)
+    first, _, last = np.linalg.svd(np.nan_to_num(mean) + 1e-12 * np.eye(3))
+    return np.asarray(first @ last)
+
+
+def twins(model: VehicleModel, flying: Fleet, law: Law, flight: PlaybackFlight) -> Array:
+    """Fly all vehicles from the first logged state, asked what the flight was asked; rates, shape (flight, time, 3)."""
+    motion, module, count = flight.motion, flying.module, len(flying.parameters)
+    period, unmix = motion.period, np.linalg.pinv(allocation_matrix(model.vehicle)) * sizes(model)
+    keep = jnp.exp(-period / flying.gusts[:, 1])
+    fresh = flying.gusts[:, 0] * jnp.sqrt(1 - keep**2)
+    logged = tuple(map(jnp.asarray, (*motion[:4], flight.speed)))
+    terms = jax.vmap(module["steady"])
+    move = jax.vmap(lambda state, rotor, own: module["step"](state, rotor, period, own))
+
+    def along(carried: Any, given: Any) -> Any:
+        state, answer, gust = carried
+        (position, velocity, rotation, rate, speed), key = given
+        own = state[:, 6:15].reshape(-1, 3, 3)
+        away = jnp.einsum("ji,njk->nik", rotation, own)
+        turned = 0.5 * jnp.stack(
+            [away[:, 2, 1] - away[:, 1, 2], away[:, 0, 2] - away[:, 2, 0], away[:, 1, 0] - away[:, 0, 1]], 1
+        )
+        moved = jnp.concatenate([state[:, 3:6] - velocity, state[:, :3] - position], axis=1).reshape(-1, 2, 3)
+        along_body = jnp.einsum("nji,nkj->nki", own, moved).reshape(-1, 6)
+        squared = jnp.maximum(speed**2 + answer @ unmix.T, 0.0)
+        after = law.keep * answer + jnp.concatenate([turned, state[:, 15:] - rate, along_body], axis=1) @ law.gain.T
+        moved_on = move(pushed(flying, state, gust, period), terms(jnp.sqrt(squared)), flying.parameters)
+        return (moved_on, after, keep * gust + fresh * jax.random.normal(key, (count, 6))), moved_on[:, 15:]
+
+    begun = jnp.concatenate([part[0].ravel() for part in logged[:4]])
+    first = jax.random.normal(jax.random.key(1), (count, 6)) * flying.gusts[:, 0]
+    start = jnp.tile(begun, (count, 1)), jnp.zeros((count, 4)), first
+    keys = jax.random.split(jax.random.key(2), len(flight) - 1)
+    rows = tuple(each[:-1] for each in logged)
+    return np.asarray(jax.jit(lambda: jax.lax.scan(along, start, (rows, keys))[1])()).swapaxes(0, 1)
+
+
+PARTS: dict[str, Callable[..., None]] = {"simulated": simulated, "real": real}
 
 if __name__ == "__main__":
     with jax.enable_x64(True):
