@@ -6,9 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from cpfls_cli.artifacts.parameters import name_of
 from cpfls_cli.export.samples import Samples
 from cpfls_cli.pages.trust import trust_words
+from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 from cpfls_cli.report.content import Block, Folded, Table, Text
 from cpfls_cli.report.numbers import number
 from cpfls_cli.report.outcome import caution_texts
@@ -28,6 +31,9 @@ def spread_answer(samples: Samples, output: Path, size: int, dry_run: bool) -> I
     if out:
         reasons = joined(f"{often} with {why}" for why, often in spread.rejected.items())
         yield Text(f"Rejected {out} of {spread.tried} draws, because no vehicle has such numbers: {reasons}.")
+    if samples.moved:
+        factors = joined(f"{name_of(name)} {100 * (factor - 1):+.2g} %" for name, factor in samples.moved.items())
+        yield Text(f"The estimate is of no body, so they are drawn around the nearest one: {factors}.")
     rows = [
         [
             _name(name),
@@ -51,14 +57,30 @@ def spread_answer(samples: Samples, output: Path, size: int, dry_run: bool) -> I
             "warning",
             always=True,
         )
-    if sheet.model.gusts is None:
-        yield Text("No gusts: the size of none is known.", "note")
+    calm = _without_gusts(sheet.model.gusts)
+    if calm:
+        yield Text(
+            f"No gusts {joined(calm)}: the flights do not tell their size, so whatever blew there is not in the spread.",
+            "warning",
+            always=True,
+        )
     yield from caution_texts(sheet.cautions)
 
 
 def _name(name: str) -> str:
     axis = name.removeprefix("gust.")
     return name_of(name) if axis == name else f"gusts, {axis.replace('_', ' ')}"
+
+
+def _without_gusts(gusts: Gusts | None) -> list[str]:
+    """Name the axes on which none are known."""
+    sizes = np.zeros(len(GUST_AXES)) if gusts is None else gusts.size
+    still = [name for name, size in zip(GUST_AXES, sizes, strict=True) if not size]
+    named = (
+        ("about", [name for name in GUST_AXES[:3] if name in still]),
+        ("along", [name for name in GUST_AXES[3:] if name in still]),
+    )
+    return [f"{word} {joined(names)}" for word, names in named if names]
 
 
 def spread_summary(samples: Samples) -> dict[str, Any]:
