@@ -216,6 +216,9 @@ class ExportFormat(StrEnum):
     C = "c"
     PYTHON = "python"
     SDF = "sdf"
+    PX4 = "px4"
+    CRAZYFLOW = "crazyflow"
+    URDF = "urdf"
     MJCF = "mjcf"
     ROTORPY = "rotorpy"
     CASADI = "casadi"
@@ -237,6 +240,9 @@ class Flown(StrEnum):
     """What an exported vehicle is flown in."""
 
     SDF = "sdf"
+    PX4 = "px4"
+    CRAZYFLOW = "crazyflow"
+    URDF = "urdf"
     MJCF = "mjcf"
     ROTORPY = "rotorpy"
     CASADI = "casadi"
@@ -695,10 +701,11 @@ def export(
         typer.Option(
             "--format",
             help="json: every parameter, with names and units; c: C99 source and header, no dependencies; python: a "
-            "module that needs NumPy only; sdf (Gazebo), mjcf (MuJoCo), rotorpy, casadi, jax: the vehicle for a "
+            "module that needs NumPy only; sdf (Gazebo), px4 (its Gazebo, with the airframe), mjcf (MuJoCo), urdf "
+            "(gym-pybullet-drones, Isaac), crazyflow (and drone-models), rotorpy, casadi, jax: the vehicle for a "
             "simulator or a library; mcap (Foxglove), csv (PlotJuggler): what a flight, prediction, replay, gap or "
             "response holds, on the log's own clock; default: by the suffix of FILE (.json, .c, .py, .xml, .sdf, "
-            ".mcap, .csv).",
+            ".urdf, .toml, .mcap, .csv).",
         ),
     ] = None,
     name: Annotated[

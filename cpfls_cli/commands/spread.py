@@ -16,7 +16,7 @@ from cpfls_cli.commands.vehicle_sheets import sheet_of
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.export.samples import Samples, require_ending
 from cpfls_cli.export.text import identifier
-from cpfls_cli.pages.spread import spread_answer, spread_summary
+from cpfls_cli.pages.export import spread_answer, spread_summary
 from cpfls_cli.playback.spread import drawn
 from cpfls_cli.report.outcome import Outcome
 

@@ -87,10 +87,17 @@ class Samples:
         """One range of each number that differs, gusts among them."""
         found = {}
         ends = np.percentile(self.spread.values, _ENDS, axis=0).T.tolist() if self.spread.names else []
-        for name, (low, high) in zip(self.spread.names, ends, strict=True):
-            number = self.numbers[name]
-            found[name] = Range(number.unit, number.value, low, high, name not in self.untold)
+        centre = self.spread.centre.tolist()
+        for name, value, (low, high) in zip(self.spread.names, centre, ends, strict=True):
+            found[name] = Range(self.numbers[name].unit, value, low, high, name not in self.untold)
         return found | dict(_gust_ranges(self.sheet.model, self.spread))
+
+    @property
+    def moved(self) -> dict[str, float]:
+        """By which factors they were drawn around other numbers than the estimates, which are of no body."""
+        pairs = zip(self.spread.names, self.spread.centre.tolist(), strict=True)
+        factors = {name: value / self.numbers[name].value for name, value in pairs}
+        return {name: factor for name, factor in factors.items() if factor != 1.0}
 
     @property
     def document(self) -> dict[str, Any]:
@@ -124,6 +131,7 @@ class Samples:
             "vehicles": len(self.spread.models),
             "drawn": self.spread.tried,
             "rejected": dict(self.spread.rejected),
+            "moved_to_a_body": self.moved,
             "conventions": _CONVENTIONS,
             "gusts": None if self.sheet.model.gusts is None else GUST_RECIPE,
         }

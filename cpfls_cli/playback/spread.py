@@ -13,7 +13,14 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters, symmetric
+from cpfls_cli.inertia import (
+    INERTIA_ENTRIES,
+    INERTIA_PARAMETERS,
+    MEASURED,
+    nearest_body,
+    six_parameters,
+    symmetric,
+)
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.parameters import LEARNED, PRODUCT_NAMES
@@ -89,6 +96,8 @@ class Spread:
     ----------
     names : tuple of str
         Numbers that differ between them.
+    centre : array, shape (number,), SI
+        What they were drawn around: the estimate, or where that is of no body the nearest one.
     values : array, shape (vehicle, number), SI
     models : tuple of VehicleModel
         Each with gusts of its own, if the vehicle has any.
@@ -99,6 +108,7 @@ class Spread:
     """
 
     names: tuple[str, ...]
+    centre: Array
     values: Array
     models: tuple[VehicleModel, ...]
     tried: int
@@ -128,7 +138,7 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
     normal distribution.
     """
     places = [place for place, each in enumerate(known.numbers) if each.value and _OF_A_GROUP not in each.name]
-    numbers = [known.numbers[place] for place in places]
+    model, numbers = _of_a_body(model, [known.numbers[place] for place in places])
     root = _root(known.correlation[np.ix_(places, places)])
     kept: list[tuple[Array, VehicleModel]] = []
     rejected, tried = Counter[str](), 0
@@ -149,11 +159,28 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
     gusts = _gusts_drawn(known.gusts, model, [made for _, made in kept], rng)
     return Spread(
         tuple(number.name for number in numbers),
+        np.array([number.value for number in numbers]),
         np.array([row for row, _ in kept]).reshape(count, len(numbers)),
         tuple(replace(made, gusts=own) for (_, made), own in zip(kept, gusts, strict=True)),
         tried,
         dict(rejected.most_common()),
     )
+
+
+def _of_a_body(model: VehicleModel, numbers: Sequence[FoundNumber]) -> tuple[VehicleModel, list[FoundNumber]]:
+    """Move an estimate to the nearest body: a flat one has a moment that is the sum of the others, and noise adds."""
+    inertia = symmetric(model.vehicle.inertia_kg_m2)
+    nearest = nearest_body(inertia)
+    if nearest is inertia or np.linalg.eigvalsh(inertia)[2] > MEASURED * np.linalg.eigvalsh(inertia)[:2].sum():
+        return model, list(numbers)
+    entries = [float(nearest[entry]) for entry in INERTIA_ENTRIES]
+    by_name = dict(zip((*MOMENTS, *PRODUCT_NAMES), entries, strict=True))
+    moved = []
+    for number in numbers:
+        ratio = by_name.get(number.name, number.value) / number.value
+        moved.append(number._replace(value=number.value * ratio, low=number.low * ratio, high=number.high * ratio))
+    xx, yy, zz, xy, xz, yz = entries
+    return replace(model, vehicle=replace(model.vehicle, inertia_kg_m2=(xx, yy, zz, xy, xz, yz))), moved
 
 
 def _root(correlation: Array) -> Array:
@@ -171,7 +198,8 @@ def _numbers_drawn(
     # In units of half an interval: of a t of so many blocks, 95 % lie between -1 and 1.
     unit = float(half_width(np.ones(()), known.blocks))
     shares = normal / np.sqrt(rng.chisquare(freedom, (count, 1)) / freedom) / unit
-    loop = np.exp(rng.uniform(*np.log(known.loop), (count, 3)))
+    least, most = np.log(known.loop)
+    loop = np.exp(rng.uniform(least, most, (count, 3)))
     widened = _of_loop(known.loop)
     values = np.empty_like(shares)
     for place, number in enumerate(numbers):

@@ -193,7 +193,7 @@ def find_vehicle(
         numbers,
         *_shares(model, own),
         tuple(_trades(solved, spread)),
-        _beside(len(sensed), _correlation(solved, spread)),
+        _beside(len(sensed), estimate_correlation(solved, spread)),
         choice,
         solved.condition_number,
         spread.blocks,
@@ -425,7 +425,7 @@ def _interval(value: float, half: float, *, positive: bool) -> tuple[float, floa
     return value / factor, value * factor
 
 
-def _correlation(fitted: Fitted, spread: Uncertainty) -> Array:
+def estimate_correlation(fitted: Fitted, spread: Uncertainty) -> Array:
     """Correlate the estimates of numbers as people know them, shape (number, number)."""
     covariance = _covariance(fitted.free.physical, fitted, spread)
     deviation = np.sqrt(np.diag(covariance))
@@ -444,6 +444,6 @@ def _beside(sensed: int, correlation: Array) -> Array:
 
 def _trades(fitted: Fitted, spread: Uncertainty) -> Iterator[Trade]:
     """Name pairs of numbers, as people know them, whose estimates go together."""
-    names, correlation = list(fitted.free.physical(fitted.values)), _correlation(fitted, spread)
+    names, correlation = list(fitted.free.physical(fitted.values)), estimate_correlation(fitted, spread)
     for first, second in np.argwhere(np.triu(np.abs(correlation) > _TRADED, 1)).tolist():
         yield Trade(names[first], names[second], float(correlation[first, second]))

@@ -91,6 +91,18 @@ def test_only_bodies_that_can_be_are_drawn_and_others_are_counted():
         assert largest <= (smallest + middle) * (1 + 1e-9)
 
 
+def test_a_flat_body_that_is_off_by_noise_is_drawn_around_the_nearest_body():
+    moments = np.array([0.005, 0.0037, 0.00895])
+    model = replace(truth(), vehicle=replace(truth().vehicle, inertia_kg_m2=tuple(moments.tolist())))
+    spread = spread_of(found_record(model, relative=0.02))
+    centre = dict(zip(spread.names, spread.centre.tolist(), strict=True))
+    third = (0.00895 - 0.0087) / 3
+    near = [centre[f"inertia.{name}"] for name in ("Ixx", "Iyy", "Izz")]
+    assert near == pytest.approx((moments + third * np.array([1, 1, -1])).tolist())
+    assert spread.tried < 3 * COUNT
+    assert centre["drag_factor"] == model.vehicle.rotors[0].drag_factor_n_m_s2
+
+
 def test_an_estimate_that_is_no_vehicle_is_refused():
     moments = np.array(truth().vehicle.inertia_kg_m2) * [1.0, 1.0, 3.0]
     model = replace(truth(), vehicle=replace(truth().vehicle, inertia_kg_m2=tuple(moments.tolist())))
