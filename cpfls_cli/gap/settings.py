@@ -42,7 +42,7 @@ COUNTS = 0.05
 """Share of a gap, in squares, from which on a part of it counts: an effect, a channel, what follows a signal."""
 
 CHANCE = 0.05
-"""Probability of chance up to which something makes an answer more careful: as usual, since no name hangs on it."""
+"""Probability of chance, and of a rival over that of a name, from which on they make an answer more careful."""
 
 FEWEST_BLOCKS = 4
 """Blocks that tell an error, if a wide one."""

@@ -17,10 +17,10 @@ from cpfls_cli.gap.balance.balance_system import is_free, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence
-from cpfls_cli.gap.naming.ranking import likely, more_left, off_by, rank_effects
+from cpfls_cli.gap.naming.ranking import likely, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
 from cpfls_cli.gap.naming.scoring import Scored
-from cpfls_cli.gap.naming.search import alternatives, beside_its_like, chance_beside_its_like, in_place_of
+from cpfls_cli.gap.naming.search import alternatives, beside_its_like, chance_beside_its_like, in_place_of, odds
 from cpfls_cli.gap.settings import ERRORS, SURE, GapSettings
 from cpfls_cli.rounding import ascending, at_most
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -89,17 +89,12 @@ def judge_effect(
         effect_sentence(candidate.effect, estimates.effects[index], flights[0].signals.vehicle),
     )
     rivals = tuple(alternatives(own, ranking, step.above_floor))
-    return JudgedEffect(effect, rivals, _odds(own, ranking, step.above_floor))
-
-
-def _odds(own: Scored, ranking: Sequence[Scored], above_floor: float) -> dict[tuple[str, ...], Array]:
-    """Compare sets by what they leave of unseen blocks, beside what their formulas are off by."""
-    noise = 1.0 + off_by(above_floor, float(own.block_error.sum()))
-    return {
-        tuple(each.effect.name for each in other.chosen): -0.5 * more_left(other.block_error, own.block_error) / noise
+    compared = {
+        tuple(each.effect.name for each in other.chosen): odds(own, other, step.above_floor)
         for other in ranking
-        if np.isfinite(other.gain) and own.candidate.effect.name not in other.candidate.effect.holds
+        if np.isfinite(other.gain) and candidate.effect.name not in other.candidate.effect.holds
     }
+    return JudgedEffect(effect, rivals, compared)
 
 
 def likely_sets(judged: Sequence[JudgedEffect]) -> tuple[LikelySet, ...]:

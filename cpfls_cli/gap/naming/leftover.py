@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 
 import numpy as np
 
@@ -11,12 +12,14 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance.balance_system import System, left_over, window_noise
+from cpfls_cli.gap.balance.balance_system import System, left_over, system, window_noise
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
 from cpfls_cli.gap.naming.earned import NamedFit, bends_of, fitted
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect, NotExcited, Unexplained
+from cpfls_cli.gap.naming.scoring import Scored
+from cpfls_cli.gap.naming.search import of_motion
 from cpfls_cli.gap.residual.dependence import (
     Dependence,
     joined_states,
@@ -196,13 +199,25 @@ def beside_the_unnamed(
 def _beyond_chance(
     step: RankedStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
 ) -> list[Candidate]:
-    """Add effects to the chosen ones as long as one explains more than chance."""
+    """Add effects to the chosen ones as long as one explains more than chance, and more than noise."""
     flights, chosen = step.hypothesis.flights, list(step.hypothesis.chosen)
-    most = len(chosen) + settings.effects_max
-    while step.ranking and len(chosen) < most and step.p_value(step.ranking[0].gain) <= CHANCE:
-        chosen.append(step.ranking[0].candidate)
+    for _ in range(settings.effects_max):
+        added = _first_beyond_chance(step)
+        if added is None:
+            break
+        chosen.append(added.candidate)
         step = rank_effects(flights, chosen, effects, settings, rng)
     return chosen
+
+
+def _first_beyond_chance(step: RankedStep) -> Scored | None:
+    beyond = takewhile(lambda scored: step.p_value(scored.gain) <= CHANCE, step.ranking)
+    return next((each for each in beyond if _shows_motion(each, step)), None)
+
+
+def _shows_motion(scored: Scored, step: RankedStep) -> bool:
+    """Tell whether chance does not explain as much as an effect does but for noise."""
+    return step.p_value(of_motion(scored.gain, step, system(step.hypothesis.flights, scored.chosen))) <= CHANCE
 
 
 def _both(number: Estimate, others: Sequence[Estimate]) -> Estimate:

@@ -24,9 +24,6 @@ from cpfls_cli.gap.settings import COUNTS, ERRORS, NOISE, OFF, VISIBLE, GapSetti
 from cpfls_cli.rounding import tied
 from cpfls_cli.weak_form.resampling import blocks_of, mirror_shifted
 
-NEAR = 0.6
-"""Share of what the best one explains from which on another one is compared with it."""
-
 _CHANCE = 0.02
 """Probability of ranks up to which one is better: of fewer than six blocks none can be."""
 
@@ -147,11 +144,6 @@ def rows(hypothesis: System) -> int:
     return sum(len(flight) * int(flight.known.sum()) for flight in hypothesis.flights)
 
 
-def surely_less(one: Scored, other: Scored) -> bool:
-    """Tell whether one explanation leaves less than another, by more than the scatter over blocks."""
-    return surely(more_left(other.block_error, one.block_error))
-
-
 def surely(margin: Array) -> bool:
     """Tell whether margins over blocks are above 0 by more than they scatter."""
     if len(margin) < 2 or margin.sum() <= 0:
@@ -194,21 +186,21 @@ def least_gain(above_floor: float, windows: int) -> float:
     return max(COUNTS * above_floor, VISIBLE**2 * windows)
 
 
-def off_by(explained: float, left: float) -> float:
-    """Bound what formulas are off by, in squared floors: two explanations differ by more or are alike.
+def off_by(explained: float, left: float, above: float = 0.0) -> float:
+    """Estimate how much formulas are off by at most, in squared floors.
 
     No formula is exact. Beside sensors and air it leaves noise of its own in proportion to its torque and force, the
-    same in all flights: up to a tenth of these, `OFF`. Where all fits to the noise it is no more than an error of the
-    floor hides in one channel.
+    same in all flights. By likelihood that is what is left above the floor, and an error of the floor in one channel;
+    before any flight it is known to be a tenth of torque and force at most, `OFF`.
 
     Parameters
     ----------
     explained : float
         The gap that formulas are asked to explain, in squared floors.
-    left : float
-        What the better one leaves, in squared floors.
+    left, above : float
+        What the better one leaves, and what of that is above the floor, in squared floors.
     """
-    return min(OFF**2 * explained, (NOISE - 1) * left / len(CHANNELS))
+    return min(OFF**2 * explained, max(above, 0.0) + (NOISE - 1) * left / len(CHANNELS))
 
 
 def likely(odds: Sequence[Array]) -> Array:
@@ -230,9 +222,10 @@ def likely(odds: Sequence[Array]) -> Array:
     ----------
     Yao, Vehtari, Simpson and Gelman 2018, Using stacking to average Bayesian predictive distributions (pseudo-BMA+).
     """
-    if not odds:
-        return np.ones(1)
-    blocks = len(odds[0])
+    blocks = len(odds[0]) if odds else 0
+    if blocks < 2:
+        # One block tells nothing of how far blocks differ.
+        return np.full(len(odds) + 1, 1 / (len(odds) + 1))
     weight = blocks * np.random.default_rng(0).dirichlet(np.ones(blocks), _DRAWS)
     total = weight @ np.stack([np.zeros(blocks), *odds], axis=1)
     density = np.exp(total - total.max(axis=1, keepdims=True))

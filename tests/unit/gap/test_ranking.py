@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import permutation_test, wilcoxon
 
-from cpfls_cli.gap.naming.ranking import chance_of_ranks, likely
+from cpfls_cli.gap.naming.ranking import chance_of_ranks, likely, off_by
 
 
 @pytest.mark.parametrize("blocks", [1, 2, 7, 40])
@@ -25,6 +25,15 @@ def test_equal_margins_share_their_ranks():
 
 def test_what_is_equal_is_chance():
     assert chance_of_ranks(np.zeros(4)) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("explained", "left", "above", "off"),
+    [(1e3, 600.0, 0.0, 10.0), (1e6, 600.0, 0.0, 25.0), (1e6, 1200.0, 600.0, 650.0), (1e4, 1200.0, 600.0, 100.0)],
+    ids=["a tenth of a small gap", "what the floor hides", "what is left above it", "a tenth is the most"],
+)
+def test_formulas_are_off_by_what_is_left_above_the_floor_and_a_tenth_at_most(explained, left, above, off):
+    assert off_by(explained, left, above) == pytest.approx(off)
 
 
 def test_alone_a_set_is_certain():
