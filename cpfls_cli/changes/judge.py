@@ -92,7 +92,7 @@ class Change:
     by_flight : array, shape (flight,)
         The same of each flight alone.
     since : int
-        Flight of today from which on it looks most as if it had changed.
+        Flight of today from which on it is changed, or looks most like it.
     found : tuple of Found
         Empty where nothing changed.
     shows : mapping of str to float
@@ -166,7 +166,11 @@ def judged(
     evidence = space.evidence(np.vstack([since_each, apart])).max(axis=0)
     p_value = beyond_chance(chance, evidence[: len(starts)].max())
     best = int(np.argmax(evidence[: len(starts)]))
-    found = _found(space, since_each[best], chance) if p_value <= FALSE_ALARM else ()
+    since, found = starts[best], tuple[Found, ...]()
+    if p_value <= FALSE_ALARM:
+        found = _found(space, since_each[best], chance)
+        since = _since(space, apart, found, starts)
+        found = _found(space, apart[since:].mean(axis=0), chance) or found
     threshold = float(np.quantile(chance, 1 - FALSE_ALARM))
     white = np.linalg.solve(space.root, drawn[0, :_SHOWN].T)
     return Change(
@@ -176,7 +180,7 @@ def judged(
         np.sqrt(np.diag(covariance)),
         p_value,
         np.array([beyond_chance(alone, each) for each in evidence[len(starts) :]]),
-        starts[best],
+        since,
         found,
         {cause.name: space.shows(index, threshold, white) for index, cause in enumerate(listed)},
     )
@@ -335,6 +339,21 @@ def _found(space: _Space, apart: Array, chance: Array) -> tuple[Found, ...]:
         belief = sum(share[at] for at, other in enumerate(space.listed) if at == index or own.holds(other))
         found.append(Found(own, space.sizes(apart, chosen, index), float(belief), alike))
     return tuple(found)
+
+
+def _since(space: _Space, apart: Array, found: Sequence[Found], starts: Sequence[int]) -> int:
+    """Find the flight before which flights are nearest to the reference, and from which on to each other.
+
+    Along what was found: what else flights of a day have in common tells nothing of it.
+    """
+    along = np.hstack([np.linalg.solve(space.root, each.cause.directions[:, : each.cause.told]) for each in found])
+    shown = np.linalg.solve(space.root, apart.T).T @ np.linalg.svd(along, full_matrices=False)[0]
+
+    def apart_from(start: int) -> float:
+        after = shown[start:]
+        return float((shown[:start] ** 2).sum() + ((after - after.mean(axis=0)) ** 2).sum())
+
+    return min(starts, key=apart_from)
 
 
 def _beside(space: _Space, apart: Array, there: Sequence[int]) -> Array:
