@@ -37,9 +37,14 @@ from benchmarks.shared.nanodrone_files import TEST, TRAINING, VEHICLE, flights
 
 pin_threads()
 
-import jax
-import jax.numpy as jnp
 import numpy as np
+
+try:
+    import jax
+    import jax.numpy as jnp
+except ImportError:
+    if __name__ == "__main__":
+        sys.exit("needs the package jax: pip install 'cpfls[simulators]'")
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.export.registry import exported
