@@ -84,6 +84,11 @@ ENDS, TUMBLES = (2.5, 97.5), 50.0
 VEHICLES = {"45 g": SMALL, "1.5 kg": LARGE}
 
 
+def main(part: str = "simulated", *words: str) -> None:
+    with jax.enable_x64(True):
+        PARTS[part](*words)
+
+
 class Found(NamedTuple):
     """What flights tell: a model with its gusts, and how sure its numbers are."""
 
@@ -420,5 +425,4 @@ def twins(model: VehicleModel, flying: Fleet, law: Law, flight: PlaybackFlight) 
 PARTS: dict[str, Callable[..., None]] = {"simulated": simulated, "real": real}
 
 if __name__ == "__main__":
-    with jax.enable_x64(True):
-        PARTS[sys.argv[1] if len(sys.argv) > 1 else "simulated"](*sys.argv[2:])
+    main(*sys.argv[1:])
