@@ -316,7 +316,7 @@ def _told(limit: Limit, figures: Figures) -> str:
 
 
 def _look(limit: Limit) -> str:
-    return "; check the units of it and of what it is held against" if len(limit.of) > 1 else "; check its unit"
+    return "; check its unit and those of what it is compared with" if len(limit.of) > 1 else "; check its unit"
 
 
 def _in_another_unit(figures: Figures, name: str, best: Mapping[str, str]) -> Beyond:

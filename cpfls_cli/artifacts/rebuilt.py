@@ -159,4 +159,5 @@ def numbers_of_flight(record: FlightNumbersRecord) -> FlightNumbers:
         duration_s=record.duration,
         commanded=record.commanded,
         cable_m=record.cable,
+        agility=record.agility,
     )

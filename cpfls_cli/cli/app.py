@@ -75,6 +75,14 @@ LogsArgument = Annotated[
 ModelArgument = Annotated[
     Path, typer.Argument(metavar="MODEL", help="Made by `cpfls identify`, `extend` or `vehicle`.")
 ]
+ExportedArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="MODEL",
+        help="Made by `cpfls identify`, `extend` or `vehicle`; for .mcap and .csv a flight, prediction, replay, "
+        "disagreement, diagnosis or response.",
+    ),
+]
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Any artifact.")]
 ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT...", help="Artifacts to report on.")]
 FlightsArgument = Annotated[
@@ -215,6 +223,17 @@ class ExportFormat(StrEnum):
     ROTORPY = "rotorpy"
     CASADI = "casadi"
     JAX = "jax"
+    MCAP = "mcap"
+    CSV = "csv"
+
+
+class AutopilotChoice(StrEnum):
+    """Whose control law is meant."""
+
+    PX4 = "px4"
+    ARDUPILOT = "ardupilot"
+    BETAFLIGHT = "betaflight"
+    CRAZYFLIE = "crazyflie"
 
 
 class Flown(StrEnum):
@@ -502,6 +521,40 @@ def response(
 
 
 @_command()
+def tune(
+    config: ConfigArgument,
+    model: Annotated[Path, typer.Argument(metavar="VEHICLE", help="Vehicle, made by `cpfls vehicle`.")],
+    output: OutputOption,
+    autopilot: Annotated[AutopilotChoice, typer.Option("--autopilot", help="Whose control law and parameters.")],
+    flights: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--flight", metavar="LOG", help="Log with today's parameters and the gyroscope's noise; any number."
+        ),
+    ] = None,
+    gain_margin: Annotated[
+        float, typer.Option("--gain-margin", metavar="DB", min=0.5, max=30.0, help="At least.")
+    ] = 6.0,
+    phase_margin: Annotated[
+        float, typer.Option("--phase-margin", metavar="DEG", min=5.0, max=85.0, help="At least.")
+    ] = 45.0,
+    disk_margin: Annotated[
+        float,
+        typer.Option("--disk-margin", metavar="DEG", min=5.0, max=85.0, help="Phase, with gain off too; at least."),
+    ] = 35.0,
+    *,
+    common: Common,
+) -> None:
+    """Find gains for an autopilot that keep their margins with every vehicle that the flights leave possible."""
+
+    def call(command: Any, job: Job) -> Any:
+        asked = command.AskedMargins(gain_margin, phase_margin, disk_margin)
+        return command.run(job, model, autopilot.value, flights or (), asked)
+
+    _run("tune", config, output, common, call)
+
+
+@_command()
 def report(
     config: ConfigArgument,
     artifacts: ArtifactsArgument,
@@ -641,7 +694,7 @@ def trend(
 
 @_command()
 def export(
-    model: ModelArgument,
+    model: ExportedArgument,
     output: OutputOption,
     form: Annotated[
         ExportFormat | None,
@@ -650,7 +703,9 @@ def export(
             help="json: every parameter, with names and units; c: C99 source and header, no dependencies; python: a "
             "module that needs NumPy only; sdf (Gazebo), px4 (its Gazebo, with the airframe), mjcf (MuJoCo), urdf "
             "(gym-pybullet-drones, Isaac), crazyflow (and drone-models), rotorpy, casadi, jax: the vehicle for a "
-            "simulator or a library; default: by the suffix of FILE (.json, .c, .py, .xml, .sdf, .urdf, .toml).",
+            "simulator or a library; mcap (Foxglove), csv (PlotJuggler): what a flight, prediction, replay, gap or "
+            "response holds, on the log's own clock; default: by the suffix of FILE (.json, .c, .py, .xml, .sdf, "
+            ".urdf, .toml, .mcap, .csv).",
         ),
     ] = None,
     name: Annotated[
@@ -664,7 +719,7 @@ def export(
     *,
     common: Common,
 ) -> None:
-    """Write a model as JSON, C or Python that computes on its own, or as a vehicle for a simulator or a library."""
+    """Write a model as code or for a simulator; flights, replays, gaps and others for Foxglove or PlotJuggler."""
     with messages_for_errors():
         chosen = form and form.value
         _run_without_config("export", output, common, lambda command, job: command.run(job, model, chosen, name))

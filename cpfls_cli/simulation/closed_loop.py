@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, cos, pi
+from typing import Protocol
 
 import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.equations_of_motion import identified_turning, rigid_turning
+from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulation.actuators import Actuators, Mixer, Rotors, actuators, mixer
+from cpfls_cli.simulation.law_pilot import Asked, GyroscopeNoise, integration_rate, law_pilot
 from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.plant import (
     ATTITUDE,
@@ -24,8 +26,7 @@ from cpfls_cli.simulation.plant import (
     VEHICLE_STATES,
     VELOCITY,
     Plant,
-    effect_wrench,
-    instant,
+    plant_of,
 )
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.trajectory.planning import sample_interval
@@ -182,9 +183,10 @@ class Clock:
     instants: Array
 
 
-def clock_of(time: Array, rate: float) -> Clock:
-    """Divide the samples of a plan, shape (time,), s, into steps of this rate at least, Hz."""
+def clock_of(time: Array, settings: ClosedLoopSettings) -> Clock:
+    """Divide the samples of a plan, shape (time,), s, into steps of the integration and of the autopilot's law."""
     period = sample_interval(time, "a flight in closed loop")
+    rate = integration_rate(settings.law, settings.integration_rate_hz)
     parts = ceil(period * rate - _ROUNDING)
     steps, step = (len(time) - 1) * parts, period / parts
     return Clock(parts, steps, step, time[0] + step * np.concatenate([[0.0], np.arange(steps) + 0.5]))
@@ -224,6 +226,40 @@ class LoopStep:
     demand: Array
 
 
+class Pilot(Protocol):
+    """What commands the rotors."""
+
+    def command(self, number: int, start: Array, middle: Array) -> tuple[Array, Array]:
+        """Command a step.
+
+        Parameters
+        ----------
+        number : int
+            Steps done so far.
+        start, middle : array, shape (state,)
+            The state at the start of the step, and in its middle.
+
+        Returns
+        -------
+        command : array, shape (rotor,), rad/s
+        demand : array, shape (rotor,), rad^2/s^2
+            Squared speeds asked for, possible or not.
+        """
+
+
+@dataclass(frozen=True)
+class PlanPilot:
+    """The autopilot that knows the vehicle, with its mixer; it answers at once."""
+
+    autopilot: Autopilot
+    mixer: Mixer
+
+    def command(self, number: int, start: Array, middle: Array) -> tuple[Array, Array]:  # noqa: ARG002
+        """Command a step; the plan has the start before the middle of each step."""
+        wrench = self.autopilot.wrench(number + 1, *_seen(middle))
+        return self.mixer.command(wrench), self.mixer.demand(wrench)
+
+
 @dataclass
 class Loop:
     """The midpoint rule with one evaluation a step.
@@ -239,8 +275,7 @@ class Loop:
         Of gusts, in the middle of each step.
     """
 
-    autopilot: Autopilot
-    mixer: Mixer
+    pilot: Pilot
     actuators: Actuators
     plant: Plant
     state: Array
@@ -256,12 +291,11 @@ class Loop:
             Steps done so far.
         """
         middle = self.state + 0.5 * self.actuators.step * self.change
-        # The plan has the start before the middle of each step.
-        wrench = _wrench(self.autopilot, number + 1, middle)
-        rotors = self.actuators.advance(self.mixer.command(wrench))
+        command, demand = self.pilot.command(number, self.state, middle)
+        rotors = self.actuators.advance(command)
         self.change = self.plant.derivative(middle, rotors, self.push[number])
         self.state = self.state + self.actuators.step * self.change
-        return LoopStep(self.change, rotors, self.mixer.demand(wrench))
+        return LoopStep(self.change, rotors, demand)
 
 
 @dataclass(frozen=True)
@@ -298,6 +332,7 @@ def fly(
     effects: SimulatedEffects,
     progress: Callable[[float, int], None],
     push: Array | None = None,
+    noise: GyroscopeNoise | None = None,
 ) -> SimulatedMotion:
     """Integrate a closed-loop flight along a planned motion.
 
@@ -316,23 +351,138 @@ def fly(
         Takes steps done and steps in all.
     push : array, shape (step, 6), N m and N, body frame, or None
         Torque and force of gusts in the middle of each step of `clock_of`.
+    noise : GyroscopeNoise or None
+        In the loop of an autopilot of `settings.autopilot` that is not `cpfls`.
 
     Raises
     ------
     ComputationError
         If the plan is not sampled uniformly, or the vehicle leaves the path or overturns.
     """
-    clock = clock_of(time, settings.integration_rate_hz)
-    push = np.zeros((clock.steps, 6)) if push is None else push
-    flight = _loop(vehicle, settings, model, effects, planned, time, clock, push)
+    clock = clock_of(time, settings)
+    autopilot = Autopilot(vehicle, settings, reference(planned, time, clock.instants))
+    attitude, rate = planned["attitude"][:1], planned["attitude_rate"][:1]
+    state = np.zeros(VEHICLE_STATES)
+    state[POSITION], state[VELOCITY] = planned["position"][0], planned["velocity"][0]
+    state[ATTITUDE], state[BODY_RATE] = attitude[0], rotations.body_rate(attitude, rate)[0]
+    mix = mixer(vehicle)
+    speed = mix.command(autopilot.wrench(0, *_seen(state)))
+    pilot: Pilot = PlanPilot(autopilot, mix)
+    if settings.law is not None:
+        motors = Motors.of(settings.law.mixer, settings.law.curve, vehicle)
+        pilot = law_pilot(settings.law, motors, _along_path(autopilot, motors, vehicle), clock.step, speed, noise)
+    flight = _loop(pilot, state, speed, vehicle, settings, model, effects, clock, push)
+
+    def check(sample: int, state: Array) -> None:
+        _refuse_lost(state, time[sample])
+        _refuse_far(state, planned["position"][sample], time[sample], settings.deviation_max_m)
+
+    return _flown(flight, clock, check, progress)
+
+
+@dataclass(frozen=True)
+class Setpoints:
+    """What an autopilot's own law is asked for, time first; a setpoint stays until the next.
+
+    Attributes
+    ----------
+    attitude : array, shape (time, 3), rad, or None
+        Roll, pitch, yaw; None where rates alone are asked for.
+    body_rate : array, shape (time, 3), rad/s, body frame, or None
+        Asked beside what the attitude asks for; None for none.
+    thrust : array, shape (time,)
+        Share of the full thrust, in the units of the law.
+    """
+
+    attitude: Array | None
+    body_rate: Array | None
+    thrust: Array
+
+
+def fly_setpoints(
+    time: Array,
+    setpoints: Setpoints,
+    start: Array,
+    vehicle: VehicleSettings,
+    settings: ClosedLoopSettings,
+    model: VehicleModel | None,
+    effects: SimulatedEffects,
+    push: Array | None = None,
+    noise: GyroscopeNoise | None = None,
+    speed: Array | None = None,
+    injected: Array | None = None,
+) -> SimulatedMotion:
+    """Integrate the law of `settings.autopilot` and a vehicle along setpoints of attitude or rate and thrust.
+
+    Parameters
+    ----------
+    time : array, shape (time,), s
+        Uniform.
+    start : array, shape (12,)
+        Position and velocity in the world, roll, pitch, yaw, body rate: m, m/s, rad, rad/s.
+    model, effects, push, noise
+        As `fly` takes them.
+    speed : array, shape (rotor,), rad/s, or None
+        Of the rotors at the start; None for what the first thrust asks of them.
+    injected : array, shape (step, 3), or None
+        Added to the commands about the body axes at each step of `clock_of`, shares of the full ones.
+
+    Raises
+    ------
+    ComputationError
+        If time is not sampled uniformly, or the vehicle overturns.
+    """
+    law = settings.law
+    if law is None:
+        raise ValueError("setpoints are flown by the law of an autopilot; name one in settings.autopilot")
+    clock = clock_of(time, settings)
+    motors = Motors.of(law.mixer, law.curve, vehicle)
+    if speed is None:
+        speed = motors.speeds(float(setpoints.thrust[0]), np.zeros(3)).speed
+    pilot = law_pilot(law, motors, _as_asked(setpoints, clock.parts), clock.step, speed, noise, injected)
+    flight = _loop(pilot, np.array(start, dtype=float), speed, vehicle, settings, model, effects, clock, push)
+    return _flown(flight, clock, lambda sample, state: _refuse_lost(state, time[sample]), lambda _done, _all: None)
+
+
+def _as_asked(setpoints: Setpoints, parts: int) -> Callable[[int, Array], Asked]:
+    targets = None if setpoints.attitude is None else rotations.rotation_matrix(setpoints.attitude)
+    rates = np.zeros((len(setpoints.thrust), 3)) if setpoints.body_rate is None else setpoints.body_rate
+
+    def asked(number: int, _state: Array) -> Asked:
+        sample = min(number // parts, len(rates) - 1)
+        target = None if targets is None else targets[sample]
+        return Asked(target, rates[sample], float(setpoints.thrust[sample]))
+
+    return asked
+
+
+def _along_path(autopilot: Autopilot, motors: Motors, vehicle: VehicleSettings) -> Callable[[int, Array], Asked]:
+    """Ask for attitude and thrust along a path, in the units of a law."""
+    lift = sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors)
+
+    def asked(number: int, state: Array) -> Asked:
+        position, velocity, rotation, body_rate = _seen(state)
+        thrust = float(autopilot.wrench(number, position, velocity, rotation, body_rate)[0])
+        share = motors.share_of(float(np.sqrt(max(thrust, 0.0) / lift)))
+        return Asked(autopilot.target(number, position, velocity), np.zeros(3), share)
+
+    return asked
+
+
+def _flown(
+    flight: Loop,
+    clock: Clock,
+    check: Callable[[int, Array], None],
+    progress: Callable[[float, int], None],
+) -> SimulatedMotion:
+    """Take all steps, and check the state at each sample."""
     states, steps = [flight.state], []
     # A vehicle that is lost may reach infinity before the next sample, where it is told.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for number in range(clock.steps):
             steps.append(flight.advance(number))
             if (number + 1) % clock.parts == 0:
-                sample = len(states)
-                _refuse_lost(flight.state, planned["position"][sample], time[sample], settings.deviation_max_m)
+                check(len(states), flight.state)
                 states.append(flight.state)
             if number % _STEPS_BETWEEN_REPORTS == 0:
                 progress(number, clock.steps)
@@ -370,47 +520,41 @@ def asked(
 
 
 def _loop(
+    pilot: Pilot,
+    state: Array,
+    speed: Array,
     vehicle: VehicleSettings,
     settings: ClosedLoopSettings,
     model: VehicleModel | None,
     effects: SimulatedEffects,
-    planned: Mapping[str, Array],
-    time: Array,
     clock: Clock,
-    push: Array,
+    push: Array | None,
 ) -> Loop:
-    """Set up the loop at the start of the plan, with the rotors at their commanded speed."""
-    autopilot = Autopilot(vehicle, settings, reference(planned, time, clock.instants))
-    flown = vehicle if model is None else model.vehicle
-    carried = tuple(one.effect.carried(flown, one.values) for one in effects.ordered if one.effect.carried is not None)
-    attitude, rate = planned["attitude"][:1], planned["attitude_rate"][:1]
-    state = np.zeros(VEHICLE_STATES)
-    state[POSITION], state[VELOCITY] = planned["position"][0], planned["velocity"][0]
-    state[ATTITUDE], state[BODY_RATE] = attitude[0], rotations.body_rate(attitude, rate)[0]
-    state = np.concatenate([state, *(body.start for body in carried)])
-    mix = mixer(vehicle)
-    speed = mix.command(_wrench(autopilot, 0, state))
-    fuzzy = None if model is None else model.fuzzy
-    turning = rigid_turning(inertia_tensor(flown)) if fuzzy is None else identified_turning(fuzzy)
-    wrench = effect_wrench(effects, instant(flown, state, speed))
-    plant = Plant(flown, turning, wrench, carried, None if model is None or model.is_rigid_body else model)
+    """Set up the loop at a state, shape (12,), with the rotors at a speed that they were commanded to."""
+    plant = plant_of(vehicle, model, effects, state, speed)
+    state = np.concatenate([state, *(body.start for body in plant.carried)])
+    push = np.zeros((clock.steps, 6)) if push is None else push
     change = plant.derivative(state, Rotors.settled(speed), push[0])
     response = RotorResponse() if model is None else model.response
-    chain = actuators(effects, response, vehicle, settings, speed, clock.step, float(time[-1] - time[0]))
-    return Loop(autopilot, mix, chain, plant, state, change, push)
+    chain = actuators(effects, response, vehicle, settings, speed, clock.step, clock.step * clock.steps)
+    return Loop(pilot, chain, plant, state, change, push)
 
 
-def _wrench(autopilot: Autopilot, number: int, state: Array) -> Array:
+def _seen(state: Array) -> tuple[Array, Array, Array, Array]:
+    """Give position, velocity, rotation and body rate, as an autopilot takes them."""
     rotation = rotations.rotation_matrix(state[None, ATTITUDE])[0]
-    return autopilot.wrench(number, state[POSITION], state[VELOCITY], rotation, state[BODY_RATE])
+    return state[POSITION], state[VELOCITY], rotation, state[BODY_RATE]
 
 
-def _refuse_lost(state: Array, planned: Array, time: float, limit: float) -> None:
+def _refuse_lost(state: Array, time: float) -> None:
     if not np.isfinite(state).all():
         raise ComputationError(f"the flight is out of control at t = {time:g} s: {_REMEDY}")
     roll, pitch, _ = state[ATTITUDE]
     if cos(roll) * cos(pitch) <= 0:
         raise ComputationError(f"the vehicle tilts beyond 90 degrees at t = {time:g} s: {_REMEDY}")
+
+
+def _refuse_far(state: Array, planned: Array, time: float, limit: float) -> None:
     away = float(np.linalg.norm(state[POSITION] - planned))
     if away > limit:
         raise ComputationError(

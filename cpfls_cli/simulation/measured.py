@@ -12,6 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.hooks import TrueMotion
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.simulation.closed_loop import SimulatedMotion, asked, clock_of, fly
+from cpfls_cli.simulation.law_pilot import GyroscopeNoise
 from cpfls_cli.simulation.model import SimulatedEffects, in_table, played_gusts, simulated_effects, with_effects
 from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, POSITION, VELOCITY
 from cpfls_cli.simulation.settings import SimulationSettings
@@ -85,9 +86,12 @@ def measure(
     held, effects = with_effects(model, given)
     gusts, push = played_gusts(model, settings.closed_loop.gusts), None
     if gusts is not None:
-        clock = clock_of(time, settings.closed_loop.integration_rate_hz)
+        clock = clock_of(time, settings.closed_loop)
         push = gusts.drawn(rng, clock.step, clock.steps)
-    motion = fly(time, planned, vehicle, settings.closed_loop, held, effects, progress, push)
+    felt = {str(name): std for name, std in settings.noise.items()}.get("body_rate", 0.0)
+    # The gyroscope of the loop and that of the log are two, so that a log's noise is the same whoever flies.
+    noise = None if settings.closed_loop.law is None or not felt else GyroscopeNoise(felt, rng.spawn(1)[0])
+    motion = fly(time, planned, vehicle, settings.closed_loop, held, effects, progress, push, noise)
     signals, noise_std = _logged(time, motion, vehicle, settings, effects, rng)
     setpoints = asked(time, planned, vehicle, settings.closed_loop, motion.state)
     signals |= {f"setpoint_{name}": values for name, values in setpoints.items()}

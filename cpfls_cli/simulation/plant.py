@@ -8,7 +8,8 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.equations_of_motion import TurningLaw
+from cpfls_cli.dynamics.equations_of_motion import TurningLaw, identified_turning, rigid_turning
+from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.hooks import CarriedBody, Carrier
 from cpfls_cli.effects.signals import Signals
@@ -152,6 +153,25 @@ class Plant:
         change[ATTITUDE] = rotations.attitude_rate(state[None, ATTITUDE], body_rate[None])[0]
         change[BODY_RATE] = turning
         return change
+
+
+def plant_of(
+    vehicle: VehicleSettings, model: VehicleModel | None, effects: SimulatedEffects, state: Array, speed: Array
+) -> Plant:
+    """Set up a vehicle, or the model in its place, with its effects.
+
+    Parameters
+    ----------
+    state : array, shape (12,)
+    speed : array, shape (rotor,), rad/s
+        Any at which it flies.
+    """
+    flown = vehicle if model is None else model.vehicle
+    carried = tuple(one.effect.carried(flown, one.values) for one in effects.ordered if one.effect.carried is not None)
+    fuzzy = None if model is None else model.fuzzy
+    turning = rigid_turning(inertia_tensor(flown)) if fuzzy is None else identified_turning(fuzzy)
+    wrench = effect_wrench(effects, instant(flown, state, speed))
+    return Plant(flown, turning, wrench, carried, None if model is None or model.is_rigid_body else model)
 
 
 def instant(vehicle: VehicleSettings, state: Array, rotor_speed: Array) -> Signals:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt, Le
 from typing_extensions import Doc
 
-from cpfls_cli.errors import SettingError
+from cpfls_cli.autopilots.law import Law
+from cpfls_cli.autopilots.registry import AUTOPILOTS, AutopilotName
+from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.settings import Settings
 
 NoisySignal = Literal[
@@ -58,6 +61,16 @@ class ClosedLoopSettings(Settings):
         Le(1e5),
         Doc("steps of the integration in a second, at least one for each sample of the trajectory"),
     ] = 500.0
+    autopilot: Annotated[
+        Literal["cpfls", AutopilotName],
+        Doc(
+            "who flies: cpfls, with an attitude control that knows the vehicle; or the attitude and rate control of an "
+            "autopilot below the same position control"
+        ),
+    ] = "cpfls"
+    autopilot_parameters: Annotated[
+        dict[str, float], Doc("its parameters by its own names; others at their defaults")
+    ] = field(default_factory=dict)
     position_frequency_hz: Annotated[float, Gt(0), Doc("natural frequency of the position control, Hz")] = 0.25
     position_damping: Annotated[float, Gt(0), Doc("damping of the position control, 1 is critical")] = 0.9
     attitude_frequency_hz: Annotated[float, Gt(0), Doc("natural frequency of roll and pitch control, Hz")] = 1.2
@@ -70,6 +83,26 @@ class ClosedLoopSettings(Settings):
         float, Ge(0), Le(0.5), Doc("share of its voltage that the battery loses under twice the hover power")
     ] = 0.02
     deviation_max_m: Annotated[float, Gt(0), Doc("distance from the path at which the flight is given up, m")] = 50.0
+
+    def __post_init__(self) -> None:
+        """Refuse parameters that the autopilot has not.
+
+        Raises
+        ------
+        SettingError
+            If there is no such parameter, or no autopilot to have it.
+        """
+        if self.autopilot == "cpfls" and self.autopilot_parameters:
+            raise SettingError("autopilot_parameters", "are those of px4 and others; name one as closed_loop.autopilot")
+        try:
+            _ = self.law
+        except InputError as error:
+            raise SettingError("autopilot_parameters", str(error)) from None
+
+    @cached_property
+    def law(self) -> Law | None:
+        """The control law of the autopilot; None for cpfls's own."""
+        return None if self.autopilot == "cpfls" else AUTOPILOTS[self.autopilot].law(self.autopilot_parameters)
 
 
 _Positive = Annotated[float, Gt(0)]

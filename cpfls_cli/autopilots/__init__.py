@@ -1,0 +1,1 @@
+"""Control laws of autopilots that people fly, written out from their documentation."""

@@ -1,0 +1,1 @@
+"""One autopilot each: what is fixed in its law, and its parameters."""

@@ -1,0 +1,127 @@
+"""Betaflight: PID of the rate in its own scales, angle mode, quadrotor mixer."""
+
+from math import pi
+
+from cpfls_cli.autopilots.motors import MixerRule
+from cpfls_cli.autopilots.parameters import Autopilot, Parameter
+
+_DEGREES = 180 / pi
+_FULL = 1000.0
+"""Sum of P, I and D that is a full command."""
+_P, _I, _D = (scale * _DEGREES / _FULL for scale in (0.032029, 0.244381, 0.000529))
+"""Shares of a full command per rad/s, rad and rad/s^2 for a gain of 1."""
+
+
+def _axis(axis: str, gains: tuple[float, ...]) -> list[Parameter]:
+    p, i, d, most = gains
+    return [
+        Parameter(f"p_{axis}", f"{axis}.p", p, 0.0, 250.0, f"{axis} rate, proportional", scale=_P, step=1.0),
+        Parameter(f"i_{axis}", f"{axis}.i", i, 0.0, 250.0, f"{axis} rate, integral", scale=_I, step=1.0),
+        Parameter(
+            f"d_{axis}", f"{axis}.d", d, 0.0, 250.0, f"{axis} rate, derivative of the gyroscope", scale=_D, step=1.0
+        ),
+        Parameter(
+            f"d_max_{axis}",
+            f"{axis}.d_raised",
+            most,
+            0.0,
+            250.0,
+            "the same in fast moves; the law here has the other",
+            scale=_D,
+            step=1.0,
+        ),
+    ]
+
+
+BETAFLIGHT = Autopilot(
+    name="betaflight",
+    title="Betaflight",
+    rate_hz=4000.0,
+    mixer=MixerRule("peak", 1.0, 1.0),
+    parameters=(
+        *_axis("roll", (45.0, 80.0, 30.0, 40.0)),
+        *_axis("pitch", (47.0, 84.0, 34.0, 46.0)),
+        *_axis("yaw", (45.0, 80.0, 0.0, 0.0)),
+        Parameter("angle_p_gain", "tilt.angle", 50.0, 0.0, 200.0, "angle to rate in angle mode", "0.1/s", 0.1, 1.0),
+        Parameter(
+            "iterm_limit", "all.integral_limit", 400.0, 0.0, 500.0, "most of the integral", scale=1 / _FULL, step=1.0
+        ),
+        Parameter(
+            "pidsum_limit",
+            "tilt.limit",
+            500.0,
+            100.0,
+            1000.0,
+            "most of a roll or pitch command",
+            scale=1 / _FULL,
+            step=1.0,
+        ),
+        Parameter(
+            "pidsum_limit_yaw", "yaw.limit", 400.0, 100.0, 1000.0, "most of a yaw command", scale=1 / _FULL, step=1.0
+        ),
+        Parameter(
+            "gyro_lpf1_dyn_min_hz",
+            "all.measured.first",
+            250.0,
+            0.0,
+            1000.0,
+            "low-pass of the gyroscope",
+            "Hz",
+            step=1.0,
+        ),
+        Parameter(
+            "gyro_lpf2_static_hz",
+            "all.measured.first2",
+            500.0,
+            0.0,
+            1000.0,
+            "second low-pass of the gyroscope",
+            "Hz",
+            step=1.0,
+        ),
+        Parameter("gyro_notch1_hz", "all.measured.notch", 0.0, 0.0, 1000.0, "notch of the gyroscope", "Hz", step=1.0),
+        Parameter("gyro_notch1_cutoff", "all.measured.notch_lower", 0.0, 0.0, 1000.0, "its lower end", "Hz", step=1.0),
+        Parameter(
+            "dterm_lpf1_dyn_min_hz", "all.slope.first", 75.0, 0.0, 1000.0, "low-pass of the derivative", "Hz", step=1.0
+        ),
+        Parameter(
+            "dterm_lpf2_static_hz",
+            "all.slope.first2",
+            150.0,
+            0.0,
+            1000.0,
+            "second low-pass of the derivative",
+            "Hz",
+            step=1.0,
+        ),
+        Parameter("thrust_linear", "motors.expo", 0.0, 0.0, 150.0, "thrust curve of the motors", "%", 0.01, 1.0),
+    ),
+    # A pilot holds the heading; here its error asks for a rate.
+    fixed={"motors.low": 0.055, "yaw.angle": 1.0},
+    logged_as={
+        "rollPID": ("p_roll", "i_roll", "d_roll"),
+        "pitchPID": ("p_pitch", "i_pitch", "d_pitch"),
+        "yawPID": ("p_yaw", "i_yaw", "d_yaw"),
+        # Until 4.5 the gains above are those of fast moves.
+        "d_min": ("d_roll", "d_pitch", "d_yaw"),
+        "d_max": ("d_max_roll", "d_max_pitch", "d_max_yaw"),
+        "levelPID": ("angle_p_gain",),
+        "gyro_lpf1_dyn_hz": ("gyro_lpf1_dyn_min_hz",),
+        "dterm_lpf1_dyn_hz": ("dterm_lpf1_dyn_min_hz",),
+        "gyro_notch_hz": ("gyro_notch1_hz",),
+        "gyro_notch_cutoff": ("gyro_notch1_cutoff",),
+    },
+    cross=((-1, -1, -1), (1, -1, 1), (-1, 1, 1), (1, 1, -1)),
+    source=(
+        "Betaflight, PID Tuning Guide, https://betaflight.com/docs/wiki/guides/current/PID-Tuning-Guide",
+        "Betaflight, Command Line Interface, https://betaflight.com/docs/development/Cli (`get NAME` prints the range)",
+    ),
+    left_out=(
+        "feedforward of the sticks",
+        "D that grows in fast moves (d_max), filters that rise with throttle, TPA, anti-gravity",
+        "smoothing of the angle at 50 Hz",
+        "the pilot, who holds the heading: here its error asks for a rate, 1 1/s",
+    ),
+    holds_integral=False,
+    series=True,
+)

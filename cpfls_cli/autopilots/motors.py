@@ -1,0 +1,185 @@
+"""From asked thrust and turning to the speeds of motors: mixer, limits, thrust curve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+_CHANGE = 1e-4
+"""Step of a derivative along a thrust curve."""
+
+
+@dataclass(frozen=True)
+class ThrustCurve:
+    """What an autopilot takes thrust to be of the signal of a motor, both from 0 to 1.
+
+    Attributes
+    ----------
+    expo : float
+        e of ``thrust = e signal^2 + (1 - e) signal``; 0 for a straight line.
+    low, high : float
+        Signals at the ends of that range.
+    series : bool
+        Whether the inverse is taken by its series of second order in e, as Betaflight does.
+    """
+
+    expo: float = 0.0
+    low: float = 0.0
+    high: float = 1.0
+    series: bool = False
+
+    def signal(self, thrust: Array) -> Array:
+        """Give the signals for shares of the full thrust, shape (rotor,)."""
+        share = np.clip(thrust, 0.0, 1.0)
+        if self.series:
+            share = share * (1 + self.expo * (1 - share) * (1 + self.expo * (1 - 2 * share)))
+        elif abs(self.expo) > 1e-9:
+            straight = 1 - self.expo
+            share = (np.sqrt(straight**2 + 4 * self.expo * share) - straight) / (2 * self.expo)
+        return np.asarray(self.low + (self.high - self.low) * share)
+
+    def thrust(self, signal: Array) -> Array:
+        """Give the shares of the full thrust that lead to signals, shape (rotor,)."""
+        share = np.clip((np.asarray(signal) - self.low) / (self.high - self.low), 0.0, 1.0)
+        guess = self.expo * share**2 + (1 - self.expo) * share
+        if not self.series:
+            return np.asarray(guess)
+        for _ in range(20):
+            # The series is steeper than 1/4 anywhere, and its inverse is near.
+            slope = (self._reached(guess + _CHANGE) - self._reached(guess - _CHANGE)) / (2 * _CHANGE)
+            guess = np.clip(guess - (self._reached(guess) - share) / np.maximum(slope, 0.25), 0.0, 1.0)
+        return np.asarray(guess)
+
+    def _reached(self, share: Array) -> Array:
+        return share * (1 + self.expo * (1 - share) * (1 + self.expo * (1 - 2 * share)))
+
+
+@dataclass(frozen=True)
+class MixerRule:
+    """How an autopilot scales the columns of its mixer, which follow the places and the spins of the rotors.
+
+    Attributes
+    ----------
+    by : {"peak", "power"}
+        ``peak``: the largest entry of a column is the given one. ``power``: roll and pitch by the root of twice their
+        mean square, both by the larger of the two, as PX4's control allocation does; yaw by its peak.
+    tilt, yaw : float
+        Share of the full thrust of a motor for a full command.
+    """
+
+    by: Literal["peak", "power"]
+    tilt: float
+    yaw: float
+
+
+def mixing(rule: MixerRule, vehicle: VehicleSettings) -> Array:
+    """Build the mixer of a vehicle, shape (rotor, 4): shares of full thrust for thrust, roll, pitch and yaw.
+
+    Raises
+    ------
+    ComputationError
+        If the rotors do not control thrust, roll, pitch and yaw.
+    """
+    places = np.array([rotor.position_m for rotor in vehicle.rotors])
+    spins = np.array([rotor.spin for rotor in vehicle.rotors], dtype=float)
+    arm = np.abs(places[:, :2]).max()
+    rows = np.array([np.ones(len(spins)), places[:, 1] / arm, -places[:, 0] / arm, -spins])
+    if np.linalg.matrix_rank(rows) < 4:
+        raise ComputationError("vehicle.rotors: they do not control thrust, roll, pitch and yaw, so no autopilot flies")
+    columns = np.linalg.pinv(rows)
+    columns[np.abs(columns) < 1e-9] = 0.0
+    columns[:, 0] /= columns[:, 0].mean()
+    peaks = np.abs(columns).max(axis=0)
+    tilts = peaks[1:3]
+    if rule.by == "power":
+        used = (columns[:, 1:3] != 0).sum(axis=0)
+        # One scale for both, so that equal commands give equal torque.
+        tilts = np.full(2, np.sqrt((columns[:, 1:3] ** 2).sum(axis=0) / (used / 2)).max())
+    columns[:, 1:3] *= rule.tilt / tilts
+    columns[:, 3] *= rule.yaw / peaks[3]
+    return np.asarray(columns)
+
+
+class Mixed(NamedTuple):
+    """What the mixer gives.
+
+    Attributes
+    ----------
+    speed : array, shape (rotor,), rad/s
+        Asked of the rotors.
+    wanted : array, shape (rotor,)
+        Shares of the full thrust before any limit.
+    saturated : array, shape (3,)
+        Whether roll, pitch, yaw are cut.
+    """
+
+    speed: Array
+    wanted: Array
+    saturated: BoolArray
+
+
+@dataclass(frozen=True)
+class Motors:
+    """Mixer and motors of a vehicle.
+
+    Where they cannot do all, yaw gives way first, then thrust, then roll and pitch. The rotors turn in proportion to
+    the signal.
+
+    Attributes
+    ----------
+    mix : array, shape (rotor, 4)
+    speed_max : float, rad/s
+        At a signal of 1.
+    """
+
+    mix: Array
+    curve: ThrustCurve
+    speed_max: float
+
+    @classmethod
+    def of(cls, rule: MixerRule, curve: ThrustCurve, vehicle: VehicleSettings) -> Motors:
+        """Give those of a vehicle."""
+        return cls(mixing(rule, vehicle), curve, vehicle.rotor_speed_max_rad_s)
+
+    def speeds(self, thrust: float, turning: Array) -> Mixed:
+        """Mix thrust, a share of the full one, and commands about the body axes, shape (3,)."""
+        base = self.mix[:, 0] * min(max(thrust, 0.0), 1.0)
+        tilt, yaw = self.mix[:, 1:3] @ turning[:2], self.mix[:, 3] * turning[2]
+        share = _room(base + tilt, yaw)
+        shares = base + tilt + share * yaw
+        over, under = max(float(shares.max()) - 1.0, 0.0), max(-float(shares.min()), 0.0)
+        # Where one end is exceeded the whole moves; where both are, roll and pitch are cut.
+        both = float(np.ptp(shares)) > 1.0
+        shares = shares - over + under if not both else shares
+        wanted = base + tilt + yaw
+        saturated = np.array([both, both, share < 1.0])
+        return Mixed(self.curve.signal(shares) * self.speed_max, wanted, saturated)
+
+    def share_of(self, speed: float) -> float:
+        """Give the share of the full thrust that is asked for to turn all rotors at a speed, rad/s."""
+        return float(self.curve.thrust(np.array(speed / self.speed_max)))
+
+    def speed_at(self, share: float) -> float:
+        """Give the speed of rotors at a share of the full thrust, rad/s."""
+        return float(self.curve.signal(np.array(share))) * self.speed_max
+
+    def speed_slope(self, share: float) -> float:
+        """Differentiate `speed_at`, rad/s for one unit of the share."""
+        ends = min(max(share, _CHANGE), 1 - _CHANGE) + np.array([-_CHANGE, _CHANGE])
+        low, high = self.curve.signal(ends)
+        return float((high - low) / (2 * _CHANGE) * self.speed_max)
+
+
+def _room(shares: Array, yaw: Array) -> float:
+    """Give the part of a yaw command, at most 1, that fits between 0 and 1."""
+    turned = np.abs(yaw) > 1e-12
+    if not turned.any():
+        return 1.0
+    room = np.where(yaw > 0, 1.0 - shares, shares)[turned] / np.abs(yaw)[turned]
+    return float(np.clip(room.min(), 0.0, 1.0))

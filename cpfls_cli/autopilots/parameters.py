@@ -1,0 +1,231 @@
+"""Parameters of an autopilot by its own names, and the control law that they make."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from math import inf
+
+from cpfls_cli.autopilots.law import AXES, AxisLaw, Filter, FilterKind, Law, Stage
+from cpfls_cli.autopilots.motors import MixerRule, ThrustCurve
+from cpfls_cli.errors import InputError
+
+_GROUPS = {"all": AXES, "tilt": AXES[:2], **{name: (name,) for name in AXES}}
+_ORDER: tuple[tuple[Stage, FilterKind, str], ...] = (
+    ("measured", "notch", "measured.notch"),
+    ("measured", "notch", "measured.notch2"),
+    ("measured", "first", "measured.first"),
+    ("measured", "first", "measured.first2"),
+    ("measured", "second", "measured.second"),
+    ("target", "first", "target.first"),
+    ("error", "first", "error.first"),
+    ("slope", "first", "slope.first"),
+    ("slope", "first", "slope.first2"),
+    ("slope", "second", "slope.second"),
+    ("output", "first", "output.first"),
+)
+"""Filters that a law may have, in the order in which a signal passes them."""
+EVERYWHERE = ("motors.expo", "motors.low", "motors.high", "motors.hover")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of an autopilot.
+
+    Attributes
+    ----------
+    name : str
+        As the autopilot writes it.
+    role : str
+        What it is in the law: axes (``roll``, ``pitch``, ``yaw``, ``tilt`` for the first two, ``all``) or ``motors``,
+        a dot, and the quantity.
+    default : float
+    low, high : float
+        Of the range that its documentation gives.
+    meaning : str
+    unit : str
+        Empty for a ratio.
+    scale : float
+        Factor from it to the quantity of the law, SI.
+    step : float
+        It is written in multiples of this.
+    absent : float or None
+        Its value where a log holds parameters but not this one; None: the default.
+    """
+
+    name: str
+    role: str
+    default: float
+    low: float
+    high: float
+    meaning: str
+    unit: str = ""
+    scale: float = 1.0
+    step: float = 1e-4
+    absent: float | None = None
+
+
+@dataclass(frozen=True)
+class Autopilot:
+    """An autopilot: what is fixed in its law, and its parameters.
+
+    Attributes
+    ----------
+    name, title : str
+    rate_hz : float
+    mixer : MixerRule
+    parameters : tuple of Parameter
+    fixed : mapping of str to float
+        Quantities of the law that are no parameters, by role.
+    logged_as : mapping of str to tuple of str
+        Parameters that a line of a log's header holds, separated by commas; an empty name is left out.
+    slope_of_error, integrates_first, holds_integral, series : bool
+        As `AxisLaw`, `Law` and `ThrustCurve` have them.
+    source : tuple of str
+        Titles and addresses of its documentation: of the law, then of the ranges.
+    left_out : tuple of str
+        Parts of its law that are not here.
+    cross : tuple of tuple of int
+        Rotors of its X quadrotor in its order: 1 for front and left, -1 for the other side; spin, 1 turns
+        counter-clockwise seen from above.
+    """
+
+    name: str
+    title: str
+    rate_hz: float
+    mixer: MixerRule
+    parameters: tuple[Parameter, ...]
+    source: tuple[str, ...]
+    left_out: tuple[str, ...]
+    cross: tuple[tuple[int, int, int], ...]
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    logged_as: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    slope_of_error: bool = False
+    integrates_first: bool = True
+    holds_integral: bool = True
+    series: bool = False
+
+    def by_role(self, role: str) -> Parameter | None:
+        """Give the parameter of a role; None where it has none."""
+        return next((each for each in self.parameters if each.role == role), None)
+
+    def named(self, name: str) -> Parameter:
+        """Give a parameter by its name.
+
+        Raises
+        ------
+        InputError
+            If the law has no such parameter.
+        """
+        for each in self.parameters:
+            if each.name == name:
+                return each
+        near = get_close_matches(name, [each.name for each in self.parameters], 1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise InputError(f"{name}: the control law of {self.title} has no such parameter{hint}")
+
+    def defaults(self) -> dict[str, float]:
+        """Give all parameters at their defaults."""
+        return {each.name: each.default for each in self.parameters}
+
+    def in_log(self, logged: Mapping[str, float | str]) -> dict[str, float]:
+        """Take the parameters of the law out of what a log knows; empty where it is of another autopilot."""
+        found = {each.name: logged[each.name] for each in self.parameters if each.name in logged}
+        for line, names in self.logged_as.items():
+            values = str(logged.get(line, "")).strip('"').split(",")
+            # What is 0 there is off, and another line says it.
+            found |= {name: value for name, value in zip(names, values, strict=False) if name and _number(value)}
+        return {name: _number(value) for name, value in found.items()}
+
+    def of_log(self, logged: Mapping[str, float]) -> dict[str, float]:
+        """Give all parameters, where those of a log are known; what it lacks as before it existed, or at the default.
+
+        Parameters
+        ----------
+        logged : mapping of str to float
+            As `in_log` gives them.
+        """
+        return {
+            each.name: logged.get(each.name, each.default if each.absent is None else each.absent)
+            for each in self.parameters
+        }
+
+    def law(self, values: Mapping[str, float] | None = None) -> Law:
+        """Make the control law of parameters.
+
+        Parameters
+        ----------
+        values : mapping of str to float, or None
+            By name; others at their defaults.
+
+        Raises
+        ------
+        InputError
+            If there is no such parameter.
+        """
+        given = self.defaults()
+        for name, value in (values or {}).items():
+            given[self.named(name).name] = float(value)
+        roles = dict(self.fixed) | {each.role: each.scale * given[each.name] for each in self.parameters}
+        axes = tuple(_axis(_of_axis(roles, axis), slope_of_error=self.slope_of_error) for axis in AXES)
+        low, high = roles.get("motors.low", 0.0), roles.get("motors.high", 1.0)
+        return Law(
+            autopilot=self.name,
+            rate_hz=self.rate_hz,
+            axes=(axes[0], axes[1], axes[2]),
+            curve=ThrustCurve(roles.get("motors.expo", 0.0), low, high, self.series),
+            mixer=self.mixer,
+            integrates_first=self.integrates_first,
+            holds_integral=self.holds_integral,
+        )
+
+
+def _number(text: float | str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0
+
+
+def _of_axis(roles: Mapping[str, float], axis: str) -> dict[str, float]:
+    """Take the quantities of one axis; what is of this axis alone counts before what is of more."""
+    found: dict[str, float] = {}
+    for group in sorted(_GROUPS, key=lambda each: -len(_GROUPS[each])):
+        if axis in _GROUPS[group]:
+            found |= {role.partition(".")[2]: value for role, value in roles.items() if role.partition(".")[0] == group}
+    return found
+
+
+def _axis(found: Mapping[str, float], *, slope_of_error: bool) -> AxisLaw:
+    whole = found.get("k", 1.0)
+    integral = whole * found["i"]
+    filters: dict[Stage, list[Filter]] = {}
+    for stage, kind, name in _ORDER:
+        if found.get(name, 0.0) > 0 and found.get(f"{name}_on", 1.0) > 0:
+            filters.setdefault(stage, []).append(Filter(kind, found[name], _width(found, name)))
+    angle_integral = found.get("angle_i", 0.0)
+    # A limit of 0 is none.
+    return AxisLaw(
+        angle=found["angle"],
+        angle_integral=angle_integral,
+        angle_slope=found.get("angle_d", 0.0),
+        angle_integral_limit=angle_integral * found.get("angle_integral_range", inf) if angle_integral else 0.0,
+        p=whole * found["p"],
+        i=integral,
+        d=whole * found["d"],
+        ff=found.get("ff", 0.0),
+        integral_limit=min(found.get("integral_limit", inf), integral * found.get("integral_range", inf) or inf),
+        limit=found.get("limit", 1.0),
+        rate_limit=found.get("rate_limit", 0.0) or inf,
+        slope_of_error=slope_of_error,
+        **{stage: tuple(chosen) for stage, chosen in filters.items()},
+    )
+
+
+def _width(found: Mapping[str, float], name: str) -> float:
+    """Give the width of a notch, by itself or by its lower end, Hz."""
+    centre, lower = found.get(name, 0.0), found.get(f"{name}_lower", 0.0)
+    if lower:
+        return (centre**2 - lower**2) / lower if lower < centre else 0.5 * centre
+    return found.get(f"{name}_width", 0.5 * centre)

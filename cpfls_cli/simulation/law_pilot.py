@@ -1,0 +1,127 @@
+"""An autopilot's own control law in flight: it measures, asks and commands at its own rate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import ceil
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli import rotations
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.autopilots.law import Controller, Law, attitude_error
+from cpfls_cli.autopilots.motors import Motors
+from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE
+
+
+@dataclass(frozen=True)
+class GyroscopeNoise:
+    """White noise of the gyroscope, which the law answers.
+
+    Attributes
+    ----------
+    std : float, rad/s
+        At each step of the law.
+    """
+
+    std: float
+    rng: np.random.Generator
+
+
+class Asked(NamedTuple):
+    """What a law is asked for.
+
+    Attributes
+    ----------
+    attitude : array, shape (3, 3), or None
+        Body to world; None where rates are asked for.
+    body_rate : array, shape (3,), rad/s, body frame
+        Added to what the attitude asks for.
+    thrust : float
+        Share of the full thrust, in the units of the law.
+    """
+
+    attitude: Array | None
+    body_rate: Array
+    thrust: float
+
+
+@dataclass
+class LawPilot:
+    """A control law between what is asked and the rotors.
+
+    Attributes
+    ----------
+    asked : callable
+        From steps of the integration done so far and the state to what is asked.
+    every : int
+        Steps of the integration for one of the law.
+    held : array, shape (2, rotor)
+        Commanded speeds in rad/s, and demanded squared speeds in rad^2/s^2, until the next step of the law.
+    injected : array, shape (step, 3), or None
+        Added to the commands about the body axes, shares of the full ones, to measure the loop.
+    """
+
+    controller: Controller
+    motors: Motors
+    asked: Callable[[int, Array], Asked]
+    every: int
+    held: Array
+    coming: Array
+    noise: GyroscopeNoise | None = None
+    injected: Array | None = None
+    saturated: BoolArray | None = None
+
+    def command(self, number: int, start: Array, middle: Array) -> tuple[Array, Array]:  # noqa: ARG002
+        """Command a step: what the law computed a step of its own ago."""
+        if number % self.every == 0:
+            self.held = self.coming
+            self.coming = self._computed(number, start)
+        return self.held[0], self.held[1]
+
+    def _computed(self, number: int, state: Array) -> Array:
+        asked, gyroscope = self.asked(number, state), state[BODY_RATE]
+        if self.noise is not None:
+            gyroscope = gyroscope + self.noise.std * self.noise.rng.standard_normal(3)
+        rate = asked.body_rate
+        if asked.attitude is not None:
+            rotation = rotations.rotation_matrix(state[None, ATTITUDE])[0]
+            rate = rate + self.controller.asked_rate(attitude_error(rotation, asked.attitude), gyroscope)
+        turning = self.controller.command(rate, gyroscope, self.saturated)
+        if self.injected is not None:
+            turning = turning + self.injected[min(number, len(self.injected) - 1)]
+        mixed = self.motors.speeds(asked.thrust, turning)
+        self.saturated = mixed.saturated
+        possible = (mixed.wanted >= 0) & (mixed.wanted <= 1)
+        demand = np.where(possible, mixed.speed**2, mixed.wanted * self.motors.speed_max**2)
+        return np.array([mixed.speed, demand])
+
+
+def law_pilot(
+    law: Law,
+    motors: Motors,
+    asked: Callable[[int, Array], Asked],
+    step: float,
+    speed: Array,
+    noise: GyroscopeNoise | None = None,
+    injected: Array | None = None,
+) -> LawPilot:
+    """Set up a law in flight.
+
+    Parameters
+    ----------
+    step : float, s
+        Of the integration; the law takes the number of steps that is nearest to its period.
+    speed : array, shape (rotor,), rad/s
+        Of the rotors until the first command acts.
+    """
+    every = max(round(law.period / step), 1)
+    held = np.array([speed, speed**2])
+    return LawPilot(Controller(law, every * step), motors, asked, every, held, held, noise, injected)
+
+
+def integration_rate(law: Law | None, rate: float) -> float:
+    """Give steps in a second of an integration that a law goes into, at least `rate`, Hz."""
+    return rate if law is None else law.rate_hz * ceil(rate / law.rate_hz - 1e-9)

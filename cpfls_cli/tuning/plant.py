@@ -1,0 +1,243 @@
+"""A vehicle in hover as the rate control of an autopilot meets it: from its commands to body rates, about each axis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import product
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, Numbers
+from cpfls_cli.autopilots.law import Law
+from cpfls_cli.autopilots.motors import Motors
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.simulation.actuators import Rotors
+from cpfls_cli.simulation.model import SimulatedEffects, with_effects
+from cpfls_cli.simulation.plant import BODY_RATE, VEHICLE_STATES, Plant, plant_of
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+_RATE_STEP, _SPEED_SHARE = 1e-3, 1e-4
+_ROUNDS = 50
+
+
+@dataclass(frozen=True)
+class AxisPlant:
+    """Angular acceleration about one axis by the command of a law, in hover.
+
+    ``(b + b_a s + b_s / (1 + s T_s)) exp(-s d) / (1 + s tau)``, over ``s + damping``.
+
+    Attributes
+    ----------
+    gain : float, rad/s^2
+        b: of a full command, when the rotors have reached their speeds.
+    by_acceleration : float, rad/s
+        b_a: by the acceleration of the rotors, which carry angular momentum.
+    slow, slow_s : float, rad/s^2 and s
+        b_s and T_s: what comes slowly beside `gain`.
+    damping : float, 1/s
+    lag, delay : float, s
+        tau and d: of the rotors behind the command.
+    """
+
+    gain: float
+    by_acceleration: float
+    slow: float
+    slow_s: float
+    damping: float
+    lag: float
+    delay: float
+
+    def response(self, frequency: Array) -> Numbers:
+        """Evaluate body rate by command, shape (frequency,), Hz."""
+        s = 2j * np.pi * frequency
+        torque = self.gain + self.by_acceleration * s + self.slow / (1 + s * self.slow_s)
+        return np.asarray(torque * np.exp(-s * self.delay) / ((1 + s * self.lag) * (s + self.damping)))
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Ends of the intervals of what the control of an axis meets, by factors on it.
+
+    Attributes
+    ----------
+    gain, lag, delay : tuple of float
+        Lowest and highest factor on gain (with the other parts of torque), lag and delay.
+    """
+
+    gain: tuple[float, float] = (1.0, 1.0)
+    lag: tuple[float, float] = (1.0, 1.0)
+    delay: tuple[float, float] = (1.0, 1.0)
+
+    def corners(self, plant: AxisPlant) -> Iterator[AxisPlant]:
+        """Give the plant as it was found, then with each choice of ends."""
+        yield plant
+        for gain, lag, delay in product(*(dict.fromkeys(each) for each in (self.gain, self.lag, self.delay))):
+            if (gain, lag, delay) != (1.0, 1.0, 1.0):
+                yield replace(
+                    plant,
+                    gain=gain * plant.gain,
+                    by_acceleration=gain * plant.by_acceleration,
+                    slow=gain * plant.slow,
+                    lag=lag * plant.lag,
+                    delay=delay * plant.delay,
+                )
+
+
+@dataclass(frozen=True)
+class HoverPlant:
+    """A vehicle in hover under a law.
+
+    Attributes
+    ----------
+    axes : tuple of AxisPlant
+        About x, y, z of the body.
+    share : float
+        Of the full thrust that hovers, in the units of the law.
+    signal : float
+        Of the motors, from 0 to 1, mean over them.
+    """
+
+    axes: tuple[AxisPlant, AxisPlant, AxisPlant]
+    share: float
+    signal: float
+    spreads: tuple[Spread, Spread, Spread] = field(default=(Spread(), Spread(), Spread()))
+
+    def corners(self, axis: int) -> list[AxisPlant]:
+        """Give the plants of an axis that flights leave possible, the one that was found first."""
+        return list(self.spreads[axis].corners(self.axes[axis]))
+
+
+def hover_plant(law: Law, vehicle: VehicleSettings, model: VehicleModel | None, rotor_lag: float) -> HoverPlant:
+    """Linearise a vehicle in hover by the machine that flies it.
+
+    Parameters
+    ----------
+    model : VehicleModel or None
+        In place of the vehicle.
+    rotor_lag : float, s
+        Of speeds behind commands, where the model does not say.
+
+    Raises
+    ------
+    ComputationError
+        If full thrust does not carry the weight.
+    """
+    held, effects = with_effects(model, SimulatedEffects())
+    flown = vehicle if held is None else held.vehicle
+    motors = Motors.of(law.mixer, law.curve, flown)
+    state = np.zeros(VEHICLE_STATES)
+    rotors = len(flown.rotors)
+    plant = plant_of(flown, held, effects, state, np.full(rotors, 0.5 * motors.speed_max))
+    state = np.concatenate([state, *(body.start for body in plant.carried)])
+    share = _hover_share(plant, motors, state)
+    speed = np.full(rotors, motors.speed_at(share))
+    slope = motors.speed_slope(share)
+    lag, delay, slow_s = _lateness(model, effects, rotor_lag)
+    by_speed, by_acceleration, by_slow = _slopes(plant, state, speed)
+    by_rate = _damping(plant, state, speed)
+    turned = slope * motors.mix[:, 1:]
+    axes = tuple(
+        AxisPlant(
+            gain=float(by_speed[axis] @ turned[:, axis]),
+            by_acceleration=float(by_acceleration[axis] @ turned[:, axis]),
+            # A change of the speed changes its slow square by twice the speed.
+            slow=float(by_slow[axis] @ (2 * speed * turned[:, axis])),
+            slow_s=slow_s,
+            damping=-float(by_rate[axis]),
+            lag=lag,
+            delay=delay,
+        )
+        for axis in range(3)
+    )
+    return HoverPlant((axes[0], axes[1], axes[2]), share, motors.speed_at(share) / motors.speed_max)
+
+
+def _hover_share(plant: Plant, motors: Motors, state: Array) -> float:
+    """Find the share of the full thrust at which nothing rises or falls."""
+
+    def climbs(share: float) -> bool:
+        speed = np.full(len(motors.mix), motors.speed_at(share))
+        return bool(plant.derivative(state, Rotors.settled(speed), np.zeros(6))[5] > 0)
+
+    if not climbs(1.0):
+        raise ComputationError(
+            "vehicle: full thrust does not carry the weight; correct mass_kg, thrust_factor_n_s2 or "
+            "rotor_speed_max_rad_s"
+        )
+    low, high = 0.0, 1.0
+    for _ in range(_ROUNDS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if climbs(middle) else (middle, high)
+    return 0.5 * (low + high)
+
+
+def _lateness(model: VehicleModel | None, effects: SimulatedEffects, rotor_lag: float) -> tuple[float, float, float]:
+    """Give lag, delay, and the time of slow actuation, s, of all between command and torque."""
+    lags = [
+        one.effect.actuation.lag(one.values)
+        for one in effects.ordered
+        if one.effect.actuation is not None and one.effect.actuation.lag is not None
+    ]
+    delays = [
+        one.values[one.effect.shapes[0].name]
+        for one in effects.ordered
+        if one.effect.actuation is not None and one.effect.actuation.delay is not None
+    ]
+    if model is None:
+        return rotor_lag, 0.0, 1.0
+    behind = model.response
+    if model.commanded:
+        return (lags[-1] if lags else 0.0), sum(delays), behind.slow_s
+    # Behind speeds that are logged; these are behind their commands.
+    return rotor_lag + behind.lag_s, behind.delay_s, behind.slow_s
+
+
+def _slopes(plant: Plant, state: Array, speed: Array) -> tuple[Array, Array, Array]:
+    """Differentiate angular acceleration by speeds, their accelerations and slow squares, shape (3, rotor) each."""
+    still = Rotors.settled(speed)
+    step = _SPEED_SHARE * float(speed.mean())
+
+    def turning(changed: Rotors) -> Array:
+        return plant.derivative(state, changed, np.zeros(6))[BODY_RATE]
+
+    def slope(name: str, size: float) -> Array:
+        columns = []
+        for unit in np.eye(len(speed)):
+            ends = [replace(still, **{name: getattr(still, name) + sign * size * unit}) for sign in (1.0, -1.0)]
+            columns.append((turning(ends[0]) - turning(ends[1])) / (2 * size))
+        return np.array(columns).T
+
+    # Slowness is that behind the present square, which a change of the speed alone leaves where it was.
+    return slope("speed", step), slope("acceleration", step), slope("slow", 2 * step * float(speed.mean()))
+
+
+def _damping(plant: Plant, state: Array, speed: Array) -> Array:
+    """Differentiate angular acceleration by body rate about the same axis, shape (3,), 1/s."""
+    still = Rotors.settled(speed)
+    slopes = []
+    for axis in range(3):
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = state.copy()
+            moved[BODY_RATE.start + axis] += sign * _RATE_STEP
+            ends.append(plant.derivative(moved, still, np.zeros(6))[BODY_RATE][axis])
+        slopes.append((ends[0] - ends[1]) / (2 * _RATE_STEP))
+    return np.array(slopes)
+
+
+def spread_of(intervals: Mapping[str, tuple[float, float]], moment: str, factor: str) -> Spread:
+    """Make the spread of an axis from intervals of constants, each as factors on what was found.
+
+    Parameters
+    ----------
+    intervals : mapping of str to tuple of float
+        By name of the constant; those that are not there are taken as they are.
+    moment, factor : str
+        Names of the moment of inertia, and of thrust or drag factor, that make the gain.
+    """
+    low, high = intervals.get(moment, (1.0, 1.0))
+    weak, strong = intervals.get(factor, (1.0, 1.0))
+    one = (1.0, 1.0)
+    return Spread((weak / high, strong / low), intervals.get("lag", one), intervals.get("delay", one))

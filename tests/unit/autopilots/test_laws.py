@@ -1,0 +1,108 @@
+"""The control laws of autopilots: their steps, their responses, their mixers and their parameters."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.autopilots.law import Controller, attitude_error
+from cpfls_cli.autopilots.motors import Motors, ThrustCurve, mixing
+from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.errors import InputError
+from cpfls_cli.rotations import rotation_matrix
+from cpfls_cli.vehicle.rotors import allocation_matrix
+from tests.builders.autopilots import CROSS
+
+NOTCHED = {
+    "px4": {"IMU_GYRO_NF0_FRQ": 80.0},
+    "ardupilot": {"INS_HNTCH_ENABLE": 1.0},
+    "betaflight": {"gyro_notch1_hz": 200.0, "gyro_notch1_cutoff": 150.0},
+    "crazyflie": {"pid_rate.rateFiltEn": 1.0},
+}
+
+
+@pytest.mark.parametrize("name", AUTOPILOTS)
+def test_the_steps_of_a_law_are_its_transfer_functions(name):
+    law, samples, small = AUTOPILOTS[name].law(NOTCHED[name]), 1 << 10, 1e-4 * np.ones(3)
+    frequency = np.arange(1, samples // 2) * law.rate_hz / samples
+    for asked, sign in ((1.0, 1.0), (0.0, -1.0)):
+        controller = Controller(law)
+        controller.command(np.zeros(3), np.zeros(3))
+        pulses = ((asked * small * (step == 0), (1 - asked) * small * (step == 0)) for step in range(samples))
+        answer = sign / 1e-4 * np.array([controller.command(*pulse) for pulse in pulses])
+        # An integral never dies, so what is compared is the change from step to step.
+        change = np.fft.fft(np.diff(answer, axis=0, prepend=0.0), axis=0)[1 : samples // 2]
+        for axis in range(3):
+            expected = law.response(axis, frequency)[0 if asked == 0.0 else 1]
+            expected = expected * (1 - np.exp(-2j * np.pi * frequency * law.period))
+            np.testing.assert_allclose(change[:, axis], expected, atol=2e-3 * abs(expected).max())
+
+
+@pytest.mark.parametrize("name", AUTOPILOTS)
+def test_a_command_turns_the_body_about_its_axis_alone(name):
+    autopilot = AUTOPILOTS[name]
+    motors = Motors.of(autopilot.mixer, autopilot.law().curve, CROSS)
+    allocation = allocation_matrix(CROSS)
+    hover = motors.speeds(0.4, np.zeros(3)).speed
+    for axis in range(3):
+        speed = motors.speeds(0.4, 0.02 * np.eye(3)[axis]).speed
+        torque = allocation[1:] @ (speed**2 - hover**2)
+        assert torque[axis] > 0
+        assert np.abs(np.delete(torque, axis)).max() < 1e-9
+    assert motors.share_of(motors.speed_at(0.4)) == pytest.approx(0.4)
+
+
+def test_the_mixers_are_scaled_as_each_autopilot_scales_them():
+    found = {name: np.abs(mixing(each.mixer, CROSS)).max(axis=0).tolist() for name, each in AUTOPILOTS.items()}
+    assert found["px4"] == pytest.approx([1.0, 0.5**0.5, 0.5**0.5, 1.0])
+    assert found["ardupilot"] == pytest.approx([1.0, 0.5, 0.5, 0.5])
+    assert found["betaflight"] == pytest.approx([1.0, 1.0, 1.0, 1.0])
+    assert found["crazyflie"] == pytest.approx([1.0, 0.5, 0.5, 1.0])
+
+
+def test_where_motors_cannot_do_all_yaw_gives_way_first():
+    motors = Motors(mixing(AUTOPILOTS["px4"].mixer, CROSS), ThrustCurve(), 1.0)
+    mixed = motors.speeds(0.5, np.array([0.6, 0.0, 0.5]))
+    allocated = np.linalg.pinv(motors.mix) @ mixed.speed
+    assert allocated[1] == pytest.approx(0.6)
+    assert 0.0 <= allocated[3] < 0.5
+    assert mixed.saturated.tolist() == [False, False, True]
+    assert mixed.wanted.max() > 1
+
+
+@pytest.mark.parametrize(
+    "curve", [ThrustCurve(0.3), ThrustCurve(0.65, 0.15, 0.95), ThrustCurve(0.6, 0.05, series=True)]
+)
+def test_a_thrust_curve_and_its_inverse(curve):
+    shares = np.linspace(0.0, 1.0, 21)
+    np.testing.assert_allclose(curve.thrust(curve.signal(shares)), shares, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", AUTOPILOTS)
+def test_defaults_lie_in_the_documented_ranges(name):
+    autopilot = AUTOPILOTS[name]
+    names = [each.name for each in autopilot.parameters]
+    assert len(set(names)) == len(names)
+    assert all(each.low <= each.default <= each.high for each in autopilot.parameters)
+    assert all("https://" in source for source in autopilot.source)
+
+
+def test_parameters_become_quantities_in_si_units():
+    law = AUTOPILOTS["px4"].law({"MC_ROLLRATE_K": 2.0, "MC_ROLLRATE_P": 0.1, "MC_ROLLRATE_MAX": 90.0})
+    assert (law.axes[0].p, law.axes[0].rate_limit) == pytest.approx((0.2, np.pi / 2))
+    # Betaflight's P of 100 is 3.2 thousandths of a full command per degree a second.
+    assert AUTOPILOTS["betaflight"].law({"p_roll": 100.0}).axes[0].p == pytest.approx(3.2029e-3 * 180 / np.pi)
+    assert AUTOPILOTS["crazyflie"].law().axes[0].p == pytest.approx(250 / 65535 * 180 / np.pi)
+    with pytest.raises(InputError, match="did you mean MC_ROLLRATE_P"):
+        AUTOPILOTS["px4"].law({"MC_ROLRATE_P": 0.1})
+
+
+def test_what_a_log_lacks_is_as_it_was_before_it_existed():
+    values = AUTOPILOTS["px4"].of_log({"MC_YAWRATE_P": 0.3})
+    assert (values["MC_YAWRATE_P"], values["MC_YAW_TQ_CUTOFF"], values["MC_ROLLRATE_P"]) == (0.3, 0.0, 0.15)
+
+
+def test_the_error_of_an_attitude_is_the_rotation_to_the_asked_one():
+    here, small = rotation_matrix(np.array([[0.3, -0.2, 1.0]]))[0], np.array([0.02, -0.03, 0.05])
+    angle = np.linalg.norm(small)
+    skew = np.array([[0, -small[2], small[1]], [small[2], 0, -small[0]], [-small[1], small[0], 0]])
+    turned = np.eye(3) + np.sin(angle) / angle * skew + (1 - np.cos(angle)) / angle**2 * skew @ skew
+    np.testing.assert_allclose(attitude_error(here, here @ turned), small, rtol=1e-3)
