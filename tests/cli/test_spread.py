@@ -96,7 +96,7 @@ def test_nothing_is_written_on_a_dry_run(cpfls, vehicle):
 
 def test_what_is_refused(refuse, vehicle, pipeline, tmp_path, monkeypatch):
     (line,) = refuse("spread", vehicle, "-o", tmp_path / "s.csv")
-    assert line.endswith("s.csv: the ending tells no form; end the name in one of .yaml, .json, .npz")
+    assert line.endswith("s.csv: its suffix names no form; give the name one of the suffixes .yaml, .json, .npz")
     (line,) = refuse("spread", pipeline.model, "-o", tmp_path / "s.json", "--force")
     assert "is a model of `cpfls identify`, which holds no covariance of its numbers; `cpfls vehicle` finds" in line
     old = tmp_path / "old.h5"
