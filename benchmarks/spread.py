@@ -385,6 +385,20 @@ def nearest(given: Instruments, number: int, other: int) -> Array:
     return np.asarray(first @ last)
 
 
+def difference(rotation: Any, own: Any) -> Any:
+    """Give the rotation from one to each of others about the body axes, small ones, shape (vehicle, 3)."""
+    away = jnp.einsum("ji,njk->nik", rotation, own)
+    pairs = ((2, 1), (0, 2), (1, 0))
+    return 0.5 * jnp.stack([away[:, row, column] - away[:, column, row] for row, column in pairs], axis=1)
+
+
+def about_z(angle: Any) -> Any:
+    """Turn about body z, shape (vehicle, 3, 3)."""
+    none, one, cosine, sine = jnp.zeros_like(angle), jnp.ones_like(angle), jnp.cos(angle), jnp.sin(angle)
+    rows = [[cosine, -sine, none], [sine, cosine, none], [none, none, one]]
+    return jnp.moveaxis(jnp.array(rows), 2, 0)
+
+
 def twins(model: VehicleModel, flying: Fleet, law: Law, flight: PlaybackFlight) -> Array:
     """Fly all vehicles from the first logged state, asked what the flight was asked; rates, shape (flight, time, 3).
 
@@ -402,16 +416,14 @@ def twins(model: VehicleModel, flying: Fleet, law: Law, flight: PlaybackFlight) 
         state, answer, gust = carried
         (position, velocity, rotation, rate, speed), key = given
         own = state[:, 6:15].reshape(-1, 3, 3)
-        away = jnp.einsum("ji,njk->nik", rotation, own)
-        turned = 0.5 * jnp.stack(
-            [away[:, 2, 1] - away[:, 1, 2], away[:, 0, 2] - away[:, 2, 0], away[:, 1, 0] - away[:, 0, 1]], 1
-        )
+        own = own @ about_z(-difference(rotation, own)[:, 2])
+        state = state.at[:, 6:15].set(own.reshape(-1, 9)).at[:, 17].set(rate[2])
+        turned = difference(rotation, own)
         moved = jnp.concatenate([state[:, 3:6] - velocity, state[:, :3] - position], axis=1).reshape(-1, 2, 3)
         along_body = jnp.einsum("nji,nkj->nki", own, moved).reshape(-1, 6)
         squared = jnp.maximum(speed**2 + answer @ unmix.T, 0.0)
         after = law.keep * answer + jnp.concatenate([turned, state[:, 15:] - rate, along_body], axis=1) @ law.gain.T
         moved_on = move(pushed(flying, state, gust, period), terms(jnp.sqrt(squared)), flying.parameters)
-        moved_on = moved_on.at[:, 17].set(rate[2])
         return (moved_on, after, keep * gust + fresh * jax.random.normal(key, (count, 6))), moved_on[:, 15:]
 
     begun = jnp.concatenate([part[0].ravel() for part in logged[:4]])
