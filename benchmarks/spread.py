@@ -17,7 +17,7 @@ real: the nano-drone benchmark (see nanodrone.py for DATA). Constants and gusts 
 path of which was flown three or four times. The law of its autopilot is not known: how torque and thrust answer is
 found in how runs of one path differ. Vehicles drawn fly the test flights in closed loop, asked what the flight was
 asked: their rotors turn as logged, and answer the difference to the logged state by that law. About yaw these flights
-tell neither the moment of inertia nor gusts, so all turn as logged there, and roll and pitch are counted.
+tell neither the moment of inertia nor gusts, so all keep the logged heading, and roll and pitch are counted.
 
 Needs jax (extra `simulators`); real needs pyarrow (extra `parquet`) too.
 """
@@ -105,6 +105,8 @@ def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
     solved, spread = constants.fitted, constants.spread
     numbers = tuple(bodily(vehicle, tuple(found_numbers(solved, spread))))
     gusts = find_gusts(solved.model, given, {each.name: each.determined for each in numbers}, told=True)
+    if gusts is not None:
+        print(f"  of what is left comes again, by axis: {np.round(gusts.foretold, 2)}", file=sys.stderr)
     held = None if gusts is None or gusts.gusts is None else gusts.gusts
     model = replace(solved.model, gusts=held)
     return Found(
@@ -320,14 +322,19 @@ def real(folder: str) -> None:
     }
     rows = []
     for kind, own in flown.items():
-        shares, lost = [], 0
+        shares, off, wide, lost = [], [], [], 0
         for flight in flights(Path(folder), TEST):
-            turned = twins(told.model, own, law, flight)
-            shares.append(share_inside(turned, flight.motion.rate[1:])[:2])
+            turned, measured = twins(told.model, own, law, flight), flight.motion.rate[1:]
+            shares.append(share_inside(turned, measured)[:2])
+            low, middle, high = np.percentile(turned[~tumbled(turned)], (ENDS[0], 50.0, ENDS[1]), axis=0)
+            off.append(np.sqrt(((middle - measured) ** 2).mean(axis=0))[:2])
+            wide.append((high - low).mean(axis=0)[:2])
             lost += int(tumbled(turned).sum())
-        rows.append((*row("nano-drone", kind, np.array(shares)), f"{lost} of {len(shares) * COUNT}"))
+        sizes_ = (", ".join(f"{value:.2g}" for value in np.mean(each, axis=0)) for each in (off, wide))
+        rows.append((*row("nano-drone", kind, np.array(shares)), *sizes_, f"{lost} of {len(shares) * COUNT}"))
         print(rows[-1], file=sys.stderr, flush=True)
-    table("spread_real", ("vehicle", "flown", *AXES, "all", "one flight, least to most", "tumbled"), rows)
+    header = ("vehicle", "flown", *AXES, "all", "one flight, least to most", "median off", "width", "tumbled")
+    table("spread_real", header, rows)
 
 
 def answers(model: VehicleModel, speed: Array) -> Array:
@@ -402,7 +409,7 @@ def about_z(angle: Any) -> Any:
 def twins(model: VehicleModel, flying: Fleet, law: Law, flight: PlaybackFlight) -> Array:
     """Fly all vehicles from the first logged state, asked what the flight was asked; rates, shape (flight, time, 3).
 
-    About yaw they turn as logged: these flights tell neither the moment of inertia nor the gusts there.
+    About yaw they keep what was logged: these flights tell neither the moment of inertia nor the gusts there.
     """
     motion, module, count = flight.motion, flying.module, len(flying.parameters)
     period, unmix = motion.period, np.linalg.pinv(allocation_matrix(model.vehicle)) * sizes(model)

@@ -8,6 +8,7 @@ import yaml
 
 from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.validation.trust import Trust
 from tests.builders.spread_vehicles import found_record
 
 COUNT = 20
@@ -72,6 +73,13 @@ def test_the_first_screen(cpfls, vehicle):
     summary = json.loads(written(cpfls, vehicle, "yaml", "--json")[0].stdout)
     assert summary["vehicles"] == COUNT
     assert summary["ranges"]["lag.time_constant_s"]["value"] == 0.035
+
+
+def test_a_model_that_lacks_an_effect_is_said_to_spread_too_little(cpfls, vehicle, monkeypatch):
+    monkeypatch.setattr(VehicleRecord, "verdict", Trust.LACKING)
+    result, output = written(cpfls, vehicle, "json")
+    assert "the model lacks, so the spread is too narrow" in result.stderr
+    assert json.loads(output.read_text())["verdict"] == Trust.LACKING
 
 
 def test_guesses_are_held_and_named(cpfls, tmp_path):
