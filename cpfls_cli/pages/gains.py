@@ -123,7 +123,6 @@ def gains_blocks(gains: Source[GainsRecord], index: int) -> Iterator[Block]:
     """Show gains on a page: margins, parameters, and the loops that they make."""
     record = gains.record
     yield Heading(gains.label)
-    yield gains_box(record)
     yield Facts(
         [
             ("Vehicle", record.vehicle_name),
