@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -23,6 +23,28 @@ if TYPE_CHECKING:
 
 MOTION = ("attitude", "attitude_rate", "attitude_acceleration")
 """Fields of trajectories and flights that hold Euler angles and their derivatives."""
+
+BEGINS = "stamp of the log's own clock at time 0 of the flight; not finite where there is none"
+CLOCK = "clock/begins"
+"""Path of the same of a single flight."""
+
+
+def known_begins(begins: Iterable[float]) -> Array | None:
+    """Arrange where flights begin on the clocks of their logs, s; None where none has a log."""
+    stamps = np.fromiter(begins, float)
+    return stamps if np.isfinite(stamps).any() else None
+
+
+@record
+class ClockGroup:
+    """The log's own clock."""
+
+    begins: float = dataset("stamp of the log at time 0", units="s")
+
+    @classmethod
+    def of(cls, begins: float) -> Self | None:
+        """Keep the stamp, s; None where there is none."""
+        return cls(begins=begins) if np.isfinite(begins) else None
 
 
 @record
@@ -311,6 +333,7 @@ class FlightRecord(Record):
         gaps=True,
         default=None,
     )
+    clock: ClockGroup | None = group(default=None)
     quality: QualityGroup | None = group(default=None)
     delay: DelayGroup | None = group(default=None)
     noise: NoiseGroup | None = group(default=None)
@@ -349,6 +372,7 @@ class FlightRecord(Record):
         return cls(
             **signals,
             **setpoints,
+            clock=ClockGroup(begins=report.first_stamp_s + report.span_s[0]),
             quality=QualityGroup.of(findings, report.warnings, report.cut_off_hz, report.updated_hz),
             delay=DelayGroup(
                 value=report.delay_s,
@@ -380,6 +404,11 @@ class FlightRecord(Record):
         held = {short: values for name, short in SETPOINTS.items() if (values := getattr(self, name)) is not None}
         known = {name: np.isfinite(values.reshape(len(values), -1)).all(axis=1) for name, values in held.items()}
         return {name: int(np.sum(own)) for name, own in known.items()}
+
+    @property
+    def begins(self) -> float:
+        """Stamp of the log's own clock at time 0, s; NaN where there is none."""
+        return np.nan if self.clock is None else self.clock.begins
 
     @property
     def motion(self) -> Motion:

@@ -10,6 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.audit import by_reason
+from cpfls_cli.artifacts.flight import BEGINS, known_begins
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, columns_of, dataset, group, record, rows_of
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.weak_form.windows import Recording
@@ -56,6 +57,7 @@ class FlightGroup:
     role: tuple[str, ...] = dataset("given, training or held-out", "flight")
     first: IntArray = dataset("index of the first sample of each flight", "flight")
     commanded: IntArray = dataset("1 where actuation is commanded, not measured", "flight")
+    begins: Array | None = dataset(BEGINS, "flight", units="s", gaps=True, default=None)
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], roles: Sequence[str]) -> Self:
@@ -67,6 +69,7 @@ class FlightGroup:
             role=tuple(roles),
             first=np.cumsum([0, *lengths[:-1]]),
             commanded=np.array([int(recording.signals.commanded) for recording in recordings]),
+            begins=known_begins(recording.begins for recording in recordings),
         )
 
 
@@ -166,9 +169,10 @@ class FlightsGroup:
         """Rebuild the flights in these roles; all if none is named."""
         each = self.each
         last = [*each.first[1:], len(self.signals.time)]
-        columns = zip(each.name, each.role, each.first, last, each.commanded, strict=True)
+        begins = np.full(len(each.name), np.nan) if each.begins is None else each.begins
+        columns = zip(each.name, each.role, each.first, last, each.commanded, begins.tolist(), strict=True)
         return [
-            Recording(name, self.signals.part(slice(start, stop), bool(commanded), study))
-            for name, role, start, stop, commanded in columns
+            Recording(name, self.signals.part(slice(start, stop), bool(commanded), study), begin)
+            for name, role, start, stop, commanded, begin in columns
             if not roles or role in roles
         ]

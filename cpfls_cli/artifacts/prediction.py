@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.artifacts.spec import BODY, EULER, PART, Format, Record, dataset, record
+from cpfls_cli.artifacts.flight import ClockGroup
+from cpfls_cli.artifacts.spec import BODY, EULER, PART, Format, Record, dataset, group, record
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
 from cpfls_cli.identification.data import TorqueData
@@ -68,6 +69,7 @@ class PredictionRecord(Record):
     )
     coriolis: Array = dataset("C(q, qd) by Christoffel symbols", "time", "axis", "axis", units="kg m^2/s", frame=EULER)
     outside: BoolArray = dataset("1 where the attitude lies outside the excited region", "time")
+    clock: ClockGroup | None = group(default=None)
 
     @classmethod
     def of(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.artifacts.flight import BEGINS, known_begins
 from cpfls_cli.artifacts.spec import BODY, WORLD, Format, Record, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.playback.replay import (
     AFTER,
@@ -47,6 +48,8 @@ _VISIBLY = 0.95
 """Ratio of errors that is visible: on real flights decay by axis, in place of one time constant, saves up to 3 %."""
 
 _DRAWN_RUNS = 12
+_KEYS = {"actuation": "driven_by", "begins": "begins_s"}
+"""What fields of a flight are called for machines."""
 
 
 @record
@@ -373,6 +376,7 @@ class PlayedFlightsGroup:
     actuation: tuple[str, ...] = dataset("what drove the playback", "flight")
     hold: tuple[str, ...] = dataset("what that is between samples: linear or previous", "flight")
     rotation_alone: BoolArray = dataset("1 where velocity was not played back", "flight")
+    begins: Array | None = dataset(BEGINS, "flight", units="s", gaps=True, default=None)
 
     @classmethod
     def of(cls, flights: Sequence[LoggedFlight], played: Sequence[Played], windows: ReplayWindows) -> Self:
@@ -382,6 +386,7 @@ class PlayedFlightsGroup:
             flights,
             windows=np.bincount(windows.flight, minlength=len(flights)),
             rotation_alone=np.array([not each.flight.translates for each in played]),
+            begins=known_begins(flight.begins for flight in flights),
         )
 
 
@@ -553,10 +558,7 @@ class ReplayRecord(Record):
             "horizon_s": self.horizon_s.tolist(),
             "windows": self.windows,
             "models": {name: self._prediction(index) for index, name in enumerate(self.prediction)},
-            "flights": [
-                {("driven_by" if key == "actuation" else key): value for key, value in row.items()}
-                for row in rows_of(self.flight)
-            ],
+            "flights": [{_KEYS.get(key, key): value for key, value in row.items()} for row in rows_of(self.flight)],
             "worst": [
                 {
                     "flight": self.flight.name[self.window.flight[index]],

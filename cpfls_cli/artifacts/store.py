@@ -380,6 +380,12 @@ def count_rows(path: Path, spec: Format, first: str) -> int | None:
     return known.shapes[first][0]
 
 
+def read_number(path: Path, name: str) -> float:
+    """Read one number of an artifact without the rest; NaN where it lacks it."""
+    with opened(path) as stored:
+        return float(stored.data[name][()]) if name in stored.data else np.nan
+
+
 def check_rows(path: Path, spec: Format, names: Sequence[str]) -> None:
     """Refuse datasets of these names that break the format of an artifact, some rows at a time."""
     with opened(path, spec) as stored, patient(path):

@@ -75,6 +75,14 @@ LogsArgument = Annotated[
 ModelArgument = Annotated[
     Path, typer.Argument(metavar="MODEL", help="Made by `cpfls identify`, `extend` or `vehicle`.")
 ]
+ExportedArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="MODEL",
+        help="Made by `cpfls identify`, `extend` or `vehicle`; for .mcap and .csv a flight, prediction, replay, "
+        "disagreement, diagnosis or response.",
+    ),
+]
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Any artifact.")]
 ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT...", help="Artifacts to report on.")]
 FlightsArgument = Annotated[
@@ -208,10 +216,15 @@ class ExportFormat(StrEnum):
     C = "c"
     PYTHON = "python"
     SDF = "sdf"
+    PX4 = "px4"
+    CRAZYFLOW = "crazyflow"
+    URDF = "urdf"
     MJCF = "mjcf"
     ROTORPY = "rotorpy"
     CASADI = "casadi"
     JAX = "jax"
+    MCAP = "mcap"
+    CSV = "csv"
 
 
 class AutopilotChoice(StrEnum):
@@ -227,6 +240,9 @@ class Flown(StrEnum):
     """What an exported vehicle is flown in."""
 
     SDF = "sdf"
+    PX4 = "px4"
+    CRAZYFLOW = "crazyflow"
+    URDF = "urdf"
     MJCF = "mjcf"
     ROTORPY = "rotorpy"
     CASADI = "casadi"
@@ -678,15 +694,18 @@ def trend(
 
 @_command()
 def export(
-    model: ModelArgument,
+    model: ExportedArgument,
     output: OutputOption,
     form: Annotated[
         ExportFormat | None,
         typer.Option(
             "--format",
             help="json: every parameter, with names and units; c: C99 source and header, no dependencies; python: a "
-            "module that needs NumPy only; sdf (Gazebo), mjcf (MuJoCo), rotorpy, casadi, jax: the vehicle for a "
-            "simulator or a library; default: by the suffix of FILE (.json, .c, .py, .xml, .sdf).",
+            "module that needs NumPy only; sdf (Gazebo), px4 (its Gazebo, with the airframe), mjcf (MuJoCo), urdf "
+            "(gym-pybullet-drones, Isaac), crazyflow (and drone-models), rotorpy, casadi, jax: the vehicle for a "
+            "simulator or a library; mcap (Foxglove), csv (PlotJuggler): what a flight, prediction, replay, gap or "
+            "response holds, on the log's own clock; default: by the suffix of FILE (.json, .c, .py, .xml, .sdf, "
+            ".urdf, .toml, .mcap, .csv).",
         ),
     ] = None,
     name: Annotated[
@@ -700,10 +719,24 @@ def export(
     *,
     common: Common,
 ) -> None:
-    """Write a model as JSON, C or Python that computes on its own, or as a vehicle for a simulator or a library."""
+    """Write a model as code or for a simulator; flights, replays, gaps and others for Foxglove or PlotJuggler."""
     with messages_for_errors():
         chosen = form and form.value
         _run_without_config("export", output, common, lambda command, job: command.run(job, model, chosen, name))
+
+
+@_command()
+def spread(
+    model: Annotated[Path, typer.Argument(metavar="VEHICLE", help="Made by `cpfls vehicle`.")],
+    output: OutputOption,
+    count: Annotated[int, typer.Option("-n", "--count", metavar="N", min=2, help="Vehicles to draw.")] = 1000,
+    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Of the draws.")] = 1,
+    *,
+    common: Common,
+) -> None:
+    """Draw vehicles from what the flights of one tell, for simulators that fly many: .yaml, .json or .npz."""
+    with messages_for_errors():
+        _run_without_config("spread", output, common, lambda command, job: command.run(job, model, count, seed))
 
 
 @_command("verify-export")

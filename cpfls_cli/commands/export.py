@@ -6,13 +6,14 @@ import keyword
 import re
 import sys
 from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
-from cpfls_cli.artifacts.output import write_texts
+from cpfls_cli.artifacts.output import write_files
 from cpfls_cli.commands.vehicle_sheets import sheet_of
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.registry import FORMS, Exported, exported
@@ -21,7 +22,9 @@ from cpfls_cli.export.text import checked_identifier, identifier
 from cpfls_cli.pages.export import export_answer
 from cpfls_cli.report.outcome import Outcome
 
-ENDINGS = {form: chosen.ending for form, chosen in FORMS.items()}
+VIEWERS = {"mcap": ".mcap", "csv": ".csv"}
+"""What is drawn by other programs, which is no model."""
+ENDINGS = {form: chosen.ending for form, chosen in FORMS.items()} | VIEWERS
 # What the module imports beside the standard library: under such a name it would import itself.
 _IMPORTED = ("casadi", "jax", "numpy", "rotorpy")
 
@@ -29,6 +32,8 @@ _IMPORTED = ("casadi", "jax", "numpy", "rotorpy")
 def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     """Write a model in another form."""
     form = form or _form_of(job.output)
+    if form in VIEWERS:
+        return import_module("cpfls_cli.commands.viewers").run(job, model, form)  # type: ignore[no-any-return]
     prefix = _prefix_of(job.output, form, name)
     outputs = _outputs_of(job.output, form)
     source = take_inputs(job, {"model": model})["model"]
@@ -38,7 +43,7 @@ def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     made = exported(sheet, form, job.output.name)
     texts = dict(zip(outputs, made.texts.values(), strict=True))
     if not job.dry_run:
-        write_texts(texts)
+        write_files(texts)
     sizes = {str(path): len(text.encode()) for path, text in texts.items()}
     answer = export_answer([*sheet.told, *made.told], sheet.warnings, sizes, job.dry_run)
     return Outcome(_summary(job, form, sheet, made, sizes), tuple(answer))
@@ -76,7 +81,7 @@ def _form_of(output: Path) -> str:
     for form, ending in ENDINGS.items():
         told.setdefault(ending, form)
     endings = ", ".join(f"{ending} ({form})" for ending, form in told.items())
-    raise InputError(f"{output}: the ending tells no form; end the name in one of {endings}")
+    raise InputError(f"{output}: its suffix names no form; give the name one of the suffixes {endings}")
 
 
 def _prefix_of(output: Path, form: str, name: str | None) -> str:

@@ -11,13 +11,13 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.evidence import UncertaintyGroup
-from cpfls_cli.artifacts.flight import FlightRecord
+from cpfls_cli.artifacts.flight import CLOCK, ClockGroup, FlightRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish_parts
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.artifacts.store import count_rows, holds, read_record
+from cpfls_cli.artifacts.store import count_rows, holds, read_number, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study
@@ -70,7 +70,8 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
         if job.dry_run:
             predicted(next(iter(stretches)))
             return nothing_written(job)
-        finish_parts(job, _by_stretches(predicted, stretches, findings, job.progress), len(stretches), inputs)
+        parts = _by_stretches(predicted, stretches, findings, job.progress)
+        finish_parts(job, _on_clock(parts, stretches.begins), len(stretches), inputs)
         about = (Text(f"{stretches.name}: {warning}", "warning") for warning in stretches.warnings)
         return Outcome(findings.summary | {"contradictions": list(wrong)}, (*said, *about, *answer(findings)))
     functions = rebuilt(model, identified).fuzzy
@@ -80,7 +81,8 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
     if job.dry_run:
         return nothing_written(job)
     draws = _draws(identified.uncertainty)
-    finish_parts(job, _along(functions, draws, flown, torque, findings, job.progress), len(flown), inputs)
+    parts = _along(functions, draws, flown, torque, findings, job.progress)
+    finish_parts(job, _on_clock(parts, read_number(flight, CLOCK)), len(flown), inputs)
     others = (*model_of_another(model, job.study), *other_vehicles([flight], job.study))
     notes = (*unjudged(identified, model), *(Text(note, "warning") for note in others))
     return Outcome(findings.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(findings, identified)))
@@ -91,6 +93,12 @@ def _draws(drawn: UncertaintyGroup | None) -> Draws | None:
     if drawn is None:
         return None
     return Draws(drawn.coefficients, drawn.rigid_body, drawn.best_rigid_body, drawn.blocks, drawn.block_duration)
+
+
+def _on_clock(parts: Iterator[PredictionRecord], begins: float) -> Iterator[PredictionRecord]:
+    """Keep the stamp of the log's own clock at time 0, s."""
+    clock = ClockGroup.of(begins)
+    return (replace(part, clock=clock) for part in parts)
 
 
 def _along(

@@ -97,17 +97,28 @@ def select_columns(columns: Mapping[str, Array], settings: ImportSettings) -> tu
         and the nearest columns of the log.
     """
     _require_present(columns, settings)
-    stamps = columns[str(settings.time_column)]
-    time: Array = to_si(np.asarray(stamps, dtype=float), settings.time_unit)
+    stamps = np.asarray(columns[str(settings.time_column)], dtype=float)
+    # In their own unit first: a date in s has few digits left for its fractions.
+    time: Array = to_si(stamps - _first(stamps, settings), settings.time_unit)
     for name, signal in settings.signals.items():
         unlike = next((size for column in signal.columns if (size := len(columns[column])) != len(time)), None)
         if unlike is not None:
             raise InputError(f"import.signals.{name}.columns: {unlike} values for {len(time)} time stamps")
     signals: dict[str, Array] = {name: _in_si(columns, signal) for name, signal in settings.signals.items()}
-    finite = time[np.isfinite(time)]
+    return time, signals
+
+
+def first_stamp(columns: Mapping[str, Array], settings: ImportSettings) -> float:
+    """Give the stamp, s, that the times of `select_columns` are counted from."""
+    stamps = np.asarray(columns[str(settings.time_column)], dtype=float)
+    return float(to_si(np.array(_first(stamps, settings)), settings.time_unit))
+
+
+def _first(stamps: Array, settings: ImportSettings) -> float:
+    finite = stamps[np.isfinite(stamps)]
     if len(finite) < 2:
         raise InputError(f"import.time_column: {settings.time_column!r} holds fewer than two time stamps")
-    return time - finite[0], signals
+    return float(finite[0])
 
 
 def _in_si(columns: Mapping[str, Array], signal: SignalMap) -> Array:

@@ -15,6 +15,7 @@ from cpfls_cli.flightlog.bandwidth import cut_offs, slow_signals, warn_of_cut_of
 from cpfls_cli.flightlog.clock import longest_stretch
 from cpfls_cli.flightlog.conversion import (
     drop_absent_signals,
+    first_stamp,
     select_columns,
     setpoints_to_program_frames,
     to_program_frames,
@@ -146,6 +147,7 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
         gaps=int((steps > 1.5 * np.median(steps)).sum()),
         longest_gap_s=float(steps.max()),
         span_s=(float(clock[0]), float(clock[-1])),
+        first_stamp_s=first_stamp(columns, mapped),
         crop_s=crop,
         log_rate_hz=rate_hz,
         rate_hz=rate_hz,

@@ -68,6 +68,8 @@ class ImportReport:
         Longest step between time stamps in the part that is kept, s.
     span_s : tuple of float
         Begin and end of what is kept, s from the log's first time stamp.
+    first_stamp_s : float
+        That stamp on the log's own clock, s.
     crop_s : tuple of float or None
         Begin and end of the crop, as asked for or found; None without one.
     log_rate_hz, rate_hz : float
@@ -94,6 +96,7 @@ class ImportReport:
     gaps: int
     longest_gap_s: float
     span_s: tuple[float, float]
+    first_stamp_s: float = 0.0
     crop_s: tuple[float, float] | None = None
     log_rate_hz: float
     rate_hz: float

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.flight import MOTION, FlightRecord
+from cpfls_cli.artifacts.flight import CLOCK, MOTION, FlightRecord
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.artifacts.store import check_rows, count_rows, read_header, read_record, read_rows
+from cpfls_cli.artifacts.store import check_rows, count_rows, read_header, read_number, read_record, read_rows
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import ENOUGH
@@ -163,6 +163,8 @@ class FlightStretches:
         Voltage of the full battery, V; 0 where the flight states a share.
     warnings : tuple of str
     study : Study
+    begins : float
+        Stamp of the log's own clock at time 0, s; NaN where there is none.
     """
 
     name: str
@@ -173,6 +175,7 @@ class FlightStretches:
     full: float
     warnings: tuple[str, ...]
     study: Study
+    begins: float
 
     def __len__(self) -> int:
         """Count the samples."""
@@ -198,7 +201,8 @@ def flight_stretches(path: Path, study: Study) -> FlightStretches:
         flight = read_flight(path, study)
         rows, samples = partial(_rows_of, flight.signals), len(flight.signals["time"])
     else:
-        flight = ReadFlight(path.name, {}, units_of(path, read_header(path), study), ())
+        units = units_of(path, read_header(path), study)
+        flight = ReadFlight(path.name, {}, units, (), begins=read_number(path, CLOCK))
         spec = FlightRecord.spec()
         names = [name for name in FlightRecord.signal_names() if count_rows(path, spec, name) is not None]
         check_rows(path, spec, names)
@@ -217,7 +221,8 @@ def flight_stretches(path: Path, study: Study) -> FlightStretches:
     doubts = doubts_on_voltage({"voltage": battery}, flight.units)
     notes = (*notes, *doubts, *([full_battery(full)] if full and not doubts else []))
     overlap = round(_OVERLAP_S / max(float(np.median(np.diff(clock[best], append=np.inf))), 1e-6))
-    return FlightStretches(path.name, rows, flight.units, best, overlap, full, (*flight.warnings, *notes), study)
+    about = ((*flight.warnings, *notes), study, flight.begins)
+    return FlightStretches(path.name, rows, flight.units, best, overlap, full, *about)
 
 
 def check_file(path: Path, study: Study, *, driven: bool = False) -> tuple[Finding, ...]:

@@ -43,7 +43,10 @@ def imported(log: Path, study: Study) -> ImportedFlight:
             delay_share=study.identification.training_share,
         )
     warnings = (*flight.report.warnings, *read.warnings)
-    return replace(flight, report=replace(flight.report, warnings=warnings, flown_at=read.flown_at))
+    first = read.begins + flight.report.first_stamp_s
+    return replace(
+        flight, report=replace(flight.report, warnings=warnings, flown_at=read.flown_at, first_stamp_s=first)
+    )
 
 
 @contextmanager

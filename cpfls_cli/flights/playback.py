@@ -131,7 +131,9 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
     shares = actuation == "rotor_command" and flight.units.get(actuation) == "1"
     updated = flight.updated_hz.get(actuation)
     about = (words[actuation], named, wrong)
-    return LoggedFlight(flight.name, parts, hold or usual, *about, shares=shares, updated_hz=updated)
+    return LoggedFlight(
+        flight.name, parts, hold or usual, *about, shares=shares, updated_hz=updated, begins=flight.begins
+    )
 
 
 def _known(flight: ReadFlight, actuation: str, part: slice) -> dict[str, Array]:

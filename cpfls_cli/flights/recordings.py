@@ -66,6 +66,8 @@ class ReadFlight:
         When the log begins, s since 1970 began (UTC); NaN where it does not tell, and of an artifact.
     updated_hz : mapping of str to float
         Updates a second of signals that its log has more rows than.
+    begins : float
+        Stamp of the log's own clock at time 0, s; NaN where there is none.
     """
 
     name: str
@@ -74,6 +76,7 @@ class ReadFlight:
     warnings: tuple[str, ...]
     flown_at: float = nan
     updated_hz: Mapping[str, float] = field(default_factory=dict)
+    begins: float = nan
 
 
 def read_flights(paths: Sequence[Path], study: Study) -> Recordings:
@@ -102,7 +105,8 @@ def read_flight(path: Path, study: Study) -> ReadFlight:
         return read_import(path.name, [imported(path, study)], study)
     record = read_record(path, FlightRecord)
     updated = {} if record.quality is None else record.quality.updated_hz
-    return ReadFlight(path.name, record.signals, units_of(path, record.origin, study), (), updated_hz=updated)
+    units = units_of(path, record.origin, study)
+    return ReadFlight(path.name, record.signals, units, (), updated_hz=updated, begins=record.begins)
 
 
 def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> ReadFlight:
@@ -115,12 +119,14 @@ def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> Rea
     signals = [FlightRecord.of_import(part, {}).signals for part in parts]
     if len(parts) == 1:
         notes = (*done, *first.report.warnings)
-        return ReadFlight(name, signals[0], _units(study), notes, first.report.flown_at, updated)
+        begins = first.report.first_stamp_s + first.report.span_s[0]
+        return ReadFlight(name, signals[0], _units(study), notes, first.report.flown_at, updated, begins)
     shared = [each for each in signals[0] if all(each in own for own in signals)]
     for own, part in zip(signals, parts, strict=True):
         own["time"] = own["time"] + part.report.span_s[0]
     joined = {each: np.concatenate([own[each] for own in signals]) for each in shared}
-    return ReadFlight(name, joined, _units(study), (), first.report.flown_at, updated)
+    begins = first.report.first_stamp_s
+    return ReadFlight(name, joined, _units(study), (), first.report.flown_at, updated, begins)
 
 
 def _require_speeds(log: str, part: ImportedFlight, study: Study) -> None:
@@ -156,7 +162,7 @@ def _recording(flight: ReadFlight, study: Study) -> tuple[Recording, tuple[str, 
     signals, notes = signals_of(flight, known, study)
     if signals.rotor_speed is not None:
         require_rotors(study)
-    return Recording(flight.name, signals), (*warnings, *notes, *doubts_on_voltage(known, flight.units))
+    return Recording(flight.name, signals, flight.begins), (*warnings, *notes, *doubts_on_voltage(known, flight.units))
 
 
 def require_rotors(study: Study) -> None:
@@ -385,8 +391,8 @@ def _thirds(flight: Recording, settings: GapSettings) -> FlightSplit:
     # A flight whose windows are refused as a whole is refused for another reason than its length.
     common_windows([flight], settings)
     cut = 2 * len(flight.signals) // 3
-    training = Recording(f"{flight.name} (first two thirds)", stretch_of(flight.signals, slice(0, cut)))
-    last = Recording(f"{flight.name} (last third)", stretch_of(flight.signals, slice(cut, None)))
+    training = Recording(f"{flight.name} (first two thirds)", stretch_of(flight.signals, slice(0, cut)), flight.begins)
+    last = Recording(f"{flight.name} (last third)", stretch_of(flight.signals, slice(cut, None)), flight.begins)
     try:
         common_windows([training, last], settings)
     except InputError as error:

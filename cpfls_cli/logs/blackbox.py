@@ -43,9 +43,8 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     # Lines that are not about the log itself.
     stated = {key: value for key, value in header.items() if not re.match(r"Product|Data version|Field|[IP] ", key)}
     parameters = {key: float(own) if re.fullmatch(r"-?\d+(\.\d+)?", own) else own for key, own in stated.items()}
-    return LogContents(
-        {"": columns}, units, parameters, header.get("Firmware revision", ""), warnings, _flown_at(header)
-    )
+    system, first = header.get("Firmware revision", ""), {"": 1e-6 * float(rows[0, 1])}
+    return LogContents({"": columns}, units, parameters, system, warnings, _flown_at(header), first)
 
 
 def _flown_at(header: Mapping[str, str]) -> float:

@@ -51,8 +51,9 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         }
         for name, samples in tables.items()
     }
+    begins = {"": origin / _STAMPS[version][1]}
     broken = "the checksum is wrong: the file is cut off or damaged; what could be read is used"
-    return LogContents(topics, system="Crazyflie uSD", warnings=() if whole else (broken,))
+    return LogContents(topics, system="Crazyflie uSD", warnings=() if whole else (broken,), begins=begins)
 
 
 def _header(content: bytes) -> tuple[int, dict[int, _Event], int]:

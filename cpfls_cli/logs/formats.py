@@ -50,6 +50,9 @@ class LogContents:
         Faults of the file as a whole.
     flown_at : float
         When it begins, s since 1970 began (UTC); NaN where the log does not tell.
+    begins : dict from column to float
+        Stamp on the log's own clock, s, at 0 of a column of stamps that the reader has made to begin there; an empty
+        name is that of all stamps.
     """
 
     topics: dict[str, dict[str, "Array"]]
@@ -58,6 +61,7 @@ class LogContents:
     system: str = ""
     warnings: tuple[str, ...] = ()
     flown_at: float = nan
+    begins: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -70,12 +74,15 @@ class LogColumns:
         The mapped ones; the others by name only, as empty arrays, so that a message can suggest them.
     settings : ImportSettings
         The section `import` as it suits the log: of columns that stand in for each other, those that the log has.
+    begins : float
+        Stamp on the log's own clock at 0 of the column that is the clock, s.
     """
 
     columns: dict[str, "Array"]
     settings: "ImportSettings"
     warnings: tuple[str, ...] = ()
     flown_at: float = nan
+    begins: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,7 +204,8 @@ def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
         columns, chosen, warnings = on_one_clock(contents.topics, contents.units, settings)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    return LogColumns(columns, chosen, (*contents.warnings, *warnings), contents.flown_at)
+    begins = contents.begins.get(str(chosen.time_column), contents.begins.get("", 0.0))
+    return LogColumns(columns, chosen, (*contents.warnings, *warnings), contents.flown_at, begins)
 
 
 def _format_of(path: Path) -> LogFormat | None:

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow
 from pyarrow import parquet
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import most_held
 from cpfls_cli.logs.formats import LogContents, some
@@ -49,7 +49,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         columns[name] = _numbers_of_column(path, name, table.column(name))
     warnings = (f"columns that hold no numbers are left out: {some(left_out)}",) if left_out else ()
     units = {name: "s" for name in set(columns) & set(kept) if _states_unit(schema.field(name).type)}
-    return LogContents({"": columns}, units, warnings=warnings)
+    return LogContents({"": columns}, units, warnings=warnings, begins={name: _begins(table, name) for name in units})
 
 
 def _numbers_of_column(path: Path, name: str, column: Any) -> Array:
@@ -81,11 +81,20 @@ def _states_unit(kind: Any) -> bool:
 
 def _seconds(column: Any) -> Array:
     """Convert stamps, whole numbers of their unit, to seconds from the first one; their difference is exact."""
-    per_second = _PER_SECOND[column.type.unit]
-    whole = pyarrow.int32() if pyarrow.types.is_time32(column.type) else pyarrow.int64()
-    stamps = column.cast(whole).cast(pyarrow.int64())
-    known = np.asarray(column.is_valid().to_numpy(), dtype=bool)
-    numbers = stamps.fill_null(0).to_numpy()
+    numbers, known = _stamps(column)
     if not known.any():
         return np.full(len(numbers), np.nan)
-    return np.where(known, (numbers - numbers[known][0]) / per_second, np.nan)
+    return np.where(known, (numbers - numbers[known][0]) / _PER_SECOND[column.type.unit], np.nan)
+
+
+def _begins(table: Any, name: str) -> float:
+    """Give the first stamp of a column, s."""
+    numbers, known = _stamps(table.column(name))
+    return float(numbers[known][0]) / _PER_SECOND[table.column(name).type.unit] if known.any() else 0.0
+
+
+def _stamps(column: Any) -> tuple[IntArray, BoolArray]:
+    """Give stamps as whole numbers of their unit, 0 where there is none, and where there is one."""
+    whole = pyarrow.int32() if pyarrow.types.is_time32(column.type) else pyarrow.int64()
+    numbers = column.cast(whole).cast(pyarrow.int64()).fill_null(0).to_numpy()
+    return numbers, np.asarray(column.is_valid().to_numpy(), dtype=bool)

@@ -82,8 +82,9 @@ def _read(path: Path, reader: Reader, wanted: set[str] | None) -> LogContents:
         f"these topics do not use the recorder's clock and are shifted by the median offset: {', '.join(shifted)}",
     )
     present = [warning for warning, causes in zip(warnings, (unknown, shifted), strict=True) if causes]
+    begins = reader.start_time / _NANOSECOND
     return LogContents(
-        topics, units, system="ROS 2", warnings=tuple(present), flown_at=date(reader.start_time / _NANOSECOND)
+        topics, units, system="ROS 2", warnings=tuple(present), flown_at=date(begins), begins={"": begins}
     )
 
 

@@ -37,10 +37,11 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     }
     if not topics:
         raise InputError(f"{path}: a ULog file without samples: was the logger stopped at once, or the file cut off?")
+    begins = {"": origin / _PER_SECOND}
     # As the log begins; in a broken one some parameters are no numbers.
     known = log.initial_parameters.items()
     parameters: dict[str, float | str] = {name: float(own) for name, own in known if isinstance(own, int | float)}
-    return LogContents(topics, {}, parameters, _system(log), _warn_of_file(log, origin), _flown_at(topics))
+    return LogContents(topics, {}, parameters, _system(log), _warn_of_file(log, origin), _flown_at(topics), begins)
 
 
 def _parsed(path: Path) -> Any:

@@ -125,6 +125,8 @@ class LoggedFlight:
         Whether its commands are shares of the full speed of the rotors.
     updated_hz : float or None
         How often the log tells what drives the playback; None where that is as often as there are samples.
+    begins : float
+        Stamp of the log's own clock at time 0, s; NaN where there is none.
     """
 
     name: str
@@ -136,6 +138,7 @@ class LoggedFlight:
     group: str = ""
     shares: bool = False
     updated_hz: float | None = None
+    begins: float = np.nan
 
     @property
     def told_hz(self) -> float:

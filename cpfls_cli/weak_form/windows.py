@@ -114,10 +114,11 @@ def windows(period: float, window_s: float, overlap: float) -> Windows:
 
 @dataclass(frozen=True)
 class Recording:
-    """A flight and its name."""
+    """A flight and its name, and the stamp of its log's own clock at time 0, s; NaN where there is none."""
 
     name: str
     signals: Signals
+    begins: float = np.nan
 
 
 class WindowSettings(Protocol):

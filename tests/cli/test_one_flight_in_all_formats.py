@@ -102,6 +102,13 @@ WRITERS = {
     "log.hdf5": (arrays(hdf5), "t", INDEXED),
     "log.mat": (arrays(scipy.io.savemat), "t", INDEXED),
 }
+BEGINS = {
+    "log.ulg": 1e-6 * ulogs.BEGIN,
+    "log.bin": 9e-6,
+    "log.db3": 1e-9 * ros_bags.BEGIN_NS,
+    "log.mcap": 1e-9 * ros_bags.BEGIN_NS,
+}
+"""Stamps with which logs begin that do not begin at 0, s."""
 # Whole numbers and no attitude: a format of its own in tests/unit/logs.
 ELSEWHERE = {".bbl", ".bfl"}
 
@@ -126,6 +133,8 @@ def test_the_same_flight_comes_back(cpfls, tmp_path, name):
     with h5py.File(tmp_path / "flight.h5") as file:
         assert len(file["time"]) == len(TIME)
         np.testing.assert_allclose(file["time"], TIME, atol=1e-8)
+        # A date in s is known to a quarter of a microsecond.
+        assert float(file["clock/begins"][()]) == pytest.approx(BEGINS.get(name, 0.0), abs=5e-7, rel=0)
         for signal, values in SIGNALS.items():
             # Most logs keep seven digits.
             np.testing.assert_allclose(file[signal], values, atol=1e-6, err_msg=signal)

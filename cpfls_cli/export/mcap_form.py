@@ -1,0 +1,228 @@
+"""A view as MCAP, for Foxglove and PlotJuggler: JSON messages with a schema for each channel, on the log's clock."""
+
+from __future__ import annotations
+
+import heapq
+import io
+import json
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.errors import InputError, install_command
+from cpfls_cli.export.tracks import BODY_FRAME, WORLD_FRAME, Curve, Pose, Track, View
+
+_NUMBER, _TEXT = {"type": "number"}, {"type": "string"}
+_DIGITS = 9
+
+
+def _object(title: str, properties: Mapping[str, Any], description: str = "") -> dict[str, Any]:
+    told = {"description": description} if description else {}
+    return {"type": "object", "title": title, **told, "properties": dict(properties)}
+
+
+def _whole(title: str, properties: Mapping[str, Any]) -> dict[str, Any]:
+    """Describe an object that has all of its properties, as those do that Foxglove knows by their titles."""
+    return {**_object(title, properties), "required": list(properties)}
+
+
+_TIMESTAMP = {
+    "type": "object",
+    "title": "time",
+    "properties": {"sec": {"type": "integer", "minimum": 0}, "nsec": {"type": "integer", "minimum": 0}},
+}
+_VECTOR = _whole("foxglove.Vector3", dict.fromkeys("xyz", _NUMBER))
+_QUATERNION = _whole("foxglove.Quaternion", dict.fromkeys("xyzw", _NUMBER))
+_POSE_IN_FRAME = _whole(
+    "foxglove.PoseInFrame",
+    {
+        "timestamp": _TIMESTAMP,
+        "frame_id": _TEXT,
+        "pose": _whole("foxglove.Pose", {"position": _VECTOR, "orientation": _QUATERNION}),
+    },
+)
+_FRAME_TRANSFORM = _whole(
+    "foxglove.FrameTransform",
+    {
+        "timestamp": _TIMESTAMP,
+        "parent_frame_id": _TEXT,
+        "child_frame_id": _TEXT,
+        "translation": _VECTOR,
+        "rotation": _QUATERNION,
+    },
+)
+
+
+def mcap_bytes(view: View) -> bytes:
+    """Write a view as MCAP.
+
+    Raises
+    ------
+    InputError
+        If the package is missing, or a stamp is before 0, which MCAP has no number for.
+    """
+    try:
+        writer_of = import_module("mcap.writer").Writer
+    except ImportError:
+        raise InputError(f"--format mcap needs the package mcap; {install_command('mcap')}") from None
+    _refuse_negative(view)
+    stream = io.BytesIO()
+    writer = writer_of(stream)
+    writer.start(profile="", library="cpfls")
+    writer.add_metadata("cpfls", {"title": view.title, **view.about})
+    first = min((int(_nanoseconds(track.time[:1])[0]) for track in view.tracks), default=0)
+    channels = [
+        *(_Channel.of_track(writer, track) for track in view.tracks),
+        *(_Channel.of_curve(writer, curve, first) for curve in view.curves),
+        *(channel for pose in view.poses for channel in _Channel.of_pose(writer, pose)),
+    ]
+    counts = dict.fromkeys((channel.number for channel in channels), 0)
+    for stamp, number, message in heapq.merge(*(channel.messages for channel in channels), key=lambda own: own[:2]):
+        writer.add_message(
+            channel_id=number,
+            log_time=stamp,
+            publish_time=stamp,
+            sequence=counts[number],
+            data=json.dumps(message, allow_nan=False, separators=(",", ":")).encode(),
+        )
+        counts[number] += 1
+    writer.finish()
+    return stream.getvalue()
+
+
+class _Channel:
+    """A channel of the file and its messages in time: stamp in ns, number of the channel, what it says."""
+
+    def __init__(self, writer: Any, topic: str, schema: Mapping[str, Any], about: Mapping[str, str]) -> None:
+        number = writer.register_schema(
+            name=schema["title"], encoding="jsonschema", data=json.dumps(schema, sort_keys=True).encode()
+        )
+        self.number: int = writer.register_channel(
+            topic=topic, message_encoding="json", schema_id=number, metadata=dict(about)
+        )
+        self.messages: Iterator[tuple[int, int, dict[str, Any]]] = iter(())
+
+    @classmethod
+    def of_track(cls, writer: Any, track: Track) -> _Channel:
+        """Give a message for each sample, by axis and what it is."""
+        about = {"unit": track.unit, "frame": track.frame, "description": track.description}
+        told = ", ".join(part for part in (track.description, track.unit, track.frame) if part)
+        columns = list(track.columns)
+        by_axis: dict[str, dict[str, Any]] = {}
+        for what, axis, _ in columns:
+            by_axis.setdefault(axis, {})[what] = _NUMBER
+        properties = by_axis[""] if set(by_axis) == {""} else {a: _object(a, own) for a, own in by_axis.items()}
+        schema = _object(f"cpfls.{track.name.replace('/', '.')}", properties, told)
+        channel = cls(writer, f"/{track.path}", schema, about)
+        channel.messages = channel._of_samples(track, columns)
+        return channel
+
+    def _of_samples(
+        self, track: Track, columns: list[tuple[str, str, Array]]
+    ) -> Iterator[tuple[int, int, dict[str, Any]]]:
+        stamps = _nanoseconds(track.time).tolist()
+        names = [(what, axis) for what, axis, _ in columns]
+        for stamp, row in zip(stamps, zip(*(_rounded(values) for _, _, values in columns), strict=True), strict=True):
+            message: dict[str, Any] = {}
+            for (what, axis), value in zip(names, row, strict=True):
+                if value is not None:
+                    (message.setdefault(axis, {}) if axis else message)[what] = value
+            if message:
+                yield stamp, self.number, message
+
+    @classmethod
+    def of_curve(cls, writer: Any, curve: Curve, stamp: int) -> _Channel:
+        """Give one message with all points."""
+        known = {name: values for name, values in curve.values.items() if np.isfinite(values).any()}
+        whole = np.isfinite(np.column_stack([curve.x, *known.values()])).all(axis=1)
+        points = {curve.over: curve.x[whole], **{name: values[whole] for name, values in known.items()}}
+        listed = {"type": "array", "items": _NUMBER}
+        schema = _object(f"cpfls.{curve.name}", dict.fromkeys(points, listed), curve.description)
+        channel = cls(writer, f"/curves/{curve.name}", schema, {"description": curve.description, "over": curve.over})
+        channel.messages = iter([(stamp, channel.number, {name: _rounded(own) for name, own in points.items()})])
+        return channel
+
+    @classmethod
+    def of_pose(cls, writer: Any, pose: Pose) -> list[_Channel]:
+        """Give a pose, and the same as the way from one frame to the other, as panels in space want it."""
+        about = {"unit": "m, quaternion", "frame": WORLD_FRAME}
+        known = np.isfinite(pose.attitude).all(axis=1)
+        stamps = _nanoseconds(pose.time[known]).tolist()
+        places, turned = np.nan_to_num(pose.position[known]).tolist(), _quaternions(pose.attitude[known]).tolist()
+        samples = [
+            (stamp, dict(zip("xyz", place, strict=True)), dict(zip("xyzw", turn, strict=True)))
+            for stamp, place, turn in zip(stamps, places, turned, strict=True)
+        ]
+        topic = "/pose" if pose.child == BODY_FRAME else f"/pose/{pose.child}"
+        posed = cls(writer, topic, _POSE_IN_FRAME, about)
+        posed.messages = iter(
+            [
+                (
+                    stamp,
+                    posed.number,
+                    {
+                        "timestamp": _timestamp(stamp),
+                        "frame_id": WORLD_FRAME,
+                        "pose": {"position": place, "orientation": turn},
+                    },
+                )
+                for stamp, place, turn in samples
+            ]
+        )
+        moved = cls(writer, f"/tf/{pose.child}", _FRAME_TRANSFORM, about)
+        moved.messages = iter(
+            [
+                (
+                    stamp,
+                    moved.number,
+                    {
+                        "timestamp": _timestamp(stamp),
+                        "parent_frame_id": WORLD_FRAME,
+                        "child_frame_id": pose.child,
+                        "translation": place,
+                        "rotation": turn,
+                    },
+                )
+                for stamp, place, turn in samples
+            ]
+        )
+        return [posed, moved]
+
+
+def _refuse_negative(view: View) -> None:
+    first = min((float(track.time[0]) for track in view.tracks if len(track.time)), default=0.0)
+    if first < 0:
+        raise InputError(
+            f"{view.title}: the clock of its log begins at {first:.6g} s, and MCAP has no stamps before 0; export it "
+            "as .csv"
+        )
+
+
+def _nanoseconds(time: Array) -> IntArray:
+    """Give stamps in ns; the whole seconds apart, so that none of their digits is lost."""
+    whole = np.floor(time)
+    return np.asarray(whole.astype(np.int64) * 10**9 + np.rint((time - whole) * 1e9).astype(np.int64))
+
+
+def _timestamp(stamp: int) -> dict[str, int]:
+    return {"sec": stamp // 10**9, "nsec": stamp % 10**9}
+
+
+def _rounded(values: Array) -> list[float | None]:
+    return [float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else None for value in values.tolist()]
+
+
+def _quaternions(attitude: Array) -> Array:
+    """Turn roll, pitch, yaw, shape (time, 3), rad, into quaternions x, y, z, w from body to world."""
+    roll, pitch, yaw = 0.5 * attitude.T
+    (cr, cp, cy), (sr, sp, sy) = (function(np.stack([roll, pitch, yaw])) for function in (np.cos, np.sin))
+    parts = (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+    return np.stack(parts, axis=1)

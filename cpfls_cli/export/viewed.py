@@ -1,0 +1,328 @@
+"""What is to be drawn of each kind of artifact: its quantities over the clock of the log, measured and of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
+from cpfls_cli.artifacts.disagreement import DisagreementRecord
+from cpfls_cli.artifacts.flight import FlightRecord
+from cpfls_cli.artifacts.gap_flights import FlightsGroup
+from cpfls_cli.artifacts.prediction import PredictionRecord
+from cpfls_cli.artifacts.replay import ReplayRecord
+from cpfls_cli.artifacts.response import ResponseRecord
+from cpfls_cli.artifacts.spec import BODY, EULER, DatasetSpec, Record
+from cpfls_cli.config.load import stored_study
+from cpfls_cli.config.study import Study
+from cpfls_cli.errors import InputError
+from cpfls_cli.export.tracks import (
+    ANGLES,
+    AXES,
+    BODY_FRAME,
+    DIFFERENCE,
+    MEASURED,
+    MODEL,
+    SETPOINT,
+    Curve,
+    Pose,
+    Track,
+    View,
+)
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
+from cpfls_cli.units import known_unit
+
+_ASKED = "setpoint_"
+_OF_CONFIG = ("rotor_command", "voltage", "setpoint_thrust")
+"""Signals whose unit is that of the import."""
+
+
+def view_of(path: Path, record: Record) -> View:
+    """Gather what is to be drawn of an artifact.
+
+    Raises
+    ------
+    InputError
+        If there is nothing.
+    """
+    study = stored_study(record.origin.config, path)
+    for kind, made in _KINDS.items():
+        if isinstance(record, kind):
+            return made(path.name, record, study)
+    *others, last = (kind.FORMAT.name for kind in _KINDS)
+    raise InputError(
+        f"{path}: is a {record.FORMAT.name}, which holds nothing over time; .mcap and .csv take {', '.join(others)} "
+        f"and {last}"
+    )
+
+
+def _stamps(study: Study) -> tuple[str, float] | None:
+    """Name the column of the log that holds its stamps, where they are in another unit than s."""
+    name, unit = study.import_.time_column, study.import_.time_unit
+    return None if name is None or unit == "s" or "." in name else (name, known_unit(unit).factor)
+
+
+def _log_time(time: Array, begins: float) -> Array:
+    return np.asarray(time + begins if np.isfinite(begins) else time)
+
+
+def _axes(spec: DatasetSpec, values: Array) -> tuple[str, ...]:
+    if values.ndim == 1:
+        return ()
+    if values.shape[1] == len(AXES) and spec.dimensions[1:] == ("axis",):
+        return ANGLES if spec.frame == EULER else AXES
+    return tuple(str(number + 1) for number in range(values.shape[1]))
+
+
+def _signals(
+    flight: str, time: Array, signals: Mapping[str, Array], specs: Mapping[str, DatasetSpec], units: Mapping[str, str]
+) -> Iterator[Track]:
+    """Put each setpoint beside what it is a setpoint of, where both have one unit."""
+    for name, values in signals.items():
+        own = name.removeprefix(_ASKED)
+        unit = units.get(name, specs[name].units)
+        if own != name and own in signals and units.get(own, specs[own].units) == unit:
+            continue
+        asked = signals.get(_ASKED + own)
+        beside = own == name and asked is not None and units.get(_ASKED + own, specs[_ASKED + own].units) == unit
+        held = {SETPOINT if own != name else MEASURED: values}
+        if beside and asked is not None:
+            held[SETPOINT] = asked.reshape(values.shape)
+        spec = specs[name]
+        yield Track(
+            name=own,
+            time=time,
+            values=held,
+            unit=unit,
+            frame=spec.frame,
+            description=spec.description,
+            flight=flight,
+            axes=_axes(spec, values),
+        )
+
+
+def _units_of(study: Study, *, imported: bool) -> dict[str, str]:
+    """Give the units that only the import knows."""
+    if not imported:
+        return {"rotor_command": "rad/s"}
+    return {name: own.unit for name, own in study.import_.signals.items() if name in _OF_CONFIG}
+
+
+def _pose(child: str, time: Array, attitude: Array | None, position: Array | None) -> list[Pose]:
+    if attitude is None:
+        return []
+    return [Pose(child, time, np.full_like(attitude, np.nan) if position is None else position, attitude)]
+
+
+def _of_flight(title: str, record: FlightRecord, study: Study) -> View:
+    time = _log_time(record.time, record.begins)
+    specs = {spec.path: spec for spec in record.spec().datasets}
+    signals = {name: values for name, values in record.signals.items() if name != "time"}
+    units = _units_of(study, imported="log" in record.origin.inputs)
+    return View(
+        title,
+        tuple(_signals("", time, signals, specs, units)),
+        poses=_pose(BODY_FRAME, time, record.attitude, record.position),
+        stamps=_stamps(study),
+        on_log_clock=record.clock is not None,
+    )
+
+
+def _of_prediction(title: str, record: PredictionRecord, study: Study) -> View:
+    begins = np.nan if record.clock is None else record.clock.begins
+    time = _log_time(record.time, begins)
+    force = None if record.force is None or record.measured_force is None else record.measured_force - record.force
+    held: dict[str, dict[str, Array | None]] = {
+        "torque": {
+            MEASURED: record.measured_torque,
+            MODEL: record.torque,
+            DIFFERENCE: record.error,
+            "low": record.torque_low,
+            "high": record.torque_high,
+        },
+        "body_torque": {MODEL: record.body_torque},
+        "force": {MEASURED: record.measured_force, MODEL: record.force, DIFFERENCE: force},
+        "attitude": {MEASURED: record.attitude},
+        "outside": {MODEL: record.outside.astype(float)},
+    }
+    tracks = []
+    for name, values in held.items():
+        known = {what: own for what, own in values.items() if own is not None}
+        spec = record.spec().dataset(name)
+        if known and spec is not None:
+            axes = _axes(spec, next(iter(known.values())))
+            about = {"unit": spec.units, "frame": spec.frame, "description": spec.description}
+            tracks.append(Track(name=name, time=time, values=known, axes=axes, **about))
+    return View(title, tracks, stamps=_stamps(study), on_log_clock=record.clock is not None)
+
+
+def _of_replay(title: str, record: ReplayRecord, study: Study) -> View:
+    begins = np.full(len(record.flown), np.nan) if record.flight.begins is None else record.flight.begins
+    several = len(record.flown) > 1
+    period = float(record.horizon_s[0])
+
+    def run(name: str, windows: IntArray, values: Mapping[str, Array | None], unit: str, about: str) -> Iterator[Track]:
+        """Put runs one after another; the last sample of a run is the first one of the next."""
+        known = {what: own[:, :-1].reshape(-1, own.shape[2]) for what, own in values.items() if own is not None}
+        if len(known) < len(values):
+            return
+        flight = int(record.window.flight[windows[0]])
+        times = record.window.start[windows][:, None] + period * np.arange(len(record.horizon_s))
+        order = np.argsort(times.ravel(), kind="stable")
+        time = _log_time(times.ravel()[order], float(begins[flight]))
+        yield Track(
+            name=name,
+            time=time,
+            values={what: own[order] for what, own in known.items()} | {DIFFERENCE: _less(known)[order]},
+            unit=unit,
+            frame=BODY if unit == "rad/s" else "world (z up)",
+            description=about,
+            flight=_short(record.flown[flight]) if several else "",
+            axes=AXES,
+        )
+
+    drawn, worst = record.drawn, record.worst
+    told = "runs of the model one after another, each from a measured state"
+    tracks = list(run("body_rate", drawn.window, {MEASURED: drawn.measured, MODEL: drawn.model}, "rad/s", told))
+    positions = {MEASURED: drawn.measured_position, MODEL: drawn.model_position}
+    tracks += run("position", drawn.window, positions, "m", told)
+    for index in range(len(worst.window)):
+        own, rates = slice(index, index + 1), f"the run in which the model is off most, number {index + 1}"
+        pair = {MEASURED: worst.measured[own], MODEL: worst.model[own]}
+        tracks += run(f"worst_{index + 1}/body_rate", worst.window[own], pair, "rad/s", rates)
+    for flight, name in enumerate(record.flown):
+        at = np.flatnonzero(record.window.flight == flight)
+        tracks.append(
+            Track(
+                name="error_from_here",
+                time=_log_time(record.window.start[at], float(begins[flight])),
+                values={each: record.window.error[row, at] for row, each in enumerate(record.prediction)},
+                unit="rad/s",
+                frame=BODY,
+                description="mean norm of the error of the body rate over the horizon of a run that begins here",
+                flight=_short(name) if several else "",
+            )
+        )
+    curves = [
+        Curve(
+            name=f"error_{signal}",
+            over="horizon_s",
+            x=record.horizon_s,
+            values=dict(zip(record.prediction, errors.mae, strict=True)),
+            description=f"mean error of {signal} by horizon, SI",
+        )
+        for signal, errors in record.errors.items()
+        if errors is not None
+    ]
+    return View(title, tracks, curves, stamps=_stamps(study), on_log_clock=record.flight.begins is not None)
+
+
+def _less(known: Mapping[str, Array]) -> Array:
+    return np.asarray(known[MEASURED] - known[MODEL])
+
+
+def _short(name: str) -> str:
+    """Name a flight by its file without ending, in one word."""
+    stem, _, part = name.partition(" (")
+    return Path(stem).stem + (f"_{part.rstrip(')').replace(' ', '_')}" if part else "")
+
+
+def _of_flights(
+    flights: FlightsGroup, record: Record
+) -> Iterator[tuple[str, float, dict[str, Array], Array, dict[str, DatasetSpec]]]:
+    """List the flights of a comparison: name for a track, begin on the clock of its log, signals, time, specs."""
+    each, signals = flights.each, flights.signals
+    begins = np.full(len(each.name), np.nan) if each.begins is None else each.begins
+    specs = {spec.path.removeprefix("signals/"): spec for spec in record.spec().datasets}
+    held = {name: own for name, own in vars(signals).items() if own is not None and name != "time"}
+    ends = [*each.first[1:], len(signals.time)]
+    for name, first, end, begin in zip(each.name, each.first, ends, begins.tolist(), strict=True):
+        part = slice(int(first), int(end))
+        known = {signal: own[part] for signal, own in held.items() if np.isfinite(own[part]).any()}
+        yield _short(name) if len(each.name) > 1 else "", begin, known, signals.time[part], specs
+
+
+def _windows(flight: str, time: Array, values: Mapping[str, Array], about: str) -> Iterator[Track]:
+    """Give gaps of windows, torque and force apart."""
+    for name, unit, first in (("gap_torque", "N m", 0), ("gap_force", "N", 3)):
+        own = {what: gaps[:, first : first + 3] for what, gaps in values.items()}
+        if any(np.isfinite(gaps).any() for gaps in own.values()):
+            yield Track(
+                name=name, time=time, values=own, unit=unit, frame=BODY, description=about, flight=flight, axes=AXES
+            )
+
+
+def _of_disagreement(title: str, record: DisagreementRecord, study: Study) -> View:
+    tracks: list[Track] = []
+    floor = record.gap.floor
+    for index, (name, begin, signals, time, specs) in enumerate(_of_flights(record.flights, record)):
+        tracks += _signals(name, _log_time(time, begin), signals, specs, {})
+        at = np.flatnonzero(record.residual.flight == index)
+        values = {DIFFERENCE: record.residual.value[at], "floor": np.broadcast_to(floor, (len(at), len(CHANNELS)))}
+        about = "what inertia and rotors leave of the motion, mean over a window; measured less model"
+        tracks += _windows(name, _log_time(record.residual.time[at], begin), values, about)
+    return View(title, tracks, stamps=_stamps(study), on_log_clock=record.flights.each.begins is not None)
+
+
+def _of_diagnosis(title: str, record: DiagnosisRecord, study: Study) -> View:
+    tracks: list[Track] = []
+    places: dict[str, tuple[str, float]] = {}
+    held = 0
+    for (name, begin, signals, time, specs), full, role in zip(
+        _of_flights(record.flights, record), record.flights.each.name, record.flights.each.role, strict=True
+    ):
+        places[full] = name, begin
+        tracks += _signals(name, _log_time(time, begin), signals, specs, {})
+        if role != "held-out":
+            continue
+        at = np.flatnonzero(record.residual.flight == held)
+        held += 1
+        values = {"before": record.residual.before[at], "after": record.residual.after[at]}
+        about = "gap of held-out windows, model as given and with the effects; measured less model"
+        tracks += _windows(name, _log_time(record.residual.time[at], begin), values, about)
+    if record.run is not None:
+        name, begin = places.get(record.run.flight, ("", np.nan))
+        own = {MEASURED: record.run.measured, "before": record.run.before, "after": record.run.after}
+        about = "free runs from measured rates, model as given and with the effects"
+        tracks.append(
+            Track(
+                name="run/body_rate",
+                time=_log_time(record.run.time, begin),
+                values=own,
+                unit="rad/s",
+                frame=BODY,
+                description=about,
+                flight=name,
+                axes=AXES,
+            )
+        )
+    return View(title, tracks, stamps=_stamps(study), on_log_clock=record.flights.each.begins is not None)
+
+
+def _of_response(title: str, record: ResponseRecord, study: Study) -> View:
+    del study
+    curves = [
+        Curve(
+            name=name.replace(" ", "_"),
+            over="frequency_hz",
+            x=record.frequency,
+            values={column: values[row] for column, values in record.columns.items()},
+            description=f"frequency response: {name}",
+        )
+        for row, name in enumerate(record.name)
+    ]
+    return View(title, (), curves)
+
+
+_KINDS: dict[type[Record], Callable[[str, Any, Study], View]] = {
+    FlightRecord: _of_flight,
+    PredictionRecord: _of_prediction,
+    ReplayRecord: _of_replay,
+    DisagreementRecord: _of_disagreement,
+    DiagnosisRecord: _of_diagnosis,
+    ResponseRecord: _of_response,
+}
