@@ -20,6 +20,7 @@ _RECORDS = {
     ("cpfls/prediction", ""): "prediction.PredictionRecord",
     ("cpfls/replay", ""): "replay.ReplayRecord",
     ("cpfls/response", ""): "response.ResponseRecord",
+    ("cpfls/twin", ""): "twin.TwinRecord",
     ("cpfls/disagreement", ""): "disagreement.DisagreementRecord",
     ("cpfls/diagnosis", ""): "diagnosis.DiagnosisRecord",
     ("cpfls/model", "extended"): "extended.ExtendedRecord",

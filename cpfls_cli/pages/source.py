@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.sweep import SweepRecord
     from cpfls_cli.artifacts.trajectory import TrajectoryRecord
     from cpfls_cli.artifacts.trend import TrendRecord
+    from cpfls_cli.artifacts.twin import TwinRecord
     from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
 R = TypeVar("R", bound=Record, default=Any)
@@ -94,6 +95,7 @@ class Sources:
     predictions: ClassVar[_OfFormat[PredictionRecord]] = _OfFormat("cpfls/prediction")
     replays: ClassVar[_OfFormat[ReplayRecord]] = _OfFormat("cpfls/replay")
     responses: ClassVar[_OfFormat[ResponseRecord]] = _OfFormat("cpfls/response")
+    twins: ClassVar[_OfFormat[TwinRecord]] = _OfFormat("cpfls/twin")
     disagreements: ClassVar[_OfFormat[DisagreementRecord]] = _OfFormat("cpfls/disagreement")
     diagnoses: ClassVar[_OfFormat[DiagnosisRecord]] = _OfFormat("cpfls/diagnosis")
     vehicles: ClassVar[_OfFormat[VehicleRecord]] = _OfFormat("cpfls/model", "vehicle")
@@ -109,7 +111,7 @@ class Sources:
     @property
     def only_gap(self) -> bool:
         """Whether nothing else was given than how models and flights disagree, and what was found then."""
-        told = (self.gap, self.replays, self.responses, self.vehicles, self.changes, self.trends)
+        told = (self.gap, self.replays, self.responses, self.twins, self.vehicles, self.changes, self.trends)
         return sum(map(len, told)) == len(self.all)
 
     @property
@@ -123,6 +125,8 @@ class Sources:
             return "What changed about a vehicle"
         if self.gap:
             return "Where simulation and flight disagree"
+        if self.twins:
+            return "Does the simulator fly like the vehicle"
         return "What a model predicts of flights" if self.replays else "How a vehicle answers its rotors"
 
     def of_kind(self, kind: type[R]) -> list[Source[R]]:
