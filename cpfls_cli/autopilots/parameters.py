@@ -78,12 +78,17 @@ class Autopilot:
     parameters : tuple of Parameter
     fixed : mapping of str to float
         Quantities of the law that are no parameters, by role.
+    logged_as : mapping of str to tuple of str
+        Parameters that a line of a log's header holds, separated by commas; an empty name is left out.
     slope_of_error, integrates_first, holds_integral, series : bool
         As `AxisLaw`, `Law` and `ThrustCurve` have them.
     source : tuple of str
         Titles and addresses of its documentation: of the law, then of the ranges.
     left_out : tuple of str
         Parts of its law that are not here.
+    cross : tuple of tuple of int
+        Rotors of its X quadrotor in its order: 1 for front and left, -1 for the other side; spin, 1 turns
+        counter-clockwise seen from above.
     """
 
     name: str
@@ -93,7 +98,9 @@ class Autopilot:
     parameters: tuple[Parameter, ...]
     source: tuple[str, ...]
     left_out: tuple[str, ...]
+    cross: tuple[tuple[int, int, int], ...]
     fixed: Mapping[str, float] = field(default_factory=dict)
+    logged_as: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     slope_of_error: bool = False
     integrates_first: bool = True
     holds_integral: bool = True
@@ -122,8 +129,23 @@ class Autopilot:
         """Give all parameters at their defaults."""
         return {each.name: each.default for each in self.parameters}
 
+    def in_log(self, logged: Mapping[str, float | str]) -> dict[str, float]:
+        """Take the parameters of the law out of what a log knows; empty where it is of another autopilot."""
+        found = {each.name: logged[each.name] for each in self.parameters if each.name in logged}
+        for line, names in self.logged_as.items():
+            values = str(logged.get(line, "")).strip('"').split(",")
+            # What is 0 there is off, and another line says it.
+            found |= {name: value for name, value in zip(names, values, strict=False) if name and _number(value)}
+        return {name: _number(value) for name, value in found.items()}
+
     def of_log(self, logged: Mapping[str, float]) -> dict[str, float]:
-        """Give all parameters as a log has them; what it lacks at the default, or as it was before it existed."""
+        """Give all parameters, where those of a log are known; what it lacks as before it existed, or at the default.
+
+        Parameters
+        ----------
+        logged : mapping of str to float
+            As `in_log` gives them.
+        """
         return {
             each.name: logged.get(each.name, each.default if each.absent is None else each.absent)
             for each in self.parameters
@@ -157,6 +179,13 @@ class Autopilot:
             integrates_first=self.integrates_first,
             holds_integral=self.holds_integral,
         )
+
+
+def _number(text: float | str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0
 
 
 def _of_axis(roles: Mapping[str, float], axis: str) -> dict[str, float]:

@@ -229,6 +229,15 @@ class ExportFormat(StrEnum):
     CSV = "csv"
 
 
+class AutopilotChoice(StrEnum):
+    """Whose control law is meant."""
+
+    PX4 = "px4"
+    ARDUPILOT = "ardupilot"
+    BETAFLIGHT = "betaflight"
+    CRAZYFLIE = "crazyflie"
+
+
 class Flown(StrEnum):
     """What an exported vehicle is flown in."""
 
@@ -518,6 +527,40 @@ def response(
 ) -> None:
     """Estimate how a vehicle answers its rotors, by frequency, and say where a model answers as it does."""
     _run("response", config, output, common, lambda command, job: command.run(job, flights, model, table))
+
+
+@_command()
+def tune(
+    config: ConfigArgument,
+    model: Annotated[Path, typer.Argument(metavar="VEHICLE", help="Vehicle, made by `cpfls vehicle`.")],
+    output: OutputOption,
+    autopilot: Annotated[AutopilotChoice, typer.Option("--autopilot", help="Whose control law and parameters.")],
+    flights: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--flight", metavar="LOG", help="Log with today's parameters and the gyroscope's noise; any number."
+        ),
+    ] = None,
+    gain_margin: Annotated[
+        float, typer.Option("--gain-margin", metavar="DB", min=0.5, max=30.0, help="At least.")
+    ] = 6.0,
+    phase_margin: Annotated[
+        float, typer.Option("--phase-margin", metavar="DEG", min=5.0, max=85.0, help="At least.")
+    ] = 45.0,
+    disk_margin: Annotated[
+        float,
+        typer.Option("--disk-margin", metavar="DEG", min=5.0, max=85.0, help="Phase, with gain off too; at least."),
+    ] = 35.0,
+    *,
+    common: Common,
+) -> None:
+    """Find gains for an autopilot that keep their margins with every vehicle that the flights leave possible."""
+
+    def call(command: Any, job: Job) -> Any:
+        asked = command.AskedMargins(gain_margin, phase_margin, disk_margin)
+        return command.run(job, model, autopilot.value, flights or (), asked)
+
+    _run("tune", config, output, common, call)
 
 
 @_command()

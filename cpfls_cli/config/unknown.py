@@ -38,7 +38,7 @@ _OFF: Final[dict[Unknown, str]] = {
 _TAKEN = frozenset({"import", "vehicle", "report", "export", "predict", "trajectory", "changed", "trend"})
 _GUESSED: Final = "guesses from mass and arms are used for what the config leaves open (--accept-guesses)"
 
-_OF_MODELS = frozenset({"replay", "response", "compare", "simulate", "gap", "extend"})
+_OF_MODELS = frozenset({"replay", "response", "compare", "simulate", "gap", "extend", "tune"})
 _TAKEN |= _OF_MODELS
 """Commands that work with guesses; a report and an export are of a model, which has its own numbers.
 

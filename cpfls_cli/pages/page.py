@@ -9,6 +9,7 @@ from cpfls_cli.artifacts.changed import ChangedRecord
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
+from cpfls_cli.artifacts.gains import GainsRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.artifacts.trend import TrendRecord
@@ -22,6 +23,7 @@ from cpfls_cli.pages.extended import extension_section
 from cpfls_cli.pages.flight import flight_section, vehicle_section
 from cpfls_cli.pages.flight_numbers import answer as flight_numbers_blocks
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
+from cpfls_cli.pages.gains import gains_blocks
 from cpfls_cli.pages.identification import identification_section, search_section
 from cpfls_cli.pages.model import model_section
 from cpfls_cli.pages.prediction import prediction_section
@@ -98,6 +100,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | None]] = (
     prediction_section,
     _of_each("twin", "Does the simulator fly like the vehicle", TwinRecord, twin_blocks),
     response_section,
+    _of_each("gains", "Gains for an autopilot", GainsRecord, gains_blocks),
     replay_section,
     _of_each("trend", "What changed over many flights", TrendRecord, trend_blocks),
     _of_each("changed", "What changed", ChangedRecord, changed_blocks),

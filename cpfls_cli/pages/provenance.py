@@ -12,6 +12,7 @@ from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.flight import FlightRecord
+from cpfls_cli.artifacts.gains import GainsRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.replay import USUAL, VEHICLE, ReplayRecord
@@ -96,6 +97,7 @@ _COMMANDS: dict[type[Record], _Command] = {
     ReplayRecord: _Command("replay", ("model", "flight")),
     TwinRecord: _Command("simulate", ("flight",), ("model",)),
     ResponseRecord: _Command("response", ("flight",), ("model",)),
+    GainsRecord: _Command("tune", ("model",), ("flight",)),
     DisagreementRecord: _Command("compare", ("flight",), ("model",)),
     DiagnosisRecord: _Command("diagnose", ("disagreement",), ("held-out",)),
     ExtendedRecord: _Command("extend", ("diagnosis",), ("model",)),
@@ -183,6 +185,10 @@ def _lines(source: Source, paths: dict[str, str]) -> Iterator[str]:
 
 def _asked(record: Record) -> list[str]:
     """Give the options that are no files."""
+    if isinstance(record, GainsRecord):
+        asked = {"gain": record.asked_gain, "phase": record.asked_phase, "disk": record.asked_disk}
+        margins = [word for name, value in asked.items() for word in (f"--{name}-margin", f"{value:g}")]
+        return ["--autopilot", record.autopilot, *margins]
     if not isinstance(record, ReplayRecord):
         return []
     hold = [] if record.hold == USUAL else ["--hold", record.hold]

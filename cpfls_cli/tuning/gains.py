@@ -4,25 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from math import floor, inf
+from functools import cached_property
+from math import floor
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Numbers
 from cpfls_cli.autopilots.law import AXES, AxisLaw, Law
 from cpfls_cli.autopilots.parameters import Autopilot, Parameter
-from cpfls_cli.tuning.margins import axis_loops, disk_of, frequencies, is_stable
+from cpfls_cli.tuning.margins import axis_loops, disk_of, frequencies, is_stable, moved_by
+from cpfls_cli.tuning.noise import Noise
 from cpfls_cli.tuning.plant import AxisPlant, HoverPlant
 
 _BELOW_CROSSOVER = 5.0
 """The integral takes over so much below what the rate follows: it costs about 11 degrees of phase there."""
+_ANGLE_BELOW = 3.0
+"""While the rate is tuned the angle is as much slower; then it gets what is left."""
 _LEADS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 """Derivative over proportional gain that is tried, in lags and delays of the loop."""
 _WORTH = 1.03
 """A longer lead has to be worth this: it brings noise."""
 _OVERSHOOT = 1.1
 """Largest gain from asked angle to angle: a step is passed by about as much less 1."""
-_ROUNDS = 40
+_ROUNDS = 24
+_LOUDER = 2.0
+"""Jitter of the commands beside that of the gains before: those are known to fly, and what motors bear is not."""
+_NEAR = 0.99
+_NOISE_HZ, _NOISE_POINTS = 10.0, 100
+_YAW_ALONE = ("yaw.error.first", "yaw.output.first")
+_RAISED = 3
 
 
 @dataclass(frozen=True)
@@ -71,45 +81,110 @@ class Proposal:
         return not self.parameter.low - slack <= self.wanted <= self.parameter.high + slack
 
 
-def tuned(autopilot: Autopilot, values: Mapping[str, float], hover: HoverPlant, asked: AskedMargins) -> list[Proposal]:
+@dataclass(frozen=True)
+class Tuned:
+    """Gains that were found.
+
+    Attributes
+    ----------
+    proposals : list of Proposal
+    disk : tuple of float
+        The least disk margin about each axis with all plants, as far as it is asked for.
+    quieter : tuple of bool
+        Whether noise holds an axis back.
+    """
+
+    proposals: list[Proposal]
+    disk: tuple[float, float, float]
+    quieter: tuple[bool, bool, bool]
+
+
+def tuned(
+    autopilot: Autopilot,
+    values: Mapping[str, float],
+    hover: HoverPlant,
+    asked: AskedMargins,
+    noise: Noise | None = None,
+) -> Tuned:
     """Find the gains of all axes.
 
     For each axis: the rate that follows fastest with a disk margin as asked with every plant that is possible, the
     integral at a fifth of that speed, the derivative as long as it is worth it; then the highest gain from angle to
-    rate with that margin and little overshoot.
+    rate with that margin and little overshoot. Commands jitter at most twice as much as with the gains before, by the
+    noise of the gyroscope.
 
     Parameters
     ----------
     values : mapping of str to float
-        All parameters, by name: filters and limits as they will be.
-
-    Returns
-    -------
-    list of Proposal
-        Of the gains alone.
+        All parameters, by name: filters and limits as they will be, gains as they are.
+    noise : Noise or None
+        None for white noise.
     """
+    before = autopilot.law(values)
     whole = dict(values) | {each.name: 1.0 for each in autopilot.parameters if each.role.endswith(".k")}
     law = autopilot.law(whole)
     wanted: dict[str, list[float]] = {}
-    for axis, name in enumerate(AXES):
-        plants = hover.corners(axis)
-        rate = _rate_gains(law, axis, plants, asked.disk)
-        roles = {"p": rate.p, "i": rate.i, "d": rate.d, "k": 1.0, "d_raised": rate.d}
-        # What the ranges leave of the rate control is what the angle is controlled through.
-        p, i, d = (_kept(autopilot, name, each, roles[each]) for each in ("p", "i", "d"))
-        kept = replace(rate, p=p, i=i, d=d)
-        angle = _angle_gain(law, axis, kept, plants, asked.disk)
-        roles |= {"angle": angle, "angle_i": angle * _ratio(law.axes[axis])}
+    least, quieter = [], []
+    for axis in range(len(AXES)):
+        search = _Search(law, axis, hover.corners(axis), asked.disk, noise, _LOUDER * _jitter(before, axis, noise))
+        found, held = search.found(autopilot)
+        least.append(held)
+        quieter.append(_jitter(_with(law, axis, found), axis, noise) > _NEAR * search.loudest)
+        roles = {"p": found.p, "i": found.i, "d": found.d, "k": 1.0, "d_raised": found.d}
+        roles |= {"angle": found.angle, "angle_i": found.angle_integral}
         for role, value in roles.items():
-            found = autopilot.by_role(f"{name}.{role}") or autopilot.by_role(f"all.{role}")
-            if found is not None:
-                wanted.setdefault(found.name, []).append(value / found.scale)
+            parameter = _parameter(autopilot, axis, role)
+            if parameter is not None:
+                wanted.setdefault(parameter.name, []).append(value / parameter.scale)
     # A parameter of several axes suits the one that bears the least.
-    return [_proposal(autopilot.named(name), min(each)) for name, each in wanted.items()]
+    proposals = [_proposal(autopilot.named(name), min(each)) for name, each in wanted.items()]
+    return Tuned(proposals, (least[0], least[1], least[2]), (quieter[0], quieter[1], quieter[2]))
 
 
-def _kept(autopilot: Autopilot, axis: str, role: str, value: float) -> float:
-    parameter = autopilot.by_role(f"{axis}.{role}")
+def with_filters(
+    autopilot: Autopilot,
+    values: Mapping[str, float],
+    hover: HoverPlant,
+    asked: AskedMargins,
+    noise: Noise | None = None,
+) -> Tuned:
+    """Find gains as `tuned`, and raise the low-passes of yaw alone where it lacks margin for them.
+
+    Some come with cut-offs that suit heavy vehicles, and no gain makes up for what they are late.
+    """
+    raised: dict[str, Proposal] = {}
+    found = tuned(autopilot, values, hover, asked, noise)
+    for _ in range(_RAISED):
+        late = [each for role in _YAW_ALONE if (each := autopilot.by_role(role)) is not None]
+        slow = [each for each in late if 0 < _valued(values, raised, each) < each.high]
+        if found.disk[2] >= _NEAR * asked.disk or not slow:
+            break
+        for each in slow:
+            raised[each.name] = proposal_of(each, min(2 * _valued(values, raised, each), each.high))
+        own = {**values, **{name: each.value for name, each in raised.items()}}
+        found = tuned(autopilot, own, hover, asked, noise)
+    return replace(found, proposals=[*found.proposals, *raised.values()])
+
+
+def _valued(values: Mapping[str, float], raised: Mapping[str, Proposal], parameter: Parameter) -> float:
+    return raised[parameter.name].value if parameter.name in raised else values[parameter.name]
+
+
+def _jitter(law: Law, axis: int, noise: Noise | None) -> float:
+    """Give how much noise makes the command jitter, by a spectrum or, in any unit, by white noise."""
+    if noise is not None:
+        return float(noise.of_commands(law)[axis])
+    frequency = np.linspace(_NOISE_HZ, 0.49 * law.rate_hz, _NOISE_POINTS)
+    return float(np.sqrt(np.mean(np.abs(law.response(axis, frequency).feedback) ** 2)))
+
+
+def _parameter(autopilot: Autopilot, axis: int, role: str) -> Parameter | None:
+    """Find the parameter of an axis, or the one that several share."""
+    groups = (AXES[axis], "tilt", "all") if axis < 2 else (AXES[axis], "all")
+    return next((found for group in groups if (found := autopilot.by_role(f"{group}.{role}")) is not None), None)
+
+
+def _kept(parameter: Parameter | None, value: float) -> float:
     return value if parameter is None else parameter.scale * _proposal(parameter, value / parameter.scale).value
 
 
@@ -125,40 +200,10 @@ def proposal_of(parameter: Parameter, wanted: float) -> Proposal:
     return Proposal(parameter, float(f"{nearest:.9g}"), wanted)
 
 
-def _ratio(axis: AxisLaw) -> float:
-    return axis.angle_integral / axis.angle if axis.angle else 0.0
-
-
 def _with(law: Law, axis: int, own: AxisLaw) -> Law:
     axes = [*law.axes]
     axes[axis] = own
     return replace(law, axes=(axes[0], axes[1], axes[2]))
-
-
-def _rate_gains(law: Law, axis: int, plants: list[AxisPlant], disk: float) -> AxisLaw:
-    """Find the proportional, integral and derivative gains of one axis."""
-    found, frequency = plants[0], frequencies(law)
-    late = found.lag + found.delay + 1.5 * law.period
-    # Yaw by reaction torque is slow and noisy; its derivative stays 0, as all autopilots have it.
-    leads = _LEADS if axis < 2 else _LEADS[:1]
-    best: AxisLaw | None = None
-    for lead in leads:
-
-        def own(gain: float, lead: float = lead) -> AxisLaw:
-            slope = gain * lead * late
-            integral = gain * _follows(gain, slope, found) / _BELOW_CROSSOVER
-            return replace(law.axes[axis], p=gain, i=integral, d=slope)
-
-        def bears(gain: float) -> bool:
-            tried = _with(law, axis, own(gain))
-            return _bears([axis_loops(tried, axis, each, frequency).rate for each in plants], disk)
-
-        gain = _largest(bears, 1e-3 / (late * _torque(found)), 10.0 / (late * _torque(found)))
-        tried = own(gain)
-        if best is None or _follows(tried.p, tried.d, found) > _WORTH * _follows(best.p, best.d, found):
-            best = tried
-    assert best is not None, "some lead is tried"
-    return best
 
 
 def _follows(p: float, d: float, plant: AxisPlant) -> float:
@@ -171,30 +216,114 @@ def _torque(plant: AxisPlant) -> float:
     return plant.gain + plant.slow
 
 
-def _angle_gain(law: Law, axis: int, rate: AxisLaw, plants: list[AxisPlant], disk: float) -> float:
-    frequency, ratio = frequencies(law), _ratio(law.axes[axis])
+@dataclass(frozen=True)
+class _Search:
+    """The search for the gains of one axis.
 
-    def bears(gain: float) -> bool:
-        tried = _with(law, axis, replace(rate, angle=gain, angle_integral=ratio * gain))
-        loops = [axis_loops(tried, axis, each, frequency) for each in plants]
-        calm = all(np.abs(each.angle_closed).max() <= _OVERSHOOT for each in loops)
-        return calm and _bears([each.angle for each in loops], disk)
+    Attributes
+    ----------
+    law : Law
+        With filters, limits and gains as they are, and as factor on all of them 1.
+    loudest : float
+        Most jitter of the command.
+    """
 
-    return _largest(bears, 0.05, 50.0)
+    law: Law
+    axis: int
+    plants: list[AxisPlant]
+    disk: float
+    noise: Noise | None
+    loudest: float
+
+    def found(self, autopilot: Autopilot) -> tuple[AxisLaw, float]:
+        """Find the gains, and the disk margin that they hold inside the documented ranges, as far as it is asked."""
+        angle = _parameter(autopilot, self.axis, "angle")
+        # What no parameter sets stays as the law has it.
+        rate = self._inside(autopilot, self._rate(None if angle is not None else self._own.angle))
+        if angle is None:
+            return rate, self._held(rate)
+        wanted = self._angled(rate, self._angle(rate))
+        proposal = _proposal(angle, wanted.angle / angle.scale)
+        if proposal.value <= proposal.wanted:
+            return wanted, self._held(wanted)
+        # The range asks for more than the rate bears: then the rate has to suit it.
+        least = angle.scale * proposal.value
+        rate = self._inside(autopilot, self._rate(least))
+        return replace(rate, angle=wanted.angle), self._held(self._angled(rate, least))
+
+    @property
+    def _own(self) -> AxisLaw:
+        return self.law.axes[self.axis]
+
+    def _inside(self, autopilot: Autopilot, rate: AxisLaw) -> AxisLaw:
+        """Bring gains of the rate inside the documented ranges, through which the angle is controlled."""
+        kept = {"p": rate.p, "i": rate.i, "d": rate.d}
+        for role, value in kept.items():
+            parameter = _parameter(autopilot, self.axis, role)
+            if parameter is not None:
+                kept[role] = parameter.scale * _proposal(parameter, value / parameter.scale).value
+        return replace(rate, p=kept["p"], i=kept["i"], d=kept["d"])
+
+    def _rate(self, angle: float | None) -> AxisLaw:
+        """Find the gains of the rate with a given gain of the angle, or with one that suits them."""
+        found = self.plants[0]
+        late = found.lag + found.delay + 1.5 * self.law.period
+        # Yaw by reaction torque is slow and noisy; its derivative stays 0, as all autopilots have it.
+        leads = _LEADS if self.axis < 2 else _LEADS[:1]
+        best: AxisLaw | None = None
+        for lead in leads:
+
+            def own(gain: float, lead: float = lead) -> AxisLaw:
+                slope = gain * lead * late
+                fast = _follows(gain, slope, found)
+                whole = replace(self._own, p=gain, i=gain * fast / _BELOW_CROSSOVER, d=slope)
+                return self._angled(whole, fast / _ANGLE_BELOW if angle is None else angle)
+
+            def held(gain: float, own: Callable[[float], AxisLaw] = own) -> float:
+                return self._held(own(gain))
+
+            scale = late * _torque(found)
+            tried = own(_largest(held, self.disk, 1e-3 / scale, 10.0 / scale))
+            if best is None or _follows(tried.p, tried.d, found) > _WORTH * _follows(best.p, best.d, found):
+                best = tried
+        assert best is not None, "some lead is tried"
+        return best
+
+    def _angle(self, rate: AxisLaw) -> float:
+        return _largest(lambda gain: self._held(self._angled(rate, gain)), self.disk, 0.05, 50.0)
+
+    def _angled(self, rate: AxisLaw, gain: float) -> AxisLaw:
+        """Give the angle a gain, with its integral in the same proportion as before."""
+        ratio = self._own.angle_integral / self._own.angle if self._own.angle else 0.0
+        return replace(rate, angle=gain, angle_integral=ratio * gain)
+
+    def _held(self, own: AxisLaw) -> float:
+        """Give the least disk margin of all loops with all plants, as far as asked; less at overshoot and jitter."""
+        law = _with(self.law, self.axis, own)
+        loud = _jitter(law, self.axis, self.noise) / self.loudest if self.loudest else 0.0
+        loops = axis_loops(law, self.axis, self._moved, frequencies(law))
+        passed = max(float(np.abs(loops.angle_closed).max()) / _OVERSHOOT, 1.0)
+        cut = np.stack([loops.rate, loops.command, loops.angle])
+        if not is_stable(loops.frequency, cut).all():
+            return 0.0
+        return min(float(disk_of(cut).min()), self.disk) / max(passed, loud, 1.0)
+
+    @cached_property
+    def _moved(self) -> Numbers:
+        frequency = frequencies(self.law)
+        return np.stack([moved_by(self.law, each, frequency) for each in self.plants])
 
 
-def _bears(loops: list[Array], disk: float) -> bool:
-    return all(is_stable(each) and disk_of(each) >= disk for each in loops)
-
-
-def _largest(bears: Callable[[float], bool], low: float, high: float) -> float:
-    """Find the largest value that a condition bears, on a logarithmic scale; the lowest where it bears none."""
+def _largest(held: Callable[[float], float], disk: float, low: float, high: float) -> float:
+    """Find the largest gain that holds a margin, on a logarithmic scale; where none does the one that holds most."""
     steps = np.geomspace(low, high, _ROUNDS)
-    borne = [step for step in steps if bears(step)]
-    if not borne:
-        return low
-    below, above = borne[-1], min(borne[-1] * steps[1] / steps[0], inf)
+    margins = np.array([held(step) for step in steps])
+    borne = np.flatnonzero(margins >= disk)
+    if not len(borne):
+        return float(steps[np.argmax(margins)])
+    below = float(steps[borne[-1]])
+    above = below * float(steps[1] / steps[0])
     for _ in range(8):
         middle = float(np.sqrt(below * above))
-        below, above = (middle, above) if bears(middle) else (below, middle)
-    return float(below)
+        below, above = (middle, above) if held(middle) >= disk else (below, middle)
+    return below

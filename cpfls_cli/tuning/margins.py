@@ -7,11 +7,11 @@ from math import inf, nan
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, Numbers
+from cpfls_cli.arrays import Array, BoolArray, Numbers
 from cpfls_cli.autopilots.law import Controller, Law
 from cpfls_cli.tuning.plant import AxisPlant, HoverPlant
 
-_LOWEST_HZ, _POINTS, _OF_NYQUIST = 0.1, 400, 0.98
+_LOWEST_HZ, _POINTS, _OF_NYQUIST = 0.1, 300, 0.98
 _STEP_S = 1.2
 STEP_RAD = np.radians(10.0)
 """Size of the step of the asked attitude that is shown."""
@@ -47,23 +47,21 @@ class Margins:
 
 @dataclass(frozen=True)
 class AxisLoops:
-    """Loops of one axis with one plant, shape (frequency,) each.
+    """Loops of one axis with one plant or several.
 
     Attributes
     ----------
-    frequency : array, Hz
-    rate, angle : array
-        Gains of the rate loop, cut at the command, and of the angle loop around it, cut at the angle.
+    frequency : array, shape (frequency,), Hz
+    rate : array, shape (..., frequency)
+        Gain of the rate loop alone, as it flies where rates are asked for.
+    command, angle : array, shape (..., frequency)
+        With the angle loop around it, cut at the command, and at the measured angle.
     """
 
     frequency: Array
     rate: Numbers
+    command: Numbers
     angle: Numbers
-
-    @property
-    def rate_closed(self) -> Numbers:
-        """Body rate by what is asked, without the angle loop; of one that is cut at the command about the same."""
-        return np.asarray(self.rate / (1 + self.rate))
 
     @property
     def angle_closed(self) -> Numbers:
@@ -76,16 +74,27 @@ def frequencies(law: Law) -> Array:
     return np.geomspace(_LOWEST_HZ, _OF_NYQUIST * 0.5 * law.rate_hz, _POINTS)
 
 
-def axis_loops(law: Law, axis: int, plant: AxisPlant, frequency: Array) -> AxisLoops:
-    """Evaluate the loops of an axis: sampled, a step late, with a command that stays from step to step."""
+def moved_by(law: Law, plant: AxisPlant, frequency: Array) -> Numbers:
+    """Give body rate by command as the law meets it: sampled, a step late, held from step to step."""
     s, period = 2j * np.pi * frequency, law.period
     held = (1 - np.exp(-s * period)) / (s * period) * np.exp(-s * period)
-    moved, control = held * plant.response(frequency), law.response(axis, frequency)
+    return np.asarray(held * plant.response(frequency))
+
+
+def axis_loops(law: Law, axis: int, moved: Numbers, frequency: Array) -> AxisLoops:
+    """Evaluate the loops of an axis.
+
+    Parameters
+    ----------
+    moved : array, shape (..., frequency)
+        Of one plant or several, as `moved_by` gives it.
+    """
+    s, control = 2j * np.pi * frequency, law.response(axis, frequency)
     own = law.axes[axis]
     rate = moved * (control.feedback + own.angle_slope * control.forward)
     # The angle follows the rate, of which the law asks.
-    angle = own.angle_response(frequency, period) * moved * control.forward / (1 + rate) / s
-    return AxisLoops(frequency, rate, angle)
+    around = moved * (own.angle_response(frequency, law.period) * control.forward / s)
+    return AxisLoops(frequency, rate, rate + around, around / (1 + rate))
 
 
 def margins(frequency: Array, loop: Numbers) -> Margins:
@@ -97,7 +106,7 @@ def margins(frequency: Array, loop: Numbers) -> Margins:
     """
     from control import FRD, stability_margins
 
-    stable, disk = is_stable(loop), disk_of(loop)
+    stable, disk = bool(is_stable(frequency, loop)), float(disk_of(loop))
     system = FRD(loop, 2 * np.pi * frequency)
     gain, phase, _, _, crossover, _ = (float(each) for each in stability_margins(system))
     in_db = abs(20 * np.log10(gain)) if np.isfinite(gain) and gain > 0 else inf
@@ -110,19 +119,25 @@ def margins(frequency: Array, loop: Numbers) -> Margins:
     )
 
 
-def disk_of(loop: Numbers) -> float:
-    """Give the disk margin of a stable loop, balanced: 1 over the largest half of ``|S - T|``."""
-    return float(1 / np.abs(0.5 * (1 - loop) / (1 + loop)).max())
+def disk_of(loop: Numbers) -> Array:
+    """Give the disk margins of stable loops, shape (..., frequency), balanced: 1 over the largest half of |S - T|."""
+    return np.asarray(1 / np.abs(0.5 * (1 - loop) / (1 + loop)).max(axis=-1))
 
 
-def is_stable(loop: Numbers) -> bool:
-    """Tell whether a closed loop is stable whose open one is, but for integrators, by Nyquist.
+def is_stable(frequency: Array, loop: Numbers) -> BoolArray:
+    """Tell whether closed loops are stable whose open ones are, but for integrators, by Nyquist.
 
-    Seen from -1 the loop, from the last frequency back to the first, turns to where an integrator or two begin, and
-    not round once more.
+    Seen from -1 the loop, from the last frequency back to the first, turns to the phase of as many integrators as it
+    falls with there, and not round once more.
+
+    Parameters
+    ----------
+    loop : array, shape (..., frequency)
     """
-    turned = np.unwrap(np.angle(1 + loop[::-1]))
-    return bool(-np.pi - 0.8 < turned[-1] - turned[0] < 0.8 and np.abs(turned[0]) < 0.5 * np.pi)
+    turned = np.unwrap(np.angle(1 + loop[..., ::-1]), axis=-1)
+    steep = np.log(np.abs(loop[..., 1] / loop[..., 0])) / np.log(frequency[1] / frequency[0])
+    back = np.abs(turned[..., -1] - turned[..., 0] - 0.5 * np.pi * steep) < 0.75 * np.pi
+    return np.asarray(back & (np.abs(turned[..., 0]) < 0.5 * np.pi))
 
 
 @dataclass(frozen=True)
@@ -173,6 +188,8 @@ def step_answer(law: Law, plants: tuple[AxisPlant, ...], step: float = STEP_RAD)
     whole = np.floor(late).astype(int)
     share = late - whole
     axes = np.arange(3)
+    # At rest before the step.
+    controller.command(np.zeros(3), np.zeros(3))
     for number in range(count):
         shown[number] = angle
         sent[number] = controller.command(controller.asked_rate(step - angle, rate), rate)
@@ -198,9 +215,9 @@ class Evaluation:
 
     Attributes
     ----------
-    rate, angle : list of Margins
-        Of the plant that was found.
-    rate_worst, angle_worst : list of Margins
+    command, angle : list of Margins
+        Of the plant that was found, cut at the command and at the angle.
+    command_worst, angle_worst : list of Margins
         The smallest of each margin over all plants that are possible.
     bandwidth_hz : array, shape (3,)
         Frequency at which the angle follows its setpoint at half power.
@@ -211,9 +228,9 @@ class Evaluation:
         Of the plants that were found, then of the softest and the sharpest ones.
     """
 
-    rate: list[Margins]
+    command: list[Margins]
     angle: list[Margins]
-    rate_worst: list[Margins]
+    command_worst: list[Margins]
     angle_worst: list[Margins]
     bandwidth_hz: Array
     loops: list[AxisLoops]
@@ -224,15 +241,18 @@ class Evaluation:
 def evaluate(law: Law, hover: HoverPlant) -> Evaluation:
     """Evaluate a law with a vehicle in hover."""
     frequency = frequencies(law)
-    corners = [[axis_loops(law, axis, each, frequency) for each in hover.corners(axis)] for axis in range(3)]
-    rates = [[margins(frequency, each.rate) for each in own] for own in corners]
+    corners = [
+        [axis_loops(law, axis, moved_by(law, each, frequency), frequency) for each in hover.corners(axis)]
+        for axis in range(3)
+    ]
+    commands = [[margins(frequency, each.command) for each in own] for own in corners]
     angles = [[margins(frequency, each.angle) for each in own] for own in corners]
     every = [hover.corners(axis) for axis in range(3)]
     ends = [hover.axes, tuple(own[min(1, len(own) - 1)] for own in every), tuple(own[-1] for own in every)]
     return Evaluation(
-        rate=[own[0] for own in rates],
+        command=[own[0] for own in commands],
         angle=[own[0] for own in angles],
-        rate_worst=[_worst(own) for own in rates],
+        command_worst=[_worst(own) for own in commands],
         angle_worst=[_worst(own) for own in angles],
         bandwidth_hz=np.array([_bandwidth(own[0]) for own in corners]),
         loops=[own[0] for own in corners],

@@ -1,17 +1,153 @@
-"""A quadrotor of a common size, to be flown by the control laws of autopilots."""
+"""A quadrotor of a common size, flown by the control laws of autopilots, and what their loops do in flight."""
 
+from dataclasses import replace
+
+import numpy as np
+from control import FRD, stability_margins
+
+from cpfls_cli.artifacts.vehicle_model import FoundNumbersGroup, InstrumentsGroup, ResponsesGroup
+from cpfls_cli.autopilots.motors import Motors
+from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.simulation.closed_loop import Setpoints, clock_of, fly_setpoints
+from cpfls_cli.simulation.law_pilot import GyroscopeNoise
+from cpfls_cli.simulation.model import SimulatedEffects
+from cpfls_cli.simulation.settings import ClosedLoopSettings
+from cpfls_cli.tuning.margins import StepAnswer
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from tests.builders.vehicle_models import record_of
 
-ARM = 0.16
-CROSS = VehicleSettings(
-    mass_kg=1.2,
-    inertia_kg_m2=(0.011, 0.012, 0.02),
-    rotors=tuple(
-        RotorSettings(
-            position_m=(x * ARM, y * ARM, 0.0), spin=spin, thrust_factor_n_s2=1.0e-5, drag_factor_n_m_s2=1.6e-7
-        )
-        for x, y, spin in ((1, -1, 1), (-1, 1, 1), (1, 1, -1), (-1, -1, -1))
-    ),
-    rotor_speed_max_rad_s=900.0,
-)
+
+def crossed(mass, arm, inertia, thrust, drag, speed_max):
+    """An X quadrotor in the order of PX4: kg, m to each hub along x and y, kg m^2, N s^2, N m s^2, rad/s."""
+    places = ((1, -1, 1), (-1, 1, 1), (1, 1, -1), (-1, -1, -1))
+    rotors = [
+        RotorSettings(position_m=(x * arm, y * arm, 0.0), spin=spin, thrust_factor_n_s2=thrust, drag_factor_n_m_s2=drag)
+        for x, y, spin in places
+    ]
+    return VehicleSettings(mass_kg=mass, inertia_kg_m2=inertia, rotors=tuple(rotors), rotor_speed_max_rad_s=speed_max)
+
+
+CROSS = crossed(1.2, 0.16, (0.011, 0.012, 0.02), 1.0e-5, 1.6e-7, 900.0)
 """An X of 450 mm: 1.2 kg, hovers at 0.36 of its full thrust."""
+
+
+def flown_step(autopilot, values, vehicle, lag, axis, *, gusts, noise, seed=1, steps=4, size=0.1, held_s=3.0):
+    """Step the asked angle about one axis there and back, in gusts: the mean answer, in parts of the step."""
+    law = AUTOPILOTS[autopilot].law(values)
+    count, shown = round(held_s * law.rate_hz), round(1.2 * law.rate_hz)
+    time = np.arange((2 * steps + 1) * count + 1) / law.rate_hz
+    wanted = np.where((np.arange(len(time)) // count) % 2 == 1, size, 0.0)
+    flight = _flown(autopilot, values, vehicle, lag, time, wanted[:, None] * np.eye(3)[axis], gusts, noise, seed)
+    angle = flight.state[count:-1, 6 + axis].reshape(steps, 2, count)[..., :shown]
+    # There and back are the same but for their sign.
+    mean = 0.5 * (angle[:, 0] + size - angle[:, 1]).mean(axis=0)
+    return StepAnswer(time[:shown], mean[:, None] / size)
+
+
+def flown_margins(
+    autopilot, values, vehicle, lag, axis, *, gusts, noise, lowest_hz, seed=1, periods=8, seconds=2.0, size=0.1
+):
+    """Measure the loop by sines that are added to its command in flight, and compute its margins, dB and degrees."""
+    law = AUTOPILOTS[autopilot].law(values)
+    count = round(seconds * law.rate_hz)
+    bins = np.unique(np.geomspace(2, min(0.4 * law.rate_hz, 60.0) * seconds, 45).round().astype(int))
+    phases = np.random.default_rng(0).uniform(0, 2 * np.pi, len(bins))
+    one = np.cos(2 * np.pi * np.outer(np.arange(count), bins) / count + phases).sum(axis=1)
+    one *= size / np.abs(one).max()
+    time = np.arange((periods + 1) * count + 1) / law.rate_hz
+    added = np.zeros((len(time), 3))
+    added[:, axis] = np.resize(one, len(time))
+    level = np.zeros((len(time), 3))
+    flight = _flown(autopilot, values, vehicle, lag, time, level, gusts, noise, seed, added)
+    motors = Motors.of(law.mixer, law.curve, vehicle)
+    sent = (np.linalg.pinv(motors.mix) @ motors.curve.thrust(flight.command / motors.speed_max).T)[1 + axis]
+    # A command acts a step late and is logged as the mean of two: so is what was added.
+    late = np.roll(one, 1)
+    heard = 0.5 * (late + np.roll(late, 1))
+    whole = sent[count : (periods + 1) * count].reshape(periods, count).mean(axis=0)
+    total, put = np.fft.fft(whole)[bins], np.fft.fft(heard)[bins]
+    loop = (put - total) / total
+    # Below, gusts are larger than what was added, and the loop is far from -1.
+    shown = bins / seconds >= lowest_hz
+    gain, phase, *_ = stability_margins(FRD(loop[shown], 2 * np.pi * bins[shown] / seconds))
+    return abs(20 * np.log10(gain)), abs(phase)
+
+
+def _flown(autopilot, values, vehicle, lag, time, attitude, gusts, noise, seed, added=None):
+    rng = np.random.default_rng(seed)
+    settings = ClosedLoopSettings(
+        autopilot=autopilot, autopilot_parameters=values, rotor_time_constant_s=lag, integration_rate_hz=1.0
+    )
+    law = settings.law
+    clock = clock_of(time, settings)
+    push = gusts.drawn(rng, clock.step, clock.steps)
+    motors = Motors.of(law.mixer, law.curve, vehicle)
+    lift = sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors)
+    share = motors.share_of(float(np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / lift)))
+    setpoints = Setpoints(attitude, None, np.full(len(time), share))
+    return fly_setpoints(
+        time,
+        setpoints,
+        np.zeros(12),
+        vehicle,
+        settings,
+        None,
+        SimulatedEffects(),
+        push,
+        GyroscopeNoise(noise, rng),
+        injected=added,
+    )
+
+
+STUDY = """
+vehicle:
+  mass_kg: 1.2
+  inertia_kg_m2: [0.011, 0.012, 0.02]
+  rotor_speed_max_rad_s: 900.0
+  rotors:
+    - {position_m: [0.16, -0.16, 0.0], spin: 1, thrust_factor_n_s2: 1.0e-5, drag_factor_n_m_s2: 1.6e-7}
+    - {position_m: [-0.16, 0.16, 0.0], spin: 1, thrust_factor_n_s2: 1.0e-5, drag_factor_n_m_s2: 1.6e-7}
+    - {position_m: [0.16, 0.16, 0.0], spin: -1, thrust_factor_n_s2: 1.0e-5, drag_factor_n_m_s2: 1.6e-7}
+    - {position_m: [-0.16, -0.16, 0.0], spin: -1, thrust_factor_n_s2: 1.0e-5, drag_factor_n_m_s2: 1.6e-7}
+"""
+"""Config of `CROSS`."""
+
+
+def found_vehicle(vehicle=CROSS, config=STUDY, *, commanded=True, instrumented=True):
+    """The artifact of a vehicle that is good for simulation and control, as if flights had told it."""
+    model = VehicleModel(vehicle=vehicle, response=RotorResponse(lag_s=0.03), commanded=commanded)
+    names = ("inertia.Ixx", "inertia.Iyy", "inertia.Izz", "lag.time_constant_s")
+    value = np.array([*vehicle.inertia_kg_m2, 0.03])
+    ends = np.array([0.05, 0.05, 0.08, 0.1]) * value
+    count = len(names)
+    instruments = InstrumentsGroup(
+        kind="repeats",
+        setpoint=(),
+        first=np.array([0]),
+        second=np.array([1]),
+        likeness=np.array([0.95]),
+        low=np.array([1.0]),
+        high=np.array([4.0]),
+        explained=np.full((1, 3), 0.98),
+        total=np.full(3, 0.98),
+        error=np.full(3, 0.01),
+        used=np.array([True]),
+    )
+    responses = ResponsesGroup(name=("roll", "pitch"), cost=np.full(2, 20.0), low=np.ones(2), high=np.full(2, 5.0))
+    return replace(
+        record_of(model, config),
+        found=FoundNumbersGroup(
+            name=names,
+            unit=("kg m^2",) * 3 + ("s",),
+            value=value,
+            low=value - ends,
+            high=value + ends,
+            stated=np.array([*vehicle.inertia_kg_m2, np.nan]),
+            determined=np.ones(count, dtype=bool),
+            at_bound=np.zeros(count, dtype=bool),
+        ),
+        instruments=instruments if instrumented else None,
+        responses=responses,
+    )

@@ -21,6 +21,7 @@ COMMANDS = (
     "vehicle",
     "replay",
     "response",
+    "tune",
     "export",
     "verify-export",
     "report",

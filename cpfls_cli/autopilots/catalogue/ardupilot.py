@@ -93,6 +93,7 @@ ARDUPILOT = Autopilot(
         Parameter("MOT_SPIN_MAX", "motors.high", 0.95, 0.9, 1.0, "signal of full thrust", step=0.01),
         Parameter("MOT_THST_HOVER", "motors.hover", 0.35, 0.2, 0.8, "thrust that hovers", step=0.01),
     ),
+    cross=((1, -1, 1), (-1, 1, 1), (1, 1, -1), (-1, -1, -1)),
     source=(
         "ArduPilot Dev, Copter Attitude Control, https://ardupilot.org/dev/docs/apmcopter-programming-attitude-control-2.html",
         "ArduPilot Copter, Complete Parameter List, https://ardupilot.org/copter/docs/parameters.html",

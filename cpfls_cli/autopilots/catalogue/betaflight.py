@@ -42,7 +42,7 @@ BETAFLIGHT = Autopilot(
         *_axis("roll", (45.0, 80.0, 30.0, 40.0)),
         *_axis("pitch", (47.0, 84.0, 34.0, 46.0)),
         *_axis("yaw", (45.0, 80.0, 0.0, 0.0)),
-        Parameter("angle_p_gain", "all.angle", 50.0, 0.0, 200.0, "angle to rate in angle mode", "0.1/s", 0.1, 1.0),
+        Parameter("angle_p_gain", "tilt.angle", 50.0, 0.0, 200.0, "angle to rate in angle mode", "0.1/s", 0.1, 1.0),
         Parameter(
             "iterm_limit", "all.integral_limit", 400.0, 0.0, 500.0, "most of the integral", scale=1 / _FULL, step=1.0
         ),
@@ -96,7 +96,22 @@ BETAFLIGHT = Autopilot(
         ),
         Parameter("thrust_linear", "motors.expo", 0.0, 0.0, 150.0, "thrust curve of the motors", "%", 0.01, 1.0),
     ),
-    fixed={"motors.low": 0.055},
+    # A pilot holds the heading; here its error asks for a rate.
+    fixed={"motors.low": 0.055, "yaw.angle": 1.0},
+    logged_as={
+        "rollPID": ("p_roll", "i_roll", "d_roll"),
+        "pitchPID": ("p_pitch", "i_pitch", "d_pitch"),
+        "yawPID": ("p_yaw", "i_yaw", "d_yaw"),
+        # Until 4.5 the gains above are those of fast moves.
+        "d_min": ("d_roll", "d_pitch", "d_yaw"),
+        "d_max": ("d_max_roll", "d_max_pitch", "d_max_yaw"),
+        "levelPID": ("angle_p_gain",),
+        "gyro_lpf1_dyn_hz": ("gyro_lpf1_dyn_min_hz",),
+        "dterm_lpf1_dyn_hz": ("dterm_lpf1_dyn_min_hz",),
+        "gyro_notch_hz": ("gyro_notch1_hz",),
+        "gyro_notch_cutoff": ("gyro_notch1_cutoff",),
+    },
+    cross=((-1, -1, -1), (1, -1, 1), (-1, 1, 1), (1, 1, -1)),
     source=(
         "Betaflight, PID Tuning Guide, https://betaflight.com/docs/wiki/guides/current/PID-Tuning-Guide",
         "Betaflight, Command Line Interface, https://betaflight.com/docs/development/Cli (`get NAME` prints the range)",
@@ -105,6 +120,7 @@ BETAFLIGHT = Autopilot(
         "feedforward of the sticks",
         "D that grows in fast moves (d_max), filters that rise with throttle, TPA, anti-gravity",
         "smoothing of the angle at 50 Hz",
+        "the pilot, who holds the heading: here its error asks for a rate, 1 1/s",
     ),
     holds_integral=False,
     series=True,

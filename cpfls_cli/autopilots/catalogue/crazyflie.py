@@ -65,6 +65,7 @@ CRAZYFLIE = Autopilot(
         "tilt.angle_integral_range": 20.0 * _DEGREE,
         "yaw.angle_integral_range": 360.0 * _DEGREE,
     },
+    cross=((1, -1, 1), (-1, -1, -1), (-1, 1, 1), (1, 1, -1)),
     source=(
         "Crazyflie firmware, Controllers, https://www.bitcraze.io/documentation/repository/crazyflie-firmware/master/"
         "functional-areas/sensor-to-control/controllers/",

@@ -77,6 +77,7 @@ PX4 = Autopilot(
         Parameter("THR_MDL_FAC", "motors.expo", 0.0, 0.0, 1.0, "thrust curve of the motors", step=0.01),
         Parameter("MPC_THR_HOVER", "motors.hover", 0.5, 0.1, 0.8, "thrust that hovers", step=0.01),
     ),
+    cross=((1, -1, 1), (-1, 1, 1), (1, 1, -1), (-1, -1, -1)),
     source=(
         "PX4 Guide, Controller Diagrams, https://docs.px4.io/main/en/flight_stack/controller_diagrams.html",
         "PX4 Guide, Parameter Reference, https://docs.px4.io/main/en/advanced_config/parameter_reference.html",

@@ -1,0 +1,95 @@
+"""Gains for autopilots: margins, overshoot and rise as predicted, and as flown by the true vehicle in gusts.
+
+    python benchmarks/tune.py [AUTOPILOT ...]
+
+Three vehicles of 35 g, 1.2 kg and 4.5 kg, each flown by the control laws of the autopilots: with their defaults, which
+is the baseline, and with gains for 45 degrees over intervals of 10 % of inertia and 20 % of the rotors' lag. Flown are
+steps of 0.1 rad in roll there and back (the mean of four), and sines that are added to the command, by which the loop
+is measured. Gusts of 2 rad/s^2 (0.3 s), gyroscope noise of 0.01 rad/s at each step of the law. Predictions know the
+vehicle and not the gusts. A dash: predicted unstable, or lost in flight.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.shared.measure import pin_threads, table
+
+pin_threads()
+
+import numpy as np
+
+from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.playback.gusts import Gusts
+from cpfls_cli.tuning.gains import AskedMargins, with_filters
+from cpfls_cli.tuning.margins import evaluate
+from cpfls_cli.tuning.plant import Spread, hover_plant
+from cpfls_cli.vehicle.settings import VehicleSettings
+from tests.builders.autopilots import CROSS, crossed, flown_margins, flown_step
+
+VEHICLES = {
+    "35 g": (crossed(0.035, 0.033, (1.6e-5, 1.7e-5, 2.9e-5), 1.8e-8, 1.1e-10, 3300.0), 0.03),
+    "1.2 kg": (CROSS, 0.04),
+    "4.5 kg": (crossed(4.5, 0.33, (0.12, 0.13, 0.21), 9.0e-5, 2.2e-6, 620.0), 0.06),
+}
+"""Vehicles, and the lag of their rotors in s."""
+SPREAD = Spread((0.9, 1.1), (0.8, 1.2))
+GUST, MEMORY_S, NOISE = 2.0, 0.3, 0.01
+
+
+def main(names: list[str]) -> None:
+    columns = ["autopilot", "vehicle", "gains"]
+    told = ("gain margin, dB", "phase margin, °", "overshoot, %", "rise, ms")
+    columns += [word for each in told for word in (each, "flown")]
+    table("tune", columns, [row for name in names for label in VEHICLES for row in flown(name, label)])
+
+
+def flown(name: str, label: str) -> Iterator[list[str]]:
+    (vehicle, lag), autopilot = VEHICLES[label], AUTOPILOTS[name]
+    gusts = gusts_of(vehicle)
+    hover = replace(hover_plant(autopilot.law(), vehicle, None, lag), spreads=(SPREAD,) * 3)
+    found = with_filters(autopilot, autopilot.defaults(), hover, AskedMargins()).proposals
+    own = autopilot.defaults() | {each.parameter.name: each.value for each in found}
+    for gains, values in (("default", autopilot.defaults()), ("tuned", own)):
+        told = evaluate(autopilot.law(values), hover)
+        command, step = told.command[0], told.steps[0]
+        predicted = (command.gain_db, command.phase_deg, 100 * step.overshoot[0], 1e3 * step.rise_s[0])
+        if not command.stable:
+            predicted = (np.nan, np.nan, np.nan, np.nan)
+        seen = _seen(name, values, vehicle, lag, gusts, command.crossover_hz)
+        pairs = [
+            entry for told_, seen_ in zip(predicted, seen, strict=True) for entry in (_number(told_), _number(seen_))
+        ]
+        yield [name, label, gains, *pairs]
+
+
+def gusts_of(vehicle: VehicleSettings) -> Gusts:
+    size = GUST * np.array(vehicle.inertia_kg_m2[:3]) * [1.0, 1.0, 0.1]
+    return Gusts(np.concatenate([size, np.zeros(3)]), MEMORY_S * np.ones(6))
+
+
+def _seen(
+    name: str, values: dict[str, float], vehicle: VehicleSettings, lag: float, gusts: Gusts, crossover: float
+) -> tuple[float, float, float, float]:
+    lowest = max(0.5 * crossover, 1.0) if np.isfinite(crossover) else 1.0
+    same = {"gusts": gusts, "noise": NOISE}
+    try:
+        gain, phase = flown_margins(name, values, vehicle, lag, 0, lowest_hz=lowest, **same)
+        step = flown_step(name, values, vehicle, lag, 0, **same)
+    except ComputationError:
+        return np.nan, np.nan, np.nan, np.nan
+    return gain, phase, 100 * float(step.overshoot[0]), 1e3 * float(step.rise_s[0])
+
+
+def _number(value: float) -> str:
+    return f"{value:.1f}" if np.isfinite(value) else "—"
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:] or list(AUTOPILOTS))

@@ -1,0 +1,287 @@
+"""Command `tune`: gains for an autopilot from a vehicle that was found, by margins over all that is possible."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.gains import AXES, DEFAULT, PROPOSED, TODAY, GainsRecord, NoiseGroup
+from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
+from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.output import refuse_own, write_text
+from cpfls_cli.artifacts.parameters import DELAY, DRAG, FOUND_AS, INERTIA, LAG, THRUST, parameters_of
+from cpfls_cli.artifacts.store import holds, read_record
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.autopilots.parameters import Autopilot
+from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.commands.numbers import to_fly, with_numbers
+from cpfls_cli.config.study import Study
+from cpfls_cli.errors import InputError, install_command
+from cpfls_cli.export.parameter_files import parameter_file
+from cpfls_cli.flights.inputs import numbered_roles
+from cpfls_cli.flights.models import read_model
+from cpfls_cli.logs.formats import log_contents, read_log
+from cpfls_cli.pages.gains import answer
+from cpfls_cli.pages.source import source_of
+from cpfls_cli.pages.trust import trust_words
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.report.content import Text
+from cpfls_cli.report.numbers import number, percent
+from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.tuning.gains import AskedMargins, Proposal, proposal_of, with_filters
+from cpfls_cli.tuning.margins import evaluate
+from cpfls_cli.tuning.noise import Line, Noise, noise_of
+from cpfls_cli.tuning.plant import HoverPlant, Spread, hover_plant, spread_of
+from cpfls_cli.validation.trust import Trust
+from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.words import joined
+
+_ASSUMED_LAG = (0.7, 1.3)
+_ASSUMED_GAIN = (0.8, 1.25)
+_OFF = 0.2
+"""Hover thrust of a log that is further from the model's says that the largest rotor speed is another."""
+
+
+def run(
+    job: Job, model: Path, autopilot: str, flights: Sequence[Path] = (), asked: AskedMargins | None = None
+) -> Outcome:
+    """Find gains and write them, and a file of parameters beside."""
+    asked = AskedMargins() if asked is None else asked
+    own = AUTOPILOTS[autopilot]
+    _require_control()
+    roles = numbered_roles("flight", flights)
+    inputs = begin(job, {"model": model} | roles)
+    record = _trusted(job, model)
+    job = with_numbers(job, "tune", model, whole=True)
+    vehicle = read_model(model, job.study)
+    logged = [log_contents(flight, ()).parameters for flight in flights]
+    today = next((found for found in map(own.in_log, logged) if found), {})
+    if job.dry_run:
+        return nothing_written(job)
+    noise = noise_of([_rates(flight, job.study) for flight in flights])
+    work = _Work(own, record, vehicle, job.study, asked, noise)
+    values = own.of_log(today) if today else own.defaults()
+    proposals, hover = work.proposed(values)
+    chosen = values | {each.parameter.name: each.value for each in proposals}
+    sets = {PROPOSED: evaluate(own.law(chosen), hover)}
+    sets[TODAY if today else DEFAULT] = evaluate(own.law(values), work.hover(values))
+    warnings = [
+        *_mixer_notes(own, vehicle.vehicle),
+        *_hover_notes(own, today, hover, record),
+        *work.notes,
+        *([] if today or not flights else [f"no log tells parameters of {own.title}; its defaults stand beside"]),
+    ]
+    heard = None if noise is None else _heard(own, noise, work.lines, (chosen, values))
+    made = GainsRecord.of(own, model.name, asked, hover, sets, proposals, today, heard, warnings)
+    suffix, text = parameter_file(made, job.output.name)
+    file = job.output.with_suffix(suffix)
+    refuse_own(file, job.output)
+    check_outputs(job, file)
+    whole = finish(job, made, inputs)
+    write_text(file, text)
+    blocks = (*answer(source_of(job, whole)), Text(f"{file}: written, for the ground station"))
+    to_report = ("cpfls", "report", job.config, job.output, "-o", job.output.with_suffix(".html"))
+    return Outcome(whole.summary | {"file": str(file)}, blocks, next=(to_report,))
+
+
+def _require_control() -> None:
+    from importlib.util import find_spec
+
+    if find_spec("control") is None:
+        raise InputError(f"margins need the package control: {install_command('tune')}")
+
+
+def _trusted(job: Job, model: Path) -> VehicleRecord:
+    """Read a vehicle that is good for simulation and control, and refuse others with the flight that is missing."""
+    if not holds(model, VehicleRecord):
+        what = "an identified model" if holds(model, ModelRecord) else "no model"
+        raise InputError(f"{model}: is {what}; gains need a vehicle that `cpfls vehicle` found")
+    record = read_record(model, VehicleRecord)
+    if record.verdict is not Trust.SIMULATION:
+        good = trust_words(Trust.SIMULATION).short
+        untold = f"; not told: {joined(record.untold)}" if record.untold else ""
+        raise InputError(
+            f"{model}: {trust_words(record.verdict).short}{untold}. Gains need a vehicle that is {good}: a body "
+            f"that is too heavy gives gains that are too high. {_missing(job, record)}"
+        )
+    return record
+
+
+def _missing(job: Job, record: VehicleRecord) -> str:
+    """Say which flight would make a vehicle good."""
+    judged = record.held_out is not None or record.instruments is not None
+    if record.verdict is Trust.NOT_JUDGED and not judged:
+        return "The flight that is missing: one that is kept aside to judge it, `cpfls vehicle` with --held-out FLIGHT"
+    planned = " ".join(map(str, to_fly(job)))
+    return f"The flight that is missing: {planned}, flown in still air, then `cpfls vehicle` again"
+
+
+@dataclass
+class _Work:
+    """What gains are found from."""
+
+    autopilot: Autopilot
+    record: VehicleRecord
+    model: VehicleModel
+    study: Study
+    asked: AskedMargins
+    noise: Noise | None
+
+    def __post_init__(self) -> None:
+        self.lines: list[Line] = [] if self.noise is None else self.noise.lines()
+        self.notes: list[str] = []
+        self.spreads = self._spreads()
+
+    def proposed(self, values: Mapping[str, float]) -> tuple[list[Proposal], HoverPlant]:
+        """Find gains with the thrust curve and the notches that go with them."""
+        others = [*_curve(self.autopilot, self.model, self.study), *_notches(self.autopilot, self.lines)]
+        whole = {**values, **{each.parameter.name: each.value for each in others}}
+        hover = self.hover(whole)
+        found = with_filters(self.autopilot, whole, hover, self.asked, self.noise)
+        if any(found.quieter):
+            axes = joined([name for name, held in zip(AXES, found.quieter, strict=True) if held])
+            why = "noise" if self.noise is not None else "noise that no log tells"
+            self.notes.append(
+                f"{axes}: held back by {why}; commands jitter at most twice as much as with the gains before: load "
+                "these, fly, and tune again with that log"
+            )
+        held = self.autopilot.by_role("motors.hover")
+        if held is not None:
+            others.append(proposal_of(held, hover.share))
+        return [*found.proposals, *others], hover
+
+    def hover(self, values: Mapping[str, float]) -> HoverPlant:
+        """Linearise the vehicle under a law."""
+        lag = self.study.simulation.closed_loop.rotor_time_constant_s
+        plant = hover_plant(self.autopilot.law(values), self.model.vehicle, self.model, lag)
+        return replace(plant, spreads=self.spreads)
+
+    def _spreads(self) -> tuple[Spread, Spread, Spread]:
+        """Give what flights leave open of each axis, and take note of what they do not tell."""
+        known = {each.key: each for each in parameters_of(self.record)}
+        intervals, stated = {}, []
+        for key in (*INERTIA[:3], THRUST, DRAG, LAG, DELAY):
+            each = known[key]
+            if each.determined and each.value and each.low is not None and each.high is not None:
+                # An end at or below zero says no more than that the number is small.
+                intervals[key] = (max(each.low / each.value, 0.1), max(each.high / each.value, 0.1))
+            elif key in INERTIA[:3] and FOUND_AS[key] in self.record.untold:
+                intervals[key] = _ASSUMED_GAIN
+                stated.append(each.name)
+        if stated:
+            self.notes.append(
+                f"{joined(stated)}: not told by flights; as they stand, from a fifth less to a quarter more"
+            )
+        if not self.model.commanded:
+            lag = 1e3 * self.study.simulation.closed_loop.rotor_time_constant_s
+            self.notes.append(
+                f"speeds were measured, so no flight tells how the rotors follow their commands: "
+                f"{number(lag, 3)} ms of simulation.closed_loop.rotor_time_constant_s, 30 % either way"
+            )
+            intervals[LAG] = _ASSUMED_LAG
+        named = {"lag": intervals.get(LAG, (1.0, 1.0)), "delay": intervals.get(DELAY, (1.0, 1.0))} | intervals
+        roll, pitch, yaw = (spread_of(named, INERTIA[axis], DRAG if axis == 2 else THRUST) for axis in range(3))
+        return roll, pitch, yaw
+
+
+def _curve(autopilot: Autopilot, model: VehicleModel, study: Study) -> Iterator[Proposal]:
+    """Propose the thrust curve, where flights tell thrust by the signal of the motors."""
+    parameter = autopilot.by_role("motors.expo")
+    if parameter is None or not model.commanded or study.import_.rotor_command_is != "speed":
+        return
+    lift = sum(rotor.thrust_factor_n_s2 for rotor in model.vehicle.rotors)
+    hovering = np.sqrt(model.vehicle.mass_kg * model.vehicle.gravity_m_s2 / lift)
+    straight = model.thrust_linear * hovering / model.vehicle.rotor_speed_max_rad_s
+    curve = autopilot.law().curve
+    span = curve.high - curve.low
+    # Thrust is signal^2 + straight signal; between the ends of the range a square and a straight part are left.
+    square, line = span**2, span * (2 * curve.low + straight)
+    yield proposal_of(parameter, square / (square + line) / parameter.scale)
+
+
+def _notches(autopilot: Autopilot, lines: Sequence[Line]) -> Iterator[Proposal]:
+    """Propose a notch for each line of the noise that the autopilot has one for."""
+    for name, line in zip(("notch", "notch2"), lines, strict=False):
+        centre = autopilot.by_role(f"all.measured.{name}")
+        if centre is None:
+            return
+        on, width = autopilot.by_role(f"all.measured.{name}_on"), autopilot.by_role(f"all.measured.{name}_width")
+        lower = autopilot.by_role(f"all.measured.{name}_lower")
+        if on is not None:
+            yield proposal_of(on, 1.0)
+        yield proposal_of(centre, line.hz)
+        if width is not None:
+            yield proposal_of(width, line.width_hz)
+        if lower is not None:
+            yield proposal_of(lower, line.hz - 0.5 * line.width_hz)
+
+
+def _rates(flight: Path, study: Study) -> tuple[Array, Array]:
+    """Read times and body rates of a log, as it has them."""
+    read = read_log(flight, study.import_)
+    mapped = {str(name): given for name, given in read.settings.signals.items()}.get("body_rate")
+    stamps = read.columns.get(read.settings.time_column or "timestamp")
+    if mapped is None or stamps is None:
+        return np.zeros(0), np.zeros((0, 3))
+    columns = [read.columns[name] for name in mapped.columns]
+    factor = np.pi / 180 if "deg" in str(mapped.unit) else 1.0
+    seconds = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[read.settings.time_unit]
+    rate = factor * np.stack(columns, axis=1)
+    known = np.isfinite(rate).all(axis=1) & np.isfinite(stamps)
+    return seconds * stamps[known], rate[known]
+
+
+def _heard(
+    autopilot: Autopilot, noise: Noise, lines: Sequence[Line], sets: tuple[Mapping[str, float], ...]
+) -> NoiseGroup:
+    return NoiseGroup.of(noise, lines, np.array([noise.of_commands(autopilot.law(values)) for values in sets]))
+
+
+def _hover_notes(
+    autopilot: Autopilot, today: Mapping[str, float], hover: HoverPlant, record: VehicleRecord
+) -> Iterator[str]:
+    """Say where the hover thrust of a log is not that of the vehicle: the full thrust is another, and all gains too."""
+    held = autopilot.by_role("motors.hover")
+    if held is None or held.name not in today:
+        return
+    if abs(today[held.name] / hover.share - 1) > _OFF:
+        yield (
+            f"{held.name} is {today[held.name]:.3g} in the log, but the vehicle hovers at "
+            f"{percent(hover.share, 2)} of its full thrust: if the log is right, vehicle.rotor_speed_max_rad_s is not "
+            f"{record.vehicle.rotor.speed_max:.6g}, and gains are off as thrust is"
+        )
+
+
+def _mixer_notes(autopilot: Autopilot, vehicle: VehicleSettings) -> Iterator[str]:
+    """Say which rotors of an X quadrotor are not where, or do not turn as, the autopilot's are."""
+    own = [
+        (int(np.sign(round(rotor.position_m[0], 4))), int(np.sign(round(rotor.position_m[1], 4))), rotor.spin)
+        for rotor in vehicle.rotors
+    ]
+    if len(own) != len(autopilot.cross) or any(0 in each[:2] for each in own):
+        return
+    wrong = [place + 1 for place, each in enumerate(own) if each[:2] != autopilot.cross[place][:2]]
+    turned = [each[2] != next(other[2] for other in autopilot.cross if other[:2] == each[:2]) for each in own]
+    if wrong:
+        yield (
+            f"mixer: rotors {joined([str(each) for each in wrong])} of the config do not stand where those of "
+            f"{autopilot.title} do ({_places(autopilot.cross)}): assign its outputs so, or order the config so"
+        )
+    if all(turned):
+        yield f"mixer: all rotors turn the other way round than those of {autopilot.title}; tell it, or yaw runs away"
+    elif any(turned):
+        yield (
+            f"mixer: rotors {joined([str(place + 1) for place, each in enumerate(turned) if each])} of the config turn "
+            f"the other way round than those of {autopilot.title} there; check vehicle.rotors.spin"
+        )
+
+
+def _places(cross: Sequence[tuple[int, int, int]]) -> str:
+    return ", ".join(
+        f"{place + 1} {'front' if x > 0 else 'rear'} {'left' if y > 0 else 'right'}"
+        for place, (x, y, _) in enumerate(cross)
+    )

@@ -1,0 +1,102 @@
+"""Parameters for autopilots in the files that their ground stations load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.artifacts.gains import GainsRecord, ParameterRow
+
+_FLOAT = 9
+"""Type of MAVLink, as QGroundControl writes it."""
+
+
+def parameter_file(record: GainsRecord, name: str) -> tuple[str, str]:
+    """Write the proposed parameters for the ground station of their autopilot.
+
+    Parameters
+    ----------
+    name : str
+        Of the artifact, for the first line.
+
+    Returns
+    -------
+    suffix : str
+        Of such files.
+    text : str
+
+    References
+    ----------
+    QGroundControl, Parameters; Mission Planner, parameter files; Betaflight CLI; cflib, param_file_helper.
+    """
+    form = _FORMS[record.autopilot]
+    head = [
+        f"# {record.title}: gains of cpfls for {record.vehicle_name}, see {name}",
+        *(f"# {each}" for each in form.how),
+    ]
+    return form.suffix, "\n".join([*head, *form.lines(record.rows)]) + "\n"
+
+
+def _comments(rows: Sequence[ParameterRow], line: Callable[[ParameterRow], str]) -> Iterator[str]:
+    for row in rows:
+        yield f"# {comment(row)}"
+        yield line(row)
+
+
+def comment(row: ParameterRow) -> str:
+    """Say what a parameter is, what it was, and what its documentation allows."""
+    unit = f" ({row.unit})" if row.unit else ""
+    before = f"now {row.today:.6g}" if np.isfinite(row.today) else f"default {row.default:.6g}"
+    most = f"{row.high:.6g}" if np.isfinite(row.high) else "no limit given"
+    cut = f"; {row.wanted:.4g} was wanted, which is outside" if row.clipped else ""
+    return f"{row.meaning}{unit}: {before}; documented range {row.low:.6g} to {most}{cut}"
+
+
+def _qgroundcontrol(rows: Sequence[ParameterRow]) -> Iterator[str]:
+    yield "# Vehicle-Id Component-Id Name Value Type"
+    yield from _comments(rows, lambda row: f"1\t1\t{row.name}\t{_value(row)}\t{_FLOAT}")
+
+
+def _mission_planner(rows: Sequence[ParameterRow]) -> Iterator[str]:
+    yield from _comments(rows, lambda row: f"{row.name},{_value(row)}")
+
+
+def _betaflight(rows: Sequence[ParameterRow]) -> Iterator[str]:
+    yield "# own values in place of the sliders"
+    yield "set simplified_pids_mode = OFF"
+    yield from _comments(rows, lambda row: f"set {row.name} = {round(row.proposed)}")
+    yield "save"
+
+
+def _crazyflie(rows: Sequence[ParameterRow]) -> Iterator[str]:
+    yield "type: persistent_param_state"
+    yield "version: '1'"
+    yield "params:"
+    for row in rows:
+        yield f"  # {comment(row)}"
+        yield f"  {row.name}:"
+        yield f"    default_value: {row.default:.9g}"
+        yield "    is_stored: true"
+        yield f"    stored_value: {_value(row)}"
+
+
+def _value(row: ParameterRow) -> str:
+    return f"{row.proposed:.9g}"
+
+
+class _Form(NamedTuple):
+    suffix: str
+    how: tuple[str, ...]
+    lines: Callable[[Sequence[ParameterRow]], Iterator[str]]
+
+
+_FORMS = {
+    "px4": _Form(
+        ".params", ("QGroundControl: Vehicle Configuration, Parameters, Tools, Load from file",), _qgroundcontrol
+    ),
+    "ardupilot": _Form(".param", ("Mission Planner: Config, Full Parameter List, Load from file",), _mission_planner),
+    "betaflight": _Form(".txt", ("Betaflight Configurator: CLI, Load from file",), _betaflight),
+    "crazyflie": _Form(".yaml", ("cfclient: Parameters, Load; or cflib, ParamFileHelper",), _crazyflie),
+}

@@ -1,0 +1,112 @@
+"""The noise of a gyroscope in flight: its spectrum, lines in it for notches, and what it makes the motors do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.autopilots.law import Law
+
+_WINDOW_S, _LEAST = 1.0, 256
+_FLOOR_SHARE = 0.25
+"""Floor at a frequency: the median over so much of it on either side."""
+_LINE_DB, _LOWEST_LINE_HZ, _FROM_THE_END = 10.0, 25.0, 0.95
+_MOST_LINES = 2
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Spectrum of body rates.
+
+    Attributes
+    ----------
+    frequency : array, shape (frequency,), Hz
+    density : array, shape (frequency, 3), (rad/s)^2/Hz
+        Single-sided, mean over flights.
+    """
+
+    frequency: Array
+    density: Array
+
+    @property
+    def highest_hz(self) -> float:
+        """Highest frequency that the flights show; what is above is folded below it, if the log has no filter."""
+        return float(self.frequency[-1])
+
+    def of_commands(self, law: Law) -> Array:
+        """Compute how much it makes the commands about each axis jitter, root mean square, shape (3,).
+
+        In shares of the full command, from 10 Hz on and as far as the flights show, without the answer of the vehicle.
+        """
+        shown = (self.frequency >= 10.0) & (self.frequency < 0.49 * law.rate_hz)
+        frequency = self.frequency[shown]
+        gains = np.stack([np.abs(law.response(axis, frequency).feedback) for axis in range(3)], axis=1)
+        spacing = float(self.frequency[1] - self.frequency[0])
+        return np.asarray(np.sqrt((gains**2 * self.density[shown]).sum(axis=0) * spacing))
+
+    def lines(self) -> list[Line]:
+        """List what stands out by 10 dB and more, the strongest first."""
+        total = self.density.sum(axis=1)
+        floor = np.array([np.median(total[self._beside(hz)]) for hz in self.frequency])
+        above = 10 * np.log10(np.maximum(total, 1e-30) / np.maximum(floor, 1e-30))
+        inside = (self.frequency > _LOWEST_LINE_HZ) & (self.frequency < _FROM_THE_END * self.highest_hz)
+        peaks = np.flatnonzero(inside[1:-1] & (above[1:-1] >= np.maximum(above[:-2], above[2:]))) + 1
+        found: list[Line] = []
+        for peak in sorted(peaks, key=lambda each: -total[each]):
+            hz = float(self.frequency[peak])
+            apart = all(abs(hz - each.hz) > max(each.width_hz, hz / 5) for each in found)
+            if above[peak] >= _LINE_DB and apart and len(found) < _MOST_LINES:
+                found.append(Line(hz, self._width(above, int(peak)), float(above[peak])))
+        return found
+
+    def _beside(self, hz: float) -> Array:
+        return np.asarray(np.abs(self.frequency - hz) <= max(_FLOOR_SHARE * hz, 5.0))
+
+    def _width(self, above: Array, peak: int) -> float:
+        """Give the width of a line where it stands half its decibels above the floor, at least a tenth of it, Hz."""
+        half = 0.5 * above[peak]
+        left = peak - int(np.argmax(above[peak::-1] < half))
+        right = peak + int(np.argmax(above[peak:] < half))
+        return max(float(self.frequency[right] - self.frequency[left]), 0.1 * float(self.frequency[peak]))
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of a spectrum: its frequency, its width in Hz, and how far it stands out, dB."""
+
+    hz: float
+    width_hz: float
+    above_db: float
+
+
+def noise_of(flights: Sequence[tuple[Array, Array]]) -> Noise | None:
+    """Estimate the spectrum of body rates by windows of a second; None where no flight is long enough.
+
+    Parameters
+    ----------
+    flights : sequence of (array, array)
+        Times, shape (time,), s, and body rates, shape (time, 3), rad/s, which may lack samples.
+    """
+    rates = [1 / float(np.median(np.diff(time))) for time, _ in flights if len(time) > _LEAST]
+    if not rates:
+        return None
+    slowest = min(rates)
+    count = max(round(_WINDOW_S * slowest), _LEAST)
+    window = np.hanning(count)[:, None]
+    scale = 2 / (slowest * float((window**2).sum()))
+    spectra = []
+    for time, rate in flights:
+        if len(time) <= _LEAST:
+            continue
+        even = np.arange(time[0], time[-1], 1 / slowest)
+        values = np.stack([np.interp(even, time, column) for column in rate.T], axis=1)
+        for begin in range(0, len(even) - count + 1, count // 2):
+            part = values[begin : begin + count]
+            spectra.append(scale * np.abs(np.fft.rfft(window * (part - part.mean(axis=0)), axis=0)) ** 2)
+    if not spectra:
+        return None
+    frequency = np.fft.rfftfreq(count, 1 / slowest)
+    return Noise(np.asarray(frequency[1:], dtype=float), np.mean(spectra, axis=0)[1:])

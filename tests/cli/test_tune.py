@@ -1,0 +1,177 @@
+"""Command `tune`."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+from cpfls_cli.artifacts.gains import GainsRecord
+from cpfls_cli.artifacts.store import read_record, write_record
+from cpfls_cli.autopilots.registry import AUTOPILOTS
+from tests.builders.autopilots import STUDY, found_vehicle
+from tests.builders.dataflash_logs import dataflash
+
+ENDINGS = {"px4": ".params", "ardupilot": ".param", "betaflight": ".txt", "crazyflie": ".yaml"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("tune")
+    (folder / "study.yaml").write_text(STUDY)
+    write_record(folder / "vehicle.h5", found_vehicle())
+    return folder
+
+
+@pytest.fixture(scope="module")
+def gains(cpfls, folder):
+    """What the command says and writes for each autopilot."""
+    told = {}
+    for name in AUTOPILOTS:
+        result = cpfls(
+            "tune", folder / "study.yaml", folder / "vehicle.h5", "--autopilot", name, "-o", folder / f"{name}.h5"
+        )
+        assert result.exit_code == 0, result.stderr
+        told[name] = result
+    return told
+
+
+def written(folder, name):
+    """Read the parameters of a ground station's file."""
+    text = (folder / f"{name}{ENDINGS[name]}").read_text()
+    if name == "crazyflie":
+        held = yaml.safe_load(text)
+        assert (held["type"], held["version"]) == ("persistent_param_state", "1")
+        return {key: row["stored_value"] for key, row in held["params"].items()}
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    if name == "px4":
+        rows = [line.split("\t") for line in lines]
+        assert all(row[:2] == ["1", "1"] and row[4] == "9" for row in rows)
+        return {row[2]: float(row[3]) for row in rows}
+    if name == "ardupilot":
+        return {key: float(value) for key, value in (line.split(",") for line in lines)}
+    assert lines[-1] == "save"
+    return {line.split()[1]: float(line.split()[3]) for line in lines[1:-1]}
+
+
+@pytest.mark.parametrize("name", ENDINGS)
+def test_the_file_of_a_ground_station_holds_what_the_artifact_proposes(name, gains, folder):
+    assert gains[name].exit_code == 0
+    record = read_record(folder / f"{name}.h5", GainsRecord)
+    assert written(folder, name) == pytest.approx(
+        dict(zip(record.parameter.name, record.parameter.proposed, strict=True))
+    )
+    ranges = {each.name: each for each in AUTOPILOTS[name].parameters}
+    assert all(ranges[each.name].low <= each.proposed <= ranges[each.name].high for each in record.rows)
+    # A comment says of each what it is, and what the documentation allows.
+    text = (folder / f"{name}{ENDINGS[name]}").read_text()
+    assert text.count("documented range") == len(record.rows)
+
+
+@pytest.mark.parametrize("name", ENDINGS)
+def test_the_answer_comes_first_and_is_short(name, gains):
+    lines = gains[name].stdout.splitlines()
+    assert lines[0].startswith("GAINS: ")
+    assert len(lines) <= 24
+
+
+def test_gains_are_those_of_the_least_favourable_vehicle(gains, folder):
+    record = read_record(folder / "px4.h5", GainsRecord)
+    assert gains["px4"].exit_code == 0
+    # Inertia and lag are told, the thrust factor is as the config has it.
+    assert record.plants == 5
+    assert record.falls_short("proposed") == []
+    assert (record.command_worst.disk[0] <= record.command.disk[0]).all()
+    assert record.hover == pytest.approx(0.363, abs=0.01)
+    assert "THR_MDL_FAC" in record.parameter.name
+
+
+def test_json_is_the_summary(cpfls, folder):
+    result = cpfls(
+        "tune", folder / "study.yaml", folder / "vehicle.h5", "--autopilot", "px4", "-o", folder / "json.h5", "--json"
+    )
+    told = json.loads(result.stdout)
+    assert told["parameters"]["MC_ROLLRATE_P"]["proposed"] > 0
+    assert told["falls_short"]["proposed"] == []
+    assert told["file"].endswith("json.params")
+
+
+def test_the_page_draws_bode_nichols_and_steps(gains, cpfls, folder):
+    assert gains["px4"].exit_code == 0
+    result = cpfls("report", folder / "study.yaml", folder / "px4.h5", "-o", folder / "px4.html")
+    assert result.exit_code == 0, result.stderr
+    page = (folder / "px4.html").read_text()
+    for figure in ("gains-bode-roll", "gains-nichols-yaw", "gains-step"):
+        assert figure in page
+    assert "--autopilot px4 --gain-margin 6" in page
+
+
+def test_rotors_in_another_order_are_told(gains):
+    assert "mixer: rotors" not in gains["px4"].output
+    assert (
+        "mixer: rotors 1, 2, 3 and 4 of the config do not stand where those of Betaflight do"
+        in gains["betaflight"].output
+    )
+
+
+def test_a_vehicle_that_flights_do_not_tell_is_refused_with_the_flight_that_is_missing(refuse, folder, tmp_path):
+    record = found_vehicle(instrumented=False)
+    loop = replace(record.loop, shown=True)
+    for name, own, words, missing in (
+        ("loop", replace(record, loop=loop), "the flights show the loop", "cpfls trajectory"),
+        ("playback", record, "not judged", "one that is kept aside"),
+        (
+            "wide",
+            replace(found_vehicle(), found=replace(record.found, determined=np.zeros(4, dtype=bool))),
+            "not told",
+            "cpfls trajectory",
+        ),
+    ):
+        path = tmp_path / f"{name}.h5"
+        write_record(path, own)
+        message = refuse("tune", folder / "study.yaml", path, "--autopilot", "px4", "-o", tmp_path / "g.h5")
+        assert words in " ".join(message)
+        assert f"The flight that is missing: {missing}" in " ".join(message)
+
+
+def test_a_model_that_is_no_vehicle_is_refused(refuse, folder, tmp_path):
+    message = refuse(
+        "tune", folder / "study.yaml", folder / "study.yaml", "--autopilot", "px4", "-o", tmp_path / "g.h5"
+    )
+    assert "gains need a vehicle that `cpfls vehicle` found" in " ".join(message)
+
+
+LOGGED = """
+import:
+  time_column: IMU.timestamp
+  torque_source: null
+  signals:
+    body_rate: {columns: [IMU.GyrX, IMU.GyrY, IMU.GyrZ], unit: rad/s}
+"""
+
+
+def test_a_log_gives_todays_parameters_and_the_noise(cpfls, tmp_path):
+    (tmp_path / "study.yaml").write_text(STUDY + LOGGED)
+    write_record(tmp_path / "vehicle.h5", found_vehicle(config=STUDY + LOGGED))
+    rng = np.random.default_rng(1)
+    line = 0.06 * np.sin(2 * np.pi * 95 * np.arange(3200) / 400)
+    rates = 0.02 * rng.standard_normal((3200, 3)) + line[:, None]
+    rows = [("IMU", (1_000_000 + 2500 * step, *rate)) for step, rate in enumerate(rates)]
+    today = {"ATC_RAT_RLL_P": 0.2, "ATC_RAT_PIT_P": 0.1, "ATC_ANG_RLL_P": 6.0, "MOT_THST_HOVER": 0.22}
+    (tmp_path / "log.bin").write_bytes(dataflash({"IMU": ("Qfff", "TimeUS,GyrX,GyrY,GyrZ")}, rows, today))
+    result = cpfls(
+        *("tune", tmp_path / "study.yaml", tmp_path / "vehicle.h5", "--autopilot", "ardupilot"),
+        *("--flight", tmp_path / "log.bin", "-o", tmp_path / "gains.h5"),
+    )
+    assert result.exit_code == 0, result.stderr
+    record = read_record(tmp_path / "gains.h5", GainsRecord)
+    assert record.set_of == ("proposed", "today")
+    assert {row.name: row.today for row in record.rows}["ATC_RAT_RLL_P"] == pytest.approx(0.2)
+    assert record.noise.line == pytest.approx([95.0], abs=1.0)
+    text = (tmp_path / "gains.param").read_text()
+    assert "roll rate, proportional (s): now 0.2; documented range 0.01 to 0.5" in text
+    assert "INS_HNTCH_FREQ,95" in text
+    assert "INS_HNTCH_ENABLE,1" in text
+    # A hover thrust of another vehicle says that the full thrust is another.
+    assert "if the log is right, vehicle.rotor_speed_max_rad_s is not 900" in result.output
