@@ -19,6 +19,7 @@ from cpfls_cli.cli.options import (
     OutputOption,
     SeveralAfterOption,
     seconds,
+    sheet,
     with_common,
 )
 from cpfls_cli.cli.path_options import (
@@ -60,7 +61,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="Identify a multirotor's rotational dynamics from flights.",
+    # Lines behind a backspace stay as they are.
+    help=f"From flight logs: what a model of a multirotor misses, and how far to trust it.\n\n\b\n{sheet()}",
 )
 
 FlownArgument = Annotated[
