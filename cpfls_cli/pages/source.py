@@ -113,9 +113,8 @@ class Sources:
     @property
     def only_gap(self) -> bool:
         """Whether nothing else was given than how models and flights disagree, and what was found then."""
-        told = (self.gap, self.replays, self.responses, self.twins, self.gains)
-        told = (*told, self.vehicles, self.changes, self.trends)
-        return sum(map(len, told)) == len(self.all)
+        alone = (self.gap, self.replays, self.responses, self.twins, self.gains)
+        return sum(map(len, (*alone, self.vehicles, self.changes, self.trends))) == len(self.all)
 
     @property
     def title(self) -> str:
