@@ -249,7 +249,7 @@ WORKFLOWS: tuple[tuple[str, tuple[str, ...]], ...] = (
         (
             "cpfls simulate study.yaml today.csv --autopilot px4 -o twin.h5",
             "cpfls gap study.yaml logs/* -o gap",
-            "cpfls replay study.yaml gap/extended.h5 today.csv -o replay.h5",
+            "cpfls report study.yaml twin.h5 -o twin.html",
         ),
     ),
     (
