@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.sweep import SweepRecord
     from cpfls_cli.artifacts.trajectory import TrajectoryRecord
     from cpfls_cli.artifacts.trend import TrendRecord
+    from cpfls_cli.artifacts.twin import TwinRecord
     from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
 R = TypeVar("R", bound=Record, default=Any)
@@ -95,6 +96,7 @@ class Sources:
     predictions: ClassVar[_OfFormat[PredictionRecord]] = _OfFormat("cpfls/prediction")
     replays: ClassVar[_OfFormat[ReplayRecord]] = _OfFormat("cpfls/replay")
     responses: ClassVar[_OfFormat[ResponseRecord]] = _OfFormat("cpfls/response")
+    twins: ClassVar[_OfFormat[TwinRecord]] = _OfFormat("cpfls/twin")
     gains: ClassVar[_OfFormat[GainsRecord]] = _OfFormat("cpfls/gains")
     disagreements: ClassVar[_OfFormat[DisagreementRecord]] = _OfFormat("cpfls/disagreement")
     diagnoses: ClassVar[_OfFormat[DiagnosisRecord]] = _OfFormat("cpfls/diagnosis")
@@ -111,8 +113,8 @@ class Sources:
     @property
     def only_gap(self) -> bool:
         """Whether nothing else was given than how models and flights disagree, and what was found then."""
-        told = (self.gap, self.replays, self.responses, self.gains, self.vehicles, self.changes, self.trends)
-        return sum(map(len, told)) == len(self.all)
+        alone = (self.gap, self.replays, self.responses, self.twins, self.gains)
+        return sum(map(len, (*alone, self.vehicles, self.changes, self.trends))) == len(self.all)
 
     @property
     def title(self) -> str:
@@ -127,6 +129,8 @@ class Sources:
             return "What changed about a vehicle"
         if self.gap:
             return "Where simulation and flight disagree"
+        if self.twins:
+            return "Does the simulator fly like the vehicle"
         return "What a model predicts of flights" if self.replays else "How a vehicle answers its rotors"
 
     def of_kind(self, kind: type[R]) -> list[Source[R]]:
