@@ -42,7 +42,10 @@ COUNTS = 0.05
 """Share of a gap, in squares, from which on a part of it counts: an effect, a channel, what follows a signal."""
 
 CHANCE = 0.05
-"""Probability of chance, and of a rival over that of a name, from which on they make an answer more careful."""
+"""Probability of chance from which on something makes an answer more careful: an unnamed effect, air that is none."""
+
+RARE = 0.01
+"""The rate of errors that names are given at: of chance for an effect, and of a rival beside the set that is chosen."""
 
 FEWEST_BLOCKS = 4
 """Blocks that tell an error, if a wide one."""
@@ -58,7 +61,7 @@ class GapSettings(Settings):
     shifts: Annotated[int, Ge(39), Doc("circular time shifts that say what chance alone explains")] = 199
     significance: Annotated[
         float, Gt(0), Lt(0.5), Doc("largest probability that an accepted effect is chance, over the whole catalogue")
-    ] = 0.01
+    ] = RARE
     effects_max: Annotated[int, Ge(1), Le(10), Doc("largest number of effects in one diagnosis")] = 6
     named_share: Annotated[
         float, Gt(0.5), Le(1), Doc("share of the gap above the noise floor from which on effects count as the answer")

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.disagreement import DisagreementRecord
     from cpfls_cli.artifacts.extended import ExtendedRecord
     from cpfls_cli.artifacts.flight import FlightRecord
+    from cpfls_cli.artifacts.gains import GainsRecord
     from cpfls_cli.artifacts.identified import IdentifiedRecord
     from cpfls_cli.artifacts.prediction import PredictionRecord
     from cpfls_cli.artifacts.replay import ReplayRecord
@@ -94,6 +95,7 @@ class Sources:
     predictions: ClassVar[_OfFormat[PredictionRecord]] = _OfFormat("cpfls/prediction")
     replays: ClassVar[_OfFormat[ReplayRecord]] = _OfFormat("cpfls/replay")
     responses: ClassVar[_OfFormat[ResponseRecord]] = _OfFormat("cpfls/response")
+    gains: ClassVar[_OfFormat[GainsRecord]] = _OfFormat("cpfls/gains")
     disagreements: ClassVar[_OfFormat[DisagreementRecord]] = _OfFormat("cpfls/disagreement")
     diagnoses: ClassVar[_OfFormat[DiagnosisRecord]] = _OfFormat("cpfls/diagnosis")
     vehicles: ClassVar[_OfFormat[VehicleRecord]] = _OfFormat("cpfls/model", "vehicle")
@@ -109,7 +111,7 @@ class Sources:
     @property
     def only_gap(self) -> bool:
         """Whether nothing else was given than how models and flights disagree, and what was found then."""
-        told = (self.gap, self.replays, self.responses, self.vehicles, self.changes, self.trends)
+        told = (self.gap, self.replays, self.responses, self.gains, self.vehicles, self.changes, self.trends)
         return sum(map(len, told)) == len(self.all)
 
     @property
@@ -117,6 +119,8 @@ class Sources:
         """Heading of the page: that of the config, or what suits artifacts of the gap workflow alone."""
         if self.settings.title != ReportSettings().title or not self.only_gap:
             return self.settings.title
+        if self.gains:
+            return "Gains for an autopilot"
         if self.vehicles:
             return "A vehicle found in flights"
         if self.changes or self.trends:

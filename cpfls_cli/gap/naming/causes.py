@@ -21,7 +21,7 @@ from cpfls_cli.gap.naming.ranking import likely, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
 from cpfls_cli.gap.naming.scoring import Scored
 from cpfls_cli.gap.naming.search import alternatives, beside_its_like, chance_beside_its_like, in_place_of, odds
-from cpfls_cli.gap.settings import ERRORS, SURE, GapSettings
+from cpfls_cli.gap.settings import ERRORS, RARE, SURE, GapSettings
 from cpfls_cli.rounding import ascending, at_most
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -33,10 +33,6 @@ _LEAST_SHARE = 0.2
 
 # In which a number of the vehicle shows.
 _CHANNEL = {"inertia_x": 0, "inertia_y": 1, "inertia_z": 2, "thrust_scale": 5}
-
-
-_TOLD = 0.01
-"""Probability from which on a set is listed."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +103,7 @@ def likely_sets(judged: Sequence[JudgedEffect]) -> tuple[LikelySet, ...]:
     weights = likely([odds for _, odds in others.values()]).tolist()
     listed = zip([chosen, *(names for names, _ in others.values())], weights, strict=True)
     sets = ascending((LikelySet(names, weight) for names, weight in listed), lambda each: -each.likely)
-    return tuple(each for each in sets if each.likely >= _TOLD)
+    return tuple(each for each in sets if each.likely >= RARE)
 
 
 def _frequency(chosen: Scored, ranking: Sequence[Scored]) -> float:

@@ -26,12 +26,15 @@ from cpfls_cli.gap.naming.ranking import (
 )
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import REFUSED, Scored, normal_equations, scoring_matrix
-from cpfls_cli.gap.settings import CHANCE, COUNTS, GapSettings
+from cpfls_cli.gap.settings import COUNTS, RARE, GapSettings
 from cpfls_cli.rounding import ascending, less
 
 _BEAM = 3
 """Sets that are followed at once: a lag, a delay and a filter each do alone most of what two of them do."""
 
+
+_NEAR = 0.6
+"""Share of what a name explains from which on another one could stand for it: of less a half would have no name."""
 
 _NUMBER = 8.0
 """What a free number has to explain, in squared floors: the logarithm of the residuals of a few flights (Schwarz 1978).
@@ -262,10 +265,11 @@ def _unseen(hypothesis: System, floor: Array, settings: GapSettings, *, moving: 
 
 
 def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Scored]:
-    """List the candidates that the chosen one does not beat: of all, those not much less likely than it."""
-    others = [each for each in ranking if np.isfinite(each.gain) and _names(each.chosen) != _names(chosen.chosen)]
+    """List the candidates that the chosen one does not beat: of all that explain about as much, those not rare."""
+    known = _names(chosen.chosen)
+    others = [each for each in ranking if each.gain > _NEAR * chosen.gain and _names(each.chosen) != known]
     own, *weights = likely([odds(chosen, other, above_floor) for other in others])
-    return [other for other, weight in zip(others, weights, strict=True) if weight >= CHANCE * own]
+    return [other for other, weight in zip(others, weights, strict=True) if weight >= RARE * own]
 
 
 def odds(own: Scored, other: Scored, above_floor: float) -> Array:
