@@ -74,6 +74,11 @@ def run(
         *_hover_notes(own, today, hover, record),
         *work.notes,
         *([] if today or not flights else [f"no log tells parameters of {own.title}; its defaults stand beside"]),
+        *(
+            ["noise is not read: the config has no import.signals.body_rate (`cpfls init LOG` proposes it)"]
+            if flights and not _maps_rates(job.study)
+            else []
+        ),
     ]
     heard = None if noise is None else _heard(own, noise, work.lines, (chosen, values))
     made = GainsRecord.of(own, model.name, asked, hover, sets, proposals, today, heard, warnings)
@@ -221,7 +226,9 @@ def _notches(autopilot: Autopilot, lines: Sequence[Line]) -> Iterator[Proposal]:
 
 
 def _rates(flight: Path, study: Study) -> tuple[Array, Array]:
-    """Read times and body rates of a log, as it has them."""
+    """Read times and body rates of a log, as it has them; none where the config does not say which they are."""
+    if not _maps_rates(study):
+        return np.zeros(0), np.zeros((0, 3))
     read = read_log(flight, study.import_)
     mapped = {str(name): given for name, given in read.settings.signals.items()}.get("body_rate")
     stamps = read.columns.get(read.settings.time_column or "timestamp")
@@ -233,6 +240,10 @@ def _rates(flight: Path, study: Study) -> tuple[Array, Array]:
     rate = factor * np.stack(columns, axis=1)
     known = np.isfinite(rate).all(axis=1) & np.isfinite(stamps)
     return seconds * stamps[known], rate[known]
+
+
+def _maps_rates(study: Study) -> bool:
+    return "body_rate" in {str(name) for name in study.import_.signals}
 
 
 def _heard(

@@ -175,3 +175,17 @@ def test_a_log_gives_todays_parameters_and_the_noise(cpfls, tmp_path):
     assert "INS_HNTCH_ENABLE,1" in text
     # A hover thrust of another vehicle says that the full thrust is another.
     assert "if the log is right, vehicle.rotor_speed_max_rad_s is not 900" in result.output
+
+
+def test_without_a_mapping_a_log_gives_parameters_alone(cpfls, folder, tmp_path):
+    (tmp_path / "log.bin").write_bytes(
+        dataflash({"IMU": ("Qf", "TimeUS,GyrX")}, [("IMU", (1_000_000, 0.1))], {"ATC_RAT_RLL_P": 0.2})
+    )
+    result = cpfls(
+        *("tune", folder / "study.yaml", folder / "vehicle.h5", "--autopilot", "ardupilot"),
+        *("--flight", tmp_path / "log.bin", "-o", tmp_path / "gains.h5"),
+    )
+    assert result.exit_code == 0, result.stderr
+    record = read_record(tmp_path / "gains.h5", GainsRecord)
+    assert (record.beside, record.noise) == ("today", None)
+    assert any("the config has no import.signals.body_rate" in words for words in record.warning)
