@@ -122,7 +122,7 @@ def altered(name: str, size: float, kind: Kind, body: Body, draw: int) -> Altere
     if name == "gyroscope bias":
         return Altered(body._replace(turn_bias=body.turn_bias + size * axis), {"drift": (size, 0.0, 0.0)})
     if name == "gyroscope scale":
-        return Altered(body._replace(turn_gain=body.turn_gain * (1 + size * axis)), {"follow roll": (np.log1p(size),)})
+        return Altered(body._replace(turn_gain=body.turn_gain * (1 + size * axis)), {"scale x": (np.log1p(size),)})
     if name == "accelerometer bias":
         return Altered(body._replace(felt_bias=body.felt_bias + size * np.eye(3)[2]), {"felt z": (size,)})
     if name == "vibration":

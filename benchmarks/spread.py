@@ -17,7 +17,7 @@ real: the nano-drone benchmark (see nanodrone.py for DATA). Constants and gusts 
 path of which was flown three or four times. The law of its autopilot is not known: how torque and thrust answer is
 found in how runs of one path differ. Vehicles drawn fly the test flights in closed loop, asked what the flight was
 asked: their rotors turn as logged, and answer the difference to the logged state by that law. About yaw these flights
-tell neither the moment of inertia nor gusts, so all turn as logged there, and roll and pitch are counted.
+tell neither the moment of inertia nor gusts, so all keep the logged heading, and roll and pitch are counted.
 
 Needs jax (extra `simulators`); real needs pyarrow (extra `parquet`) too.
 """
@@ -37,9 +37,14 @@ from benchmarks.shared.nanodrone_files import TEST, TRAINING, VEHICLE, flights
 
 pin_threads()
 
-import jax
-import jax.numpy as jnp
 import numpy as np
+
+try:
+    import jax
+    import jax.numpy as jnp
+except ImportError:
+    if __name__ == "__main__":
+        sys.exit("needs the package jax: pip install 'cpfls[simulators]'")
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.export.registry import exported
@@ -79,6 +84,11 @@ ENDS, TUMBLES = (2.5, 97.5), 50.0
 VEHICLES = {"45 g": SMALL, "1.5 kg": LARGE}
 
 
+def main(part: str = "simulated", *words: str) -> None:
+    with jax.enable_x64(True):
+        PARTS[part](*words)
+
+
 class Found(NamedTuple):
     """What flights tell: a model with its gusts, and how sure its numbers are."""
 
@@ -95,6 +105,8 @@ def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
     solved, spread = constants.fitted, constants.spread
     numbers = tuple(bodily(vehicle, tuple(found_numbers(solved, spread))))
     gusts = find_gusts(solved.model, given, {each.name: each.determined for each in numbers}, told=True)
+    if gusts is not None:
+        print(f"  of what is left comes again, by axis: {np.round(gusts.foretold, 2)}", file=sys.stderr)
     held = None if gusts is None or gusts.gusts is None else gusts.gusts
     model = replace(solved.model, gusts=held)
     return Found(
@@ -310,14 +322,19 @@ def real(folder: str) -> None:
     }
     rows = []
     for kind, own in flown.items():
-        shares, lost = [], 0
+        shares, off, wide, lost = [], [], [], 0
         for flight in flights(Path(folder), TEST):
-            turned = twins(told.model, own, law, flight)
-            shares.append(share_inside(turned, flight.motion.rate[1:])[:2])
+            turned, measured = twins(told.model, own, law, flight), flight.motion.rate[1:]
+            shares.append(share_inside(turned, measured)[:2])
+            low, middle, high = np.percentile(turned[~tumbled(turned)], (ENDS[0], 50.0, ENDS[1]), axis=0)
+            off.append(np.sqrt(((middle - measured) ** 2).mean(axis=0))[:2])
+            wide.append((high - low).mean(axis=0)[:2])
             lost += int(tumbled(turned).sum())
-        rows.append((*row("nano-drone", kind, np.array(shares)), f"{lost} of {len(shares) * COUNT}"))
+        sizes_ = (", ".join(f"{value:.2g}" for value in np.mean(each, axis=0)) for each in (off, wide))
+        rows.append((*row("nano-drone", kind, np.array(shares)), *sizes_, f"{lost} of {len(shares) * COUNT}"))
         print(rows[-1], file=sys.stderr, flush=True)
-    table("spread_real", ("vehicle", "flown", *AXES, "all", "one flight, least to most", "tumbled"), rows)
+    header = ("vehicle", "flown", *AXES, "all", "one flight, least to most", "median off", "width", "tumbled")
+    table("spread_real", header, rows)
 
 
 def answers(model: VehicleModel, speed: Array) -> Array:
@@ -375,10 +392,24 @@ def nearest(given: Instruments, number: int, other: int) -> Array:
     return np.asarray(first @ last)
 
 
+def difference(rotation: Any, own: Any) -> Any:
+    """Give the rotation from one to each of others about the body axes, small ones, shape (vehicle, 3)."""
+    away = jnp.einsum("ji,njk->nik", rotation, own)
+    pairs = ((2, 1), (0, 2), (1, 0))
+    return 0.5 * jnp.stack([away[:, row, column] - away[:, column, row] for row, column in pairs], axis=1)
+
+
+def about_z(angle: Any) -> Any:
+    """Turn about body z, shape (vehicle, 3, 3)."""
+    none, one, cosine, sine = jnp.zeros_like(angle), jnp.ones_like(angle), jnp.cos(angle), jnp.sin(angle)
+    rows = [[cosine, -sine, none], [sine, cosine, none], [none, none, one]]
+    return jnp.moveaxis(jnp.array(rows), 2, 0)
+
+
 def twins(model: VehicleModel, flying: Fleet, law: Law, flight: PlaybackFlight) -> Array:
     """Fly all vehicles from the first logged state, asked what the flight was asked; rates, shape (flight, time, 3).
 
-    About yaw they turn as logged: these flights tell neither the moment of inertia nor the gusts there.
+    About yaw they keep what was logged: these flights tell neither the moment of inertia nor the gusts there.
     """
     motion, module, count = flight.motion, flying.module, len(flying.parameters)
     period, unmix = motion.period, np.linalg.pinv(allocation_matrix(model.vehicle)) * sizes(model)
@@ -392,16 +423,14 @@ def twins(model: VehicleModel, flying: Fleet, law: Law, flight: PlaybackFlight) 
         state, answer, gust = carried
         (position, velocity, rotation, rate, speed), key = given
         own = state[:, 6:15].reshape(-1, 3, 3)
-        away = jnp.einsum("ji,njk->nik", rotation, own)
-        turned = 0.5 * jnp.stack(
-            [away[:, 2, 1] - away[:, 1, 2], away[:, 0, 2] - away[:, 2, 0], away[:, 1, 0] - away[:, 0, 1]], 1
-        )
+        own = own @ about_z(-difference(rotation, own)[:, 2])
+        state = state.at[:, 6:15].set(own.reshape(-1, 9)).at[:, 17].set(rate[2])
+        turned = difference(rotation, own)
         moved = jnp.concatenate([state[:, 3:6] - velocity, state[:, :3] - position], axis=1).reshape(-1, 2, 3)
         along_body = jnp.einsum("nji,nkj->nki", own, moved).reshape(-1, 6)
         squared = jnp.maximum(speed**2 + answer @ unmix.T, 0.0)
         after = law.keep * answer + jnp.concatenate([turned, state[:, 15:] - rate, along_body], axis=1) @ law.gain.T
         moved_on = move(pushed(flying, state, gust, period), terms(jnp.sqrt(squared)), flying.parameters)
-        moved_on = moved_on.at[:, 17].set(rate[2])
         return (moved_on, after, keep * gust + fresh * jax.random.normal(key, (count, 6))), moved_on[:, 15:]
 
     begun = jnp.concatenate([part[0].ravel() for part in logged[:4]])
@@ -415,5 +444,4 @@ def twins(model: VehicleModel, flying: Fleet, law: Law, flight: PlaybackFlight) 
 PARTS: dict[str, Callable[..., None]] = {"simulated": simulated, "real": real}
 
 if __name__ == "__main__":
-    with jax.enable_x64(True):
-        PARTS[sys.argv[1] if len(sys.argv) > 1 else "simulated"](*sys.argv[2:])
+    main(*sys.argv[1:])

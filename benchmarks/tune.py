@@ -52,9 +52,7 @@ def main(names: list[str]) -> None:
 
 def flown(name: str, label: str) -> Iterator[list[str]]:
     (vehicle, lag), autopilot = VEHICLES[label], AUTOPILOTS[name]
-    gusts = Gusts(
-        GUST * np.array([*vehicle.inertia_kg_m2[:2], 0.1 * vehicle.inertia_kg_m2[2], 0, 0, 0]), MEMORY_S * np.ones(6)
-    )
+    gusts = gusts_of(vehicle)
     hover = replace(hover_plant(autopilot.law(), vehicle, None, lag), spreads=(SPREAD,) * 3)
     found = with_filters(autopilot, autopilot.defaults(), hover, AskedMargins()).proposals
     own = autopilot.defaults() | {each.parameter.name: each.value for each in found}
@@ -69,6 +67,11 @@ def flown(name: str, label: str) -> Iterator[list[str]]:
             entry for told_, seen_ in zip(predicted, seen, strict=True) for entry in (_number(told_), _number(seen_))
         ]
         yield [name, label, gains, *pairs]
+
+
+def gusts_of(vehicle: VehicleSettings) -> Gusts:
+    size = GUST * np.array(vehicle.inertia_kg_m2[:3]) * [1.0, 1.0, 0.1]
+    return Gusts(np.concatenate([size, np.zeros(3)]), MEMORY_S * np.ones(6))
 
 
 def _seen(

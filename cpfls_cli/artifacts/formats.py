@@ -20,6 +20,7 @@ _RECORDS = {
     ("cpfls/prediction", ""): "prediction.PredictionRecord",
     ("cpfls/replay", ""): "replay.ReplayRecord",
     ("cpfls/response", ""): "response.ResponseRecord",
+    ("cpfls/twin", ""): "twin.TwinRecord",
     ("cpfls/gains", ""): "gains.GainsRecord",
     ("cpfls/disagreement", ""): "disagreement.DisagreementRecord",
     ("cpfls/diagnosis", ""): "diagnosis.DiagnosisRecord",

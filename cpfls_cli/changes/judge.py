@@ -5,12 +5,11 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.changes.causes import Cause, causes
 from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.changes.reference import Reference, common_numbers, kinds_of
@@ -41,12 +40,12 @@ _SHOWN, _SIZES = 100, np.geomspace(0.05, 3.0, 28)
 three times what is usual does not show cannot be told."""
 
 _IN_COMMON = 0.8
-"""Share of their variance that flights of a day have in common where chance is drawn."""
+"""Share of their variance that flights of a day have in common where chance is drawn: another share makes a search over
+starts find as much by chance, or less."""
 
-_SCALES, _TAILS = 6, (1e-3, 1e-3)
-"""Points of the scales of a kind that densities are summed over, and what is left out at either end."""
-
+_QUANTILES = (np.arange(12) + 0.5) / 12
 _HALF_WIDTH = 1.96
+_NONE = slice(0, 0)
 
 
 class Size(NamedTuple):
@@ -93,7 +92,7 @@ class Change:
     by_flight : array, shape (flight,)
         The same of each flight alone.
     since : int
-        Flight of today from which on it looks most as if it had changed.
+        Flight of today from which on it is changed, or looks most like it.
     found : tuple of Found
         Empty where nothing changed.
     shows : mapping of str to float
@@ -120,9 +119,9 @@ def changed(
     """Hold flights of today against reference flights.
 
     Each change that is possible is a normal distribution of its sizes beside that of unchanged flights, a multivariate
-    t of each kind of numbers; its evidence is the ratio of both densities. It may be there from any flight of today on.
-    The largest evidence counts, against the largest that unchanged flights have, searched alike: the only threshold is
-    the rate of false alarms.
+    t; its evidence is the ratio of both densities. It may be there from any flight of today on. The largest evidence
+    counts, against the largest that unchanged flights have, searched alike: the only threshold is the rate of false
+    alarms.
 
     Parameters
     ----------
@@ -167,7 +166,11 @@ def judged(
     evidence = space.evidence(np.vstack([since_each, apart])).max(axis=0)
     p_value = beyond_chance(chance, evidence[: len(starts)].max())
     best = int(np.argmax(evidence[: len(starts)]))
-    found = _found(space, since_each[best], chance) if p_value <= FALSE_ALARM else ()
+    since, found = starts[best], tuple[Found, ...]()
+    if p_value <= FALSE_ALARM:
+        found = _found(space, since_each[best], chance)
+        since = _since(space, apart, found, starts)
+        found = _found(space, apart[since:].mean(axis=0), chance) or found
     threshold = float(np.quantile(chance, 1 - FALSE_ALARM))
     white = np.linalg.solve(space.root, drawn[0, :_SHOWN].T)
     return Change(
@@ -177,7 +180,7 @@ def judged(
         np.sqrt(np.diag(covariance)),
         p_value,
         np.array([beyond_chance(alone, each) for each in evidence[len(starts) :]]),
-        starts[best],
+        since,
         found,
         {cause.name: space.shows(index, threshold, white) for index, cause in enumerate(listed)},
     )
@@ -188,34 +191,8 @@ def beyond_chance(chance: Array, value: float) -> float:
     return float((1 + (chance >= value).sum()) / (1 + len(chance)))
 
 
-class _Mixture(NamedTuple):
-    """A density as a mixture over scales of the kinds that its directions touch, in logarithms.
-
-    Attributes
-    ----------
-    weights : array, shape (scale, row)
-        Logarithm of each part.
-    means : array, shape (scale, size, row)
-        Of sizes along the directions.
-    covariances : array, shape (scale, size, size)
-    """
-
-    weights: Array
-    means: Array
-    covariances: Array
-
-    @property
-    def density(self) -> Array:
-        """Logarithm of the density, shape (row,)."""
-        most = self.weights.max(axis=0)
-        return np.asarray(most + np.log(np.exp(self.weights - most).sum(axis=0)))
-
-
 class _Space:
-    """Densities of numbers under no change and under each one: of each kind a multivariate t with a scale of its own.
-
-    So a change has to do with the kinds that it touches alone.
-    """
+    """Densities of numbers under no change and under each one, as mixtures of normal ones."""
 
     def __init__(self, covariance: Array, freedom: float, kinds: Sequence[str], listed: Sequence[Cause]) -> None:
         # Slow to load, and who reads a record computes nothing.
@@ -224,10 +201,7 @@ class _Space:
         self.listed, self.freedom = listed, freedom
         self.kind = np.unique(kinds, return_inverse=True)[1]
         self.root = np.linalg.cholesky(covariance)
-        square = np.geomspace(chdtri(freedom, 1 - _TAILS[0]), chdtri(freedom, _TAILS[1]), _SCALES)
-        self.scales = freedom / square
-        weight = 0.5 * freedom * (np.log(square / freedom) - square / freedom)
-        self.weights = weight - np.log(np.exp(weight - weight.max()).sum()) - weight.max()
+        self.scales = freedom / chdtri(freedom, 1 - _QUANTILES)
         self.white = [np.linalg.solve(self.root, cause.directions) for cause in listed]
         self.prior = np.log([cause.prior for cause in listed])
 
@@ -246,70 +220,57 @@ class _Space:
         order = np.argsort(np.argsort(counts, kind="stable"), kind="stable")
         return np.asarray(scale * (np.array(means)[order] @ self.root.T))
 
-    def evidence(self, apart: Array, beside: Sequence[int] = ()) -> Array:
+    def evidence(self, apart: Array, beside: Array | None = None) -> Array:
         """Compute the logarithm of the evidence of each change, shape (cause, row).
 
         Parameters
         ----------
         apart : array, shape (row, number)
-        beside : sequence of int
-            Changes that are there anyway.
+        beside : array, shape (number, size), or None
+            Whitened directions of changes that are there anyway.
         """
         rows = np.linalg.solve(self.root, apart.T)
-        with_each = np.array([self._gain(rows, [*beside, index]) for index in range(len(self.listed))])
-        return np.asarray(with_each - self._gain(rows, beside) + self.prior[:, None])
+        base = rows[:, :0] if beside is None else beside
+        without = self._density(rows, base)
+        known = base.shape[1]
+        each = [
+            self._density(rows, np.hstack([base, own]), slice(known, known + cause.losses))
+            for own, cause in zip(self.white, self.listed, strict=True)
+        ]
+        return np.array(each) - without + self.prior[:, None]
 
-    def _gain(self, rows: Array, chosen: Sequence[int]) -> Array:
-        """Compute the logarithm of the density of whitened rows with changes over that without any, shape (row,)."""
-        if not chosen:
-            return np.zeros(rows.shape[1])
-        columns = np.hstack([self.white[index] for index in chosen])
-        gain = np.zeros(rows.shape[1])
-        for kinds, own in self._parts(columns):
-            without = sum(
-                self._mixture(rows, [kind], columns[:, :0], np.zeros(0, dtype=bool)).density for kind in kinds
-            )
-            gain += self._mixture(rows, kinds, columns[:, own], self._losses(chosen)[own]).density - without
-        return gain
-
-    def _losses(self, chosen: Sequence[int]) -> BoolArray:
-        """Mark the directions of changes whose sizes are nearly always above 0."""
-        each = [np.arange(self.white[index].shape[1]) < self.listed[index].losses for index in chosen]
-        return np.concatenate(each)
-
-    def _parts(self, columns: Array) -> list[tuple[list[int], BoolArray]]:
-        """Part directions that have no kind in common: the kinds of each part, and the directions that touch them."""
-        touches = np.array([(columns[self.kind == kind] != 0).any(axis=0) for kind in range(self.kind.max() + 1)])
-        parts: list[tuple[list[int], BoolArray]] = []
-        for column in touches.T:
-            kinds = set(np.flatnonzero(column).tolist())
-            apart = [part for part in parts if not kinds & set(part[0])]
-            kinds = kinds.union(*(part[0] for part in parts if kinds & set(part[0])))
-            parts = [*apart, (sorted(kinds), np.asarray(touches[sorted(kinds)].any(axis=0)))] if kinds else parts
-        return parts
-
-    def _mixture(self, rows: Array, kinds: Sequence[int], columns: Array, losses: BoolArray) -> _Mixture:
-        """Compute the density of the numbers of kinds, but for what all have in common.
+    def _density(self, rows: Array, directions: Array, losses: slice = _NONE) -> Array:
+        """Compute the logarithm of the density of whitened rows, but for what all have in common, shape (row,).
 
         Parameters
         ----------
-        columns : array, shape (number, size)
-            Whitened directions.
-        losses : array, shape (size,)
-            Those whose sizes are nearly always above 0.
+        losses : slice
+            Directions whose sizes are nearly always above 0.
         """
-        own = [self.kind == kind for kind in kinds]
-        scales = np.array(list(product(self.scales, repeat=len(own))))
-        squares = np.array([(rows[each] ** 2).sum(axis=0) for each in own])
-        along = np.array([columns[each].T @ rows[each] for each in own])
-        gram = np.array([columns[each].T @ columns[each] for each in own])
-        covariances: Array = np.linalg.inv(np.eye(columns.shape[1]) + np.einsum("sk,kij->sij", 1 / scales, gram))
-        projected: Array = np.einsum("sk,kir->sir", 1 / scales, along)
-        means: Array = covariances @ projected
-        spread = np.log(scales) @ [each.sum() for each in own] - np.linalg.slogdet(covariances)[1]
-        weights = np.array(list(product(self.weights, repeat=len(own)))).sum(axis=1) - 0.5 * spread
-        exponent = (1 / scales) @ squares - (projected * means).sum(axis=1)
-        return _Mixture(weights[:, None] - 0.5 * exponent + _losing(means, covariances, losses), means, covariances)
+        left, sizes, _ = np.linalg.svd(directions, full_matrices=False)
+        along, square = (left.T @ rows) ** 2, (rows**2).sum(axis=0)
+        parts = []
+        for scale in self.scales:
+            grown = scale + sizes**2
+            inside = (along * (1 / scale - 1 / grown)[:, None]).sum(axis=0)
+            weight = len(rows) * np.log(scale) + np.log(grown / scale).sum()
+            parts.append(-0.5 * (square / scale - inside + weight) + self._losing(rows, directions, scale, losses))
+        most = np.max(parts, axis=0)
+        return np.asarray(most + np.log(np.mean(np.exp(np.array(parts) - most), axis=0)))
+
+    def _losing(self, rows: Array, directions: Array, scale: float, losses: slice) -> Array:
+        """Compute the logarithm of what the sign of losses adds to a density, shape (row,).
+
+        Of two losses as if neither told of the other.
+        """
+        if losses == _NONE:
+            return np.zeros(rows.shape[1])
+        from scipy.special import ndtr
+
+        inverse = np.linalg.inv(directions.T @ directions / scale + np.eye(directions.shape[1]))[losses]
+        mean, error = inverse @ (directions.T @ rows) / scale, np.sqrt(np.diag(inverse[:, losses]))
+        above = ndtr(mean / error[:, None])
+        return np.asarray(np.log(2 * (_LOSES * above + (1 - _LOSES) * (1 - above))).sum(axis=0))
 
     def sizes(self, apart: Array, chosen: Sequence[int], of: int) -> tuple[Size, ...]:
         """Estimate the sizes of one of several changes that are there, in its unit.
@@ -317,17 +278,22 @@ class _Space:
         What is told of any size counts as as likely; a prior of what is usual would draw large ones in.
         """
         first = sum(self.white[index].shape[1] for index in chosen[: chosen.index(of)])
-        told = slice(first, first + self.listed[of].told)
-        columns = np.hstack([self.white[index] for index in chosen])
-        columns[:, told] *= _ANY
-        rows = np.linalg.solve(self.root, apart[:, None])
-        kinds, own = next(part for part in self._parts(columns) if part[1][told].all())
-        mixture = self._mixture(rows, kinds, columns[:, own], np.zeros(own.sum(), dtype=bool))
-        share = np.exp(mixture.weights - mixture.density)
-        at = np.searchsorted(np.flatnonzero(own), np.arange(told.start, told.stop))
-        means, variances = mixture.means[:, at, 0], np.diagonal(mixture.covariances, axis1=1, axis2=2)[:, at]
+        told = np.arange(first, first + self.listed[of].told)
+        directions = np.hstack([self.white[index] for index in chosen])
+        directions[:, told] *= _ANY
+        row = np.linalg.solve(self.root, apart)
+        logarithms, means, variances = [], [], []
+        for scale in self.scales:
+            inverse = np.linalg.inv(directions.T @ directions / scale + np.eye(directions.shape[1]))
+            covariance = scale * np.eye(len(row)) + directions @ directions.T
+            _, determinant = np.linalg.slogdet(covariance)
+            logarithms.append(-0.5 * (row @ np.linalg.solve(covariance, row) + determinant))
+            means.append((inverse @ directions.T @ row / scale)[told])
+            variances.append(np.diag(inverse)[told])
+        share = np.exp(np.array(logarithms) - max(logarithms))[:, None]
+        share /= share.sum()
         mean = (share * means).sum(axis=0)
-        error = np.sqrt((share * (variances + (means - mean) ** 2)).sum(axis=0))
+        error = np.sqrt((share * (np.array(variances) + (np.array(means) - mean) ** 2)).sum(axis=0))
         cause = self.listed[of]
         shown = _ANY * cause.usual * (mean + np.outer([0.0, -_HALF_WIDTH, _HALF_WIDTH], error))
         return tuple(Size(*map(cause.size, each)) for each in shown.T)
@@ -337,25 +303,12 @@ class _Space:
         own, cause = self.white[index], self.listed[index]
 
         def is_enough(size: float) -> bool:
-            evidence = self._gain(drawn + size * own[:, :1], [index]) + self.prior[index]
-            return bool(np.mean(evidence >= threshold) >= _POWER)
+            rows = drawn + size * own[:, :1]
+            evidence = self._density(rows, own, slice(0, cause.losses)) - self._density(rows, own[:, :0])
+            return bool(np.mean(evidence + self.prior[index] >= threshold) >= _POWER)
 
         first = bisect_left(_SIZES, x=True, key=is_enough)
         return cause.size(_SIZES[first] * cause.usual) if first < len(_SIZES) else float("inf")
-
-
-def _losing(means: Array, covariances: Array, losses: BoolArray) -> Array:
-    """Compute the logarithm of what the sign of losses adds to a density, shape (scale, row).
-
-    Of two losses as if neither told of the other.
-    """
-    if not losses.any():
-        return np.zeros((len(means), means.shape[2]))
-    from scipy.special import ndtr
-
-    error = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)[:, losses])
-    above = ndtr(means[:, losses] / error[:, :, None])
-    return np.asarray(np.log(2 * (_LOSES * above + (1 - _LOSES) * (1 - above))).sum(axis=1))
 
 
 def _found(space: _Space, apart: Array, chance: Array) -> tuple[Found, ...]:
@@ -388,9 +341,25 @@ def _found(space: _Space, apart: Array, chance: Array) -> tuple[Found, ...]:
     return tuple(found)
 
 
+def _since(space: _Space, apart: Array, found: Sequence[Found], starts: Sequence[int]) -> int:
+    """Find the flight before which flights are nearest to the reference, and from which on to each other.
+
+    Along what was found: what else flights of a day have in common tells nothing of it.
+    """
+    along = np.hstack([np.linalg.solve(space.root, each.cause.directions[:, : each.cause.told]) for each in found])
+    shown = np.linalg.solve(space.root, apart.T).T @ np.linalg.svd(along, full_matrices=False)[0]
+
+    def apart_from(start: int) -> float:
+        after = shown[start:]
+        return float((shown[:start] ** 2).sum() + ((after - after.mean(axis=0)) ** 2).sum())
+
+    return min(starts, key=apart_from)
+
+
 def _beside(space: _Space, apart: Array, there: Sequence[int]) -> Array:
     """Compute the logarithm of the evidence of each change beside those that are there, shape (cause,)."""
-    evidence = space.evidence(apart[None], there)[:, 0]
+    beside = np.hstack([space.white[index] for index in there]) if there else None
+    evidence = space.evidence(apart[None], beside)[:, 0]
     rotors = frozenset[str]().union(*(space.listed[index].rotors for index in there))
     for index, cause in enumerate(space.listed):
         if index in there or cause.rotors & rotors:

@@ -346,7 +346,7 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
     if signals.attitude is not None:
         turns = _of_attitude(signals)
         yield _drift(signals, turns, flies)
-        yield _scale(own.average(signals.body_rate)[inside], own.average(turns)[inside])
+        yield _scale(signals, turns, flies)
 
 
 def _delay_error(left_out: Array) -> Array:
@@ -411,10 +411,17 @@ def _drift(signals: Signals, turns: Array, flies: BoolArray) -> _Numbers:
     return _averaged([f"drift {axis}" for axis in _AXES], apart, flies[1:] & flies[:-1], lambda means: means)
 
 
-def _scale(rates: Array, turns: Array) -> _Numbers:
-    """Fit the attitude's rate, which is noisier, to the gyroscope's, of windows: its scale, a logarithm."""
-    x = rates - rates.mean(axis=0)
-    products = np.stack([x * x, x * (turns - turns.mean(axis=0))], axis=2)
+def _scale(signals: Signals, turns: Array, flies: BoolArray) -> _Numbers:
+    """Fit the attitude's rate, which is noisier, to the gyroscope's: its scale, a logarithm.
+
+    Of windows that no vibration passes, which the attitude does not hold.
+    """
+    own, inside = _windows(signals, flies, _SWING_S)
+    if inside.sum() < FEWEST_WINDOWS:
+        return [], np.zeros(0), np.zeros(0)
+    x, y = (own.average(each)[inside] for each in (signals.body_rate, turns))
+    x = x - x.mean(axis=0)
+    products = np.stack([x * x, x * y], axis=2)
     with np.errstate(invalid="ignore"):
         return _averaged(
             [f"scale {axis}" for axis in _AXES],

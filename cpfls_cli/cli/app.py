@@ -19,6 +19,7 @@ from cpfls_cli.cli.options import (
     OutputOption,
     SeveralAfterOption,
     seconds,
+    sheet,
     with_common,
 )
 from cpfls_cli.cli.path_options import (
@@ -60,10 +61,16 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="Identify a multirotor's rotational dynamics from flights.",
+    # Lines behind a backspace stay as they are.
+    help=f"From flight logs: what a model of a multirotor misses, and how far to trust it.\n\n\b\n{sheet()}",
 )
 
-TrajectoryArgument = Annotated[Path, typer.Argument(metavar="TRAJECTORY", help="Made by `cpfls trajectory`.")]
+FlownArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="TRAJECTORY", help="Made by `cpfls trajectory`; or a flight or log, whose setpoints --autopilot flies."
+    ),
+]
 FlightArgument = Annotated[Path, typer.Argument(metavar="FLIGHT", help="Made by `cpfls simulate` or `cpfls import`.")]
 TrainingArgument = Annotated[
     list[Path], typer.Argument(metavar="FLIGHT...", help="Made by `cpfls simulate` or `cpfls import`; one or more.")
@@ -325,7 +332,7 @@ def trajectory(
 @_command()
 def simulate(
     config: ConfigArgument,
-    trajectory: TrajectoryArgument,
+    trajectory: FlownArgument,
     output: OutputOption,
     model: Annotated[
         Path | None,
@@ -334,7 +341,8 @@ def simulate(
             metavar="MODEL",
             help="Control the attitude with this model of `cpfls identify`, and compare its tracking error with those "
             "of a rigid body and of PD alone. With --mode closed-loop: fly it, or one of `cpfls extend`, in place of "
-            "the vehicle of the config; one of `cpfls vehicle` is always flown. Effects given come on top.",
+            "the vehicle of the config; one of `cpfls vehicle` is always flown. Effects given come on top. Along "
+            "a FLIGHT: fly it beside the vehicle of the config.",
         ),
     ] = None,
     mode: Annotated[
@@ -358,12 +366,21 @@ def simulate(
     gusts: Annotated[
         bool, typer.Option("--gusts", help="Fly in the gusts that the model of `cpfls vehicle` holds, in closed loop.")
     ] = False,
+    autopilot: Annotated[
+        str | None,
+        typer.Option(
+            "--autopilot",
+            metavar="NAME",
+            help="px4, ardupilot, betaflight or crazyflie: its own control law flies, in closed loop; along a FLIGHT "
+            "with the gains of its log.",
+        ),
+    ] = None,
     *,
     common: Common,
 ) -> None:
-    """Fly a trajectory: exactly, in closed loop with effects that a model lacks, or with a model that controls it."""
+    """Fly a trajectory, exactly or in closed loop; or a flight's own setpoints, to see where simulator and it part."""
     with messages_for_errors():
-        asked = _of("simulate").option_overrides(mode, effect or [], gusts=gusts)
+        asked = _of("simulate").option_overrides(mode, effect or [], gusts=gusts, autopilot=autopilot)
         common = replace(common, overrides=[*(common.overrides or []), *asked])
 
     _run("simulate", config, output, common, lambda command, job: command.run(job, trajectory, model, mode))

@@ -234,3 +234,51 @@ def seconds(text: str) -> float:
     if not 0.0 < value < math.inf:
         raise typer.BadParameter(f"{text!r} is not a duration; write 90, 90s, 10m or 2h")
     return value
+
+
+WORKFLOWS: tuple[tuple[str, tuple[str, ...]], ...] = (
+    (
+        "I have logs and want a model",
+        (
+            "cpfls init logs/* --mass 1.2 --arm 0.16 -o study.yaml",
+            "cpfls vehicle study.yaml logs/* -o vehicle.h5",
+        ),
+    ),
+    (
+        "My simulator differs from flight",
+        (
+            "cpfls simulate study.yaml today.csv --autopilot px4 -o twin.h5",
+            "cpfls gap study.yaml logs/* -o gap",
+            "cpfls report study.yaml twin.h5 -o twin.html",
+        ),
+    ),
+    (
+        "Something changed",
+        (
+            "cpfls changed study.yaml today.csv --since logs/* -o changed",
+            "cpfls trend study.yaml logs -o trend",
+        ),
+    ),
+    (
+        "I want gains",
+        (
+            "cpfls vehicle study.yaml logs/* -o vehicle.h5",
+            "cpfls tune study.yaml vehicle.h5 --autopilot px4 -o gains.h5",
+        ),
+    ),
+    (
+        "I want to plan a flight",
+        (
+            "cpfls trajectory study.yaml --hover 30 --excite roll,pitch -o path.h5",
+            "cpfls simulate study.yaml path.h5 --autopilot px4 -o flight.h5",
+        ),
+    ),
+    ("I want the paper", ("make quick", "make reproduce")),
+)
+"""What to type for what: the first screen of ``cpfls --help`` and of README.md."""
+
+
+def sheet(indent: str = "") -> str:
+    """Write all of it, each command on a line of its own."""
+    lines = [line for title, commands in WORKFLOWS for line in (title, *(f"  {command}" for command in commands))]
+    return "\n".join(indent + line for line in lines)

@@ -28,6 +28,7 @@ _PAGES = {
     "cpfls/prediction": "prediction",
     "cpfls/replay": "replay",
     "cpfls/response": "response",
+    "cpfls/twin": "twin",
     "cpfls/disagreement": "disagreement",
     "cpfls/diagnosis": "diagnosis",
     "cpfls/flight-numbers": "flight_numbers",

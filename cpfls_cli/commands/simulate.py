@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.models import read_model
+from cpfls_cli.logs.formats import is_log
 from cpfls_cli.pages.disturbance import still_air_text
 from cpfls_cli.pages.flight import answer, autopilot_text
 from cpfls_cli.pages.source import source_of
@@ -40,7 +42,9 @@ _EFFECT_FORM = "write NAME=VALUE[,VALUE...] or NAME.coefficient=VALUE, see `cpfl
 
 
 def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None = None) -> Outcome:
-    """Simulate a flight along a trajectory and write it."""
+    """Simulate a flight along a trajectory, or along the setpoints of a flight, and write it."""
+    if is_log(trajectory) or holds(trajectory, FlightRecord):
+        return import_module("cpfls_cli.commands.twin").run(job, trajectory, model)  # type: ignore[no-any-return]
     if model is not None and mode is None:
         whole = holds(model, VehicleRecord)
         job = replace(job, study=_with_mode(job.study, "closed-loop" if whole else "computed-torque"))
@@ -146,14 +150,17 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def option_overrides(mode: str | None, effects: Sequence[str], *, gusts: bool = False) -> list[str]:
-    """Write ``--mode``, ``--effect`` and ``--gusts`` as overrides of the config, which its artifact then holds."""
+def option_overrides(
+    mode: str | None, effects: Sequence[str], *, gusts: bool = False, autopilot: str | None = None
+) -> list[str]:
+    """Write options as overrides of the config, which its artifact then holds."""
     given: dict[str, list[float] | dict[str, float]] = {}
     for text in effects:
         _add_effect(text, given)
-    mode = "closed-loop" if gusts and mode is None else mode
+    mode = "closed-loop" if (gusts or autopilot) and mode is None else mode
     chosen = [] if mode is None else [f"simulation.mode={mode}"]
     chosen += ["simulation.closed_loop.gusts=true"] if gusts else []
+    chosen += [] if autopilot is None else [f"simulation.closed_loop.autopilot={autopilot}"]
     # JSON is YAML, and numbers keep all their digits.
     return [*chosen, *(f"simulation.closed_loop.effects.{name}={json.dumps(value)}" for name, value in given.items())]
 

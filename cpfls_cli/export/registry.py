@@ -89,7 +89,7 @@ TARGETS = {
     "sdf": Target("Gazebo's motor model", ".sdf", sdf_held, sdf_text, fly=fly_sdf, package="", step_s=1e-3, levels=4),
     "px4": Target("PX4's Gazebo", ".sdf", sdf_held, px4_text, AIRFRAME, fly=fly_sdf, package="", step_s=1e-3, levels=4),
     "crazyflow": Target(
-        "crazyflow and drone-models",
+        "crazyflow",
         ".toml",
         crazyflow_held,
         crazyflow_text,

@@ -211,5 +211,5 @@ def _gust_ranges(nominal: VehicleModel, spread: Spread) -> Iterator[tuple[str, R
 def require_ending(name: str, suffix: str) -> str:
     """Refuse a file whose ending tells no form."""
     if suffix not in ENDINGS:
-        raise InputError(f"{name}: the ending tells no form; end the name in one of {', '.join(ENDINGS)}")
+        raise InputError(f"{name}: its suffix names no form; give the name one of the suffixes {', '.join(ENDINGS)}")
     return suffix

@@ -16,7 +16,8 @@ from cpfls_cli.artifacts.gap_flights import FlightsGroup
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.replay import ReplayRecord
 from cpfls_cli.artifacts.response import ResponseRecord
-from cpfls_cli.artifacts.spec import BODY, EULER, DatasetSpec, Record
+from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, DatasetSpec, Record
+from cpfls_cli.artifacts.twin import TwinRecord
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
@@ -34,9 +35,11 @@ from cpfls_cli.export.tracks import (
     View,
 )
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
+from cpfls_cli.simulation.twin import FRAMES, UNITS
 from cpfls_cli.units import known_unit
 
 _ASKED = "setpoint_"
+_FRAMES = {"body": BODY, "angles": EULER, "world": WORLD}
 _OF_CONFIG = ("rotor_command", "voltage", "setpoint_thrust")
 """Signals whose unit is that of the import."""
 
@@ -179,7 +182,7 @@ def _of_replay(title: str, record: ReplayRecord, study: Study) -> View:
             time=time,
             values={what: own[order] for what, own in known.items()} | {DIFFERENCE: _less(known)[order]},
             unit=unit,
-            frame=BODY if unit == "rad/s" else "world (z up)",
+            frame=BODY if unit == "rad/s" else WORLD,
             description=about,
             flight=_short(record.flown[flight]) if several else "",
             axes=AXES,
@@ -318,6 +321,33 @@ def _of_response(title: str, record: ResponseRecord, study: Study) -> View:
     return View(title, (), curves)
 
 
+def _of_twin(title: str, record: TwinRecord, study: Study) -> View:
+    begins = np.nan if record.clock is None else record.clock.begins
+    time, last = _log_time(record.time, begins), len(record.vehicle) - 1
+    tracks = []
+    for index, channel in enumerate(record.channel):
+        simulated = {_short(name): record.simulated[each, :, index] for each, name in enumerate(record.vehicle)}
+        difference = record.measured[:, index] - record.simulated[last, :, index]
+        own = {MEASURED: record.measured[:, index], SETPOINT: record.setpoint[:, index], **simulated}
+        tracks.append(
+            Track(
+                name=channel.replace(" ", "_"),
+                time=time,
+                values={**own, DIFFERENCE: difference},
+                unit=UNITS[channel],
+                frame=_FRAMES[FRAMES[channel]],
+                description=f"{channel} of the flight, and of vehicles simulated along its setpoints",
+            )
+        )
+    poses = [
+        pose
+        for each, name in enumerate(record.vehicle)
+        for pose in _pose(_short(name), time, record.simulated[each, :, 3:6], record.position[each])
+    ]
+    measured = _pose(BODY_FRAME, time, record.measured[:, 3:6], record.measured_position)
+    return View(title, tracks, poses=[*measured, *poses], stamps=_stamps(study), on_log_clock=record.clock is not None)
+
+
 _KINDS: dict[type[Record], Callable[[str, Any, Study], View]] = {
     FlightRecord: _of_flight,
     PredictionRecord: _of_prediction,
@@ -325,4 +355,5 @@ _KINDS: dict[type[Record], Callable[[str, Any, Study], View]] = {
     DisagreementRecord: _of_disagreement,
     DiagnosisRecord: _of_diagnosis,
     ResponseRecord: _of_response,
+    TwinRecord: _of_twin,
 }

@@ -23,6 +23,7 @@ from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 from cpfls_cli.report.content import Block, Box, Folded, Table, Text
 from cpfls_cli.report.numbers import number
 from cpfls_cli.report.outcome import caution_texts
+from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import joined
 
 _SCORE_UNITS = {"mse": "(N m)^2", "max_error": "N m", "relative_error": "1", "r2": "1", "vaf": "1", "r2_body": "1"}
@@ -192,6 +193,12 @@ def spread_answer(samples: Samples, output: Path, size: int, dry_run: bool) -> I
         held = joined(each.replace("_", " ") for each in samples.held)
         yield Text(
             f"Not drawn, because it is a guess and no flight tells it: {held}. Give it a range of your own.",
+            "warning",
+            always=True,
+        )
+    if sheet.verdict == Trust.LACKING:
+        yield Text(
+            "The vehicle answers with something that the model lacks, so the spread is too narrow by as much as that.",
             "warning",
             always=True,
         )

@@ -13,6 +13,7 @@ from cpfls_cli.artifacts.gains import GainsRecord
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.artifacts.trend import TrendRecord
+from cpfls_cli.artifacts.twin import TwinRecord
 from cpfls_cli.pages.changed import changed_blocks
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
 from cpfls_cli.pages.diagnosis import diagnosis_blocks
@@ -38,6 +39,7 @@ from cpfls_cli.pages.sweep import replicates_section
 from cpfls_cli.pages.tracking import tracking_section
 from cpfls_cli.pages.trajectory import path_blocks
 from cpfls_cli.pages.trend import trend_blocks
+from cpfls_cli.pages.twin import twin_blocks
 from cpfls_cli.pages.uncertainty import uncertainty_blocks
 from cpfls_cli.pages.vehicle_model import found_vehicle_section
 from cpfls_cli.report.content import Block, Document, Section
@@ -96,6 +98,7 @@ _SECTIONS: Sequence[Callable[[Sources], Section | None]] = (
     search_section,
     _of_each("partitions", "Partitions and parameters", IdentifiedRecord, partitions_blocks),
     prediction_section,
+    _of_each("twin", "Does the simulator fly like the vehicle", TwinRecord, twin_blocks),
     response_section,
     _of_each("gains", "Gains for an autopilot", GainsRecord, gains_blocks),
     replay_section,

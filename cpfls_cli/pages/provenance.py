@@ -22,6 +22,7 @@ from cpfls_cli.artifacts.spec import InputFile, Record
 from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.artifacts.trend import TrendRecord
+from cpfls_cli.artifacts.twin import TwinRecord
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.unknown import needs_numbers
 from cpfls_cli.pages.source import Source, Sources
@@ -94,6 +95,7 @@ _COMMANDS: dict[type[Record], _Command] = {
     SweepRecord: _Command("sweep", ("flight",), ("validate", "choose-on")),
     PredictionRecord: _Command("predict", ("model", "flight")),
     ReplayRecord: _Command("replay", ("model", "flight")),
+    TwinRecord: _Command("simulate", ("flight",), ("model",)),
     ResponseRecord: _Command("response", ("flight",), ("model",)),
     GainsRecord: _Command("tune", ("model",), ("flight",)),
     DisagreementRecord: _Command("compare", ("flight",), ("model",)),

@@ -95,12 +95,12 @@ def _told(record: ResponseRecord, index: int) -> str:
     low, high = record.band[index].tolist()
     if not np.isfinite(low):
         return f"{name}: not judged, nowhere {_clear(record)}"
-    where = _span(low, high)
+    where = span_words(low, high)
     if not np.isfinite(record.cost[index]):
         return f"{name}: {_behind(record, index)} {where}"
     parts = record.deviations(index)
     right = len(parts) == 1 and parts[0].right
-    details = "right throughout" if right else ", ".join(map(_deviation, parts))
+    details = "right throughout" if right else ", ".join(map(deviation_words, parts))
     alone = "of the loop: " if not record.has_instruments else f"not moved by {_moved_by(record)}, so of the loop: "
     judged = f"{word_of(word)}, " if record.is_of_vehicle(index) else alone
     return f"{name}: {judged}J = {number(float(record.cost[index]), 3)} {where}; {details}"
@@ -129,12 +129,14 @@ def word_of(word: str) -> str:
     return _WORDS.get(word, word)
 
 
-def _span(low: float, high: float) -> str:
+def span_words(low: float, high: float) -> str:
+    """Say from which frequency to which, Hz."""
     return f"from {number(low, 2)} to {number(high, 2)} Hz"
 
 
-def _deviation(part: Deviation) -> str:
-    where = _span(part.low, part.high)
+def deviation_words(part: Deviation) -> str:
+    """Say how far a model is off over a stretch of frequencies."""
+    where = span_words(part.low, part.high)
     if part.right:
         return f"right {where}"
     decibels, said = 20 * np.log10(part.gain), []

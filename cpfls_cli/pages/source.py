@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.disagreement import DisagreementRecord
     from cpfls_cli.artifacts.extended import ExtendedRecord
     from cpfls_cli.artifacts.flight import FlightRecord
+    from cpfls_cli.artifacts.gains import GainsRecord
     from cpfls_cli.artifacts.identified import IdentifiedRecord
     from cpfls_cli.artifacts.prediction import PredictionRecord
     from cpfls_cli.artifacts.replay import ReplayRecord
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from cpfls_cli.artifacts.sweep import SweepRecord
     from cpfls_cli.artifacts.trajectory import TrajectoryRecord
     from cpfls_cli.artifacts.trend import TrendRecord
+    from cpfls_cli.artifacts.twin import TwinRecord
     from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
 R = TypeVar("R", bound=Record, default=Any)
@@ -94,6 +96,8 @@ class Sources:
     predictions: ClassVar[_OfFormat[PredictionRecord]] = _OfFormat("cpfls/prediction")
     replays: ClassVar[_OfFormat[ReplayRecord]] = _OfFormat("cpfls/replay")
     responses: ClassVar[_OfFormat[ResponseRecord]] = _OfFormat("cpfls/response")
+    twins: ClassVar[_OfFormat[TwinRecord]] = _OfFormat("cpfls/twin")
+    gains: ClassVar[_OfFormat[GainsRecord]] = _OfFormat("cpfls/gains")
     disagreements: ClassVar[_OfFormat[DisagreementRecord]] = _OfFormat("cpfls/disagreement")
     diagnoses: ClassVar[_OfFormat[DiagnosisRecord]] = _OfFormat("cpfls/diagnosis")
     vehicles: ClassVar[_OfFormat[VehicleRecord]] = _OfFormat("cpfls/model", "vehicle")
@@ -109,20 +113,24 @@ class Sources:
     @property
     def only_gap(self) -> bool:
         """Whether nothing else was given than how models and flights disagree, and what was found then."""
-        told = (self.gap, self.replays, self.responses, self.vehicles, self.changes, self.trends)
-        return sum(map(len, told)) == len(self.all)
+        alone = (self.gap, self.replays, self.responses, self.twins, self.gains)
+        return sum(map(len, (*alone, self.vehicles, self.changes, self.trends))) == len(self.all)
 
     @property
     def title(self) -> str:
         """Heading of the page: that of the config, or what suits artifacts of the gap workflow alone."""
         if self.settings.title != ReportSettings().title or not self.only_gap:
             return self.settings.title
+        if self.gains:
+            return "Gains for an autopilot"
         if self.vehicles:
             return "A vehicle found in flights"
         if self.changes or self.trends:
             return "What changed about a vehicle"
         if self.gap:
             return "Where simulation and flight disagree"
+        if self.twins:
+            return "Does the simulator fly like the vehicle"
         return "What a model predicts of flights" if self.replays else "How a vehicle answers its rotors"
 
     def of_kind(self, kind: type[R]) -> list[Source[R]]:

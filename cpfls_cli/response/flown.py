@@ -84,7 +84,7 @@ def vehicle_responses(
             own = [_with_instrument(*pair) for pair in zip(own, given, strict=True)]
         found[name] = [part for parts in own for part in parts]
     period = flights[0].parts[0].period
-    estimates = {name: _estimate(parts, period) for name, parts in found.items()}
+    estimates = {name: estimated(parts, period) for name, parts in found.items()}
     known = [VehicleResponse(name, each, mismatch(each)) for name, each in estimates.items() if each is not None]
     if not known:
         longest = max(len(part) for flight in flights for part in flight.parts) * period
@@ -95,7 +95,7 @@ def vehicle_responses(
     return tuple(known)
 
 
-def _estimate(parts: Sequence[Stretch], period: float) -> FrequencyResponse | None:
+def estimated(parts: Sequence[Stretch], period: float) -> FrequencyResponse | None:
     """Estimate a response with its instruments; without them where they do not move it, which then is said."""
     found = frequency_response(parts, period)
     if found is not None and (not found.instrumented or judged_band(found) is not None):

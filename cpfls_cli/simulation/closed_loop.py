@@ -374,7 +374,7 @@ def fly(
     flight = _loop(pilot, state, speed, vehicle, settings, model, effects, clock, push)
 
     def check(sample: int, state: Array) -> None:
-        _refuse_lost(state, time[sample])
+        _refuse_lost(state, time, sample)
         _refuse_far(state, planned["position"][sample], time[sample], settings.deviation_max_m)
 
     return _flown(flight, clock, check, progress)
@@ -441,7 +441,7 @@ def fly_setpoints(
         speed = motors.speeds(float(setpoints.thrust[0]), np.zeros(3)).speed
     pilot = law_pilot(law, motors, _as_asked(setpoints, clock.parts), clock.step, speed, noise, injected)
     flight = _loop(pilot, np.array(start, dtype=float), speed, vehicle, settings, model, effects, clock, push)
-    return _flown(flight, clock, lambda sample, state: _refuse_lost(state, time[sample]), lambda _done, _all: None)
+    return _flown(flight, clock, lambda sample, state: _refuse_lost(state, time, sample), lambda _done, _all: None)
 
 
 def _as_asked(setpoints: Setpoints, parts: int) -> Callable[[int, Array], Asked]:
@@ -510,13 +510,16 @@ def asked(
     -------
     dict of str to array, shape (time, 3), m, m/s, rad
         ``position`` and ``velocity`` in the world frame; ``attitude`` as roll, pitch, yaw, within half a turn of those
-        that are flown.
+        that are flown; of an autopilot's own law ``thrust`` too, shape (time,), N.
     """
     autopilot = Autopilot(vehicle, settings, reference(planned, time, time))
     targets = [autopilot.target(step, own[POSITION], own[VELOCITY]) for step, own in enumerate(state)]
     flown = state[:, ATTITUDE]
     attitude = flown + rotations.wrapped(rotations.euler_angles(np.array(targets)) - flown)
-    return {"position": planned["position"], "velocity": planned["velocity"], "attitude": attitude}
+    found = {"position": planned["position"], "velocity": planned["velocity"], "attitude": attitude}
+    if settings.law is not None:
+        found["thrust"] = np.array([autopilot.wrench(step, *_seen(own))[0] for step, own in enumerate(state)])
+    return found
 
 
 def _loop(
@@ -546,12 +549,26 @@ def _seen(state: Array) -> tuple[Array, Array, Array, Array]:
     return state[POSITION], state[VELOCITY], rotation, state[BODY_RATE]
 
 
-def _refuse_lost(state: Array, time: float) -> None:
+class LostVehicleError(ComputationError):
+    """A vehicle that no autopilot holds any more.
+
+    Attributes
+    ----------
+    sample : int
+        At which it was seen.
+    """
+
+    def __init__(self, message: str, sample: int) -> None:
+        super().__init__(message)
+        self.sample = sample
+
+
+def _refuse_lost(state: Array, time: Array, sample: int) -> None:
     if not np.isfinite(state).all():
-        raise ComputationError(f"the flight is out of control at t = {time:g} s: {_REMEDY}")
+        raise LostVehicleError(f"the flight is out of control at t = {time[sample]:g} s: {_REMEDY}", sample)
     roll, pitch, _ = state[ATTITUDE]
     if cos(roll) * cos(pitch) <= 0:
-        raise ComputationError(f"the vehicle tilts beyond 90 degrees at t = {time:g} s: {_REMEDY}")
+        raise LostVehicleError(f"the vehicle tilts beyond 90 degrees at t = {time[sample]:g} s: {_REMEDY}", sample)
 
 
 def _refuse_far(state: Array, planned: Array, time: float, limit: float) -> None:

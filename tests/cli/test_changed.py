@@ -73,7 +73,8 @@ def test_numbers_of_flights_are_kept(changed, folder, monkeypatch):
     # By other code they are others, and of another vehicle.
     monkeypatch.setattr("cpfls_cli.flights.kept_numbers.read_alone", None)
     monkeypatch.setattr("cpfls_cli.flights.kept_numbers.code_fingerprint", lambda: "other")
-    assert changed("same.csv").exit_code != 0
+    with pytest.raises(TypeError):
+        changed("same.csv")
     monkeypatch.undo()
     assert changed("same.csv", options=["--set", "vehicle.mass_kg=7"]).exit_code == 0
     assert any(path.read_bytes() != content for path, content in kept.items())

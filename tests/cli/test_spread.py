@@ -8,6 +8,7 @@ import yaml
 
 from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.validation.trust import Trust
 from tests.builders.spread_vehicles import found_record
 
 COUNT = 20
@@ -74,6 +75,13 @@ def test_the_first_screen(cpfls, vehicle):
     assert summary["ranges"]["lag.time_constant_s"]["value"] == 0.035
 
 
+def test_a_model_that_lacks_an_effect_is_said_to_spread_too_little(cpfls, vehicle, monkeypatch):
+    monkeypatch.setattr(VehicleRecord, "verdict", Trust.LACKING)
+    result, output = written(cpfls, vehicle, "json")
+    assert "the model lacks, so the spread is too narrow" in result.stderr
+    assert json.loads(output.read_text())["verdict"] == Trust.LACKING
+
+
 def test_guesses_are_held_and_named(cpfls, tmp_path):
     path = tmp_path / "vehicle.h5"
     write_record(path, found_record(guess=("drag_factor",), disturbance=None, gusts=False))
@@ -96,7 +104,7 @@ def test_nothing_is_written_on_a_dry_run(cpfls, vehicle):
 
 def test_what_is_refused(refuse, vehicle, pipeline, tmp_path, monkeypatch):
     (line,) = refuse("spread", vehicle, "-o", tmp_path / "s.csv")
-    assert line.endswith("s.csv: the ending tells no form; end the name in one of .yaml, .json, .npz")
+    assert line.endswith("s.csv: its suffix names no form; give the name one of the suffixes .yaml, .json, .npz")
     (line,) = refuse("spread", pipeline.model, "-o", tmp_path / "s.json", "--force")
     assert "is a model of `cpfls identify`, which holds no covariance of its numbers; `cpfls vehicle` finds" in line
     old = tmp_path / "old.h5"

@@ -11,6 +11,7 @@ from cpfls_cli.artifacts.gains import GainsRecord
 from cpfls_cli.artifacts.store import read_record, write_record
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from tests.builders.autopilots import STUDY, found_vehicle
+from tests.builders.dataflash_logs import dataflash
 
 ENDINGS = {"px4": ".params", "ardupilot": ".param", "betaflight": ".txt", "crazyflie": ".yaml"}
 
@@ -139,3 +140,38 @@ def test_a_model_that_is_no_vehicle_is_refused(refuse, folder, tmp_path):
         "tune", folder / "study.yaml", folder / "study.yaml", "--autopilot", "px4", "-o", tmp_path / "g.h5"
     )
     assert "gains need a vehicle that `cpfls vehicle` found" in " ".join(message)
+
+
+LOGGED = """
+import:
+  time_column: IMU.timestamp
+  torque_source: null
+  signals:
+    body_rate: {columns: [IMU.GyrX, IMU.GyrY, IMU.GyrZ], unit: rad/s}
+"""
+
+
+def test_a_log_gives_todays_parameters_and_the_noise(cpfls, tmp_path):
+    (tmp_path / "study.yaml").write_text(STUDY + LOGGED)
+    write_record(tmp_path / "vehicle.h5", found_vehicle(config=STUDY + LOGGED))
+    rng = np.random.default_rng(1)
+    line = 0.06 * np.sin(2 * np.pi * 95 * np.arange(3200) / 400)
+    rates = 0.02 * rng.standard_normal((3200, 3)) + line[:, None]
+    rows = [("IMU", (1_000_000 + 2500 * step, *rate)) for step, rate in enumerate(rates)]
+    today = {"ATC_RAT_RLL_P": 0.2, "ATC_RAT_PIT_P": 0.1, "ATC_ANG_RLL_P": 6.0, "MOT_THST_HOVER": 0.22}
+    (tmp_path / "log.bin").write_bytes(dataflash({"IMU": ("Qfff", "TimeUS,GyrX,GyrY,GyrZ")}, rows, today))
+    result = cpfls(
+        *("tune", tmp_path / "study.yaml", tmp_path / "vehicle.h5", "--autopilot", "ardupilot"),
+        *("--flight", tmp_path / "log.bin", "-o", tmp_path / "gains.h5"),
+    )
+    assert result.exit_code == 0, result.stderr
+    record = read_record(tmp_path / "gains.h5", GainsRecord)
+    assert record.set_of == ("proposed", "today")
+    assert {row.name: row.today for row in record.rows}["ATC_RAT_RLL_P"] == pytest.approx(0.2)
+    assert record.noise.line == pytest.approx([95.0], abs=1.0)
+    text = (tmp_path / "gains.param").read_text()
+    assert "roll rate, proportional (s): now 0.2; documented range 0.01 to 0.5" in text
+    assert "INS_HNTCH_FREQ,95" in text
+    assert "INS_HNTCH_ENABLE,1" in text
+    # A hover thrust of another vehicle says that the full thrust is another.
+    assert "if the log is right, vehicle.rotor_speed_max_rad_s is not 900" in result.output

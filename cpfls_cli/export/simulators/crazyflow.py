@@ -20,7 +20,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import thrust_wrench, wrench
-from cpfls_cli.effects.scales import arm
+from cpfls_cli.effects.scales import arm, hover_speed
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.course import Course
@@ -33,6 +33,10 @@ from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
 
 STEP_S = 2.5e-3
+_FORCE_OF_VELOCITY = slice(3, 6), slice(1, 4)
+_DRAG = (*_FORCE_OF_VELOCITY, 0)
+"""Places in a table of weights."""
+
 _ARRAYS = "SCIPY_ARRAY_API"
 _ROTORS, _RPM = 4, 30 / np.pi
 _USE = (
@@ -50,25 +54,33 @@ def crazyflow_held(model: VehicleModel) -> tuple[Held, Holds]:
             f"crazyflow and drone-models mix four rotors, but this vehicle has {model.rotors}; --format mjcf, sdf, jax "
             "and casadi take any number"
         )
-    numbers = numbers_of(model, _wrenches(model), alike=True)
-    held = held_by(model, numbers.holds, RotorResponse(lag_s=model.response.lag_s), constant_body(model))
-    return replace(held, numbers=numbers.of(model.table.weights)), numbers.holds
+    numbers, hover = numbers_of(model, _wrenches(model), alike=True), hover_speed(model.vehicle)
+
+    def holds(weights: Array) -> Array:
+        held = numbers.holds(weights)
+        held[_DRAG] = _in_hover(weights[_FORCE_OF_VELOCITY], hover)
+        return held
+
+    held = held_by(model, holds, RotorResponse(lag_s=model.response.lag_s), constant_body(model))
+    return replace(held, numbers=numbers.of(model.table.weights)), holds
+
+
+def _in_hover(weights: Array, hover: float) -> Array:
+    """Sum the terms of rotors that hover, from which on the drag of rotors is one of the body, shape (3, 3)."""
+    rotors = (weights.shape[2] - 1) // 4
+    turning = np.concatenate([[1.0], np.full(rotors, hover), np.full(rotors, hover**2), np.zeros(2 * rotors)])
+    return np.asarray(weights @ turning)
 
 
 def _wrenches(model: VehicleModel) -> Any:
-    """Give the part of the curves that is linear in the speed, and drag, for a unit of each number."""
+    """Give the part of the curves that is linear in the speed, for a unit of each number."""
     turns = spins(model.vehicle)
 
     def of(signals: Signals) -> Mapping[str, Array]:
         speed = signals.speed
         yaw = np.zeros((len(speed), 3))
         yaw[:, 2] = speed @ turns
-        found = {"thrust_linear": thrust_wrench(signals.hubs, speed), "yaw_linear": wrench(yaw)}
-        for row, column in np.ndindex(3, 3):
-            force = np.zeros((len(speed), 3))
-            force[:, row] = signals.air_velocity[:, column]
-            found[f"drag_{row}{column}"] = wrench(force=force)
-        return found
+        return {"thrust_linear": thrust_wrench(signals.hubs, speed), "yaw_linear": wrench(yaw)}
 
     return of
 
@@ -88,7 +100,7 @@ def crazyflow_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) ->
         "rpm2torque": [0.0, found["yaw_linear"] / _RPM, found["yaw"] / _RPM**2],
         "rotor_dyn_coef": [rate, 0.0, rate, 0.0],
         "mixing_matrix": [(hubs[:, 1] / length).tolist(), (-hubs[:, 0] / length).tolist(), spins(vehicle).tolist()],
-        "drag_matrix": [[found[f"drag_{row}{column}"] for column in range(3)] for row in range(3)],
+        "drag_matrix": held.table.weights[_DRAG].tolist(),
         "prop_inertia": 0.0,
         "thrust_min": 0.0,
         "thrust_max": found["thrust_linear"] * most + found["thrust"] * most**2,

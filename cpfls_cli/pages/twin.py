@@ -1,0 +1,317 @@
+"""The page of a twin: where a simulator parts from a flight whose setpoints it flew, by channel, time and frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cpfls_cli.artifacts.replay import VEHICLE
+from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED
+from cpfls_cli.artifacts.twin import SETPOINT, STAYS, TwinRecord
+from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.pages.gap import MEASURED
+from cpfls_cli.pages.response import deviation_words, span_words
+from cpfls_cli.pages.sensors import contradicted
+from cpfls_cli.pages.source import Source
+from cpfls_cli.report.canvas import BASELINE, HELD, band, legend_over, line, plain_ticks, plot, style_of
+from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Plot, Table, Text, in_short
+from cpfls_cli.report.numbers import number, plain, sentence
+from cpfls_cli.simulation.twin import LIFT
+from cpfls_cli.words import joined
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_PREDICTIONS = {SETPOINT: "Setpoint", STAYS: "Still"}
+_ASKED = {"attitude": "attitude and thrust", "body_rate": "body rates and thrust"}
+_GAINS = {
+    "stated": "as the config states them",
+    "log": "those of the log",
+    "simulation": "those that the flight was simulated with",
+    "defaults": "the defaults of the autopilot",
+}
+_INSTRUMENTS = {
+    "repeats": "the same path flown again",
+    "setpoints": "setpoints from outside of all loops",
+    "none": "none: the setpoints themselves, which answer gusts below the bandwidth of the position control",
+}
+_NO_PART = "They answer the setpoints alike, and what differs is no more than gusts and noise"
+_LEGEND = (
+    "First the root mean square of measured less simulated, beside the setpoint itself and a vehicle that stays as it "
+    "begins. J adds up differences of the answers to the setpoints (up to 50 good, up to 100 acceptable). Apart: from "
+    "the first second in which what follows the setpoints and differs is more than gusts and noise, and than 1 dB of "
+    "the motion."
+)
+_SHOWN_S = 6.0
+_BEFORE: dict[str, Any] = {**style_of(2), "linewidth": 1.4, "zorder": 3}
+_AFTER: dict[str, Any] = {**style_of(1), "linewidth": 1.4, "zorder": 3.5}
+_TICKS_HZ = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+
+
+def answer(twin: Source[TwinRecord], index: int = 1) -> Iterator[Block]:
+    """Say whether the simulator flies like the vehicle, and where it does not."""
+    record = twin.record
+    box = twin_box(record)
+    yield from in_short(box, 4, "what else parts, and the vehicle of the config")
+    yield from _tables(record, index)
+    yield from (Text(words, "warning") for words in record.warning)
+
+
+def twin_box(record: TwinRecord) -> Box:
+    """Say of the last vehicle first whether it flies like the flight, then channel by channel, then of the others."""
+    last = len(record.vehicle) - 1
+    parted, judged = _parted(record, last), record.judged(last)
+    told = [sentence(_channel(record, last, channel)) for channel in parted]
+    told += [sentence(_in_short(record, each)) for each in range(last)]
+    if record.contradiction:
+        return Box("TWIN", contradicted(record.contradiction[0]), told, "warning")
+    title, tone = _title(record, last, parted, judged)
+    return Box("TWIN", sentence(title), told if parted or not judged else [sentence(_NO_PART), *told], tone)
+
+
+def _title(record: TwinRecord, vehicle: int, parted: list[int], judged: list[int]) -> tuple[str, Any]:
+    name, names = record.name(vehicle), record.channel
+    if np.isfinite(record.lost[vehicle]):
+        return f"{name} overturns {_when(record.lost[vehicle])} along the setpoints of {record.flight}", "warning"
+    if not judged and not parted:
+        return f"{name} cannot be judged: the setpoints of {record.flight} move it nowhere clearly", "warning"
+    if parted:
+        alike = [names[channel] for channel in judged if channel not in parted]
+        rest = f"; alike in {joined(alike)}" if alike else ""
+        where = joined([names[channel] for channel in parted])
+        return f"{name} parts from {record.flight} in {where}{rest}", "warning"
+    return f"{name} flies like {record.flight}: {joined([names[channel] for channel in judged])}", "good"
+
+
+def _parted(record: TwinRecord, vehicle: int) -> list[int]:
+    return [channel for channel in range(len(record.channel)) if record.parts(vehicle, channel)]
+
+
+def _in_short(record: TwinRecord, vehicle: int) -> str:
+    """Say of another vehicle in what it parts."""
+    parted, name = _parted(record, vehicle), record.name(vehicle)
+    if np.isfinite(record.lost[vehicle]):
+        return f"{name} overturns {_when(record.lost[vehicle])}"
+    if not parted:
+        return f"{name} parts in nothing"
+    return f"{name} parts in {joined([record.channel[channel] for channel in parted])}"
+
+
+def _when(second: float) -> str:
+    return f"at {number(float(second), 3)} s"
+
+
+def _channel(record: TwinRecord, vehicle: int, channel: int) -> str:
+    """Say of one channel at which frequencies and when a vehicle parts."""
+    parts, row = [], record.answers.row(vehicle, channel)
+    if row is not None and np.isfinite(record.answers.cost[row]):
+        off = [each for each in record.answers.deviations(row) if not each.right]
+        where = ", ".join(map(deviation_words, off)) or "right throughout"
+        low, high = record.answers.band[row].tolist()
+        parts.append(f"J = {number(float(record.answers.cost[row]), 3)} {span_words(low, high)}; {where}")
+    first = record.first_apart(vehicle, channel)
+    if np.isfinite(first):
+        share = float(record.window.apart[vehicle, :, channel].mean())
+        follows = np.nan_to_num(record.window.follows[vehicle, :, channel])
+        largest, floor = int(np.argmax(follows)), float(record.floor[vehicle, channel])
+        parts.append(
+            f"apart first {_when(first)}, in {number(100 * share, 2)} % of the seconds, most "
+            f"{_when(record.window.start[largest])} ({number(float(follows[largest]), 2)} {_unit(record, channel)}, "
+            f"gusts and noise {number(floor, 2)})"
+        )
+    return f"{record.channel[channel]}: {'; '.join(parts)}"
+
+
+def _unit(record: TwinRecord, channel: int) -> str:
+    name = record.channel[channel]
+    if name.startswith("velocity"):
+        return "m/s"
+    if name == LIFT:
+        return "m/s²"
+    return "rad/s" if name.endswith("rate") else "rad"
+
+
+def _tables(record: TwinRecord, index: int) -> Iterator[Block]:
+    """Show the channels that are judged; the others are folded away."""
+    known = [channel for channel in range(len(record.channel)) if np.isfinite(record.movement[channel])]
+    judged = [each for each in known if each in record.judged(len(record.vehicle) - 1)]
+    others = [each for each in known if each not in judged]
+    caption = f"Differences of simulated vehicles that fly freely along the setpoints of {record.flight}."
+    if judged:
+        yield _table(f"twin-{index}", caption, record, judged, _LEGEND)
+    if others:
+        more = _table(
+            f"twin-others-{index}", f"The same of channels that are not judged: {record.flight}.", record, others
+        )
+        yield Folded("channels that are not judged", [more]) if judged else more
+
+
+def _table(name: str, caption: str, record: TwinRecord, channels: list[int], legend: str = "") -> Table:
+    vehicles = range(len(record.vehicle))
+    names = ["Config" if record.vehicle[each] == VEHICLE else "Model" for each in vehicles]
+    header = (
+        "Channel",
+        *names,
+        *_PREDICTIONS.values(),
+        *(f"J {name.lower()}" for name in names),
+        *(f"{name} apart" for name in names),
+    )
+    rows: list[list[str | Cell]] = [
+        [
+            f"{record.channel[channel]}, {_unit(record, channel)}",
+            *(number(float(value), 2) for value in record.rms[:, channel]),
+            *(_judged(record, each, channel, record.word(each, channel)) for each in vehicles),
+            *(_seconds(record.first_apart(each, channel)) for each in vehicles),
+        ]
+        for channel in channels
+    ]
+    return Table(name, caption, header, rows, frozenset({0}), legend=legend)
+
+
+def _seconds(value: float) -> str:
+    return f"{number(value, 3)} s" if np.isfinite(value) else "—"
+
+
+def _judged(record: TwinRecord, vehicle: int, channel: int, word: str) -> Cell:
+    if word == NOT_JUDGED:
+        return Cell("—")
+    return Cell(number(record.cost(vehicle, channel), 3), "warning" if word == NOT_ACCEPTABLE else "plain")
+
+
+def twin_blocks(twin: Source[TwinRecord], index: int) -> Iterator[Block]:
+    """Show all of a twin: who flew what, where they part, and three pictures."""
+    record = twin.record
+    title = AUTOPILOTS[record.autopilot].title if record.autopilot in AUTOPILOTS else record.autopilot
+    yield Heading(twin.label)
+    rows = [
+        ("Flight", record.flight),
+        ("Law", f"{title}, asked for {_ASKED.get(record.asked, record.asked)} as logged"),
+        ("Gains", _GAINS.get(record.gains.source, record.gains.source)),
+        ("Thrust", "the logged setpoint" if record.thrust_from == "setpoint" else "that of the flight's rotors"),
+        ("Rotors", f"{number(1e3 * record.rotor_lag_s, 3)} ms behind their command"),
+        ("Instruments", _INSTRUMENTS.get(record.instruments, record.instruments)),
+    ]
+    if record.left_out:
+        rows.append(("Not simulated", "; ".join(record.left_out)))
+    yield Facts(rows)
+    yield from _tables(record, index)
+    yield from (Text(words, "warning") for words in record.warning)
+    yield _stretch_figure(record, index)
+    if record.judged(len(record.vehicle) - 1):
+        yield _frequency_figure(record, index)
+        yield _time_figure(record, index)
+
+
+def _styles(record: TwinRecord) -> list[dict[str, Any]]:
+    """Draw the last vehicle as the one after, others as those before."""
+    return [_BEFORE if each < len(record.vehicle) - 1 else _AFTER for each in range(len(record.vehicle))]
+
+
+def _shown(record: TwinRecord) -> list[int]:
+    """List the channels that are worth drawing: those judged, or the rates."""
+    return record.judged(len(record.vehicle) - 1) or [0, 1, 2]
+
+
+def _stretch_figure(record: TwinRecord, index: int) -> Plot:
+    """Draw flight and vehicles around the second in which they are farthest apart for what they move."""
+    channels = [channel for channel in _shown(record) if channel < 6][:6]
+    told = np.isfinite(record.window.follows[0][:, channels]).any()
+    follows = record.window.follows if told else record.window.difference
+    away = np.nan_to_num(follows[0][:, channels]) / np.maximum(record.movement[channels], 1e-12)
+    window, worst = np.unravel_index(int(np.argmax(away)), away.shape)
+    axis = channels[int(worst)] % 3
+    rows = [channel for channel in (axis, axis + 3) if np.isfinite(record.movement[channel])]
+    middle = float(record.window.start[window]) + 0.5
+    part = np.abs(record.time - middle) <= _SHOWN_S / 2
+
+    def draw(figure: Figure) -> None:
+        panels = np.atleast_1d(figure.subplots(len(rows), 1, sharex=True))
+        for axes, channel in zip(panels, rows, strict=True):
+            line(axes, record.time[part], record.measured[part, channel], label="flight", **MEASURED)
+            if np.isfinite(record.setpoint[part, channel]).any():
+                line(axes, record.time[part], record.setpoint[part, channel], label="setpoint", **BASELINE)
+            for vehicle, style in enumerate(_styles(record)):
+                values = record.simulated[vehicle, part, channel]
+                line(axes, record.time[part], values, label=record.name(vehicle), **style)
+            axes.set_ylabel(f"{record.channel[channel]}, {_unit(record, channel)}")
+        panels[-1].set_xlabel("s")
+        legend_over(figure, panels[0])
+
+    caption = (
+        f"{joined([record.channel[each] for each in rows]).capitalize()} of {record.flight} and simulated, around the "
+        "second in which the first of them is farthest off. They start in the flight's state and never see it again."
+    )
+    return plot(f"twin-stretch-{index}", caption, "Flight and simulated vehicles over time", 4.4, draw)
+
+
+def _frequency_figure(record: TwinRecord, index: int) -> Plot:
+    """Draw how much stronger and earlier the simulated vehicles answer, by frequency."""
+    channels = _shown(record)[:3]
+
+    def draw(figure: Figure) -> None:
+        panels = figure.subplots(2, len(channels), sharex=True, sharey="row", squeeze=False)
+        for column, channel in enumerate(channels):
+            for vehicle, style in enumerate(_styles(record)):
+                row = record.answers.row(vehicle, channel)
+                if row is not None:
+                    _ratio(panels[:, column], record, row, record.name(vehicle), style, first=vehicle == 0)
+            panels[0, column].set_title(record.channel[channel])
+            panels[1, column].set_xlabel("Hz")
+            panels[1, column].set_xscale("log")
+            low, high = record.answers.frequency[[0, -1]]
+            ticks = [tick for tick in _TICKS_HZ if 0.99 * low <= tick <= 1.01 * high][:: 2 if len(channels) > 2 else 1]
+            panels[1, column].set_xticks([], minor=True)
+            panels[1, column].set_xticks(ticks, [plain(tick) for tick in ticks])
+        panels[0, 0].set_ylabel("simulated over flight, dB")
+        panels[1, 0].set_ylabel("degrees")
+        legend_over(figure, panels[0, 0])
+
+    caption = (
+        "Answer to the same setpoints, simulated over flown: at 0 dB and 0 degrees they fly alike. Shaded: 95 % of the "
+        "scatter that gusts and noise leave in the flight's answer. Only where the answer is clear."
+    )
+    return plot(f"twin-frequency-{index}", caption, "Simulated over flown answer by frequency", 4.6, draw)
+
+
+def _ratio(panels: Any, record: TwinRecord, row: int, name: str, style: dict[str, Any], *, first: bool) -> None:
+    low, high = record.answers.band[row].tolist()
+    inside = (record.answers.frequency >= low) & (record.answers.frequency <= high)
+    frequency = record.answers.frequency[inside]
+    gain = (record.answers.model.magnitude - record.answers.measured.magnitude)[row][inside]
+    phase = (record.answers.model.phase - record.answers.measured.phase)[row][inside]
+    scatter = 2 * record.answers.random_error[row][inside]
+    halves = (20 * np.log10(1 + scatter), np.degrees(scatter))
+    turned = (phase + 180.0) % 360.0 - 180.0
+    for axes, values, half in zip(panels, (gain, turned), halves, strict=True):
+        if first:
+            band(axes, frequency, -half, half, color="#c9c9c9", label="95 %")
+            axes.axhline(0.0, **HELD)
+        axes.plot(frequency, values, label=name, **style)
+        plain_ticks(axes.yaxis)
+
+
+def _time_figure(record: TwinRecord, index: int) -> Plot:
+    """Draw second by second how much of the difference is the simulator's."""
+    channels = [channel for channel in _shown(record) if channel < 6][:3]
+    middles = record.window.start + 0.5
+
+    def draw(figure: Figure) -> None:
+        panels = np.atleast_1d(figure.subplots(len(channels), 1, sharex=True))
+        for axes, channel in zip(panels, channels, strict=True):
+            floor = record.floor[-1, channel]
+            axes.axhline(floor, label="gusts and noise", **BASELINE)
+            for vehicle, style in enumerate(_styles(record)):
+                follows = record.window.follows[vehicle, :, channel]
+                line(axes, middles, follows, label=record.name(vehicle), **style)
+            axes.set_ylabel(f"{record.channel[channel]}, {_unit(record, channel)}")
+            axes.set_ylim(bottom=0.0)
+        panels[-1].set_xlabel("s")
+        legend_over(figure, panels[0])
+
+    caption = (
+        "Difference that follows the setpoints, root mean square of each second: the simulator's own fault. Dashed: "
+        "what of the difference does not follow them, over the whole flight."
+    )
+    return plot(f"twin-time-{index}", caption, "Difference by second", 4.4, draw)

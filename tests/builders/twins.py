@@ -1,0 +1,72 @@
+"""Flights under an autopilot's own law along setpoints of the attitude, in gusts and noise, to be flown again."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from cpfls_cli.artifacts.replay import VEHICLE
+from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.twin import GainsGroup
+from cpfls_cli.commands.twin import record_of
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.simulation.closed_loop import Setpoints, clock_of, fly_setpoints
+from cpfls_cli.simulation.law_pilot import GyroscopeNoise
+from cpfls_cli.simulation.model import SimulatedEffects
+from cpfls_cli.simulation.settings import ClosedLoopSettings
+from cpfls_cli.simulation.twin import asked_of, fly_twin
+from tests.builders.autopilots import CROSS
+from tests.builders.studies import VEHICLE as STUDY
+
+LOOP = ClosedLoopSettings(autopilot="px4", rotor_time_constant_s=0.03, integration_rate_hz=400.0)
+PERIOD = 0.02
+NOISE = 0.01
+HOVER = 0.36
+_GUST, _MEMORY_S = np.array([0.02, 0.02, 0.005, 0.3, 0.3, 0.3]), 0.4
+
+
+def flown(seconds=12.0, seed=3, gusts=True):
+    """Fly steps of the attitude; what is measured is noisy."""
+    rng = np.random.default_rng(seed)
+    time = PERIOD * np.arange(round(seconds / PERIOD) + 1)
+    steps = rng.uniform(-1, 1, (round(seconds / 0.4) + 2, 3)) * [0.25, 0.25, 0.4]
+    attitude, thrust = steps[(time / 0.4).astype(int)], np.full(len(time), HOVER)
+    clock = clock_of(time, LOOP)
+    push = gust_along(clock, rng) if gusts else None
+    noise = GyroscopeNoise(NOISE, rng.spawn(1)[0]) if gusts else None
+    asked = Setpoints(attitude, None, thrust)
+    motion = fly_setpoints(time, asked, np.zeros(12), CROSS, LOOP, None, SimulatedEffects(), push, noise)
+    scatter = NOISE * rng.standard_normal((2, len(time), 3)) * gusts
+    signals = Signals(
+        time=time,
+        body_rate=motion.state[:, 9:12] + scatter[0],
+        attitude=motion.state[:, 6:9] + 0.2 * scatter[1],
+        velocity=motion.state[:, 3:6],
+        position=motion.state[:, :3],
+        acceleration=motion.change[:, 3:6],
+        rotor_speed=motion.speed,
+        vehicle=CROSS,
+        setpoints={"attitude": attitude, "thrust": thrust[:, None]},
+    )
+    return LoggedFlight.of("flight", signals)
+
+
+def gust_along(clock, rng):
+    """Torque and force that last for a while, in the middle of each step."""
+    kept = np.exp(-clock.step / _MEMORY_S)
+    drawn = _GUST * rng.standard_normal((clock.steps, 6))
+    push = drawn.copy()
+    for step in range(1, clock.steps):
+        push[step] = kept * push[step - 1] + np.sqrt(1 - kept**2) * drawn[step]
+    return push
+
+
+def twin_record():
+    """Arrange a flight beside a vehicle with rotors that are too slow, and beside the one that flew."""
+    flight = flown(6.0)
+    asked = asked_of(flight, LOOP, CROSS, share=True)
+    loops = {VEHICLE: replace(LOOP, rotor_time_constant_s=0.1), "found.h5": LOOP}
+    twins = {name: fly_twin(flight, asked, CROSS, loop, None, SimulatedEffects()) for name, loop in loops.items()}
+    gains = GainsGroup(source="defaults", name=("MC_ROLLRATE_P",), value=np.array([0.15]))
+    made = record_of(flight, asked, twins, LOOP, gains, ["the gains are guessed"])
+    return made.with_header(Header("0", 1, STUDY))

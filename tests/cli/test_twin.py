@@ -1,0 +1,147 @@
+"""`cpfls simulate` along a flight: its own setpoints, an autopilot's law, and where simulator and flight part."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+import yaml
+
+from tests.builders import ulogs
+from tests.builders.autopilots import CROSS
+from tests.builders.twins import LOOP, PERIOD, flown
+
+STATED = {
+    "mass_kg": CROSS.mass_kg,
+    "inertia_kg_m2": list(CROSS.inertia_kg_m2),
+    "rotor_speed_max_rad_s": CROSS.rotor_speed_max_rad_s,
+    "rotors": [
+        {
+            "position_m": list(rotor.position_m),
+            "spin": rotor.spin,
+            "thrust_factor_n_s2": rotor.thrust_factor_n_s2,
+            "drag_factor_n_m_s2": rotor.drag_factor_n_m_s2,
+        }
+        for rotor in CROSS.rotors
+    ],
+}
+FIELDS = {"attitude": 3, "body_rate": 3, "rotor_speed": 4, "setpoint_attitude": 3, "setpoint_thrust": 1}
+UNITS = {"attitude": "rad", "body_rate": "rad/s", "rotor_speed": "rad/s", "setpoint_attitude": "rad"}
+GAINS = {"MC_ROLLRATE_P": 0.15, "MC_PITCHRATE_P": 0.15, "UNRELATED": 7.0}
+
+
+@pytest.fixture(scope="module")
+def logged(tmp_path_factory):
+    """A log of PX4 that holds its parameters, and the study that describes it."""
+    folder = tmp_path_factory.mktemp("twin")
+    (part,) = flown(8.0).parts
+    columns = np.hstack(
+        [part.attitude, part.body_rate, part.rotor_speed, part.setpoints["attitude"], part.setpoints["thrust"]]
+    )
+    described = ";".join(f"float[{count}] {name}" for name, count in FIELDS.items())
+    rows = [(round(1e6 * PERIOD * index), 0, row) for index, row in enumerate(columns)]
+    (folder / "log.ulg").write_bytes(ulogs.ulog(rows, {"flight": f"uint64_t timestamp;{described}"}, GAINS))
+    signals = {
+        name: {"columns": [f"flight.{name}[{index}]" for index in range(count)], "unit": UNITS.get(name, "1")}
+        for name, count in FIELDS.items()
+    }
+    loop = {"rotor_time_constant_s": LOOP.rotor_time_constant_s, "integration_rate_hz": LOOP.integration_rate_hz}
+    study = {
+        "vehicle": STATED,
+        "simulation": {"closed_loop": loop},
+        "import": {"time_column": None, "torque_source": None, "signals": signals},
+    }
+    (folder / "study.yaml").write_text(yaml.safe_dump(study))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def twin(cpfls, logged):
+    output = logged / "twin.h5"
+    result = cpfls("simulate", logged / "study.yaml", logged / "log.ulg", "--autopilot", "px4", "-o", output, "--json")
+    assert result.exit_code == 0, result.stderr
+    return json.loads(result.stdout), output
+
+
+def test_a_log_is_flown_with_its_own_gains_on_its_own_clock(twin):
+    said, output = twin
+    assert (said["autopilot"], said["asked"], said["thrust_from"]) == ("px4", "attitude", "setpoint")
+    assert said["gains"]["source"] == "log"
+    assert said["gains"]["MC_ROLLRATE_P"] == pytest.approx(0.15)
+    assert "UNRELATED" not in said["gains"]
+    channels = said["vehicles"]["vehicle"]["channels"]
+    assert channels["roll rate"]["word"] == channels["pitch rate"]["word"] == "good"
+    assert not any(each["parts"] for each in channels.values())
+    # The simulator is nearer than what knows no vehicle.
+    assert said["rms"]["vehicle"]["roll"] < 0.3 * min(
+        said["rms"][name]["roll"] for name in ("setpoint", "nothing-moves")
+    )
+    with h5py.File(output) as file:
+        assert float(file["clock/begins"][()]) == pytest.approx(1e-6 * ulogs.BEGIN)
+
+
+def test_other_gains_part_and_the_answer_says_where(cpfls, logged):
+    result = cpfls(
+        *("simulate", logged / "study.yaml", logged / "log.ulg", "--autopilot", "px4", "-o", logged / "weak.h5"),
+        *("--set", "simulation.closed_loop.autopilot_parameters={MC_ROLLRATE_P: 0.04}"),
+    )
+    assert result.exit_code == 0, result.stderr
+    assert result.stdout.startswith("TWIN: The vehicle of the config parts from log.ulg in roll rate")
+    assert "Hz" in result.stdout
+    assert "cpfls gap" in result.stdout
+    assert all(len(line) <= 100 for line in result.stdout.splitlines() if line.startswith(("roll", "pitch", "Channel")))
+    again = cpfls("info", logged / "weak.h5")
+    assert result.stdout.splitlines()[0] in again.stdout
+
+
+def test_a_flight_without_the_log_has_the_usual_gains(cpfls, logged):
+    flight = logged / "flight.h5"
+    assert cpfls("import", logged / "study.yaml", logged / "log.ulg", "-o", flight).exit_code == 0
+    words = ("simulate", logged / "study.yaml", flight, "-o", logged / "usual.h5", "--json")
+    result = cpfls(*words, "--autopilot", "px4")
+    said = json.loads(result.stdout)
+    assert said["gains"]["source"] == "defaults"
+    assert any("defaults of PX4" in warning for warning in said["warnings"])
+
+
+def test_what_cannot_be_flown_is_refused(refuse, logged, tmp_path):
+    words = ("simulate", logged / "study.yaml", logged / "log.ulg", "-o", tmp_path / "twin.h5")
+    (said,) = refuse(*words)
+    assert "--autopilot px4, ardupilot, betaflight, crazyflie" in said
+    (said,) = refuse(*words, "--autopilot", "px4", "--gusts")
+    assert "leave --gusts out" in said
+    (said,) = refuse(*words, "--autopilot", "pixhawk")
+    assert "pixhawk" in said
+
+
+def test_it_is_looked_at_in_other_programs(cpfls, twin, tmp_path):
+    _, output = twin
+    assert cpfls("export", output, "-o", tmp_path / "twin.csv").exit_code == 0
+    header, first = (tmp_path / "twin.csv").read_text().splitlines()[:2]
+    cells = dict(zip(header.split(","), first.split(","), strict=True))
+    assert float(cells["__time"]) == pytest.approx(1e-6 * ulogs.BEGIN)
+    gap = float(cells["roll/measured"]) - float(cells["roll/vehicle"])
+    assert float(cells["roll/difference"]) == pytest.approx(gap, abs=1e-7)
+
+
+def test_a_flight_that_was_simulated_knows_its_autopilot(cpfls, tmp_path):
+    loop = {"integration_rate_hz": 400.0, "rotor_time_constant_s": 0.03, "autopilot_parameters": {}}
+    study = {
+        "vehicle": STATED,
+        "trajectory": {"sample_time_s": 0.01},
+        "simulation": {"mode": "closed-loop", "closed_loop": loop, "noise": {"body_rate": 0.01}},
+    }
+    (tmp_path / "study.yaml").write_text(yaml.safe_dump(study))
+    path, flight = tmp_path / "path.h5", tmp_path / "flight.h5"
+    steps = (
+        ("trajectory", tmp_path / "study.yaml", "--hover", "5", "--excite", "roll", "-o", path),
+        ("simulate", tmp_path / "study.yaml", path, "--autopilot", "crazyflie", "-o", flight),
+    )
+    for words in steps:
+        result = cpfls(*words)
+        assert result.exit_code == 0, result.stderr
+    result = cpfls("simulate", tmp_path / "study.yaml", flight, "-o", tmp_path / "twin.h5", "--json")
+    assert result.exit_code == 0, result.stderr
+    said = json.loads(result.stdout)
+    assert (said["autopilot"], said["gains"]["source"], said["thrust_from"]) == ("crazyflie", "simulation", "setpoint")
+    assert not said["vehicles"]["vehicle"]["channels"]["roll rate"]["parts"]
