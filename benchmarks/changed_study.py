@@ -127,7 +127,7 @@ def altered(name: str, size: float, kind: Kind, body: Body, draw: int) -> Altere
         return Altered(body._replace(felt_bias=body.felt_bias + size * np.eye(3)[2]), {"felt z": (size,)})
     if name == "vibration":
         shaken = body._replace(unbalance=times([one], 1 + size, body.unbalance))
-        return Altered(shaken, {"vibration": (), f"unbalance M{one + 1}": ()})
+        return Altered(shaken, {"vibration": (), "unbalance": (), f"unbalance M{one + 1}": ()})
     if name == "battery":
         return Altered(body._replace(sag=body.sag * (1 + size)), {"battery sag": (size * body.sag,)})
     if name == "gusts":
