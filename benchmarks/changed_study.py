@@ -1,6 +1,6 @@
 """What is said of vehicles that nobody changed, and of fifteen changes at three sizes each, in flights with truth.
 
-    python benchmarks/changed_study.py quadrotor|hexarotor [--draws N] [--trim SHARE] [--of CHANGE...]
+    python benchmarks/changed_study.py quadrotor|hexarotor|nano [--draws N] [--trim SHARE] [--of CHANGE...]
 
 Vehicles hover and fly gentle legs for 30 s in gusts, each day with another trim, battery, wind and gusts; their configs
 are off by what configs are off by. Numbers of flights are kept in a folder, so that they need not fly again.
@@ -25,17 +25,20 @@ pin_threads()
 
 import numpy as np
 
-from benchmarks.shared.changing_flights import HEXA, QUAD, Body, Kind, Trim, day_of, flown, vehicle_of
+from benchmarks.shared.changing_flights import HEXA, NANO, QUAD, Body, Kind, Trim, day_of, flown, vehicle_of
 from cpfls_cli.changes.judge import NAMED, Change, _Space, changed
 from cpfls_cli.changes.numbers import FlightNumbers, flight_numbers
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-KINDS = {"quadrotor": QUAD, "hexarotor": HEXA}
+KINDS = {"quadrotor": QUAD, "hexarotor": HEXA, "nano": NANO}
 INSTRUMENTS = ("commands", "speeds")
 VEHICLES, DAYS, A_DAY, THRICE = 6, 9, 3, 3
 """Of the first so many days three flights."""
 
 REFERENCES = (3, 5, 8)
+FASTER = 2.0
+"""Pace of flights that are flown otherwise: legs of four times the acceleration."""
+
 USUAL = 5
 """Reference flights of changes."""
 
@@ -119,7 +122,7 @@ def altered(name: str, size: float, kind: Kind, body: Body, draw: int) -> Altere
     if name == "gyroscope bias":
         return Altered(body._replace(turn_bias=body.turn_bias + size * axis), {"drift": (size, 0.0, 0.0)})
     if name == "gyroscope scale":
-        return Altered(body._replace(turn_gain=body.turn_gain * (1 + size * axis)), {"follow roll": (np.log1p(size),)})
+        return Altered(body._replace(turn_gain=body.turn_gain * (1 + size * axis)), {"scale x": (np.log1p(size),)})
     if name == "accelerometer bias":
         return Altered(body._replace(felt_bias=body.felt_bias + size * np.eye(3)[2]), {"felt z": (size,)})
     if name == "vibration":
@@ -152,8 +155,8 @@ class Case(NamedTuple):
     told: Told
 
 
-def _told(kind: Kind, vehicle: VehicleSettings, body: Body, seed: list[int]) -> Told:
-    return {name: flight_numbers(each, kind.volts) for name, each in flown(kind, vehicle, body, seed).items()}
+def _told(kind: Kind, vehicle: VehicleSettings, body: Body, seed: list[int], pace: float = 1.0) -> Told:
+    return {name: flight_numbers(each, kind.volts) for name, each in flown(kind, vehicle, body, seed, pace).items()}
 
 
 def _fleet(kind: Kind, trim: Trim) -> Fleet:
@@ -166,6 +169,17 @@ def _fleet(kind: Kind, trim: Trim) -> Fleet:
             flights = A_DAY if day < THRICE else 1
             days[-1].append([_told(kind, vehicle, own, [index, day, flight]) for flight in range(flights)])
     return Fleet(vehicles, days)
+
+
+def _faster(kind: Kind, trim: Trim, fleet: Fleet) -> list[list[Told]]:
+    """Fly once more on each day, legs in half of the time: by vehicle and day."""
+    made = []
+    for index, (vehicle, body) in enumerate(fleet.vehicles):
+        made.append([])
+        for day in range(DAYS):
+            own = day_of(kind, body, trim, np.random.default_rng([kind.rotors, index, day]))
+            made[-1].append(_told(kind, vehicle, own, [index, day, A_DAY], FASTER))
+    return made
 
 
 def _cases(kind: Kind, trim: Trim, fleet: Fleet, names: Sequence[str], draw: int) -> list[Case]:
@@ -193,18 +207,47 @@ def _unchanged(fleet: Fleet) -> Iterator[list[object]]:
     for instrument in INSTRUMENTS:
         for flights in (1, A_DAY):
             for count in REFERENCES:
-                # What would show is not asked here, and takes two thirds of the time.
-                with patch.object(_Space, "shows", lambda *_: np.nan):
+                with _WITHOUT_SHOWS:
                     runs = [
                         _judged(fleet, index, instrument, day[:flights], count, number)
                         for index, days in enumerate(fleet.days)
                         for number, day in enumerate(days)
                         if len(day) >= flights
                     ]
-                alarms = [run for run in runs if run.found]
-                said = ", ".join(sorted("+".join(found.cause.name for found in run.found) for run in alarms))
-                small = sum(run.p_value <= 0.05 for run in runs)
-                yield [instrument, count, flights, len(runs), len(alarms), small, said or "—"]
+                yield [instrument, count, flights, *_alarms(runs)]
+
+
+_WITHOUT_SHOWS = patch.object(_Space, "shows", lambda *_: np.nan)
+"""What would show is not asked of vehicles that nobody changed, and takes long."""
+
+
+def _alarms(runs: Sequence[Change]) -> list[object]:
+    alarms = [run for run in runs if run.found]
+    said = ", ".join(sorted("+".join(found.cause.name for found in run.found) for run in alarms))
+    return [len(runs), len(alarms), sum(run.p_value <= 0.05 for run in runs), said or "—"]
+
+
+def _otherwise(fleet: Fleet, faster: list[list[Told]]) -> Iterator[list[object]]:
+    """Hold each day's flight against those of other days that are flown otherwise, or some so and some so."""
+    usual = [[day[0] for day in days] for days in fleet.days]
+    sides = {"slow": (faster, usual), "fast": (usual, faster), "both": (faster, usual)}
+    for instrument in INSTRUMENTS:
+        for before, (today, others) in sides.items():
+            for count in REFERENCES:
+                runs = []
+                with _WITHOUT_SHOWS:
+                    for index, (vehicle, _) in enumerate(fleet.vehicles):
+                        for day in range(DAYS):
+                            rng = np.random.default_rng([index, count, day])
+                            days = rng.permutation([each for each in range(DAYS) if each != day])[:count]
+                            # One in three is flown as today's.
+                            mixed = [before == "both" and at % 3 == 0 for at in range(count)]
+                            known = [
+                                (today if alike else others)[index][each][instrument]
+                                for alike, each in zip(mixed, days, strict=True)
+                            ]
+                            runs.append(changed([today[index][day][instrument]], known, vehicle, rng))
+                yield [instrument, before, count, *_alarms(runs)]
 
 
 class Verdict(NamedTuple):
@@ -279,12 +322,17 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=20)
     parser.add_argument("--trim", type=float, default=0.03)
     parser.add_argument("--keep", type=Path)
-    parser.add_argument("--only", choices=["unchanged", "changes"])
+    parser.add_argument("--only", choices=["unchanged", "changes", "otherwise"])
     parser.add_argument("--of", nargs="+", choices=SIZES, default=list(SIZES), metavar="CHANGE")
     given = parser.parse_args()
     kind, trim = KINDS[given.kind], Trim(given.trim, given.trim / 30)
     folder = given.keep and given.keep / f"{given.kind}-{given.trim:g}"
     fleet: Fleet = _kept(folder and folder / "fleet.pickle", partial(_fleet, kind, trim))
+    if given.only == "otherwise":
+        faster = _kept(folder and folder / "faster.pickle", partial(_faster, kind, trim, fleet))
+        header = ["log", "references flown", "references", "sets", "alarms", "p <= 5 %", "said"]
+        table(f"changed_otherwise_{given.kind}", header, list(_otherwise(fleet, faster)))
+        return
     if given.only != "changes":
         header = ["log", "references", "flights today", "sets", "alarms", "p <= 5 %", "said"]
         table(f"changed_unchanged_{given.kind}", header, list(_unchanged(fleet)))

@@ -49,6 +49,9 @@ def six_parameters(inertia: Sequence[float] | Array) -> Array:
     return parameters
 
 
+_ROUNDING = 1e-9
+"""Share of a moment of inertia that is rounding."""
+
 _WIDER = 1.25
 """Radius of gyration, in distances of the farthest hub, beyond which is no multirotor: mass all in the hubs gives 1."""
 
@@ -80,6 +83,28 @@ def more_than_others(moments: Sequence[float] | Array) -> tuple[str, ...]:
     whole = sum(moments[:3])
     named = zip(INERTIA_PARAMETERS, moments, strict=False)
     return tuple(name for name, moment in list(named)[:3] if moment > MEASURED * (whole - moment))
+
+
+def nearest_body(inertia: Array, margin: float = 0.0) -> Array:
+    """Give the nearest inertia of a body: each principal moment is less, by a margin, than the sum of the others.
+
+    Parameters
+    ----------
+    inertia : array, shape (3, 3), kg m^2
+    margin : float, kg m^2
+
+    Returns
+    -------
+    array, shape (3, 3), kg m^2
+        The very same where a body has it.
+    """
+    moments, axes = np.linalg.eigh(inertia)
+    excess = moments[2] - moments[0] - moments[1] + margin
+    if excess <= 0.0:
+        return inertia
+    # A little more than a third of the excess each, so that rounding brings none of it back.
+    third = excess / 3.0 + _ROUNDING * moments[2]
+    return np.asarray((axes * (moments + third * np.array([1.0, 1.0, -1.0]))) @ axes.T)
 
 
 def symmetric_columns(vectors: Array) -> Array:

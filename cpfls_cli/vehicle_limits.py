@@ -268,7 +268,7 @@ def figures_of_hubs(hubs: Array) -> dict[str, float]:
 
 def beyond_any_vehicle(figures: Figures) -> tuple[Beyond, ...]:
     """Find numbers that no vehicle has, in the fewest wrong units that explain them."""
-    broken = list(_broken(figures))
+    broken = list(broken_limits(figures))
     if not broken:
         return ()
     readings = _readings(figures)
@@ -281,7 +281,8 @@ def beyond_any_vehicle(figures: Figures) -> tuple[Beyond, ...]:
     return (*found[:-1], found[-1]._replace(why=f"{found[-1].why}{also}"))
 
 
-def _broken(figures: Figures) -> Iterator[Limit]:
+def broken_limits(figures: Figures) -> Iterator[Limit]:
+    """List the limits that a vehicle of these numbers is beyond."""
     return (limit for limit in LIMITS if not limit.allows(limit.value(figures)))
 
 
@@ -294,7 +295,7 @@ def _readings(figures: Figures) -> list[dict[str, str]]:
         if not changed or len(changed) > _MOST_UNITS or any(isnan(figures[name]) for name in changed):
             continue
         read = _read(figures, changed)
-        if not any(True for _ in _broken(read)):
+        if not any(True for _ in broken_limits(read)):
             tried.append((len(changed) + sum(limit.unusual(read) for limit in LIMITS), changed))
     tried.sort(key=lambda one: one[0])
     return [units for cost, units in tried if cost < tried[0][0] + _CLOSE]
@@ -315,14 +316,14 @@ def _told(limit: Limit, figures: Figures) -> str:
 
 
 def _look(limit: Limit) -> str:
-    return "; check the units of it and of what it is held against" if len(limit.of) > 1 else "; check its unit"
+    return "; check its unit and those of what it is compared with" if len(limit.of) > 1 else "; check its unit"
 
 
 def _in_another_unit(figures: Figures, name: str, best: Mapping[str, str]) -> Beyond:
     """Say what is impossible about a number once the others are read rightly, and what it was likely meant to be."""
     unit, others = best[name], {other: own for other, own in best.items() if other != name}
     read = _read(figures, others)
-    concerned = next((limit for limit in _broken(read) if name in limit.of), None)
+    concerned = next((limit for limit in broken_limits(read) if name in limit.of), None)
     given = "with the others right, " if concerned is None or others.keys() & {*concerned.of} else ""
     told = "" if concerned is None else f"{_told(concerned, read)}: "
     quantity, value = _QUANTITIES[name], figures[name]

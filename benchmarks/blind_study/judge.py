@@ -51,6 +51,7 @@ def _judged(folder, compared):
         "effects": [_effect(effect) for effect in found.effects],
         "closest": [_effect(effect) for effect in found.closest],
         "alternatives": [vars(rival) for rival in found.alternatives],
+        "sets": [vars(each) for each in found.sets],
         "unexplained": [vars(left) for left in found.unexplained],
         "differences": list(found.differences),
         "contradictions": list(found.contradictions),

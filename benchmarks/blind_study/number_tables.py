@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from itertools import pairwise
 
 import numpy as np
 
 from benchmarks.blind_study.score import RIGHT, exact, numbers
 from benchmarks.blind_study.text import percent, table
 
+_LIKELY = (0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 2.0)
 _CLOSE = 0.05
 _NEAR = 0.15
 _LEVELS = ("low", "mid", "high")
@@ -79,6 +81,23 @@ def gap_table(judged):
         cells = [_shrunk([each for each in own if each.key["level"] == level]) for level in _LEVELS]
         rows.append((effect, *cells, _EARLIER.get(effect, "")))
     return table(("effect", *(f"{level} noise" for level in _LEVELS), "earlier study, mid"), rows)
+
+
+def likely_table(judged):
+    """Hold how likely listed sets were said to be against how many of them were what is hidden.
+
+    Of one to three effects of the catalogue, where the truth is among the sets compared.
+    """
+    pairs = []
+    for each in judged:
+        listed = [(own["likely"], set(own["effects"]) == each.truth) for own in each.said.get("sets", ())]
+        pairs += listed if each.key["group"] in ("single", "pair", "triple") and any(true for _, true in listed) else []
+    rows = []
+    for low, high in pairwise(_LIKELY):
+        own = [(likely, true) for likely, true in pairs if low <= likely < high]
+        told = f"{sum(likely for likely, _ in own):.1f}"
+        rows.append((f"{low:.0%} to {min(high, 1):.0%}", len(own), told, sum(true for _, true in own)))
+    return table(("said to be likely", "sets", "of them right, as said", "right"), rows if pairs else [])
 
 
 def coefficients_of(judged):

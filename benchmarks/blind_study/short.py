@@ -1,4 +1,4 @@
-"""What a small study says on one page: totals, each group, coverage of each effect, and every miss."""
+"""What a small study says on one page: totals, groups, coverage by effect, how likely sets are, and every miss."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections import Counter, defaultdict
 import numpy as np
 
 from benchmarks.blind_study.air_tables import air_by_channel, air_coverage, air_totals
-from benchmarks.blind_study.number_tables import coverage_table
+from benchmarks.blind_study.number_tables import coverage_table, likely_table
 from benchmarks.blind_study.score import UNSEEN
 from benchmarks.blind_study.tables import misses, totals
 from benchmarks.blind_study.text import table
@@ -18,7 +18,15 @@ def short(judged):
     seconds = [each.said["seconds"] for each in judged]
     took = f"{len(judged)} sets, {np.median(seconds):.1f} s a set (median), {sum(seconds):.0f} s in all"
     in_gusts = air_totals(judged), air_coverage(judged), air_by_channel(judged)
-    parts = (took, totals(judged), *in_gusts, _groups(judged), coverage_table(judged), misses(judged))
+    parts = (
+        took,
+        totals(judged),
+        *in_gusts,
+        _groups(judged),
+        coverage_table(judged),
+        likely_table(judged),
+        misses(judged),
+    )
     return "\n\n".join(part for part in parts if part) + "\n"
 
 

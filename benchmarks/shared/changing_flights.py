@@ -44,6 +44,10 @@ class Kind(NamedTuple):
     volts: float
     by_voltage: float
     """Power of the voltage that thrust goes with."""
+    bandwidth: float = 12.0
+    """Of the autopilot's loop of attitude, rad/s."""
+    integral: float = 0.0
+    """Of its error over the angle itself, 1/s."""
 
     @property
     def places(self) -> Array:
@@ -68,6 +72,10 @@ QUAD = Kind(
 HEXA = Kind(
     "hexarotor, 2.4 kg", 6, 2.4, (0.04, 0.045, 0.08), 0.27, 1.1e-5, 1.9e-7, 0.035, 0.5, (1.5, 1.5, 0.5), 1.0, 22.2, 1.0
 )
+NANO = Kind(
+    "nano, 32 g", 4, 0.032, (1.6e-5, 1.6e-5, 2.9e-5), 0.046, 2e-8, 1.2e-10, 0.05, 0.02, (5.0, 5.0, 1.5), 0.5, 4.2, 1.0,
+    bandwidth=8.0, integral=1.0,
+)  # fmt: skip
 
 
 class Body(NamedTuple):
@@ -160,8 +168,8 @@ def day_of(kind: Kind, body: Body, trim: Trim, rng: np.random.Generator) -> Body
     )
 
 
-def flown(kind: Kind, vehicle: VehicleSettings, body: Body, seed: list[int]) -> dict[str, Recording]:
-    """Fly once; give the flight with its commands alone, and with rotor speeds too."""
+def flown(kind: Kind, vehicle: VehicleSettings, body: Body, seed: list[int], pace: float = 1.0) -> dict[str, Recording]:
+    """Fly once, legs in a time divided by the pace; give the flight with its commands alone, and with speeds too."""
     rng = np.random.default_rng(seed)
     samples = round((SECONDS + SETTLES_S) / STEP_S)
     # A battery that is loaded for each flight, in air that changes from flight to flight.
@@ -175,10 +183,10 @@ def flown(kind: Kind, vehicle: VehicleSettings, body: Body, seed: list[int]) -> 
     force = np.full(kind.rotors, kind.thrust_factor)
     unmix = np.linalg.pinv(np.array([force, force * y, -force * x, -kind.spins * kind.drag_factor]))
     log = _fly(
-        *(legs(rng, samples), push, shove, noise),
+        *(legs(rng, samples, pace), push, shove, noise),
         *(body.mass, body.inertia, places, body.thrust, body.drag, kind.spins, body.lag, round(body.late / STEP_S)),
         *(body.air, body.wind, body.turn_bias, body.turn_gain, body.charge, body.sag, kind.by_voltage),
-        *(kind.mass, np.array(kind.inertia), unmix, kind.hover),
+        *(kind.mass, np.array(kind.inertia), unmix, kind.hover, kind.bandwidth, kind.integral),
     )
     settled = log[round(SETTLES_S / STEP_S / EVERY) :]
     return dict(_logged(vehicle, body, places, settled, rng))
@@ -223,20 +231,20 @@ def _logged(
     ]
 
 
-def legs(rng: np.random.Generator, samples: int) -> Array:
+def legs(rng: np.random.Generator, samples: int, pace: float = 1.0) -> Array:
     """Draw position, velocity and acceleration of legs of least jerk between hovers, shape (samples, 9)."""
     time = STEP_S * np.arange(samples)
     path, place, start = np.zeros((samples, 9)), np.array([0.0, 0.0, 1.0]), 2.0
     path[:, :3] = place
     while start < time[-1]:
         goal = np.array([*rng.uniform(-0.8, 0.8, 2), 1.0 + rng.uniform(-0.2, 0.2)])
-        lasts = rng.uniform(2.5, 3.5)
+        lasts = rng.uniform(2.5, 3.5) / pace
         share = np.clip((time - start) / lasts, 0.0, 1.0)[:, None]
         step = goal - place
         path[:, :3] += step * share**3 * (10 - 15 * share + 6 * share**2)
         path[:, 3:6] += step * 30 * share**2 * (1 - share) ** 2 / lasts
         path[:, 6:] += step * 60 * share * (1 - share) * (1 - 2 * share) / lasts**2
-        place, start = goal, start + lasts + rng.uniform(1.0, 2.5)
+        place, start = goal, start + lasts + rng.uniform(1.0, 2.5) / pace
     return path
 
 
@@ -252,7 +260,7 @@ def _flies(
     path: Array, push: Array, shove: Array, noise: Array,
     mass: float, inertia: Array, places: Array, thrust: Array, drag: Array, spins: Array, lag: float, late: int,
     air: float, wind: Array, turn_bias: Array, turn_gain: Array, charge: float, sag: float, by_voltage: float,
-    known_mass: float, known_inertia: Array, unmix: Array, hover: float,
+    known_mass: float, known_inertia: Array, unmix: Array, hover: float, bandwidth: float, integral: float,
 ) -> Array:  # fmt: skip
     """Integrate; each row logs position, velocity, rotation, felt force, rate, voltage, speeds, commands, phases."""
     rotors, samples = len(thrust), len(path)
@@ -261,8 +269,8 @@ def _flies(
     turn, rate, felt = np.eye(3), np.zeros(3), np.array([0.0, 0.0, 9.81])
     speed, phase, squared = np.full(rotors, hover**0.5), np.zeros(rotors), np.full(rotors, hover)
     asked = np.full((late + 1, rotors), hover)
-    stiff, damped = 144.0 * np.array([1.0, 1.0, 0.16]), 16.8 * np.array([1.0, 1.0, 0.4])
-    wrench, error, wanted = np.zeros(4), np.zeros(3), np.zeros(3)
+    stiff, damped = bandwidth**2 * np.array([1.0, 1.0, 0.16]), 1.4 * bandwidth * np.array([1.0, 1.0, 0.4])
+    wrench, error, wanted, summed = np.zeros(4), np.zeros(3), np.zeros(3), np.zeros(3)
     measured, torque, force, spin_up = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     for now in range(samples):
         load = 0.0
@@ -288,7 +296,9 @@ def _flies(
         error[2] = -turn[1, 0]
         wrench[0] = known_mass * (wanted[0] * turn[0, 2] + wanted[1] * turn[1, 2] + wanted[2] * turn[2, 2])
         for axis in range(3):
-            wrench[1 + axis] = known_inertia[axis] * (stiff[axis] * error[axis] - damped[axis] * measured[axis])
+            summed[axis] += integral * 2e-3 * error[axis]
+            angle_left = error[axis] + summed[axis]
+            wrench[1 + axis] = known_inertia[axis] * (stiff[axis] * angle_left - damped[axis] * measured[axis])
         for rotor in range(rotors):
             total = 0.0
             for column in range(4):

@@ -128,6 +128,7 @@ class ChangedRecord(FoundRecord):
     )
     p_value: float = dataset("probability that flights of an unchanged vehicle look as much like any change")
     by_flight: Array = dataset("the same of each flight of today alone", "today")
+    since_flight: int = dataset("index of the flight of today from which on it looks most as if it had changed")
 
     @classmethod
     def of(
@@ -158,6 +159,7 @@ class ChangedRecord(FoundRecord):
             cable=np.array([flight.cable_m for flight in today]),
             p_value=change.p_value,
             by_flight=change.by_flight,
+            since_flight=change.since,
             false_alarm=false_alarm,
             named_from=named_from,
             **found_groups(change.found, change.shows, units),
@@ -171,10 +173,8 @@ class ChangedRecord(FoundRecord):
 
     @property
     def since(self) -> int | None:
-        """Index of today's flight from which on each shows a change alone; None where the last does not."""
-        still = np.flatnonzero(self.by_flight > self.false_alarm)
-        first = int(still[-1]) + 1 if len(still) else 0
-        return first if self.changed and first < len(self.today) else None
+        """Index of today's flight from which on it is changed; None where it is not."""
+        return self.since_flight if self.changed else None
 
     @property
     def hover_changed(self) -> bool:

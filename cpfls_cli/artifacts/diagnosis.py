@@ -28,7 +28,7 @@ from cpfls_cli.artifacts.gap_flights import (
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, LearnedGroup, learned_in
 from cpfls_cli.artifacts.model import VehicleGroup
 from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, group_of, record, rows_of
-from cpfls_cli.gap.naming.results import Alternative, Unexplained
+from cpfls_cli.gap.naming.results import Alternative, LikelySet, Unexplained
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.before_after import BeforeAfter
@@ -42,6 +42,8 @@ KINDS = ("torque", "force")
 
 _PHYSICS = ("wrench", "actuator")
 """Kinds of effects that torque and force show; sensors and numbers of the vehicle are told on other grounds."""
+
+_PLUS = " + "
 
 
 @record
@@ -68,6 +70,24 @@ class AlternativeGroup:
     def rows(self) -> list[Alternative]:
         """List effects that could be named instead."""
         return [Alternative(**row) for row in rows_of(self)]
+
+
+@record
+class LikelySetGroup:
+    """Sets of effects, each with how likely it is among those compared."""
+
+    effects: tuple[str, ...] = dataset("effects of a set, joined by a plus sign; most likely first", "set")
+    likely: Array = dataset("probability among the sets compared, by what each leaves of blocks that no fit saw", "set")
+
+    @classmethod
+    def of(cls, sets: Sequence[LikelySet]) -> Self:
+        """Arrange sets."""
+        return columns_of(cls, sets, effects=tuple(_PLUS.join(each.effects) for each in sets))
+
+    def rows(self) -> list[LikelySet]:
+        """List sets."""
+        pairs = zip(self.effects, self.likely.tolist(), strict=True)
+        return [LikelySet(tuple(names.split(_PLUS)), likely) for names, likely in pairs]
 
 
 @record
@@ -270,6 +290,7 @@ class DiagnosisRecord(Record):
     again_before: ComesAgainGroup | None = group("comes_again_before", default=None)
     again_after: ComesAgainGroup | None = group("comes_again_after", default=None)
     disturbance: DisturbanceGroup | None = group(default=None)
+    sets: LikelySetGroup | None = group("effect_set", default=None)
 
     @classmethod
     def of(
@@ -316,6 +337,7 @@ class DiagnosisRecord(Record):
             again_before=ComesAgainGroup.of(change.again_before),
             again_after=ComesAgainGroup.of(change.again_after),
             disturbance=None if diagnosed.air is None else DisturbanceGroup.of(diagnosed.air.found, diagnosed.air.told),
+            sets=LikelySetGroup.of(diagnosis.sets),
         )
 
     @property
@@ -409,6 +431,7 @@ class DiagnosisRecord(Record):
             "effects": [effect_summary(effect) for effect in self.effects.named],
             "closest": [effect_summary(effect) for effect in self.effects.closest],
             "alternatives": rows_of(self.alternative),
+            "sets": [vars(each) | {"effects": list(each.effects)} for each in self.sets.rows()] if self.sets else [],
             "unexplained": [vars(each) for each in self.unexplained.unexplained()],
             "not_excited": self.not_excited.summary,
             "where": where and where._asdict(),

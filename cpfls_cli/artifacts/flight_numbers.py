@@ -40,12 +40,22 @@ class FlightNumbersRecord(Record):
     cable: float = dataset(
         "length of the cable that fits best what swings under it, if anything does", units="m", gaps=True
     )
+    agility: float = dataset(
+        "acceleration that it is flown with beside the mean, root mean square", units="m/s^2", gaps=True
+    )
     flown_at: float = dataset("when it was flown, since 1970 began (UTC), where the log tells", units="s", gaps=True)
+    code: str = dataset("hash of the code that computed it: other code computes it anew")
     warning: tuple[str, ...] = dataset("what to know about the flight", "warning")
 
     @classmethod
     def of(
-        cls, told: FlightNumbers, units: Sequence[str], period: float, flown_at: float, warnings: Sequence[str]
+        cls,
+        told: FlightNumbers,
+        units: Sequence[str],
+        period: float,
+        flown_at: float,
+        code: str,
+        warnings: Sequence[str],
     ) -> Self:
         """Arrange the numbers of a flight."""
         return cls(
@@ -59,7 +69,9 @@ class FlightNumbersRecord(Record):
             period=period,
             commanded=told.commanded,
             cable=told.cable_m,
+            agility=told.agility,
             flown_at=flown_at,
+            code=code,
             warning=tuple(warnings),
         )
 

@@ -248,21 +248,21 @@ def sealed_output(path: Path) -> Iterator[EnduringFile]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file, as `write_texts`."""
-    write_texts({path: text})
+    """Write a text file, as `write_files`."""
+    write_files({path: text})
 
 
-def write_texts(texts: Mapping[Path, str | bytes]) -> None:
+def write_files(contents: Mapping[Path, str | bytes]) -> None:
     """Write files of text or bytes under temporary names, then move them in place when all of them are complete.
 
     What is no character, such as a byte of a file name that is not UTF-8, is written as a question mark.
     """
     with ExitStack() as stack:
         written = {}
-        for path, text in texts.items():
+        for path, content in contents.items():
             written[path] = temporary = stack.enter_context(atomic_path(path))
             with _writing(path), temporary.open("wb") as file:
-                file.write(text if isinstance(text, bytes) else text.encode("utf-8", "replace"))
+                file.write(content if isinstance(content, bytes) else content.encode("utf-8", "replace"))
                 file.flush()
                 os.fsync(file.fileno())
         _refuse_appeared(written)

@@ -8,10 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from cpfls_cli.artifacts.audit import AuditGroup, AuditRepairGroup
+from cpfls_cli.artifacts.disturbance import DisturbanceGroup
 from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
 from cpfls_cli.artifacts.model import USUAL, EffectsGroup, InertiaFunctionsGroup, VehicleGroup
 from cpfls_cli.artifacts.spec import rows_of
-from cpfls_cli.artifacts.vehicle_model import ObserverGroup
+from cpfls_cli.artifacts.vehicle_model import ObserverGroup, VehicleRecord
 from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.consistency.repairs import ChannelRepair
@@ -19,9 +20,12 @@ from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.effects.registry import effect
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.fuzzy.inputs import InputRange
+from cpfls_cli.playback.gusts import GUST_AXES
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.playback.spread import Estimates, GustRanges
 from cpfls_cli.playback.table import Remainder
+from cpfls_cli.playback.vehicle import FoundNumber
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 
@@ -53,6 +57,42 @@ def vehicle_model(group: VehicleGroup) -> VehicleModel:
 def observer(group: ObserverGroup, past_s: float) -> Observer:
     """Rebuild the observer of a forecast that uses so much of the past."""
     return Observer(rate=group.rate, memory_s=group.memory, past_s=past_s)
+
+
+def estimates(record: VehicleRecord) -> Estimates:
+    """Rebuild what flights say of the numbers of a vehicle.
+
+    Raises
+    ------
+    InputError
+        If the artifact is of before correlations were written.
+    """
+    if record.correlation is None:
+        raise InputError(
+            "holds intervals of single numbers, but not how they go together: it was made by an earlier version; run "
+            "`cpfls vehicle` again"
+        )
+    # Where instruments tell the constants no loop has widened their intervals.
+    told = record.instruments is not None
+    loop = np.ones((2, 3)) if told else np.array([np.fmin(record.loop.low, 1.0), np.fmax(record.loop.high, 1.0)])
+    return Estimates(
+        numbers=[FoundNumber(**row) for row in rows_of(record.found)],
+        correlation=record.correlation,
+        blocks=record.blocks,
+        loop=loop,
+        gusts=None if record.disturbance is None else _gust_ranges(record.disturbance),
+    )
+
+
+def _gust_ranges(group: DisturbanceGroup) -> GustRanges | None:
+    """Extend what is known of gusts to all axes: none where no size is."""
+    there = np.flatnonzero(np.isfinite(group.size))
+    if not len(there):
+        return None
+    found = GustRanges(*(np.full(len(GUST_AXES), none) for none in (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)))
+    for name, values in found._asdict().items():
+        values[there] = getattr(group, name)[there]
+    return found
 
 
 def model_effects(group: EffectsGroup) -> tuple[ModelEffect, ...]:
@@ -119,4 +159,5 @@ def numbers_of_flight(record: FlightNumbersRecord) -> FlightNumbers:
         duration_s=record.duration,
         commanded=record.commanded,
         cable_m=record.cable,
+        agility=record.agility,
     )

@@ -311,6 +311,9 @@ class VehicleRecord(ModelRecord):
         "contradictions within the flights or with the vehicle", "contradiction", default=None
     )
     disturbance: DisturbanceGroup | None = group(default=None)
+    correlation: Array | None = dataset(
+        "of the estimates in /found; of what is positive, of its logarithm", "found", "found", default=None
+    )
 
     @classmethod
     def of(
@@ -357,6 +360,7 @@ class VehicleRecord(ModelRecord):
             difference=columns_of(DifferencesGroup, found.differences) if found.differences else None,
             contradiction=None if contradictions is None else tuple(contradictions),
             disturbance=None if found.gusts is None else DisturbanceGroup.of(found.gusts),
+            correlation=found.correlation,
         )
 
     @property

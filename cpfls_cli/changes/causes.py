@@ -89,12 +89,16 @@ _ALONE = {
     "gusts": (0.7, "1"),
     "lean": (0.7, "m/s^2"),
     "drift": (0.05, "rad/s"),
+    "scale": (0.1, "1"),
     "battery": (0.05, "1"),
 }
 """Of kinds of which each number stands for itself: how much it changes where it does, and its unit."""
 
-_ALIKE = {"late": 0.3, "answer": 0.5, "gusts": 0.5}
+_ALIKE = {"late": 0.3, "answer": 0.5, "gusts": 0.5, "unbalance": 0.5}
 """Kinds of which all numbers change at once, and the share of that by which each does so by itself."""
+
+_ONE_TOO = ("unbalance",)
+"""Of these the kinds of which one number can change as well: rotors that turn alike are hardly told apart."""
 
 _AT_ONCE = ("lean", "drift")
 """Kinds of which all numbers change at once, each by itself."""
@@ -176,7 +180,7 @@ def _of_kind(numbers: _Numbers, kind: str) -> Iterator[Cause]:
         yield Cause(kind, np.stack(columns, axis=1), usual, unit)
     elif kind in _AT_ONCE:
         yield Cause(kind, np.stack(each, axis=1), usual, unit, told=len(each))
-    else:
+    if kind in _ONE_TOO or kind not in (*_ALIKE, *_AT_ONCE):
         for name, column in zip(numbers.of_kind(kind), each, strict=True):
             yield Cause(name, column[:, None], usual, unit)
         if kind == "turn":

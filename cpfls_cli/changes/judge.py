@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -34,8 +35,13 @@ _ANY = 10.0
 """Times what is usual: a prior so wide says nothing of a size."""
 
 _DRAWS, _POWER = 2000, 0.9
-_SHOWN, _SIZES = 100, np.geomspace(0.05, 8.0, 32)
-"""Draws and sizes, in what is usual of a change, that tell which one shows: neighbours differ by a sixth."""
+_SHOWN, _SIZES = 100, np.geomspace(0.05, 3.0, 28)
+"""Draws and sizes, in what is usual of a change, that tell which one shows: neighbours differ by a sixth. One of which
+three times what is usual does not show cannot be told."""
+
+_IN_COMMON = 0.8
+"""Share of their variance that flights of a day have in common where chance is drawn: another share makes a search over
+starts find as much by chance, or less."""
 
 _QUANTILES = (np.arange(12) + 0.5) / 12
 _HALF_WIDTH = 1.96
@@ -85,6 +91,8 @@ class Change:
         the number of draws.
     by_flight : array, shape (flight,)
         The same of each flight alone.
+    since : int
+        Flight of today from which on it is changed, or looks most like it.
     found : tuple of Found
         Empty where nothing changed.
     shows : mapping of str to float
@@ -97,6 +105,7 @@ class Change:
     deviation: Array
     p_value: float
     by_flight: Array
+    since: int
     found: tuple[Found, ...]
     shows: dict[str, float]
 
@@ -110,8 +119,9 @@ def changed(
     """Hold flights of today against reference flights.
 
     Each change that is possible is a normal distribution of its sizes beside that of unchanged flights, a multivariate
-    t; its evidence is the ratio of both densities. The largest evidence counts, against the largest that unchanged
-    flights have: the only threshold is the rate of false alarms.
+    t; its evidence is the ratio of both densities. It may be there from any flight of today on. The largest evidence
+    counts, against the largest that unchanged flights have, searched alike: the only threshold is the rate of false
+    alarms.
 
     Parameters
     ----------
@@ -128,26 +138,52 @@ def changed(
         raise InputError("flights of today and of the reference tell no number in common; import the same signals")
     if {flight.commanded for flight in [*before, *today]} == {True, False}:
         names = tuple(name for name in names if not name.startswith("load "))
-    return judged(today, Reference.of(before, names, vehicle), vehicle, rng)
+    return judged(today, Reference.of(before, names, vehicle), vehicle, rng, range(len(today)))
 
 
 def judged(
-    today: Sequence[FlightNumbers], reference: Reference, vehicle: VehicleSettings, rng: np.random.Generator
+    today: Sequence[FlightNumbers],
+    reference: Reference,
+    vehicle: VehicleSettings,
+    rng: np.random.Generator,
+    starts: Sequence[int] = (0,),
 ) -> Change:
-    """Hold flights of today against a reference, as `changed`."""
+    """Hold flights of today against a reference, as `changed`.
+
+    Parameters
+    ----------
+    starts : sequence of int
+        Flights from which on it may be changed, up to the last: the most telling one counts, as it does in chance.
+    """
     names = reference.names
     apart, covariance = reference.apart(today)
     listed = causes(names, vehicle)
     space = _Space(covariance, reference.freedom, kinds_of(names), listed)
-    chance = np.sort(space.evidence(space.drawn(rng)).max(axis=0))
-    evidence = space.evidence(np.vstack([apart.mean(axis=0), apart]))
-    p_value, *by_flight = (beyond_chance(chance, each) for each in evidence.max(axis=0))
-    found = _found(space, apart.mean(axis=0), chance) if p_value <= FALSE_ALARM else ()
+    since_each = np.array([apart[start:].mean(axis=0) for start in starts])
+    drawn = space.drawn(rng, [len(today) - start for start in starts])
+    most = space.evidence(drawn.reshape(-1, len(names))).max(axis=0).reshape(drawn.shape[:2])
+    chance, alone = np.sort(most.max(axis=0)), np.sort(most[-1])
+    evidence = space.evidence(np.vstack([since_each, apart])).max(axis=0)
+    p_value = beyond_chance(chance, evidence[: len(starts)].max())
+    best = int(np.argmax(evidence[: len(starts)]))
+    since, found = starts[best], tuple[Found, ...]()
+    if p_value <= FALSE_ALARM:
+        found = _found(space, since_each[best], chance)
+        since = _since(space, apart, found, starts)
+        found = _found(space, apart[since:].mean(axis=0), chance) or found
     threshold = float(np.quantile(chance, 1 - FALSE_ALARM))
-    drawn = np.linalg.solve(space.root, space.drawn(rng, _SHOWN).T)
-    shows = {cause.name: space.shows(index, threshold, drawn) for index, cause in enumerate(listed)}
-    deviation = np.sqrt(np.diag(covariance))
-    return Change(names, reference, apart, deviation, p_value, np.array(by_flight), found, shows)
+    white = np.linalg.solve(space.root, drawn[0, :_SHOWN].T)
+    return Change(
+        names,
+        reference,
+        apart,
+        np.sqrt(np.diag(covariance)),
+        p_value,
+        np.array([beyond_chance(alone, each) for each in evidence[len(starts) :]]),
+        since,
+        found,
+        {cause.name: space.shows(index, threshold, white) for index, cause in enumerate(listed)},
+    )
 
 
 def beyond_chance(chance: Array, value: float) -> float:
@@ -169,10 +205,20 @@ class _Space:
         self.white = [np.linalg.solve(self.root, cause.directions) for cause in listed]
         self.prior = np.log([cause.prior for cause in listed])
 
-    def drawn(self, rng: np.random.Generator, count: int = _DRAWS) -> Array:
-        """Draw numbers of unchanged flights, shape (draw, number): each kind has a scatter of its own to be off by."""
-        scale = self.freedom / rng.chisquare(self.freedom, (count, self.kind.max() + 1))
-        return np.asarray(np.sqrt(scale)[:, self.kind] * (rng.normal(size=(count, len(self.root))) @ self.root.T))
+    def drawn(self, rng: np.random.Generator, counts: Sequence[int] = (1,), draws: int = _DRAWS) -> Array:
+        """Draw means of so many of the last flights of an unchanged day, shape (count, draw, number).
+
+        Each kind has a scatter of its own to be off by.
+        """
+        scale = np.sqrt(self.freedom / rng.chisquare(self.freedom, (draws, self.kind.max() + 1)))[:, self.kind]
+        day, own = rng.normal(size=(2, draws, len(self.root)))
+        means, total, flights = [], np.zeros_like(own), 0
+        for count in sorted(counts):
+            # The mean of so many of them, of which some are in the mean before.
+            total, flights = total + np.sqrt(count - flights) * rng.normal(size=own.shape), count
+            means.append(np.sqrt(_IN_COMMON) * day + np.sqrt(1 - _IN_COMMON) * total / count)
+        order = np.argsort(np.argsort(counts, kind="stable"), kind="stable")
+        return np.asarray(scale * (np.array(means)[order] @ self.root.T))
 
     def evidence(self, apart: Array, beside: Array | None = None) -> Array:
         """Compute the logarithm of the evidence of each change, shape (cause, row).
@@ -253,13 +299,16 @@ class _Space:
         return tuple(Size(*map(cause.size, each)) for each in shown.T)
 
     def shows(self, index: int, threshold: float, drawn: Array) -> float:
-        """Find the smallest size of a change that shows with 90 %, in its unit; infinite beyond eight times usual."""
+        """Find the smallest size of a change that shows with 90 %, in its unit; infinite where none does."""
         own, cause = self.white[index], self.listed[index]
-        rows = (drawn[:, None] + _SIZES[:, None] * own[:, :1, None]).reshape(len(own), -1)
-        evidence = self._density(rows, own, slice(0, cause.losses)) - self._density(rows, own[:, :0])
-        power = (evidence + self.prior[index] >= threshold).reshape(len(_SIZES), -1).mean(axis=1)
-        enough = np.flatnonzero(power >= _POWER)
-        return cause.size(_SIZES[enough[0]] * cause.usual) if len(enough) else float("inf")
+
+        def is_enough(size: float) -> bool:
+            rows = drawn + size * own[:, :1]
+            evidence = self._density(rows, own, slice(0, cause.losses)) - self._density(rows, own[:, :0])
+            return bool(np.mean(evidence + self.prior[index] >= threshold) >= _POWER)
+
+        first = bisect_left(_SIZES, x=True, key=is_enough)
+        return cause.size(_SIZES[first] * cause.usual) if first < len(_SIZES) else float("inf")
 
 
 def _found(space: _Space, apart: Array, chance: Array) -> tuple[Found, ...]:
@@ -290,6 +339,21 @@ def _found(space: _Space, apart: Array, chance: Array) -> tuple[Found, ...]:
         belief = sum(share[at] for at, other in enumerate(space.listed) if at == index or own.holds(other))
         found.append(Found(own, space.sizes(apart, chosen, index), float(belief), alike))
     return tuple(found)
+
+
+def _since(space: _Space, apart: Array, found: Sequence[Found], starts: Sequence[int]) -> int:
+    """Find the flight before which flights are nearest to the reference, and from which on to each other.
+
+    Along what was found: what else flights of a day have in common tells nothing of it.
+    """
+    along = np.hstack([np.linalg.solve(space.root, each.cause.directions[:, : each.cause.told]) for each in found])
+    shown = np.linalg.solve(space.root, apart.T).T @ np.linalg.svd(along, full_matrices=False)[0]
+
+    def apart_from(start: int) -> float:
+        after = shown[start:]
+        return float((shown[:start] ** 2).sum() + ((after - after.mean(axis=0)) ** 2).sum())
+
+    return min(starts, key=apart_from)
 
 
 def _beside(space: _Space, apart: Array, there: Sequence[int]) -> Array:

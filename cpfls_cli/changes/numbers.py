@@ -40,40 +40,46 @@ class Kind:
     apart, together : float
         Standard deviations from day to day of a vehicle that nobody changed: of each number by itself, and of all
         numbers of the kind alike. What is usual where reference flights are too few to tell it themselves.
+    agile : float
+        By how much numbers differ in flights that are flown e times as agile: standard deviation, half of its variance
+        in common.
     """
 
     unit: str
     apart: float
     together: float
+    agile: float
 
 
 KINDS: dict[str, Kind] = {
     # Thrust that a rotor is asked for over its share of the weight, logarithm.
-    "load": Kind("1", 0.02, 0.02),
+    "load": Kind("1", 0.02, 0.02, 0.01),
     # Squared speed of a rotor over what it is commanded, logarithm.
-    "turn": Kind("1", 0.02, 0.02),
+    "turn": Kind("1", 0.02, 0.02, 0.01),
     # Time by which a rotor's speed follows its command.
-    "answer": Kind("s", 0.002, 0.002),
+    "answer": Kind("s", 0.002, 0.002, 0.001),
     # Root mean square above 20 Hz, logarithm.
-    "vibration": Kind("1", 0.1, 0.25),
+    "vibration": Kind("1", 0.1, 0.25, 0.3),
     # Acceleration that turns with a rotor, amplitude, logarithm.
-    "unbalance": Kind("1", 0.3, 0.2),
+    "unbalance": Kind("1", 0.3, 0.2, 0.2),
     # Angular acceleration over that of the rotors' torque, logarithm.
-    "follow": Kind("1", 0.05, 0.03),
+    "follow": Kind("1", 0.1, 0.1, 1.0),
     # Time by which the body's rotation follows the rotors.
-    "late": Kind("s", 0.002, 0.003),
+    "late": Kind("s", 0.002, 0.003, 0.03),
     # Angular acceleration that the rotors do not explain, root mean square, logarithm.
-    "gusts": Kind("1", 0.2, 0.6),
+    "gusts": Kind("1", 0.2, 0.6, 0.6),
     # Mean horizontal thrust over mass, world axes.
-    "lean": Kind("m/s^2", 0.3, 0.0),
+    "lean": Kind("m/s^2", 0.3, 0.0, 0.1),
     # Mean of the accelerometer, along z less gravity.
-    "felt": Kind("m/s^2", 0.05, 0.0),
+    "felt": Kind("m/s^2", 0.05, 0.0, 0.05),
     # Mean rate of the gyroscope beside the attitude's.
-    "drift": Kind("rad/s", 0.01, 0.0),
+    "drift": Kind("rad/s", 0.01, 0.0, 0.005),
     # Mass that swings on a cable over that of the vehicle.
-    "swing": Kind("1", 0.02, 0.0),
+    "swing": Kind("1", 0.02, 0.0, 0.02),
     # Voltage that flight draws from the battery, share of a full one.
-    "battery": Kind("1", 0.02, 0.0),
+    "battery": Kind("1", 0.02, 0.0, 0.01),
+    # Rate of the gyroscope over that of the attitude, logarithm.
+    "scale": Kind("1", 0.01, 0.01, 0.02),
 }
 """Of each number the first word of its name."""
 
@@ -122,6 +128,8 @@ class FlightNumbers:
         Whether loads are of commands, and not of speeds that were measured.
     cable_m : float
         Length of the cable that fits best what swings, if anything does; NaN where the log does not hold it.
+    agility : float
+        Acceleration that it is flown with beside the mean, root mean square, m/s^2; NaN where the log does not hold it.
     """
 
     name: str
@@ -131,6 +139,7 @@ class FlightNumbers:
     duration_s: float
     commanded: bool
     cable_m: float = float("nan")
+    agility: float = float("nan")
 
 
 def flight_numbers(recording: Recording, full_voltage: float = 1.0) -> FlightNumbers:
@@ -167,7 +176,8 @@ def flight_numbers(recording: Recording, full_voltage: float = 1.0) -> FlightNum
             if np.isfinite(value) and np.isfinite(apart):
                 values[each], errors[each] = float(value), float(apart)
     voltage = np.nan if signals.voltage is None else full_voltage * float(signals.voltage[flies].mean())
-    return FlightNumbers(name, values, errors, voltage, duration, signals.commanded, cable)
+    agility = _agility(signals, flies)
+    return FlightNumbers(name, values, errors, voltage, duration, signals.commanded, cable, agility)
 
 
 def in_flight(signals: Signals) -> BoolArray:
@@ -180,6 +190,19 @@ def in_flight(signals: Signals) -> BoolArray:
     level = _FLIES * np.median(carries)
     margin = round(_MARGIN_S / signals.period)
     return np.asarray(binary_erosion(thrust > level, iterations=max(margin, 1), border_value=1))
+
+
+def _agility(signals: Signals, flies: BoolArray) -> float:
+    """Tell how a flight is flown: the acceleration beside its mean that its attitude and thrust ask for.
+
+    Of windows, so that noise counts little.
+    """
+    own, inside = _windows(signals, flies, _SWING_S)
+    if signals.attitude is None or not inside.any():
+        return float("nan")
+    assert signals.thrust is not None, "rotor speeds are there"
+    asked = own.average(signals.rotation[:, :, 2] * (signals.thrust / signals.vehicle.mass_kg)[:, None])[inside]
+    return float(np.sqrt(((asked - asked.mean(axis=0)) ** 2).sum(axis=1).mean()))
 
 
 _Numbers = tuple[list[str], Array, Array]
@@ -321,7 +344,9 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
         error = _delay_error(values[1:]) if kind == "late" else jackknife_error(values[1:])
         yield [f"{kind} {axis}" for axis in _ROTATIONS], values[0], error
     if signals.attitude is not None:
-        yield _drift(signals, flies)
+        turns = _of_attitude(signals)
+        yield _drift(signals, turns, flies)
+        yield _scale(signals, turns, flies)
 
 
 def _delay_error(left_out: Array) -> Array:
@@ -368,17 +393,42 @@ def _fit(turned: Array, driven: Array) -> Array:
     return np.array([np.where(gain > 0, gain, np.nan), late, np.sqrt(left[best, axis] / len(turned))])
 
 
-def _drift(signals: Signals, flies: BoolArray) -> _Numbers:
-    """Compare the gyroscope's rate with that of the attitude, which turns by the body rate."""
+def _of_attitude(signals: Signals) -> Array:
+    """Compute the body rate that the attitude turns by, from the sample before to each, shape (time, 3)."""
     rotation = signals.rotation
     turned = np.einsum("tji,tjk->tik", rotation[:-1], rotation[1:])
     vector = 0.5 * np.stack(
         [turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[:, 2, 0], turned[:, 1, 0] - turned[:, 0, 1]],
         axis=1,
     )
+    return np.concatenate([vector[:1], vector]) / signals.period
+
+
+def _drift(signals: Signals, turns: Array, flies: BoolArray) -> _Numbers:
+    """Compare the gyroscope's rate with that of the attitude, which turns by the body rate."""
     middle = 0.5 * (signals.body_rate[:-1] + signals.body_rate[1:])
-    apart = middle - vector / signals.period
+    apart = middle - turns[1:]
     return _averaged([f"drift {axis}" for axis in _AXES], apart, flies[1:] & flies[:-1], lambda means: means)
+
+
+def _scale(signals: Signals, turns: Array, flies: BoolArray) -> _Numbers:
+    """Fit the attitude's rate, which is noisier, to the gyroscope's: its scale, a logarithm.
+
+    Of windows that no vibration passes, which the attitude does not hold.
+    """
+    own, inside = _windows(signals, flies, _SWING_S)
+    if inside.sum() < FEWEST_WINDOWS:
+        return [], np.zeros(0), np.zeros(0)
+    x, y = (own.average(each)[inside] for each in (signals.body_rate, turns))
+    x = x - x.mean(axis=0)
+    products = np.stack([x * x, x * y], axis=2)
+    with np.errstate(invalid="ignore"):
+        return _averaged(
+            [f"scale {axis}" for axis in _AXES],
+            products,
+            np.ones(len(x), dtype=bool),
+            lambda means: np.log(means[:, 0] / means[:, 1]),
+        )
 
 
 def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:

@@ -26,6 +26,10 @@ _BY_VOLTAGE, _VOLTAGE_ERROR = {"load": -1.0, "turn": 1.0}, 1.0
 the autopilot makes up for the battery, the square where it does not."""
 
 
+_CALM = 1.0
+"""Acceleration below which flights are flown alike, m/s^2."""
+
+
 @dataclass(frozen=True)
 class Reference:
     """Numbers of reference flights: their mean and covariance.
@@ -46,6 +50,12 @@ class Reference:
         with none.
     voltage : float
         Of the mean; NaN where it does not count.
+    by_agility : array, shape (number,)
+        By how much a number goes with the logarithm of how agile a flight is flown.
+    agility_error : array, shape (number,)
+        Its standard error; 0 where it does not count.
+    agility : float
+        That logarithm of the mean; NaN where it does not count.
     """
 
     names: tuple[str, ...]
@@ -56,13 +66,18 @@ class Reference:
     by_voltage: Array
     voltage_error: Array
     voltage: float
+    by_agility: Array
+    agility_error: Array
+    agility: float
 
     @classmethod
     def of(cls, flights: Sequence[FlightNumbers], names: Sequence[str], vehicle: VehicleSettings) -> Reference:
         """Learn from reference flights, at least one.
 
         A conjugate prior (inverse Wishart, in blocks by kind) holds what is usual from day to day; it counts as three
-        flights. The covariance is that of the predictive distribution, a multivariate t.
+        flights. The covariance is that of the predictive distribution, a multivariate t. Numbers go with how agile
+        flights are flown by a regression with a prior of its own: where the reference flights are all flown alike,
+        flights that are not tell the less the more they differ.
 
         Parameters
         ----------
@@ -79,19 +94,29 @@ class Reference:
             values -= np.outer(np.log([flight.voltage / voltage for flight in flights]), power)
         mean, measured = values.mean(axis=0), _measured(flights, names)
         expected = expected_covariance(flights, names, vehicle)
-        covariance, freedom = learned_covariance(values - mean, len(flights) - 1.0, expected, names)
-        return cls(tuple(names), mean, covariance * (1 + 1 / len(flights)), freedom, measured, power, error, voltage)
+        apart, slope, prior, agility, spread = _by_agility(flights, names, values - mean, np.diag(expected))
+        covariance, freedom = learned_covariance(apart, len(flights) - 1.0, expected, names)
+        noise = np.diag(covariance)
+        unsure = np.sqrt(noise / (spread + noise / prior)) if np.isfinite(agility) else np.zeros(len(names))
+        return cls(
+            *(tuple(names), mean, covariance * (1 + 1 / len(flights)), freedom, measured, power, error, voltage),
+            *(slope, unsure, agility),
+        )
 
     def apart(self, flights: Sequence[FlightNumbers]) -> tuple[Array, Array]:
         """Compute how far flights of a day are from the reference, shape (flight, number), and the covariance.
 
-        What goes with the voltage is that at the reference's; how sure that is counts in the covariance. It is that of
-        their mean: flights of a day have their day in common.
+        What goes with the voltage and with how agile they are flown is that at the reference's; how sure that is counts
+        in the covariance. It is that of their mean: flights of a day have their day in common.
         """
         values = np.array([[flight.values[name] for name in self.names] for flight in flights])
         # Flights that tell a number worse than those of the reference do.
         beside = _measured(flights, self.names) / len(flights) - self.measured
+        more = self.more_agile(flights)
+        values -= np.outer(more, self.by_agility)
+        unlike = np.abs(more).max() * self.agility_error
         covariance = self.covariance + np.diag(np.maximum(beside, 0.0))
+        covariance += np.outer(unlike, unlike) * 0.5 * (_alike(self.names) + np.eye(len(self.names)))
         voltage = np.array([flight.voltage for flight in flights])
         if np.isfinite(self.voltage) and np.isfinite(voltage).all():
             lower = np.log(voltage / self.voltage)
@@ -99,6 +124,16 @@ class Reference:
             unsure = lower.mean() * self.voltage_error
             covariance += np.outer(unsure, unsure) * _alike(self.names)
         return values - self.mean, covariance
+
+    def more_agile(self, flights: Sequence[FlightNumbers]) -> Array:
+        """Tell how much more agile each is flown than the reference, a logarithm, shape (flight,); 0 if not known."""
+        more = _logarithms(flights) - self.agility
+        return np.where(np.isfinite(more), more, 0.0)
+
+
+def _logarithms(flights: Sequence[FlightNumbers]) -> Array:
+    """Take the logarithm of how agile flights are flown: in hover gusts and noise make it."""
+    return np.log(_CALM + np.array([flight.agility for flight in flights]))
 
 
 def _measured(flights: Sequence[FlightNumbers], names: Sequence[str]) -> Array:
@@ -199,6 +234,31 @@ def _alike(names: Sequence[str]) -> BoolArray:
     """Mark the pairs of numbers of one kind, shape (number, number)."""
     kinds = np.array(kinds_of(names))
     return np.asarray(kinds[:, None] == kinds)
+
+
+def _by_agility(
+    flights: Sequence[FlightNumbers], names: Sequence[str], values: Array, noise: Array
+) -> tuple[Array, Array, Array, float, float]:
+    """Regress numbers on the logarithm of how agile flights are flown.
+
+    Returns
+    -------
+    rows : array, shape (row, number)
+        What is left, and what the prior adds.
+    slope, prior : array, shape (number,)
+        And the variance of the slope before any flight.
+    agility, spread : float
+        Mean of the logarithm, and the sum of squares about it.
+    """
+    prior = np.array([KINDS[kind].agile ** 2 for kind in kinds_of(names)])
+    more = _logarithms(flights)
+    agility = float(more.mean())
+    if not np.isfinite(agility):
+        return values, np.zeros(len(names)), prior, agility, 0.0
+    beside = more - agility
+    spread = float(beside @ beside)
+    slope = beside @ values / (spread + noise / prior)
+    return np.vstack([values - np.outer(beside, slope), slope * np.sqrt(noise / prior)]), slope, prior, agility, spread
 
 
 def _by_voltage(flights: Sequence[FlightNumbers], names: Sequence[str], values: Array) -> tuple[Array, Array, float]:

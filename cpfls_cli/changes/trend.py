@@ -206,6 +206,9 @@ class Row:
         Standard deviation of what numbers of a kind have in common by the voltage, whose effect is not known well.
     noise : array, shape (flight, number)
         Standard deviation of what a flight tells worse than others do.
+    agility : array, shape (flight, number)
+        Standard deviation of what is not known for how agile a flight is flown; half of its variance numbers of a kind
+        have in common.
     """
 
     names: tuple[str, ...]
@@ -213,6 +216,7 @@ class Row:
     expected: Array
     voltage: Array
     noise: Array
+    agility: Array
 
     @classmethod
     def of(cls, flights: Sequence[FlightNumbers], reference: Reference, vehicle: VehicleSettings) -> Row:
@@ -228,6 +232,7 @@ class Row:
             expected,
             voltage=np.outer(known, reference.voltage_error),
             noise=np.sqrt(np.maximum(measured - measured.mean(axis=0), 0.0)),
+            agility=np.outer(reference.more_agile(flights), reference.agility_error),
         )
 
     def covariance(self, values: Array) -> tuple[Array, float]:
@@ -254,6 +259,7 @@ class Row:
             lower += np.diag(np.sqrt(rng.chisquare(freedom + size - 1 - np.arange(size))))
             drawn = np.linalg.solve(lower.T, rng.normal(size=(size, len(self.values))))
             noise = rng.normal(size=self.noise.shape) * self.noise
+            noise += np.sqrt(0.5) * (rng.normal(size=size) + rng.normal(size=size)[kind]) * self.agility
             yield np.sqrt(freedom) * (root @ drawn).T + rng.normal(size=size)[kind] * self.voltage + noise
 
 

@@ -223,6 +223,9 @@ class ExportFormat(StrEnum):
     C = "c"
     PYTHON = "python"
     SDF = "sdf"
+    PX4 = "px4"
+    CRAZYFLOW = "crazyflow"
+    URDF = "urdf"
     MJCF = "mjcf"
     ROTORPY = "rotorpy"
     CASADI = "casadi"
@@ -244,6 +247,9 @@ class Flown(StrEnum):
     """What an exported vehicle is flown in."""
 
     SDF = "sdf"
+    PX4 = "px4"
+    CRAZYFLOW = "crazyflow"
+    URDF = "urdf"
     MJCF = "mjcf"
     ROTORPY = "rotorpy"
     CASADI = "casadi"
@@ -712,10 +718,11 @@ def export(
         typer.Option(
             "--format",
             help="json: every parameter, with names and units; c: C99 source and header, no dependencies; python: a "
-            "module that needs NumPy only; sdf (Gazebo), mjcf (MuJoCo), rotorpy, casadi, jax: the vehicle for a "
+            "module that needs NumPy only; sdf (Gazebo), px4 (its Gazebo, with the airframe), mjcf (MuJoCo), urdf "
+            "(gym-pybullet-drones, Isaac), crazyflow (and drone-models), rotorpy, casadi, jax: the vehicle for a "
             "simulator or a library; mcap (Foxglove), csv (PlotJuggler): what a flight, prediction, replay, gap or "
             "response holds, on the log's own clock; default: by the suffix of FILE (.json, .c, .py, .xml, .sdf, "
-            ".mcap, .csv).",
+            ".urdf, .toml, .mcap, .csv).",
         ),
     ] = None,
     name: Annotated[
@@ -733,6 +740,20 @@ def export(
     with messages_for_errors():
         chosen = form and form.value
         _run_without_config("export", output, common, lambda command, job: command.run(job, model, chosen, name))
+
+
+@_command()
+def spread(
+    model: Annotated[Path, typer.Argument(metavar="VEHICLE", help="Made by `cpfls vehicle`.")],
+    output: OutputOption,
+    count: Annotated[int, typer.Option("-n", "--count", metavar="N", min=2, help="Vehicles to draw.")] = 1000,
+    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Of the draws.")] = 1,
+    *,
+    common: Common,
+) -> None:
+    """Draw vehicles from what the flights of one tell, for simulators that fly many: .yaml, .json or .npz."""
+    with messages_for_errors():
+        _run_without_config("spread", output, common, lambda command, job: command.run(job, model, count, seed))
 
 
 @_command("verify-export")

@@ -186,9 +186,9 @@ _WITHOUT_VEHICLE = ("vehicle", "report", "config")
 
 
 def _left_out(command: str, hints: Mapping[str, Any]) -> tuple[str, ...]:
-    """List the options on numbers of the vehicle that a command has no use for, or has as an option of its own."""
+    """List the options that a command has no use for, being those on numbers, or has as an option of its own."""
     if "config" not in hints or command in _WITHOUT_VEHICLE:
-        return _OF_NUMBERS
+        return (*_OF_NUMBERS, "seed") if "seed" in hints else _OF_NUMBERS
     own = "model" in hints and not any(isinstance(each, ArgumentInfo) for each in get_args(hints["model"]))
     return ("numbers",) if own else ()
 

@@ -11,7 +11,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -172,13 +172,18 @@ def progress_bar(title: str, common: Common) -> Iterator[Callable[..., None]]:
     callable
         Takes steps done, steps in all, and a note; where standard error is no terminal it writes a line now and then.
     """
-    if common.quiet:
-        yield _silent
-        return
-    if not sys.stderr.isatty():
-        with _log_shown(title) if common.verbose else nullcontext():
+    with _log_shown(title, common):
+        if common.quiet:
+            yield _silent
+        elif not sys.stderr.isatty():
             yield _log_progress(title, asked=common.verbose)
-        return
+        else:
+            with _bar(title) as show:
+                yield show
+
+
+@contextmanager
+def _bar(title: str) -> Iterator[Callable[..., None]]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
     from rich.table import Column
@@ -193,7 +198,7 @@ def progress_bar(title: str, common: Common) -> Iterator[Callable[..., None]]:
             "{task.fields[note]}", markup=False, table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1)
         ),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True, expand=True) as bar, _log_shown(title):
+    with Progress(*columns, console=Console(stderr=True), transient=True, expand=True) as bar:
         task = bar.add_task(title, total=None, note="")
 
         def show(done: float, total: int, note: str = "") -> None:
@@ -203,14 +208,19 @@ def progress_bar(title: str, common: Common) -> Iterator[Callable[..., None]]:
 
 
 @contextmanager
-def _log_shown(title: str) -> Iterator[None]:
-    """Show what the program logs as lines on standard error, above a bar."""
+def _log_shown(title: str, common: Common) -> Iterator[None]:
+    """Show what the program logs as lines on standard error, above a bar; warnings also where nobody watches."""
     import logging
 
-    log, lines = logging.getLogger("cpfls_cli"), logging.StreamHandler(sys.stderr)
-    lines.setFormatter(logging.Formatter(f"{title}: %(message)s"))
+    class Line(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            # What standard error is now: a bar takes its place while it is shown.
+            print(visible(f"{title}: {record.getMessage()}"), file=sys.stderr, flush=True)
+
+    log, lines = logging.getLogger("cpfls_cli"), Line()
     log.addHandler(lines)
-    log.setLevel(logging.INFO)
+    watched = common.verbose or sys.stderr.isatty()
+    log.setLevel(logging.ERROR if common.quiet else logging.INFO if watched else logging.WARNING)
     try:
         yield
     finally:

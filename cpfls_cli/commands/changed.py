@@ -16,8 +16,8 @@ from cpfls_cli.artifacts.output import check_folder, filled_folder, refuse_input
 from cpfls_cli.artifacts.rebuilt import numbers_of_flight
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.changes.causes import causes
-from cpfls_cli.changes.judge import FALSE_ALARM, NAMED, changed
-from cpfls_cli.changes.numbers import KINDS
+from cpfls_cli.changes.judge import FALSE_ALARM, NAMED, Change, changed
+from cpfls_cli.changes.numbers import KINDS, FlightNumbers
 from cpfls_cli.changes.reference import FEWEST, common_numbers
 from cpfls_cli.commands import report
 from cpfls_cli.errors import InputError
@@ -35,6 +35,10 @@ FILES = ("changed.h5", "report.html", "changed.json")
 
 _RATE = 0.01
 """By which sampling rates differ that are another."""
+
+_UNLIKE = 0.7
+"""Share of what a number may be off by that is not known for how flights are flown, from which on it is said: a half of
+the variance."""
 
 
 def run(job: Job, today: Sequence[Path], since: Sequence[Path], *, fail_on_change: bool = False) -> Outcome:
@@ -114,6 +118,7 @@ def _record(job: Job, flights: Mapping[str, FlightNumbersRecord], notes: Sequenc
     units = units_of(change.names, vehicle)
     warnings = [
         *_warnings(of_today, of_before, change.names),
+        *_flown_unlike(change, today, before),
         *notes,
         *(f"{own.flight}: {words}" for own in (*of_today, *of_before) for words in own.warning),
     ]
@@ -163,9 +168,30 @@ def _warnings(
         yield f"not compared, for not all flights tell it: {joined(lost)} (only {joined(few)})"
 
 
+def _flown_unlike(change: Change, today: Sequence[FlightNumbers], before: Sequence[FlightNumbers]) -> Iterator[str]:
+    """Say that today's flights are flown unlike those of the reference, where that makes them tell less."""
+    reference = change.reference
+    unsure = np.abs(reference.more_agile(today)).max() * reference.agility_error
+    kinds = dict.fromkeys(
+        name.split()[0] for name, less in zip(change.names, unsure > _UNLIKE * change.deviation, strict=True) if less
+    )
+    if kinds:
+        now, then = ([flight.agility for flight in side] for side in (today, before))
+        yield (
+            f"flown unlike the reference: with accelerations of {_range(now)} m/s^2 (root mean square), those of "
+            f"{_range(then)}; {joined(kinds)} count for less, as they go with it; take reference flights that are "
+            "flown alike"
+        )
+
+
+def _range(values: Sequence[float]) -> str:
+    low, high = f"{min(values):.2g}", f"{max(values):.2g}"
+    return low if low == high else f"{low} to {high}"
+
+
 def _next(job: Job, record: ChangedRecord, flown: Sequence[Path]) -> Command:
     """Give the command that goes on: what a model misses of the flights that changed, or the numbers of all flights."""
     if not record.changed:
         return "cpfls", "info", job.output / FILES[0], "-v"
-    changed_ones = flown[record.since or 0 : len(record.today)]
+    changed_ones = flown[record.since_flight : len(record.today)]
     return go_on(job, "gap", *changed_ones, output=job.beside("gap"))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
-from cpfls_cli.artifacts.output import write_texts
+from cpfls_cli.artifacts.output import write_files
 from cpfls_cli.commands.vehicle_sheets import sheet_of
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.registry import FORMS, Exported, exported
@@ -43,7 +43,7 @@ def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     made = exported(sheet, form, job.output.name)
     texts = dict(zip(outputs, made.texts.values(), strict=True))
     if not job.dry_run:
-        write_texts(texts)
+        write_files(texts)
     sizes = {str(path): len(text.encode()) for path, text in texts.items()}
     answer = export_answer([*sheet.told, *made.told], sheet.warnings, sizes, job.dry_run)
     return Outcome(_summary(job, form, sheet, made, sizes), tuple(answer))
@@ -81,7 +81,7 @@ def _form_of(output: Path) -> str:
     for form, ending in ENDINGS.items():
         told.setdefault(ending, form)
     endings = ", ".join(f"{ending} ({form})" for ending, form in told.items())
-    raise InputError(f"{output}: the ending tells no form; end the name in one of {endings}")
+    raise InputError(f"{output}: its suffix names no form; give the name one of the suffixes {endings}")
 
 
 def _prefix_of(output: Path, form: str, name: str | None) -> str:

@@ -28,6 +28,7 @@ from cpfls_cli.identification.identify import Identification, identify
 from cpfls_cli.identification.search import NothingFoundError, SearchRun, SearchStep, require_flights
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.model import answer
+from cpfls_cli.pages.sensors import tell_before_search
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Text
@@ -57,6 +58,7 @@ def run(
     held_out = held_out_parts(job.study, data.rests, inputs, validate)
     wrong = _contradictions([*flights, *choose_on, *validate], job.study)
     others = other_vehicles([*flights, *choose_on, *validate], job.study)
+    tell_before_search(wrong)
     if job.dry_run:
         return nothing_written(job)
     clock = time.perf_counter()

@@ -101,7 +101,7 @@ def _inverse(
         flight = simulate(planned, job.study.vehicle, job.study.simulation, generator(job.study, "simulate"))
     problems = [violation_sentence(violation, time) for violation in flight.violations]
     if problems and job.study.simulation.infeasible == "stop":
-        remedy = "fly gentler, change the vehicle, or set simulation.infeasible: report"
+        remedy = "fly more gently, change the vehicle, or set simulation.infeasible: report"
         raise ComputationError("\n".join([*problems, f"{trajectory}: no flight was written; {remedy}"]))
     record = finish(job, FlightRecord.of_simulation({"time": time, **flight.signals}, flight.noise_std), inputs)
     warnings = (Text(problem, "warning") for problem in problems)

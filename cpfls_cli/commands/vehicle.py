@@ -23,6 +23,7 @@ from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.playback import flights_to_play, played
 from cpfls_cli.flights.recordings import refuse_seen, seen_twice
 from cpfls_cli.pages.model import answer
+from cpfls_cli.pages.sensors import tell_before_search
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.parameters import MASS, blocks_of
@@ -75,6 +76,7 @@ def run(
     _check_blocks(study)
     _check_groups(study.playback.groups, read[: len(flights)])
     training, rest = read[: len(flights)], read[len(flights) :]
+    tell_before_search(contradictions_of(read) or ())
     if job.dry_run:
         return nothing_written(job)
     if kept is None:
@@ -140,8 +142,8 @@ def _write_config(config: ConfigCopy | None, record: VehicleRecord) -> tuple[Tex
 def _require_rotors(flight: LoggedFlight) -> None:
     if flight.playback.wrench is not None:
         raise InputError(
-            f"{flight.name}: states torque and thrust instead of rotor speeds; a vehicle is found from rotor_speed or "
-            "rotor_command, name their columns in import.signals"
+            f"{flight.name}: holds torque and thrust instead of rotor speeds; `cpfls vehicle` needs rotor_speed or "
+            "rotor_command: name their columns in import.signals"
         )
 
 

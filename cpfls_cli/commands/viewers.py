@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
-from cpfls_cli.artifacts.output import write_texts
+from cpfls_cli.artifacts.output import write_files
 from cpfls_cli.artifacts.store import read_any
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.mcap_form import mcap_bytes
@@ -30,7 +30,7 @@ def run(job: Job, artifact: Path, form: str) -> Outcome:
     view = view_of(artifact, read_any(artifact))
     content = mcap_bytes(view) if form == "mcap" else csv_text(view)
     if not job.dry_run:
-        write_texts({job.output: content})
+        write_files({job.output: content})
     size = len(content if isinstance(content, bytes) else content.encode())
     verb = "would be written" if job.dry_run else "written"
     told = [f"{job.output}: {verb} ({size} bytes)", *_told(view, form)]

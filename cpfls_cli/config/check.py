@@ -18,8 +18,9 @@ from cpfls_cli.config.unknown import KEYS, with_guesses
 from cpfls_cli.errors import SettingError
 from cpfls_cli.identification.settings import PRESETS
 from cpfls_cli.inertia import MEASURED, symmetric
+from cpfls_cli.vehicle.rotors import figures_of_vehicle
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.vehicle_limits import beyond_any_vehicle, figures_of, figures_of_hubs
+from cpfls_cli.vehicle_limits import beyond_any_vehicle
 
 _GONE = {("report", "paper"), ("report", "evaluation_times")}
 """Sections and keys that configs of before hold; inside artifacts they are left out, in a file they are refused."""
@@ -111,21 +112,10 @@ def why_no_body(vehicle: VehicleSettings) -> str:
 
 def _no_vehicle(vehicle: VehicleSettings) -> Iterator[tuple[Location, str]]:
     """Refuse numbers that no vehicle has, key by key; nothing of guesses."""
-    rotors, moments = vehicle.rotors, np.linalg.eigvalsh(symmetric(vehicle.inertia_kg_m2))
-    hubs = np.array([rotor.position_m for rotor in rotors])
-    known = {"mass": vehicle.mass_kg, "gravity": vehicle.gravity_m_s2, "speed_max": vehicle.rotor_speed_max_rad_s}
-    known |= figures_of_hubs(hubs)
-    if "inertia" not in vehicle.unknown:
-        known |= {"least_inertia": float(moments[0]), "inertia": float(moments[-1])}
-    if "thrust_factor" not in vehicle.unknown:
-        known["thrust_factor"] = float(np.mean([rotor.thrust_factor_n_s2 for rotor in rotors]))
-    if "drag_factor" not in vehicle.unknown:
-        known["drag_factor"] = float(np.mean([rotor.drag_factor_n_m_s2 for rotor in rotors]))
-    radii = {place: rotor.radius_m for place, rotor in enumerate(rotors) if rotor.radius_m is not None}
-    if radii:
-        known["radius"] = float(np.mean(list(radii.values())))
-    places = {"arm": int(np.argmax(np.abs(hubs).max(axis=1))), "radius": next(iter(radii), 0)}
-    for name, why in beyond_any_vehicle(figures_of(**known)):
+    hubs = np.array([rotor.position_m for rotor in vehicle.rotors])
+    radii = (place for place, rotor in enumerate(vehicle.rotors) if rotor.radius_m is not None)
+    places = {"arm": int(np.argmax(np.abs(hubs).max(axis=1))), "radius": next(radii, 0)}
+    for name, why in beyond_any_vehicle(figures_of_vehicle(vehicle)):
         yield ("vehicle", *_KEYS_OF[name].format(places.get(name, 0)).split(".")), why
 
 

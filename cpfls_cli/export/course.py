@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import MeasuredMotion
@@ -77,6 +79,37 @@ class Course:
     def errors(self, states: State) -> Array:
         """Compare runs with what was measured, shape (run, horizon, 4, 3), as `cpfls_cli.playback.player.Runs` does."""
         return less_measured(states, self.flight.motion, self.starts[:, None] + 1 + np.arange(self.horizon))
+
+
+Wrench = Callable[[Array, Array, Array], tuple[Array, Array]]
+"""From rotor speeds, velocity through the air and body rate of each run to torque and force, body frame, (run, 3)."""
+
+
+def fly_body(course: Course, mass: float, inertia: Array, wrench: Wrench, lag: float) -> State:
+    """Fly a rigid body by the published equations of a target, semi-implicit; see `Target.fly`.
+
+    Parameters
+    ----------
+    inertia : array, shape (3, 3), kg m^2
+    lag : float, s
+        Of the rotors behind their commands; 0 for none.
+    """
+    period, gravity = course.period, np.array([0.0, 0.0, -course.gravity])
+    speed, state = course.lagged(RotorResponse(lag_s=lag)), course.start
+    rows, keep = [], np.exp(-period / lag) if lag else 0.0
+    for step, command in enumerate(course.commands.swapaxes(0, 1), 1):
+        speed = speed if lag else command
+        air = np.einsum("nji,nj->ni", state.rotation, state.velocity)
+        torque, force = wrench(speed, air, state.rate)
+        linear = np.einsum("nij,nj->ni", state.rotation, force) / mass + gravity
+        moment = torque - np.cross(state.rate, state.rate @ inertia)
+        velocity, rate = state.velocity + period * linear, state.rate + period * np.linalg.solve(inertia, moment.T).T
+        turned = state.rotation @ rotations.turns(period * rate)
+        state = State(state.position + period * velocity, velocity, turned, rate)
+        speed = keep * speed + (1.0 - keep) * command
+        if step % course.finer == 0:
+            rows.append(state)
+    return State(*(np.stack(parts, axis=1) for parts in zip(*rows, strict=True)))
 
 
 def _finer_speed(flight: PlaybackFlight, finer: int) -> Array:

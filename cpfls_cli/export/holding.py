@@ -16,6 +16,7 @@ from cpfls_cli.effects.polynomial import STATE_TERMS
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import InputError
+from cpfls_cli.inertia import nearest_body
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Body, MeasuredMotion
 from cpfls_cli.playback.model import VehicleModel
@@ -174,13 +175,9 @@ def constant_body(model: VehicleModel) -> Body:
 
 def of_a_body(body: Body, margin: float = 0.0) -> Body:
     """Take the nearest inertia of a body: each principal moment is less, by a margin, than the sum of the others."""
-    moments, axes = np.linalg.eigh(body.inertia)
-    excess = moments[2] - moments[0] - moments[1] + margin
-    if excess <= 0.0:
+    inertia = nearest_body(body.inertia, margin)
+    if inertia is body.inertia:
         return body
-    # A little more than a third of the excess each, so that rounding brings none of it back.
-    third = excess / 3.0 + _NOTHING * moments[2]
-    inertia = (axes * (moments + third * np.array([1.0, 1.0, -1.0]))) @ axes.T
     return body._replace(inertia=inertia, inverse=np.asarray(np.linalg.inv(inertia), dtype=float))
 
 

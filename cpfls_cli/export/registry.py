@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +14,13 @@ from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import Held, Holds, Missing, missing, together
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.sheet import Sheet
+from cpfls_cli.export.simulators.crazyflow import STEP_S, crazyflow_held, crazyflow_text, fly_crazyflow
 from cpfls_cli.export.simulators.functions import casadi_text, fly_casadi, fly_jax, jax_text
 from cpfls_cli.export.simulators.mjcf import fly_mjcf, mjcf_held, mjcf_text
+from cpfls_cli.export.simulators.px4 import AIRFRAME, px4_text
 from cpfls_cli.export.simulators.rotorpy import fly_rotorpy, rotorpy_held, rotorpy_text
 from cpfls_cli.export.simulators.sdf import fly_sdf, sdf_held, sdf_text
+from cpfls_cli.export.simulators.urdf import fly_urdf, urdf_held, urdf_text
 from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
@@ -84,6 +87,27 @@ def _c(sheet: Sheet, _held: Held, told: Sequence[str], file: str) -> str:
 TARGETS = {
     "mjcf": Target("MuJoCo", ".xml", mjcf_held, mjcf_text, fly=fly_mjcf, package="mujoco", step_s=1e-3, levels=4),
     "sdf": Target("Gazebo's motor model", ".sdf", sdf_held, sdf_text, fly=fly_sdf, package="", step_s=1e-3, levels=4),
+    "px4": Target("PX4's Gazebo", ".sdf", sdf_held, px4_text, AIRFRAME, fly=fly_sdf, package="", step_s=1e-3, levels=4),
+    "crazyflow": Target(
+        "crazyflow",
+        ".toml",
+        crazyflow_held,
+        crazyflow_text,
+        fly=fly_crazyflow,
+        package="drone_models",
+        step_s=STEP_S,
+        levels=4,
+    ),
+    "urdf": Target(
+        "gym-pybullet-drones",
+        ".urdf",
+        urdf_held,
+        urdf_text,
+        fly=fly_urdf,
+        package="",
+        step_s=1e-3,
+        levels=4,
+    ),
     "rotorpy": Target("RotorPy", ".py", rotorpy_held, rotorpy_text, fly=fly_rotorpy, package="rotorpy", levels=4),
     "casadi": Target("CasADi", ".py", _whole, casadi_text, fly=fly_casadi, package="casadi"),
     "jax": Target("JAX", ".py", _whole, jax_text, fly=fly_jax, package="jax"),
@@ -148,9 +172,7 @@ def _left(sheet: Sheet, held: Held, holds: Holds, title: str) -> tuple[tuple[Mis
 def require_package(form: str) -> None:
     """Refuse to fly with a package that is not installed."""
     package = TARGETS[form].package
-    try:
-        import_module(package or "cpfls_cli")
-    except ImportError:
+    if package and find_spec(package) is None:
         raise InputError(
             f"--format {form}: flying the file needs the package {package}; {install_command('simulators')}"
-        ) from None
+        )

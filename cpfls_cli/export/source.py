@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -18,6 +18,7 @@ from cpfls_cli.export.points import PERIOD, Expected, ReferencePoints, Reference
 from cpfls_cli.export.sheet import Sheet, rule_labels
 from cpfls_cli.export.text import c_row, c_rows, comment_lines, comment_text, filled, literal_text, number, python_rows
 from cpfls_cli.inertia import symmetric
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.structure import ModelStructure
 
 _OUTSIDE, _VERTICAL = 1, 4
@@ -131,11 +132,10 @@ def _c_part(part: Sequence[Any] | Array, indent: int) -> str:
 
 def python_source(sheet: Sheet, file: str, library: str = "numpy", told: Sequence[str] = ()) -> str:
     """Write a model as a module of Python that computes with one library, with further paragraphs in its head."""
-    model, weights, rules = sheet.model, sheet.weights, sheet.rules
+    weights, rules = sheet.weights, sheet.rules
     points, runs, attitudes = sheet.references
     coefficients = np.zeros(0) if rules is None else rules.coefficients
-    _, *times = response_of(sheet).values()
-    parameters = [model.body.mass, model.body.gravity, *sheet.rigid_body, *times, *weights.weight, *coefficients]
+    parameters = _parameters(sheet, weights.weight, delayed=library == "jax")
     tests = library == "numpy"
     words = {
         **_common_words(sheet, told),
@@ -157,6 +157,23 @@ def python_source(sheet: Sheet, file: str, library: str = "numpy", told: Sequenc
         "runs": [_python_entries(run_of(run)) for run in runs] if tests else [],
     }
     return fill_template("model.py.j2", words)
+
+
+def _parameters(sheet: Sheet, weights: Array, *, delayed: bool) -> list[float]:
+    """List the parameters of a vehicle; for functions of JAX, of which many may fly side by side, its delay too."""
+    rules, vehicle = sheet.rules, sheet.model.vehicle
+    delay, *times = response_of(sheet).values()
+    rule = [] if rules is None else rules.coefficients.tolist()
+    known = [vehicle.mass_kg, vehicle.gravity_m_s2, *sheet.rigid_body.tolist(), *times]
+    return [*known, *weights.tolist(), *rule, *([delay] if delayed else [])]
+
+
+def jax_parameters(sheet: Sheet, models: Sequence[VehicleModel]) -> Array:
+    """Give the parameters of vehicles like that of a sheet for its functions in JAX, shape (vehicle, parameter)."""
+    places = sheet.weights[:3]
+    return np.array(
+        [_parameters(replace(sheet, model=each), each.table.weights[places], delayed=True) for each in models]
+    )
 
 
 def _python_rules(model: InertiaFunctions) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import json
 import math
 import re
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -114,6 +114,22 @@ def _written(value: Any, depth: int) -> str:
     if isinstance(value, list | tuple) and any(isinstance(item, Mapping | str) for item in value):
         return "[\n" + ",\n".join(blank + _written(item, depth + 1) for item in value) + "\n" + " " * depth + "]"
     return json.dumps(_plain(value), allow_nan=False)
+
+
+def yaml_text(comment: Sequence[str], document: Mapping[str, Any]) -> str:
+    """Write a document as YAML that any reader takes, below a comment: mappings in lines, lists of numbers in one."""
+    return "\n".join([*(f"#{line}".rstrip() for line in comment_lines(comment)), *_yaml_lines(document, ""), ""])
+
+
+def _yaml_lines(document: Mapping[str, Any], blank: str) -> Iterator[str]:
+    for key, value in document.items():
+        if isinstance(value, Mapping) and value:
+            yield f"{blank}{json.dumps(key)}:"
+            yield from _yaml_lines(value, f"{blank}  ")
+        else:
+            # Readers of YAML 1.1 take 1e-05 for text.
+            written = re.sub(r"(?<![\w.\"])(-?\d+)e([-+]\d+)", r"\1.0e\2", json.dumps(_plain(value), allow_nan=False))
+            yield f"{blank}{json.dumps(key)}: {written}"
 
 
 def _plain(value: Any) -> Any:

@@ -14,7 +14,7 @@ from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.recordings import read_alone
-from cpfls_cli.version import __version__
+from cpfls_cli.version import code_fingerprint
 
 FOLDER = "flights"
 """Of the folder that a command fills, where numbers are kept."""
@@ -28,7 +28,7 @@ def kept_numbers(
 ) -> FlightNumbersRecord:
     """Give the numbers of a flight or log as they are kept in a folder, or compute them and keep them there.
 
-    Those that are kept are taken where content, vehicle and import are the same, and the version of the program.
+    Those that are kept are taken where content, vehicle and import are the same, and the code of the program.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def kept_numbers(
     recording, full, warnings, flown_at = read_alone(flight, study)
     told = flight_numbers(recording, full)
     units = [KINDS[name.split()[0]].unit for name in told.values]
-    made = FlightNumbersRecord.of(told, units, recording.signals.period, flown_at, warnings)
+    made = FlightNumbersRecord.of(told, units, recording.signals.period, flown_at, code_fingerprint(), warnings)
     record = made.with_header(header_of(study, {"flight": file}, cautions))
     folder.mkdir(parents=True, exist_ok=True)
     write_record(_path(flight, file, folder), record)
@@ -62,7 +62,7 @@ def find_kept(flight: Path, file: InputFile, study: Study, folder: Path) -> Flig
         made_by = stored_study(record.origin.config, path)
     except InputError:
         return None
-    same = record.made_from("flight") == file.sha256 and record.origin.version == __version__
+    same = record.made_from("flight") == file.sha256 and record.code == code_fingerprint()
     return record if same and _of_flight(made_by) == _of_flight(study) else None
 
 

@@ -27,6 +27,7 @@ from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     impossible_ratios,
     judge_effect,
+    likely_sets,
     sensor_fault,
     shares,
     wrong_numbers,
@@ -373,7 +374,13 @@ def _concluded(
         wrong,
         differ,
         removed,
+        likely_sets(judged) if still or not _late(judged) else (),
     )
+
+
+def _late(judged: Sequence[JudgedEffect]) -> bool:
+    """Tell whether anything lies between command and rotors: in gusts its fits see the loop, and do not compare."""
+    return any(CATALOGUE[each.effect.name].actuation is not None for each in judged)
 
 
 def _pull(hypothesis: System, floor: Array) -> Array:

@@ -20,8 +20,8 @@ Without a gap half of the channels exceed 1 floor, and floors of coloured noise 
 NOISE = 1.25
 """Mean square in squared floors up to which a residual counts as noise: what an estimate of the floor is off by."""
 
-LARGE = 3.0
-"""Root mean square in floors that no name for a gap may leave behind, twice what is clear."""
+OFF = 0.1
+"""Share of its torque and force that a formula may be off by: laws of drag, lift and rotors are known to a tenth."""
 
 VISIBLE = 0.3
 """Root mean square in floors of one channel from which on an effect shows.
@@ -35,8 +35,20 @@ WORSE = 1.1
 ERRORS = 2.0
 """Standard errors by which a difference is sure, 95 % two-sided."""
 
+SURE = 3.0
+"""Standard errors by which one of several numbers is sure: three or four are asked, on few blocks."""
+
 COUNTS = 0.05
-"""Share of the whole gap, in squared floors, from which on a part of it is judged on its own."""
+"""Share of a gap, in squares, from which on a part of it counts: an effect, a channel, what follows a signal."""
+
+CHANCE = 0.05
+"""Probability of chance from which on something makes an answer more careful: an unnamed effect, air that is none."""
+
+RARE = 0.01
+"""The rate of errors that names are given at: of chance for an effect, and of a rival beside the set that is chosen."""
+
+FEWEST_BLOCKS = 4
+"""Blocks that tell an error, if a wide one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +61,7 @@ class GapSettings(Settings):
     shifts: Annotated[int, Ge(39), Doc("circular time shifts that say what chance alone explains")] = 199
     significance: Annotated[
         float, Gt(0), Lt(0.5), Doc("largest probability that an accepted effect is chance, over the whole catalogue")
-    ] = 0.01
+    ] = RARE
     effects_max: Annotated[int, Ge(1), Le(10), Doc("largest number of effects in one diagnosis")] = 6
     named_share: Annotated[
         float, Gt(0.5), Le(1), Doc("share of the gap above the noise floor from which on effects count as the answer")

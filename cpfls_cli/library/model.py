@@ -44,7 +44,7 @@ def run(*words: str | os.PathLike[str]) -> None:
         app(given, prog_name="cpfls")
     except SystemExit as end:
         if end.code:
-            raise CpflsError(f"cpfls {' '.join(given)}: exit code {end.code}, for what standard error says") from None
+            raise CpflsError(f"cpfls {' '.join(given)}: exit code {end.code}, see standard error") from None
 
 
 def load_model(path: str | os.PathLike[str], config: str | os.PathLike[str] | None = None) -> Model:
@@ -216,7 +216,7 @@ class Model:
         Raises
         ------
         InputError
-            If the model holds an effect that no state alone gives, such as a load on a cable.
+            If the model holds an effect that depends on more than the state, such as a load on a cable.
         """
         import numpy as np
 
@@ -309,7 +309,7 @@ class Model:
         model = rebuilt(self._path, record)
         if model.beside_table:
             parts = ", ".join(model.beside_table)
-            raise InputError(f"{self._path}: holds {parts}, which no state alone gives; Model.replay plays it back")
+            raise InputError(f"{self._path}: holds {parts}, which depends on more than the state; use Model.replay")
         return model
 
     def _require_rotors(self, speed: Any) -> None:

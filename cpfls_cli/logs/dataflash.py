@@ -17,6 +17,8 @@ from cpfls_cli.logs.records import bytes_of, date, numbers, seconds, table
 
 _HEAD = b"\xa3\x95"
 _OF_FORMATS = 0x80
+# Name that the head of a message has in a record; no field may have it.
+_BEFORE = "(head)"
 _FORMAT = np.dtype([("", "V3"), ("kind", "u1"), ("length", "u1"), ("name", "S4"), ("types", "S16"), ("fields", "S64")])
 # Letter of a type to its place in memory and the factor that the letter implies.
 _NUMBERS = {
@@ -114,12 +116,12 @@ def _describe(message: bytes, kinds: dict[int, _Kind]) -> None:
     """Take up the kind that a message describes; one that contradicts itself is left out."""
     (own,) = np.frombuffer(message, _FORMAT)
     letters, names = own["types"].decode("latin-1"), own["fields"].decode("latin-1").split(",")
-    if own["kind"] in kinds or len(names) != len(letters) or len(set(names)) != len(names):
+    if own["kind"] in kinds or len(names) != len(letters) or len({"", _BEFORE, *names}) != len(names) + 2:
         return
     if not set(letters) <= {*_NUMBERS, *_OTHERS}:
         return
     places = [_NUMBERS[letter][0] if letter in _NUMBERS else _OTHERS[letter] for letter in letters]
-    record = np.dtype([("", "V3"), *((name, f"<{kind}") for name, kind in zip(names, places, strict=True))])
+    record = np.dtype([(_BEFORE, "V3"), *((name, f"<{kind}") for name, kind in zip(names, places, strict=True))])
     if record.itemsize == own["length"]:
         kinds[int(own["kind"])] = _Kind(own["name"].decode("latin-1"), dict(zip(names, letters, strict=True)), record)
 

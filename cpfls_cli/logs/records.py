@@ -40,5 +40,6 @@ def date(second: float) -> float:
 
 
 def seconds(stamps: np.ndarray, origin: int, per_second: int) -> Array:
-    """Convert whole numbers to s from an origin; their difference is exact."""
-    return np.asarray((stamps.astype(np.int64) - origin) / per_second, dtype=float)
+    """Convert whole numbers to s from an origin; their difference is exact, also of stamps beyond half of 64 bits."""
+    since = stamps.astype(np.int64).astype(np.uint64) - np.uint64(origin % 2**64)
+    return np.asarray(since.astype(np.int64) / per_second, dtype=float)

@@ -25,6 +25,7 @@ _NAMES = {
     "gusts": "gusts",
     "lean": "steady wind or a tilted sensor",
     "drift": "an offset of the gyroscope",
+    "unbalance": "another balance of rotors",
     "battery sag": "another battery",
 }
 """What a cause is, where its key does not say it."""
@@ -52,6 +53,7 @@ _CHECKS = {
     "gusts": "fly again in still air; if it stays, look for what is loose",
     "lean": "fly again in still air; if it stays, calibrate the level, and see how the autopilot is mounted",
     "drift": "calibrate the gyroscope, warm and at rest",
+    "scale": "see whether the gyroscope's range, its firmware or what estimates the attitude was changed",
     "battery": "charge and balance the battery, or take another; feel its contacts for heat",
 }
 """What to look at, by cause or its first word."""
@@ -66,7 +68,9 @@ def cause_name(cause: str) -> str:
         return f"a {cause}"
     if kind == "felt":
         return f"an offset of the accelerometer along {of}"
-    if kind == "unbalance":
+    if kind == "scale":
+        return f"another scale of the gyroscope about {of}"
+    if kind == "unbalance" and of:
         return f"another balance of rotor {of}"
     if kind == "follow":
         return f"{of} that follows otherwise"
@@ -105,7 +109,7 @@ def change_words(
         "centre": lambda: f"the centre of mass lies {_off_centre(sizes)}",
         "torque": lambda: f"a torque about z takes {_percent(size)} of the rotors' drag",
         "vibration": lambda: f"it vibrates {_times(size)}",
-        "unbalance": lambda: f"what turns with rotor {of} shakes it {_times(size)}",
+        "unbalance": lambda: f"what turns with {f'rotor {of}' if of else 'the rotors'} shakes it {_times(size)}",
         "turn": lambda: f"rotor {of} turns {_percent(_less_one(0.5, size), ('faster', 'slower'))} than it is told",
         "follow": lambda: f"{of} follows the rotors' torque {_percent(_less_one(1.0, size), ('more', 'less'))}",
         "late": lambda: f"rotation follows the rotors {_amount(size, 1e3, ' ms', ('later', 'earlier'))}",
@@ -114,6 +118,9 @@ def change_words(
         "gusts": lambda: f"what turns it beside the rotors, gusts, is {_times(size)}",
         "lean": lambda: f"it leans with {_each(sizes, axes, 'm/s²', 'along')} of the world, as against wind",
         "drift": lambda: f"the gyroscope is off by {_each(sizes, axes, 'rad/s', 'about')}",
+        "scale": lambda: (
+            f"the gyroscope reads {_percent(_less_one(1.0, size), ('more', 'less'))} about {of} beside the attitude"
+        ),
         "battery": lambda: f"the battery falls {_percent(size, ('further', 'less far'))}",
     }
     return words[kind]() if kind in words else f"{cause}: {number(size[0], 2)}"
@@ -128,7 +135,7 @@ def smallest_words(cause: str, size: float, vehicle: VehicleSettings) -> str:
         "rotors": f"two rotors that pull {number(100 * size, 2)} % less",
         "mass": weight,
         "load": f"{weight} on a cable",
-        "unbalance": f"{number(math.exp(size), 2)} times the unbalance of rotor {of}",
+        "unbalance": f"{number(math.exp(size), 2)} times the unbalance of {f'rotor {of}' if of else 'rotors'}",
         "weight": f"{weight} {of}",
         "hover": f"{number(100 * size, 2)} % of the thrust in hover",
         "all": f"{number(50 * size, 2)} % of the speed of all rotors",
@@ -143,6 +150,7 @@ def smallest_words(cause: str, size: float, vehicle: VehicleSettings) -> str:
         "gusts": f"{number(math.exp(size), 2)} times the gusts",
         "lean": f"{number(size, 2)} m/s² of steady wind or a tilted sensor",
         "drift": f"{number(size, 2)} rad/s of the gyroscope",
+        "scale": f"{number(100 * math.expm1(size), 2)} % of the gyroscope's scale about {of}",
         "battery": f"{number(100 * size, 2)} % of a full battery",
     }
     return words.get(kind, f"{cause}: {number(size, 2)}")

@@ -30,6 +30,7 @@ _NATURAL = {
     "vibration accelerometer": "m/s²",
     "unbalance": "m/s²",
     "follow": "",
+    "scale": "",
     "gusts": "rad/s²",
 }
 """Units of numbers that are logarithms, without their axis: of what they are the logarithm of."""
@@ -125,16 +126,11 @@ def _since(record: ChangedRecord) -> str:
     if len(record.today) == 1:
         return record.today[0]
     alone = [name for name, p in zip(record.today, record.by_flight, strict=True) if p <= record.false_alarm]
-    if record.since is not None:
-        first = record.today[record.since]
-        if record.since == 0:
-            return f"{first}, the first of today: each of the {len(record.today)} flights shows it alone"
-        return f"{first}, number {record.since + 1} of {len(record.today)}; those before do not show it alone"
-    return (
-        f"not known: {joined(alone)} alone show{'s' if len(alone) == 1 else ''} it"
-        if alone
-        else (f"not known: no flight alone shows it, all {len(record.today)} together do")
-    )
+    shown = f"{len(alone)} of {len(record.today)} flights show it alone"
+    first = record.today[record.since_flight]
+    if record.since_flight == 0:
+        return f"{first}, the first of today: {shown}"
+    return f"{first}, number {record.since_flight + 1} of {len(record.today)}: {shown}"
 
 
 def checks(record: FoundRecord, among: Sequence[int] | None = None) -> Iterator[tuple[str, str]]:

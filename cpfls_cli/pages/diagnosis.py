@@ -21,6 +21,7 @@ from cpfls_cli.pages.effects import (
     effects_table,
     intervals_figure,
     parameters_table,
+    sets_table,
     share_words,
     titles,
 )
@@ -141,6 +142,7 @@ def _effects(record: DiagnosisRecord, index: int) -> Iterator[Block]:
     effects = record.effects
     if effects.effect.name:
         yield effects_table(f"effects-{index}", effects)
+        yield from [sets_table(f"sets-{index}", record.sets.rows())] if record.sets and record.sets.effects else []
     else:
         yield Text("No effect of the catalogue is named.")
     if effects.coefficient.name:

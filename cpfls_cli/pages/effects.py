@@ -12,6 +12,7 @@ from cpfls_cli.pages.gap import AFTER
 from cpfls_cli.report.canvas import plot
 from cpfls_cli.report.content import Plot, Table
 from cpfls_cli.report.numbers import UNKNOWN, number, printed, probability, whole_percent, with_interval
+from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     # What effects are called is told of models that are read without a gap.
     from cpfls_cli.arrays import Array
     from cpfls_cli.artifacts.gap_effects import NamedEffectsGroup
-    from cpfls_cli.gap.naming.results import Estimate, NamedEffect
+    from cpfls_cli.gap.naming.results import Estimate, LikelySet, NamedEffect
 
 _RELATIVE = "_error"
 _SHORT = {"inertia_x": "Ixx", "inertia_y": "Iyy", "inertia_z": "Izz", "thrust_scale": "thrust"}
@@ -140,6 +141,17 @@ def effects_table(name: str, effects: NamedEffectsGroup) -> Table:
     )
     header = ("Effect", "Identifier", "Share", "p", "Chosen again", "What it is")
     return Table(name, caption, header, rows, frozenset({0, 1, 5}), frozenset({0, 5}))
+
+
+def sets_table(name: str, sets: Sequence[LikelySet]) -> Table:
+    """Show how likely each set of effects is among those compared."""
+    rows = [[joined(titles(each.effects)), whole_percent(each.likely)] for each in sets]
+    caption = (
+        "How likely each set of effects is, of the one that the search chose and all with other effects in the place "
+        "of one of it: by what each leaves of stretches of flight that no fit saw. A set that is not in the catalogue "
+        "is not among them."
+    )
+    return Table(name, caption, ("Set of effects", "Likely"), rows, frozenset({0}), frozenset({0}))
 
 
 def coefficients_table(name: str, effects: NamedEffectsGroup) -> Table:

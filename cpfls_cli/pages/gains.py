@@ -39,12 +39,11 @@ def gains_box(record: GainsRecord) -> Box:
     own, short = record.set_of.index(PROPOSED), record.falls_short(PROPOSED)
     fast = joined(f"{name} {number(float(record.bandwidth[own, axis]), 2)} Hz" for axis, name in enumerate(record.axis))
     title = f"{record.title}: the angle follows to {fast}"
-    asked = f"{number(record.required, 3)}° of phase in a disk with gain"
-    plants = f"{record.plants} vehicles that the flights leave possible"
+    asked = f"{number(record.required, 3)}°, gain off too"
     if short:
-        told = f"{joined(short)}: less than the asked margin ({asked}) with some of {plants}"
+        told = f"{joined(short)}: less than the asked margin ({asked}) with some of {record.plants} possible vehicles"
     else:
-        told = f"all axes keep the asked margin ({asked}) with all {plants}"
+        told = f"all axes keep the asked margin ({asked}) with {record.plants} possible vehicles"
     return Box("GAINS", sentence(title), [sentence(told), sentence(_beside(record))], "warning" if short else "good")
 
 
@@ -72,20 +71,18 @@ def _margins(record: GainsRecord, index: int) -> Table:
                     number(float(command.gain[own, axis]), 2),
                     number(float(command.phase[own, axis]), 2),
                     Cell(number(disk, 2), "warning" if name in short else "plain"),
-                    number(float(record.command.crossover[own, axis]), 2),
                     number(float(record.bandwidth[own, axis]), 2),
                     percent(float(record.overshoot[own, axis]), 2),
                     number(1e3 * float(record.rise[own, axis]), 2),
                 ]
             )
-    header = ("Gains", "Axis", "dB", "Phase, °", "Disk, °", "Command, Hz", "Angle, Hz", "Overshoot", "Rise, ms")
-    caption = (
-        f"The least margins with {record.plants} vehicles that are possible, and how fast it is with the best guess."
-    )
+    header = ("Gains", "Axis", "dB", "Phase, °", "Disk, °", "Angle, Hz", "Overshoot", "Rise, ms")
+    caption = f"The least margins with {record.plants} possible vehicles, and how fast the best guess is."
     legend = (
-        "dB and phase: what the loop, cut at the command, bears of either alone. Disk: the phase that may be off while "
-        "gain is off as well, cut at the command or at the angle, the less. Command: where the gain of the loop is 1. "
-        "Angle: where the angle follows at half power. Overshoot and rise: of a step of 10°."
+        "Possible vehicles: the best guess, and the corners of the intervals that flights leave. dB and phase: what "
+        "the loop, cut at the command, bears of either alone. Disk: the phase that may be off while gain is off as "
+        "well, cut at the command or at the angle, the less. Angle: where it follows at half power. Overshoot, rise: "
+        "of a step."
     )
     return Table(f"gains-margins-{index}", caption, header, rows, frozenset({0, 1}), legend=legend)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from typing import Any
 
@@ -32,6 +33,14 @@ def settled_channels(audit: AuditGroup) -> Iterator[Text]:
 def contradicted(first: str) -> str:
     """Say before anything else that a log contradicts itself, and where it does so first."""
     return f"The log contradicts itself: {sentence(first)}"
+
+
+def tell_before_search(contradictions: Sequence[str]) -> None:
+    """Say at once, above the progress, that what a long search finds cannot be used."""
+    if contradictions:
+        logging.getLogger("cpfls_cli").warning(
+            "%s No model found in it can be used: Ctrl-C ends the search.", contradicted(contradictions[0])
+        )
 
 
 def _faults(audit: AuditGroup) -> Iterator[Block]:

@@ -109,6 +109,8 @@ class FoundVehicle:
         Of rotors, named effects and learned remainder.
     airspeed : float, m/s
         In the rotor plane; 95 % of the samples are slower.
+    correlation : array, shape (number, number)
+        Of the estimates; of what is positive, of its logarithm.
     condition_number : float
         Of the last fit.
     blocks : int
@@ -138,6 +140,7 @@ class FoundVehicle:
     shares: tuple[Share, ...]
     airspeed: float
     trades: tuple[Trade, ...]
+    correlation: Array
     choice: Choice
     condition_number: float
     blocks: int
@@ -190,6 +193,7 @@ def find_vehicle(
         numbers,
         *_shares(model, own),
         tuple(_trades(solved, spread)),
+        _beside(len(sensed), estimate_correlation(solved, spread)),
         choice,
         solved.condition_number,
         spread.blocks,
@@ -421,10 +425,25 @@ def _interval(value: float, half: float, *, positive: bool) -> tuple[float, floa
     return value / factor, value * factor
 
 
+def estimate_correlation(fitted: Fitted, spread: Uncertainty) -> Array:
+    """Correlate the estimates of numbers as people know them, shape (number, number)."""
+    covariance = _covariance(fitted.free.physical, fitted, spread)
+    deviation = np.sqrt(np.diag(covariance))
+    # Of a number on a bound no block tells anything, so that it goes with no other.
+    correlation = covariance / np.maximum(np.outer(deviation, deviation), np.finfo(float).tiny)
+    np.fill_diagonal(correlation, 1.0)
+    return np.asarray(correlation)
+
+
+def _beside(sensed: int, correlation: Array) -> Array:
+    """Put numbers that go with no other before those of a fit."""
+    whole = np.eye(sensed + len(correlation))
+    whole[sensed:, sensed:] = correlation
+    return whole
+
+
 def _trades(fitted: Fitted, spread: Uncertainty) -> Iterator[Trade]:
     """Name pairs of numbers, as people know them, whose estimates go together."""
-    names, covariance = list(fitted.free.physical(fitted.values)), _covariance(fitted.free.physical, fitted, spread)
-    deviation = np.sqrt(np.diag(covariance))
-    correlation = covariance / np.maximum(np.outer(deviation, deviation), np.finfo(float).tiny)
+    names, correlation = list(fitted.free.physical(fitted.values)), estimate_correlation(fitted, spread)
     for first, second in np.argwhere(np.triu(np.abs(correlation) > _TRADED, 1)).tolist():
         yield Trade(names[first], names[second], float(correlation[first, second]))

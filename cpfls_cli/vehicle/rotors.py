@@ -9,7 +9,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, require_columns
 from cpfls_cli.errors import ComputationError
+from cpfls_cli.inertia import symmetric
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle_limits import Figures, figures_of, figures_of_hubs
 
 _AXES = ("thrust", "roll", "pitch", "yaw")
 ViolationKind = Literal["negative squared speed", "above the limit"]
@@ -95,6 +97,23 @@ def allocation_matrix(vehicle: VehicleSettings) -> Array:
         k, b = rotor.thrust_factor_n_s2, rotor.drag_factor_n_m_s2
         columns.append([k, y * k, -x * k, -rotor.spin * b])
     return np.array(columns).T
+
+
+def figures_of_vehicle(vehicle: VehicleSettings) -> Figures:
+    """Give the numbers of a vehicle that say whether there can be such a one; those that are guesses are not known."""
+    rotors, moments = vehicle.rotors, np.linalg.eigvalsh(symmetric(vehicle.inertia_kg_m2))
+    known = {"mass": vehicle.mass_kg, "gravity": vehicle.gravity_m_s2, "speed_max": vehicle.rotor_speed_max_rad_s}
+    known |= figures_of_hubs(np.array([rotor.position_m for rotor in rotors]))
+    if "inertia" not in vehicle.unknown:
+        known |= {"least_inertia": float(moments[0]), "inertia": float(moments[-1])}
+    if "thrust_factor" not in vehicle.unknown:
+        known["thrust_factor"] = float(np.mean([rotor.thrust_factor_n_s2 for rotor in rotors]))
+    if "drag_factor" not in vehicle.unknown:
+        known["drag_factor"] = float(np.mean([rotor.drag_factor_n_m_s2 for rotor in rotors]))
+    radii = [rotor.radius_m for rotor in rotors if rotor.radius_m is not None]
+    if radii:
+        known["radius"] = float(np.mean(radii))
+    return figures_of(**known)
 
 
 def body_wrench(vehicle: VehicleSettings, rotor_speed: Array) -> BodyWrench:

@@ -156,7 +156,7 @@ def require_workers(client: Client, patience_s: float) -> None:
         address = client.scheduler.address
         raise WorkerError(
             f"the Dask scheduler at {address} has no workers: start some with `dask worker {address} --nthreads 1`; "
-            "where they vanished because their machines ran out of memory, start fewer on each"
+            "if they ended because their machines ran out of memory, start fewer on each"
         ) from error
 
 
@@ -179,10 +179,10 @@ def explained(client: Client) -> Iterator[None]:
 
 def _words(error: Exception, client: Client) -> str:
     if client.status != "running":
-        return "the Dask scheduler vanished: start it and its workers again"
+        return "the Dask scheduler is gone: start it and its workers again"
     if isinstance(error, (KilledWorker, CancelledError)):
         return (
-            "one Dask worker after the other vanished while it evaluated the same chromosomes; where their machines "
+            "one Dask worker after another ended while it evaluated the same chromosomes; if their machines "
             "ran out of memory, start fewer workers on each, or add memory"
         )
     return f"the Dask cluster failed with {type(error).__name__}: {error}"

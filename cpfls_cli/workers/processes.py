@@ -68,8 +68,8 @@ class _Process:
         except (EOFError, OSError) as error:
             self._process.join(_LONGEST_FAREWELL_S)
             raise WorkerError(
-                f"a worker process vanished ({_ending(self._process.exitcode)}); where the machine ran out of memory, "
-                "take fewer workers or less data, or add memory"
+                f"a worker process ended unexpectedly ({_ending(self._process.exitcode)}); if the machine ran "
+                "out of memory, use fewer workers or less data, or add memory"
             ) from error
 
 
@@ -143,7 +143,7 @@ def _start(started: list[_Process], count: int) -> None:
         for _ in range(count):
             started.append(_Process())  # noqa: PERF401 - kept one by one, to be ended when a later one fails
     except OSError as error:
-        raise WorkerError(f"worker {len(started) + 1} of {count} cannot start ({error}): take fewer") from error
+        raise WorkerError(f"worker {len(started) + 1} of {count} cannot start ({error}): use fewer") from error
 
 
 @contextmanager

@@ -133,10 +133,10 @@ def attempt(work: Callable[[], _Result]) -> _Result | Failure:
     except CpflsError as error:
         return Failure(str(error), of_data=True)
     except MemoryError:
-        return Failure("a worker ran out of memory: take fewer workers, or give the machine more memory")
+        return Failure("a worker ran out of memory: use fewer workers, or add memory")
     except Exception as error:
         kind = type(error).__name__
-        message = f"a worker failed with {kind}: {error}; take one worker without a scheduler to see more"
+        message = f"a worker failed with {kind}: {error}; use one worker without a scheduler to see more"
         return Failure(message, traceback.format_exc())
 
 

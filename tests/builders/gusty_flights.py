@@ -72,7 +72,8 @@ LARGE = Truth(1.5, (0.018, 0.02, 0.034), 0.17, 8.5e-6, 1.36e-7, 0.03, 3e-3, 0.3)
 class Flight(NamedTuple):
     """What is flown: a vehicle in gusts on a path; each number of a path, and of a draw of gusts, is another one.
 
-    A path has frequencies of 0.8 Hz at most, and if asked for a shake of its acceleration up to `reach`.
+    A path has frequencies of 0.8 Hz at most, and if asked for a shake of its acceleration up to `reach`, and a heading
+    that swings by about `swing` in rad.
     """
 
     truth: Truth
@@ -81,6 +82,7 @@ class Flight(NamedTuple):
     draw: int = 0
     bandwidth: float = 12.0
     reach: float = 0.0
+    swing: float = 0.0
 
 
 def gusty_flights(flights, seconds=30.0):
@@ -104,7 +106,9 @@ def gusty_flights(flights, seconds=30.0):
             setpoints={
                 "position": path[::EVERY, number, :3],
                 "velocity": path[::EVERY, number, 3:6],
-                "attitude": np.stack([-np.arcsin(up[:, 1]), np.arctan2(up[:, 0], up[:, 2]), 0 * up[:, 0]], axis=1),
+                "attitude": np.stack(
+                    [-np.arcsin(up[:, 1]), np.arctan2(up[:, 0], up[:, 2]), path[::EVERY, number, 9]], axis=1
+                ),
             },
         )
 
@@ -117,7 +121,7 @@ def _memory(rng, samples, memory_s):
 
 
 def path_of(flight, samples):
-    """Draw position, velocity and acceleration that a flight is asked for, shape (samples, 9)."""
+    """Draw position, velocity, acceleration and heading that a flight is asked for, shape (samples, 10)."""
     rng = np.random.default_rng([1000, flight.path])
     turns = 2 * np.pi * np.linspace(0.08, 0.8, 9)
     size = rng.uniform(0.5, 1.0, (3, 9)) * 0.035 / (turns / 2 / np.pi) ** 1.2 * np.array([[1.0], [1.0], [0.5]])
@@ -125,12 +129,17 @@ def path_of(flight, samples):
     if flight.reach:
         turns = 2 * np.pi * np.geomspace(0.8, flight.reach, 25)
         path += _sines(rng, turns, 0.35 / turns**2 * np.ones((3, 1)), samples)
-    return path
+    heading = np.zeros((samples, 1))
+    if flight.swing:
+        turns = 2 * np.pi * np.geomspace(0.1, 3.0, 12)
+        size = flight.swing / turns**0.5 * np.ones((1, 1))
+        heading = _sines(np.random.default_rng([2000, flight.path]), turns, size, samples)[:, :1]
+    return np.hstack([path, heading])
 
 
 def _sines(rng, turns, size, samples):
     """Add sines of random phases: value, first and second derivative, shape (samples, 9)."""
-    phase = np.arange(samples)[:, None, None] * STEP_S * turns + rng.uniform(0, 2 * np.pi, (3, len(turns)))
+    phase = np.arange(samples)[:, None, None] * STEP_S * turns + rng.uniform(0, 2 * np.pi, (len(size), len(turns)))
     sine, cosine = size * np.sin(phase), size * np.cos(phase)
     return np.hstack([sine.sum(axis=2), (turns * cosine).sum(axis=2), -(turns**2 * sine).sum(axis=2)])
 
@@ -165,13 +174,13 @@ def _flown(flights, path, pushes, shoves, noise):
     logs = []
     for now in range(len(path)):
         measured = rate + noise[now]
-        wanted = path[now, :, 6:] + near * (path[now, :, :3] - position)
+        wanted = path[now, :, 6:9] + near * (path[now, :, :3] - position)
         wanted = _clipped(wanted + follow * (path[now, :, 3:6] - velocity), -6.0, 6.0) + UP
         up = wanted / np.sqrt((wanted**2).sum(axis=1, keepdims=True))
-        # The heading is kept, so the vehicle leans about an axis of the level plane.
+        # The heading is asked for by itself, so the vehicle leans about an axis of the level plane.
         lean = _skew(up) @ turn[:, :, 2, None]
         error = -(turn.transpose(0, 2, 1) @ lean)[:, :, 0]
-        error[:, 2] = -turn[:, 1, 0]
+        error[:, 2] = np.sin(path[now, :, 9]) * turn[:, 0, 0] - np.cos(path[now, :, 9]) * turn[:, 1, 0]
         torque = inertia * (stiff * error - damped * measured)
         thrust = mass * (wanted * turn[:, :, 2]).sum(axis=1, keepdims=True)
         squared = (unmix @ np.concatenate([thrust, torque], axis=1)[:, :, None])[:, :, 0]

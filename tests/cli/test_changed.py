@@ -58,7 +58,7 @@ def test_the_flight_that_it_began_with_is_told(changed, folder):
         save(folder / f"weak{number}.csv", flight_table(20 + number, (1.0, 1.0, 0.65, 1.0)), HEADER)
     result = changed("same.csv", *(f"weak{number}.csv" for number in (3, 4, 5)))
     assert "otor M3 pulls" in result.stdout.splitlines()[0]
-    assert "weak3.csv, number 2 of 4; those before do not show it alone" in result.stdout
+    assert "weak3.csv, number 2 of 4: 3 of 4 flights show it alone" in result.stdout
     after = result.stdout.partition("next:\n")[2]
     assert "weak3.csv" in after
     assert "same.csv" not in after
@@ -70,7 +70,12 @@ def test_numbers_of_flights_are_kept(changed, folder, monkeypatch):
     monkeypatch.setattr("cpfls_cli.flights.kept_numbers.read_alone", None)
     assert changed("same.csv").exit_code == 0
     monkeypatch.undo()
-    # Of another vehicle they are others.
+    # By other code they are others, and of another vehicle.
+    monkeypatch.setattr("cpfls_cli.flights.kept_numbers.read_alone", None)
+    monkeypatch.setattr("cpfls_cli.flights.kept_numbers.code_fingerprint", lambda: "other")
+    with pytest.raises(TypeError):
+        changed("same.csv")
+    monkeypatch.undo()
     assert changed("same.csv", options=["--set", "vehicle.mass_kg=7"]).exit_code == 0
     assert any(path.read_bytes() != content for path, content in kept.items())
 

@@ -78,6 +78,16 @@ def test_a_vehicle_found_in_it_is_not_to_be_used(logs, name, tmp_path):
     assert wrong.words in summary["contradictions"][0]
 
 
+@pytest.mark.parametrize(("option", "says"), [((), True), (("-q",), False)])
+def test_vehicle_says_it_before_it_searches(logs, option, says, tmp_path):
+    wrong = WRONG[next(iter(WRONG))]
+    config, (first, _) = logs(wrong.sign)
+    result = run("vehicle", config, first, "-o", tmp_path / "v.h5", "--dry-run", *option, *asked(wrong))
+    assert result.exit_code == 0
+    assert (SAID in result.stderr) is says
+    assert (wrong.words in result.stderr) is says
+
+
 def test_replay_says_it_first(logs, tmp_path):
     wrong = WRONG["ENU declared NED"]
     config, (first, _) = logs(wrong.sign)

@@ -274,8 +274,8 @@ def test_the_suffix_tells_the_form(cpfls, pipeline, tmp_path, form):
 def test_a_suffix_that_tells_no_form(refuse, pipeline, tmp_path):
     (line,) = refuse("export", pipeline.model, "-o", tmp_path / "m.h")
     assert line == (
-        f"{tmp_path / 'm.h'}: the ending tells no form; end the name in one of .json (json), .c (c), .py (python), "
-        ".xml (mjcf), .sdf (sdf)"
+        f"{tmp_path / 'm.h'}: its suffix names no form; give the name one of the suffixes .json (json), .c (c), "
+        ".py (python), .xml (mjcf), .sdf (sdf), .toml (crazyflow), .urdf (urdf), .mcap (mcap), .csv (csv)"
     )
 
 

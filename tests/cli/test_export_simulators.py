@@ -3,7 +3,9 @@
 import json
 import shutil
 import subprocess
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -33,6 +35,8 @@ def read(form, output):
     """Take a file as its target does."""
     if TARGETS[form].ending == ".py":
         compile(output.read_text(), str(output), "exec")
+    elif TARGETS[form].ending == ".toml":
+        return tomllib.loads(output.read_text())
     else:
         return ElementTree.fromstring(output.read_text())
     return None
@@ -50,7 +54,9 @@ def test_a_vehicle_is_exported_and_hostile_names_stay_text(cpfls, tmp_path, form
     result = cpfls(*words, "--json")
     assert result.exit_code == 0, result.stderr
     summary = json.loads(result.stdout)
-    assert (summary["format"], summary["rotors"], summary["bytes"]) == (form, 4, output.stat().st_size)
+    sizes = [Path(written).stat().st_size for written in summary["output"]]
+    assert (summary["format"], summary["rotors"], summary["bytes"]) == (form, 4, sum(sizes))
+    assert summary["output"][-1] == str(output)
     title = summary["missing"][-1]["title"]
     assert title.startswith("load on a cable (")
     assert summary["missing"][-1] == {
@@ -91,6 +97,58 @@ def test_gazebo_takes_the_file(cpfls, vehicle, tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+def test_px4_gets_its_sensors_and_an_airframe(cpfls, vehicle, tmp_path):
+    output = tmp_path / "uav.sdf"
+    assert cpfls("export", vehicle, "--format", "px4", "-o", output).exit_code == 0
+    model = read("px4", output).find("model")
+    names = [sensor.get("name") for sensor in model.findall("link[@name='base_link']/sensor")]
+    assert names == ["imu_sensor", "air_pressure_sensor", "magnetometer_sensor", "navsat_sensor"]
+    # PX4's bridge publishes under the name that the model is spawned by.
+    assert not list(model.iter("robotNamespace"))
+    airframe = output.with_suffix(".airframe")
+    assert subprocess.run(["sh", "-n", airframe], check=False).returncode == 0
+    lines = [line.split() for line in airframe.read_text().splitlines() if line.startswith("param set-default")]
+    parameters = {name: float(value) for _, _, name, value in lines}
+    assert parameters["CA_ROTOR_COUNT"] == 4
+    for rotor, known in enumerate(truth().vehicle.rotors):
+        x, y, _ = known.position_m
+        assert parameters[f"CA_ROTOR{rotor}_PX"] == pytest.approx(x)
+        assert parameters[f"CA_ROTOR{rotor}_PY"] == pytest.approx(-y)
+        lever = known.drag_factor_n_m_s2 / known.thrust_factor_n_s2
+        assert parameters[f"CA_ROTOR{rotor}_KM"] == pytest.approx(known.spin * lever)
+        assert parameters[f"SIM_GZ_EC_FUNC{rotor + 1}"] == 101 + rotor
+    weight = truth().vehicle.mass_kg * truth().vehicle.gravity_m_s2
+    assert parameters["MPC_THR_HOVER"] == pytest.approx(weight / (4 * known.thrust_factor_n_s2 * 1500.0**2))
+
+
+def test_a_section_of_toml_has_what_the_dynamics_take(cpfls, vehicle, tmp_path):
+    output = tmp_path / "uav.toml"
+    assert cpfls("export", vehicle, "-o", output).exit_code == 0
+    (name, section), *_ = read("crazyflow", output).items()
+    assert name == "uav"
+    assert section["mass"] == 0.8
+    most = section["rpm2thrust"][2] * (1500.0 * 30 / np.pi) ** 2
+    assert section["thrust_max"] == pytest.approx(most)
+    assert section["rotor_dyn_coef"] == [1 / 0.035, 0.0, 1 / 0.035, 0.0]
+    rolling = [known.position_m[1] / section["L"] for known in truth().vehicle.rotors]
+    assert section["mixing_matrix"][0] == pytest.approx(rolling)
+    assert section["mixing_matrix"][2] == [-known.spin for known in truth().vehicle.rotors]
+
+
+def test_urdf_is_read_by_a_parser_of_others(cpfls, vehicle, tmp_path):
+    yourdfpy = pytest.importorskip("yourdfpy", reason="needs the package yourdfpy, which reads URDF")
+    output = tmp_path / "uav.urdf"
+    assert cpfls("export", vehicle, "-o", output).exit_code == 0
+    robot = yourdfpy.URDF.load(str(output), load_meshes=False, build_scene_graph=False).robot
+    links = {link.name: link.inertial for link in robot.links}
+    assert links["base_link"].mass == 0.8
+    assert np.allclose(np.diag(links["base_link"].inertia), truth().vehicle.inertia_kg_m2[:3])
+    assert [joint.type for joint in robot.joints] == ["fixed"] * 5
+    properties = read("urdf", output).find("properties").attrib
+    turns = [-truth().vehicle.rotors[int(rotor) - 1].spin for rotor in properties["rotors"].split()]
+    assert turns == [-1, 1, -1, 1]
+
+
 def test_an_identified_model_is_exported_as_a_vehicle(cpfls, pipeline, tmp_path):
     result = cpfls("export", pipeline.model, "--format", "casadi", "-o", tmp_path / "quad.py", "--force")
     assert result.exit_code == 0, result.stderr
@@ -107,6 +165,12 @@ def test_what_a_target_cannot_hold_at_all(refuse, tmp_path):
         "jax and casadi take any number"
     )
     assert not (tmp_path / "uav.py").exists()
+    for form, words in (
+        ("crazyflow", "crazyflow and drone-models mix four"),
+        ("urdf", "turns four rotors, two each way"),
+    ):
+        (line,) = refuse("export", path, "--format", form, "-o", tmp_path / f"uav{TARGETS[form].ending}")
+        assert words in line
 
 
 @pytest.mark.parametrize("ending", ["xml", "c"])

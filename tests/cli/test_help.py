@@ -23,6 +23,7 @@ COMMANDS = (
     "response",
     "tune",
     "export",
+    "spread",
     "verify-export",
     "report",
     "compare",
@@ -47,8 +48,9 @@ def test_commands_are_those_documented():
 def test_help_of_every_command_lists_the_common_options(cpfls, command):
     result = cpfls(command, "--help")
     assert result.exit_code == 0
-    # What overrides a config is offered where one is read.
+    # What overrides a config is offered where one is read, and a seed where something is drawn.
     overriding = {"--set", "--seed"} if "CONFIG" not in result.stdout else set()
+    overriding -= {"--seed"} if command == "spread" else set()
     assert all((option in result.stdout) == (option not in overriding) for option in COMMON)
     assert ("--output" in result.stdout) == (command not in {"verify-export", "info", "check", "config", "effects"})
 

@@ -19,6 +19,7 @@ from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Table, unfolded
 from cpfls_cli.report.terminal import terminal_lines
+from tests.builders.autopilots import STUDY, found_vehicle
 from tests.builders.changed_flights import write_flights
 from tests.builders.command_line import undrawn
 from tests.builders.shifted_flights import CONFIG, OFFSET, flight_table, save
@@ -75,6 +76,7 @@ def screens(cpfls, pipeline, study, tmp_path_factory):
     _of_changes(show, folder)
     _of_logs(show, folder)
     _of_open_numbers(show, folder)
+    _of_autopilots(show, folder)
     return shown
 
 
@@ -133,6 +135,12 @@ def _of_logs(show, folder):
     show("import", "import", "found.yaml", names[0], output="log1.h5")
 
 
+def _of_autopilots(show, folder):
+    (folder / "cross.yaml").write_text(STUDY)
+    write_record(folder / "cross.h5", found_vehicle())
+    show("tune", "tune", "cross.yaml", "cross.h5", "--autopilot", "px4", output="gains.h5")
+
+
 def _of_open_numbers(show, folder):
     """Show what goes on from a vehicle whose config leaves its numbers open: they are guessed, or were found."""
     config, data = folder / "open.yaml", yaml.safe_load(CONFIG + VEHICLE)
@@ -161,7 +169,7 @@ NAMES = (
     *("trajectory", "mission", "simulate", "tracking", "reduce", "identify", "sweep", "response"),
     *("info flight", "info selection", "info diagnosis", "check", "effects", "effect payload", "effect flexible_mount"),
     *("effect linear_damping", "compare", "diagnose", "extend", "gap", "gap of nothing", "response of a model"),
-    *("changed", "not changed", "trend"),
+    *("changed", "not changed", "trend", "tune"),
     *("init", "init of one", "import"),
 )
 """Runs by name."""

@@ -133,6 +133,8 @@ def swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -
     nodes = np.ascontiguousarray(felt[::stride])
     middles = 0.5 * (felt[:-stride:stride] + felt[stride::stride])
     states = integrate(nodes, middles, stride * signals.period, length, damping)
+    # A jump of the velocity, as at the end of a crash, throws it beyond all numbers: from there on it hangs at rest.
+    states = np.where(np.isfinite(states).all(axis=1, keepdims=True), states, states[0])
     at = signals.time[::stride]
     # The samples beyond the last step are less than a step away.
     return np.asarray(CubicSpline(at, states)(signals.time))

@@ -16,11 +16,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import hub_wrench, wrench
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.export.course import Course
+from cpfls_cli.export.course import Course, fly_body
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
@@ -40,7 +39,7 @@ _SLOWER, _MARGIN = 10.0, 1.5
 _RADIUS_M = 0.05
 """Of a rotor that nobody knows the size of; it is drawn alone."""
 
-_SHORTEST_S = 1e-6
+SHORTEST_S = 1e-6
 """Lag of rotors that have none: the plugin divides by it."""
 
 _ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
@@ -69,8 +68,21 @@ def _wrenches(signals: Signals) -> Mapping[str, Array]:
 
 def sdf_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) -> str:
     """Write a vehicle as SDF, with what it does not hold."""
+    return written(sdf_root(sheet, held, told, _USE, sheet.name))
+
+
+def written(root: ElementTree.Element) -> str:
+    """Write a document of XML."""
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def sdf_root(
+    sheet: Sheet, held: Held, told: Sequence[str], use: Sequence[str], namespace: str | None
+) -> ElementTree.Element:
+    """Build the document of a vehicle; without a namespace the topics are those of whatever spawns it."""
     root = ElementTree.Element("sdf", version="1.9")
-    root.append(ElementTree.Comment(xml_text([*sheet.facts, "", *told, "", _spin_in_words(sheet, held), *_USE])))
+    root.append(ElementTree.Comment(xml_text([*sheet.facts, "", *told, "", _spin_in_words(sheet, held), *use])))
     model = ElementTree.SubElement(root, "model", name=sheet.name)
     hubs = places(sheet.model, alike=False)
     rotor = _rotor_inertia(sheet, held)
@@ -91,10 +103,11 @@ def sdf_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) -> str:
         ElementTree.SubElement(limit, "lower").text, ElementTree.SubElement(limit, "upper").text = "-1e16", "1e16"
     for i in range(1, len(hubs) + 1):
         plugin = ElementTree.SubElement(model, "plugin", _PLUGIN)
+        if namespace is not None:
+            ElementTree.SubElement(plugin, "robotNamespace").text = namespace
         for name, value in _motor(sheet, held, i).items():
             ElementTree.SubElement(plugin, name).text = value if isinstance(value, str) else number(value)
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+    return root
 
 
 _USE = (
@@ -141,11 +154,10 @@ def _pose(place: Array) -> str:
 
 def _motor(sheet: Sheet, held: Held, rotor: int) -> dict[str, str | float]:
     """Give the parameters of the plugin of one rotor."""
-    numbers, lag = held.numbers, max(held.response.lag_s, _SHORTEST_S)
+    numbers, lag = held.numbers, max(held.response.lag_s, SHORTEST_S)
     # A rotor that turns counter-clockwise turns the body clockwise.
     turns = "cw" if spins(sheet.model.vehicle)[rotor - 1] > 0 else "ccw"
     return {
-        "robotNamespace": sheet.name,
         "jointName": f"rotor_{rotor}_joint",
         "linkName": f"rotor_{rotor}",
         "turningDirection": turns,
@@ -179,28 +191,17 @@ def fly_sdf(text: str, course: Course) -> State:
     yaw = -np.array([1.0 if motor["turningDirection"] == "ccw" else -1.0 for motor in motors]) * column(
         "momentConstant"
     )
-    lag, period = float(column("timeConstantUp")[0]), course.period
-    gravity = np.array([0.0, 0.0, -course.gravity])
-    speed, state = course.lagged(RotorResponse(lag_s=lag)), course.start
-    rows, keep = [], np.exp(-period / lag)
-    for step, command in enumerate(course.commands.swapaxes(0, 1), 1):
-        # Without a lag the filter is at the command at once.
-        speed = command if lag <= _SHORTEST_S else speed
-        air = np.einsum("nji,nj->ni", state.rotation, state.velocity)
-        across = (air[:, None] + np.cross(state.rate[:, None], hubs)) * [1.0, 1.0, 0.0] * np.abs(speed)[..., None]
-        force = -drag[:, None] * across + (thrust * speed**2)[..., None] * [0.0, 0.0, 1.0]
-        torque = (
-            np.cross(hubs, force) - rolling[:, None] * across + (yaw * thrust * speed**2)[..., None] * [0.0, 0.0, 1.0]
-        )
-        linear = np.einsum("nij,nj->ni", state.rotation, force.sum(axis=1)) / mass + gravity
-        moment = torque.sum(axis=1) - np.cross(state.rate, state.rate @ inertia)
-        velocity, rate = state.velocity + period * linear, state.rate + period * np.linalg.solve(inertia, moment.T).T
-        turned = state.rotation @ rotations.turns(period * rate)
-        state = State(state.position + period * velocity, velocity, turned, rate)
-        speed = keep * speed + (1.0 - keep) * command
-        if step % course.finer == 0:
-            rows.append(state)
-    return State(*(np.stack(parts, axis=1) for parts in zip(*rows, strict=True)))
+    lag = float(column("timeConstantUp")[0])
+
+    def wrench(speed: Array, air: Array, rate: Array) -> tuple[Array, Array]:
+        across = (air[:, None] + np.cross(rate[:, None], hubs)) * [1.0, 1.0, 0.0] * np.abs(speed)[..., None]
+        up = [0.0, 0.0, 1.0]
+        force = -drag[:, None] * across + (thrust * speed**2)[..., None] * up
+        torque = np.cross(hubs, force) - rolling[:, None] * across + (yaw * thrust * speed**2)[..., None] * up
+        return torque.sum(axis=1), force.sum(axis=1)
+
+    # Without a lag the filter is at the command at once.
+    return fly_body(course, mass, inertia, wrench, 0.0 if lag <= SHORTEST_S else lag)
 
 
 def _whole_body(model: ElementTree.Element) -> tuple[float, Array, Array]:

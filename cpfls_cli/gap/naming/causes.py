@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,19 +17,16 @@ from cpfls_cli.gap.balance.balance_system import is_free, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence
-from cpfls_cli.gap.naming.ranking import rank_effects
-from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect
+from cpfls_cli.gap.naming.ranking import likely, rank_effects
+from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
 from cpfls_cli.gap.naming.scoring import Scored
-from cpfls_cli.gap.naming.search import alternatives, beside_its_like, chance_beside_its_like, in_place_of
-from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.rounding import at_most
+from cpfls_cli.gap.naming.search import alternatives, beside_its_like, chance_beside_its_like, in_place_of, odds
+from cpfls_cli.gap.settings import ERRORS, RARE, SURE, GapSettings
+from cpfls_cli.rounding import ascending, at_most
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _MATTERS = 0.02
 """Relative error of a moment of inertia or of the thrust from which on it is told."""
-
-_SURE = 1.5
-"""Half widths of its interval that an error exceeds: four numbers are asked."""
 
 _LEAST_SHARE = 0.2
 """Share of the gap of its own channel that a refitted number of the vehicle has to take off unseen flights."""
@@ -37,16 +34,20 @@ _LEAST_SHARE = 0.2
 # In which a number of the vehicle shows.
 _CHANNEL = {"inertia_x": 0, "inertia_y": 1, "inertia_z": 2, "thrust_scale": 5}
 
-_PULLS = 2.0
-"""Multiple of the pull of noise that an error has to exceed."""
-
 
 @dataclass(frozen=True)
 class JudgedEffect:
-    """A chosen effect and its rivals."""
+    """A chosen effect and its rivals.
+
+    Attributes
+    ----------
+    odds : mapping of tuple of str to array, shape (block,)
+        Of each set with others in its place, beside the chosen one: logarithm of the predictive density of each block.
+    """
 
     effect: NamedEffect
     alternatives: tuple[Alternative, ...]
+    odds: Mapping[tuple[str, ...], Array]
 
 
 def judge_effect(
@@ -83,7 +84,26 @@ def judge_effect(
         _frequency(own, ranking),
         effect_sentence(candidate.effect, estimates.effects[index], flights[0].signals.vehicle),
     )
-    return JudgedEffect(effect, tuple(alternatives(own, ranking, step.above_floor)))
+    rivals = tuple(alternatives(own, ranking, step.above_floor))
+    compared = {
+        tuple(each.effect.name for each in other.chosen): odds(own, other, step.above_floor)
+        for other in ranking
+        if np.isfinite(other.gain) and candidate.effect.name not in other.candidate.effect.holds
+    }
+    return JudgedEffect(effect, rivals, compared)
+
+
+def likely_sets(judged: Sequence[JudgedEffect]) -> tuple[LikelySet, ...]:
+    """List the chosen set and those with others in the place of one of its effects, most likely first."""
+    if not judged:
+        return ()
+    chosen = tuple(each.effect.name for each in judged)
+    others = {frozenset(names): (names, odds) for each in judged for names, odds in each.odds.items()}
+    others.pop(frozenset(chosen), None)
+    weights = likely([odds for _, odds in others.values()]).tolist()
+    listed = zip([chosen, *(names for names, _ in others.values())], weights, strict=True)
+    sets = ascending((LikelySet(names, weight) for names, weight in listed), lambda each: -each.likely)
+    return tuple(each for each in sets if each.likely >= RARE)
 
 
 def _frequency(chosen: Scored, ranking: Sequence[Scored]) -> float:
@@ -148,7 +168,7 @@ def wrong_numbers(
     wrong = [
         number
         for number, drawn in pairs
-        if abs(number.value) > _PULLS * drawn
+        if abs(number.value) > ERRORS * drawn
         and _is_wrong(number, effects)
         and removed[_CHANNEL[number.name]] >= _LEAST_SHARE
     ]
@@ -181,7 +201,7 @@ def _is_wrong(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
         accounts = CATALOGUE[effect.name].accounts
         if accounts is not None:
             accounted += accounts(number.name, {c.name: c.value for c in effect.coefficients})
-    return abs(number.value) > max(_SURE * half, _MATTERS) and abs(number.value) > accounted
+    return abs(number.value) > max(SURE / ERRORS * half, _MATTERS) and abs(number.value) > accounted
 
 
 def sensor_fault(

@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
-from cpfls_cli.gap.balance.balance_system import is_free, relative_scatter, system
+from cpfls_cli.gap.balance.balance_system import relative_scatter, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.naming.earned import NamedFit, Refusal, fitted, on_bound
@@ -18,14 +18,8 @@ from cpfls_cli.gap.naming.estimate import channel_weight, estimates
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out, share_removed
 from cpfls_cli.gap.naming.leftover import Leftover, leftover
 from cpfls_cli.gap.naming.ranking import RankedStep, block_index
-from cpfls_cli.gap.settings import CLEAR, ERRORS, VISIBLE, WORSE, GapSettings
+from cpfls_cli.gap.settings import CLEAR, ERRORS, NOISE, OFF, VISIBLE, WORSE, GapSettings
 from cpfls_cli.rounding import ascending, largest, levelled, smallest
-
-_FILLS = 0.01
-"""Share of what the largest effect takes off, in squares, below which another may fill what its formula is off by."""
-
-_BESIDE = 0.7
-"""Root mean square in floors of one channel that an effect so much smaller has to take off."""
 
 
 class Judgement(NamedTuple):
@@ -99,7 +93,7 @@ class Judge:
         least = smallest(compared, lambda each: compared[each].visibly)
         if compared[least].visibly < VISIBLE**2:
             return Refusal(least, "on the held-out flights the gap is as small without it")
-        return _elsewhere(judgement, compared) or _filling(judgement, compared)
+        return _filling(judgement, compared)
 
     def _without(self, judgement: Judgement, name: str) -> Without:
         """Leave an effect out and refit the others."""
@@ -154,41 +148,19 @@ class Without(NamedTuple):
         return np.where(worse, after / np.maximum(self.left, 1e-9), 0.0)
 
 
-def _elsewhere(judgement: Judgement, compared: dict[str, Without]) -> Refusal | None:
-    """Find an effect that is not known to end where it should, beside one that takes off more where it shows.
-
-    Its free coefficients follow any curve, that of a larger effect whose formula is off too, and only its shape says
-    that it acts where no other does.
-    """
-    for candidate, numbers in zip(judgement.found.hypothesis.chosen, judgement.found.estimates.effects, strict=True):
-        ends = {shape.name: shape.grid[-1] for shape in candidate.effect.shapes}
-        reaching = [number.name for number in numbers if number.name in ends and number.high >= ends[number.name]]
-        if len(ends) != 1 or not reaching or not is_free(candidate):
-            continue
-        channel = compared[candidate.effect.name].channel
-        seen = {name: one.seen[channel] for name, one in compared.items()}
-        most = largest(seen, seen.__getitem__)
-        if most != candidate.effect.name:
-            return Refusal(
-                candidate.effect.name,
-                f"its {reaching[0]} may be at the bound of what is possible, and the error of the formula of"
-                f" {most} in the {CHANNELS[channel]} would then look the same",
-            )
-    return None
-
-
 def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | None:
-    """Find an effect that may fill what the formula of one a hundred times as large, in squares, is off by.
+    """Find an effect that may fill what the formula of a larger one is off by, `OFF` of it.
 
-    Where the large one acts; elsewhere what it is off by is of second order, and a hundred times as small again.
+    Where the large one acts; elsewhere what it is off by is of second order. Where all fits to the noise, formulas are
+    off by no more than an error of the floor hides.
     """
     floors = judgement.held_out.size(judgement.held_out.after).floors
-    beyond = _FILLS * max((one.visibly for one in compared.values()), default=0.0)
+    beyond = OFF**2 * max((one.visibly for one in compared.values()), default=0.0)
     for name in ascending(compared, lambda each: compared[each].visibly):
         channel, off = compared[name].channel, compared[name].visibly
         left = float(floors[channel])
         beside = max(beyond, *(one.seen[channel] for one in compared.values()))
-        if off < _FILLS * beside and (left > CLEAR or off < _BESIDE**2):
+        if off < OFF**2 * beside and (left > CLEAR or off < ERRORS * (NOISE - 1)):
             told = f"{left:.2g} floors are left with it" if left > CLEAR else f"it is {off**0.5:.2g} floors large"
             return Refusal(
                 name,

@@ -11,19 +11,16 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.balance_system import System, is_free, system
+from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, free_estimates, sized, weighted_estimates
-from cpfls_cli.gap.naming.ranking import block_index, rank_effects, surely_less
+from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.rounding import levelled, smallest
+from cpfls_cli.rounding import levelled
 
 _ON_BOUND = 1e-3
 """Share of its range that a number is from its bound at most to be on it."""
-
-_CANCEL = 0.5
-"""What two effects leave of each other, as a share of the smaller one, below which they are one."""
 
 
 class NamedFit(NamedTuple):
@@ -71,15 +68,14 @@ def earned(
 ) -> tuple[NamedFit, list[Refusal]]:
     """Fit chosen effects, and refit without those that have not earned a name on the flights that they were found in.
 
-    These are effects whose size does not differ from zero, which are not told; effects that sit on a bound; of
-    effects that cancel each other the one that explains less; and those that a bend of another one would surely beat.
+    These are effects whose size does not differ from zero, which are not told, and effects that sit on a bound.
     """
     found, refusals = fitted(flights, chosen, floor, settings), []
     while found.hypothesis.chosen:
         nothing = nothing_by_size(found)
         out = [candidate for candidate in found.hypothesis.chosen if candidate.effect.name in nothing]
         if not out:
-            refused = on_bound(found, floor) or _cancelling(found, floor) or _filling_a_bend(found, settings)
+            refused = on_bound(found, floor)
             if refused is None:
                 break
             out, refusal = refused
@@ -159,55 +155,6 @@ def _main(found: NamedFit, index: int, numbers: Sequence[Estimate], floor: Array
     columns = found.hypothesis.columns(candidate) * linear / floor[:, None]
     largest = names[int(np.argmax(levelled((columns**2).sum(axis=(0, 1)))))]
     return [number for number in numbers if number.name == largest]
-
-
-def _cancelling(found: NamedFit, floor: Array) -> tuple[list[Candidate], Refusal] | None:
-    """Find two effects that leave less than half of the smaller one of each other."""
-    chosen = found.hypothesis.chosen
-    parts = [_explained(found, index) / floor for index in range(len(chosen))]
-    sizes = [float(np.linalg.norm(part)) for part in parts]
-    for first in range(len(chosen)):
-        for second in range(first):
-            left = float(np.linalg.norm(parts[first] + parts[second]))
-            if left < _CANCEL * min(sizes[first], sizes[second]):
-                return _lesser(found, floor, first, second)
-    return None
-
-
-def _explained(found: NamedFit, index: int) -> Array:
-    """Compute what an effect explains, N m and N; an effect on the actuation by its own column."""
-    candidate = found.hypothesis.chosen[index]
-    columns = found.hypothesis.columns(candidate)
-    linear = found.estimates.of_effect[index] if is_free(candidate) else np.ones(columns.shape[2])
-    return np.asarray(columns @ linear)
-
-
-def _lesser(found: NamedFit, floor: Array, *pair: int) -> tuple[list[Candidate], Refusal]:
-    chosen = found.hypothesis.chosen
-    left = {}
-    for index in pair:
-        others = [candidate for position, candidate in enumerate(chosen) if position != index]
-        without, estimates = weighted_estimates(system(found.hypothesis.flights, others), floor, found.block)
-        left[index] = float(((without.left(estimates.linear) / floor) ** 2).sum())
-    out = smallest(left, lambda index: left[index])
-    other = next(index for index in pair if index != out)
-    names = chosen[out].effect.name, chosen[other].effect.name
-    return [chosen[out]], Refusal(names[0], f"{names[0]} and {names[1]} nearly cancel, and one of them does as well")
-
-
-def _filling_a_bend(found: NamedFit, settings: GapSettings) -> tuple[list[Candidate], Refusal] | None:
-    """Find an effect, the latest first, that a bend of another one's formula surely explains more than."""
-    chosen, flights = found.hypothesis.chosen, found.hypothesis.flights
-    for own in reversed(chosen):
-        others = [each for each in chosen if each is not own]
-        bends = bends_of(others, flights)
-        if not bends or own.effect.kind != "wrench":
-            continue
-        ranking = rank_effects(flights, others, bends, settings, None, [own]).ranking
-        best, kept = ranking[0], next(each for each in ranking if each.candidate.effect is own.effect)
-        if best is not kept and surely_less(best, kept):
-            return [own], Refusal(own.effect.name, f"{best.candidate.effect.name} explains more")
-    return None
 
 
 def bends_of(named: Sequence[Candidate], flights: Sequence[WeakFlight]) -> list[Effect]:

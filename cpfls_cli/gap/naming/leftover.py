@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 
 import numpy as np
 
@@ -11,12 +12,14 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance.balance_system import System, left_over, window_noise
+from cpfls_cli.gap.balance.balance_system import System, left_over, system, window_noise
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
 from cpfls_cli.gap.naming.earned import NamedFit, bends_of, fitted
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect, NotExcited, Unexplained
+from cpfls_cli.gap.naming.scoring import Scored
+from cpfls_cli.gap.naming.search import of_motion
 from cpfls_cli.gap.residual.dependence import (
     Dependence,
     joined_states,
@@ -25,25 +28,14 @@ from cpfls_cli.gap.residual.dependence import (
     without_actuation,
 )
 from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
-from cpfls_cli.gap.settings import CLEAR, NOISE, VISIBLE, GapSettings
+from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, FEWEST_BLOCKS, NOISE, SURE, VISIBLE, GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _PER_WINDOW = 6
 """Hops in a window where bands are looked for: ten samples of the fastest wave that a window passes."""
 
-_TELLS = 0.05
-"""Share that a signal or a band has to explain to be named."""
-_SURE = 3.0
-"""Standard errors by which power flows: more than for one number, because three axes are asked on few blocks."""
-
-_FEWEST_BLOCKS = 4
-"""Blocks whose scatter says something of an error."""
-
 _USUAL_OF_BOUND = 0.2
 """A coefficient that is large but not unheard of, as a share of its bound."""
-
-_CHANCE = 0.05
-"""Probability of chance up to which an effect widens the intervals of others, which leave out as much."""
 
 
 @dataclass(frozen=True)
@@ -123,8 +115,8 @@ def _unexplained(
 ) -> Unexplained | None:
     signal = next((d for d in dependence if d.channel == channel), None)
     band = band if band is not None and band.channel == channel else None
-    follows = signal is not None and signal.p_value <= settings.significance and signal.r2 > _TELLS
-    rings = band is not None and band.p_value <= settings.significance and band.share > _TELLS
+    follows = signal is not None and signal.p_value <= settings.significance and signal.r2 > COUNTS
+    rings = band is not None and band.p_value <= settings.significance and band.share > COUNTS
     if not (size > CLEAR or follows or rings):
         return None
     share = max(signal.r2 if follows and signal else 0.0, band.share if rings and band else 0.0)
@@ -153,12 +145,12 @@ def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[
         ``feeds``, ``drains`` or ``neither`` by axis.
     """
     numbers = np.unique(block)
-    if len(numbers) < _FEWEST_BLOCKS:
+    if len(numbers) < FEWEST_BLOCKS:
         return ["neither"] * torque.shape[1]
     power = (torque - torque.mean(axis=0)) * (body_rate - body_rate.mean(axis=0))
     means = np.array([power[block == number].mean(axis=0) for number in numbers])
     mean, error = means.mean(axis=0), mean_error(means)
-    sure = np.abs(mean) > _SURE * error
+    sure = np.abs(mean) > SURE * error
     return ["neither" if not s else "feeds" if m > 0 else "drains" for m, s in zip(mean, sure, strict=True)]
 
 
@@ -207,13 +199,25 @@ def beside_the_unnamed(
 def _beyond_chance(
     step: RankedStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
 ) -> list[Candidate]:
-    """Add effects to the chosen ones as long as one explains more than chance."""
+    """Add effects to the chosen ones as long as one explains more than chance, and more than noise."""
     flights, chosen = step.hypothesis.flights, list(step.hypothesis.chosen)
-    most = len(chosen) + settings.effects_max
-    while step.ranking and len(chosen) < most and step.p_value(step.ranking[0].gain) <= _CHANCE:
-        chosen.append(step.ranking[0].candidate)
+    for _ in range(settings.effects_max):
+        added = _first_beyond_chance(step)
+        if added is None:
+            break
+        chosen.append(added.candidate)
         step = rank_effects(flights, chosen, effects, settings, rng)
     return chosen
+
+
+def _first_beyond_chance(step: RankedStep) -> Scored | None:
+    beyond = takewhile(lambda scored: step.p_value(scored.gain) <= CHANCE, step.ranking)
+    return next((each for each in beyond if _shows_motion(each, step)), None)
+
+
+def _shows_motion(scored: Scored, step: RankedStep) -> bool:
+    """Tell whether chance does not explain as much as an effect does but for noise."""
+    return step.p_value(of_motion(scored.gain, step, system(step.hypothesis.flights, scored.chosen))) <= CHANCE
 
 
 def _both(number: Estimate, others: Sequence[Estimate]) -> Estimate:

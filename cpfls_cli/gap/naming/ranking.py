@@ -20,24 +20,15 @@ from cpfls_cli.gap.naming.scoring import (
     score,
     scoring_matrix,
 )
-from cpfls_cli.gap.settings import ERRORS, VISIBLE, GapSettings
+from cpfls_cli.gap.settings import COUNTS, ERRORS, NOISE, OFF, VISIBLE, GapSettings
 from cpfls_cli.rounding import tied
 from cpfls_cli.weak_form.resampling import blocks_of, mirror_shifted
 
-NEAR = 0.6
-"""Share of what the best one explains from which on another one is compared with it."""
-
-LEAST_SHARE = 0.05
-"""Share of the remaining gap above the floor that an effect has to explain."""
-
-CLOSE = 0.01
-"""Share of the gap by which two explanations are as good as each other."""
-
-_OF_THE_REST = 0.25
-"""Share of what the better one leaves of a channel up to which another one is as good, in squares."""
-
 _CHANCE = 0.02
 """Probability of ranks up to which one is better: of fewer than six blocks none can be."""
+
+_DRAWS = 1000
+"""Of weights of blocks: what is likely is known to a hundredth or two."""
 
 
 @dataclass(frozen=True)
@@ -153,11 +144,6 @@ def rows(hypothesis: System) -> int:
     return sum(len(flight) * int(flight.known.sum()) for flight in hypothesis.flights)
 
 
-def surely_less(one: Scored, other: Scored) -> bool:
-    """Tell whether one explanation leaves less than another, by more than the scatter over blocks."""
-    return surely(more_left(other.block_error, one.block_error))
-
-
 def surely(margin: Array) -> bool:
     """Tell whether margins over blocks are above 0 by more than they scatter."""
     if len(margin) < 2 or margin.sum() <= 0:
@@ -197,19 +183,50 @@ def least_gain(above_floor: float, windows: int) -> float:
     above_floor : float
         The gap, in squared floors.
     """
-    return max(LEAST_SHARE * above_floor, VISIBLE**2 * windows)
+    return max(COUNTS * above_floor, VISIBLE**2 * windows)
 
 
-def least_margin(above_floor: float, left: float) -> float:
-    """Compute the difference of two explanations up to which they are as good as each other.
+def off_by(explained: float, left: float, above: float = 0.0) -> float:
+    """Estimate how much formulas are off by at most, in squared floors.
 
-    It is next to nothing of a large gap, or next to nothing beside what the better one leaves itself.
+    No formula is exact. Beside sensors and air it leaves noise of its own in proportion to its torque and force, the
+    same in all flights. By likelihood that is what is left above the floor, and an error of the floor in one channel;
+    before any flight it is known to be a tenth of torque and force at most, `OFF`.
 
     Parameters
     ----------
-    above_floor : float
-        The gap, in squared floors.
-    left : float
-        What the better one leaves, in squared floors.
+    explained : float
+        The gap that formulas are asked to explain, in squared floors.
+    left, above : float
+        What the better one leaves, and what of that is above the floor, in squared floors.
     """
-    return min(CLOSE * above_floor, _OF_THE_REST * left / len(CHANNELS))
+    return min(OFF**2 * explained, max(above, 0.0) + (NOISE - 1) * left / len(CHANNELS))
+
+
+def likely(odds: Sequence[Array]) -> Array:
+    """Compute how likely a set of effects is beside others, from how well each foretells blocks that no fit saw.
+
+    Sets differ in some blocks and not in others, and no formula is exact, so blocks are weighed at random.
+
+    Parameters
+    ----------
+    odds : sequence of array, shape (block,)
+        Logarithm of the predictive density of each block under another set, less that under the first one.
+
+    Returns
+    -------
+    array, shape (1 + other,)
+        Of the first one and of the others; they add up to 1.
+
+    References
+    ----------
+    Yao, Vehtari, Simpson and Gelman 2018, Using stacking to average Bayesian predictive distributions (pseudo-BMA+).
+    """
+    blocks = len(odds[0]) if odds else 0
+    if blocks < 2:
+        # One block tells nothing of how far blocks differ.
+        return np.full(len(odds) + 1, 1 / (len(odds) + 1))
+    weight = blocks * np.random.default_rng(0).dirichlet(np.ones(blocks), _DRAWS)
+    total = weight @ np.stack([np.zeros(blocks), *odds], axis=1)
+    density = np.exp(total - total.max(axis=1, keepdims=True))
+    return np.asarray((density / density.sum(axis=1, keepdims=True)).mean(axis=0))

@@ -10,16 +10,10 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.settings import CLEAR, COUNTS, LARGE, GapSettings
+from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, OFF, GapSettings
 
 _SECOND_CAUSE = 0.03
 """Share of the gap, in squared floors, from which on what is left is a cause of its own."""
-
-_REST = 0.1
-"""Root mean square that is left, as a share of the gap, that no name for the gap may leave behind."""
-
-_MAIN = 0.1
-"""Share of the gap from which on an effect that cannot be told from another makes the whole answer ambiguous."""
 
 
 class GapVerdict(StrEnum):
@@ -96,6 +90,14 @@ class Alternative:
 
 
 @dataclass(frozen=True)
+class LikelySet:
+    """A set of effects with how likely it is among those compared."""
+
+    effects: tuple[str, ...]
+    likely: float
+
+
+@dataclass(frozen=True)
 class Unexplained:
     """A channel with a gap that nothing in the catalogue explains; other fields are described at `UnexplainedGroup`.
 
@@ -161,6 +163,8 @@ class Diagnosis:
         What differs between the flights that were learned from and those held out, in sentences.
     shares : mapping of str to float
         The share of ``torque`` and of ``force``, where they have a gap.
+    sets : tuple of LikelySet
+        The set that the search chose, and those with another effect in the place of one of it; most likely first.
     """
 
     verdict: GapVerdict
@@ -179,6 +183,7 @@ class Diagnosis:
     contradictions: tuple[str, ...] = ()
     differences: tuple[str, ...] = ()
     shares: Mapping[str, float] = field(default_factory=dict)
+    sets: tuple[LikelySet, ...] = ()
 
 
 def verdict_of(
@@ -215,7 +220,8 @@ def verdict_of(
     by_chance = any(effect.p_value > settings.significance for effect in effects)
     if min(shares) < settings.named_share or unexplained or stays or by_chance:
         return GapVerdict.PARTIAL
-    main = {effect.name for effect in effects if effect.share >= _MAIN}
+    # What may be left without a name may be called by another one.
+    main = {effect.name for effect in effects if effect.share >= 1 - settings.named_share}
     return GapVerdict.AMBIGUOUS if any(rival.instead_of in main for rival in alternatives) else GapVerdict.NAMED
 
 
@@ -236,7 +242,7 @@ def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> 
     filled = effects > 1 and bool((after > CLEAR).any())
     largest = np.repeat([np.nanmax(before[kind], initial=0.0) for kind in (slice(0, 3), slice(3, 6))], 3)
     clear = (before > CLEAR) & (before**2 > COUNTS * largest**2)
-    large = (after > LARGE) & (after > _REST * before)
+    large = (after > ERRORS * CLEAR) & (after > OFF * before)
     return filled or bool((clear & (_is_left(after, before, named_share) | large)).any())
 
 

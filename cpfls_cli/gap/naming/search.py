@@ -13,31 +13,28 @@ from cpfls_cli.gap.balance.balance_system import System, floors, system
 from cpfls_cli.gap.balance.refine import compensation, fit, refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.ranking import (
-    CLOSE,
-    LEAST_SHARE,
-    NEAR,
     RankedStep,
     best_floor,
     block_index,
     chance_of_ranks,
     least_gain,
-    least_margin,
+    likely,
     more_left,
+    off_by,
     rank_effects,
     rows,
-    surely_less,
 )
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import REFUSED, Scored, normal_equations, scoring_matrix
-from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.settings import COUNTS, RARE, GapSettings
 from cpfls_cli.rounding import ascending, less
 
 _BEAM = 3
 """Sets that are followed at once: a lag, a delay and a filter each do alone most of what two of them do."""
 
 
-_OFF = 1e-4
-"""Share of a gap, in squares, that sets of formulas for it leave: each is off by a hundredth of its torque or more."""
+_NEAR = 0.6
+"""Share of what a name explains from which on another one could stand for it: of less a half would have no name."""
 
 _NUMBER = 8.0
 """What a free number has to explain, in squared floors: the logarithm of the residuals of a few flights (Schwarz 1978).
@@ -74,14 +71,13 @@ def forward_selection(
         progress(len(steps))
         if len(chosen) >= settings.effects_max:
             return chosen, steps
-        off = _OFF * steps[0].above_floor
         grown = _moved(flights, step, settings) if acceptable(step, settings) else []
-        grown += grown_elsewhere(flights, beam[1:], step, effects, settings, off)
+        grown += grown_elsewhere(flights, beam[1:], step, effects, settings)
         if not grown:
             return chosen, steps
-        best = simplest(ascending(grown, lambda scored: -scored.gain), step.above_floor, off)
+        best = simplest(ascending(grown, lambda scored: -scored.gain), step.above_floor)
         refitted = refined(flights, best.chosen, step.floor)
-        if not quiet_enough(best.gain, step, refitted):
+        if of_motion(best.gain, step, refitted) < _enough(step):
             return chosen, steps
         kept = needed(refitted, step, settings)
         # What is dropped can undo what was added; a set that was there before would come round again for ever.
@@ -106,12 +102,12 @@ def _enough(step: RankedStep) -> float:
 
 
 def _moved(flights: Sequence[WeakFlight], step: RankedStep, settings: GapSettings) -> list[Scored]:
-    """List the candidates that come near the best; those between command and rotors, if that is one, with shapes moved.
+    """List the candidates that explain something; those between command and rotors, if the best is, with shapes moved.
 
     Between the points of a grid an effect with more shapes comes closer to what one with fewer is.
     """
     best = step.ranking[0]
-    near = [scored for scored in step.ranking if scored.gain > NEAR * best.gain]
+    near = [scored for scored in step.ranking if scored.gain > 0]
     alike = [scored for scored in near if _late(scored)]
     beside_late = any(each.effect.actuation is not None for each in best.others)
     if best not in alike or not (beside_late or len(alike) > 1):
@@ -126,7 +122,6 @@ def grown_elsewhere(
     step: RankedStep,
     effects: Sequence[Effect],
     settings: GapSettings,
-    off: float = 0.0,
 ) -> list[Scored]:
     """List sets that grew from others than the best one and leave less than that with no more numbers.
 
@@ -146,21 +141,23 @@ def grown_elsewhere(
             if _names(scored.chosen) != _names(chosen) and _numbers(scored.chosen) <= most:
                 grown = refined(flights, scored.chosen, step.floor) if late else system(flights, scored.chosen)
                 found.append(rescored(grown, step, settings))
-    return [scored for scored in found if _is_better(scored, own, step, off)]
+    return [scored for scored in found if _is_better(scored, own, step)]
 
 
-def _is_better(scored: Scored, own: Scored, step: RankedStep, off: float) -> bool:
-    """Tell whether a set leaves less than another one; with more numbers surely and by as much as is worth a name."""
-    gain = scored.gain - own.gain
-    more = _numbers(scored.chosen) > _numbers(own.chosen)
-    if more:
-        return gain >= _more(own, step, off) and surely_less(scored, own)
+def _is_better(scored: Scored, own: Scored, step: RankedStep) -> bool:
+    """Tell whether a set leaves less than another one.
+
+    With more numbers it has to beat that one, by as much as is worth a name and by more than it leaves above the floor.
+    """
+    gain, off = scored.gain - own.gain, step.above_floor - scored.gain
+    if _numbers(scored.chosen) > _numbers(own.chosen):
+        return gain >= max(_more(own, step), off) and not unbeaten(scored, [own], step.above_floor)
     return bool(less(0.0, gain, step.above_floor))
 
 
-def _more(own: Scored, step: RankedStep, off: float) -> float:
-    """Compute the least gain, in squared floors, of what is added to a set: more than formulas are off by."""
-    return max(least_gain(max(step.above_floor - own.gain, 0.0), len(step.hypothesis.residual)), off)
+def _more(own: Scored, step: RankedStep) -> float:
+    """Compute the least gain, in squared floors, of what is added to a set."""
+    return least_gain(max(step.above_floor - own.gain, 0.0), len(step.hypothesis.residual))
 
 
 def needed(refitted: System, step: RankedStep, settings: GapSettings) -> tuple[Candidate, ...]:
@@ -172,24 +169,23 @@ def needed(refitted: System, step: RankedStep, settings: GapSettings) -> tuple[C
         alike = beside_its_like(kept.chosen, index)
         without = refined(kept.flights, others, step.floor) if alike else system(kept.flights, others)
         left, before = (rescored(each, step, settings).block_error.sum() for each in (without, kept))
-        if less(left - before, LEAST_SHARE * max(left - rows(kept), 0.0), left):
+        if less(left - before, COUNTS * max(left - rows(kept), 0.0), left):
             kept = refined(kept.flights, others, step.floor)
     return kept.chosen
 
 
-def quiet_enough(gain: float, step: RankedStep, refitted: System) -> bool:
-    """Tell whether an effect explains motion, not noise.
+def of_motion(gain: float, step: RankedStep, with_it: System) -> float:
+    """Take off a gain what of it is noise, in squared floors.
 
     Columns of rates hold the noise of the gyroscope, and so does the inertial torque: where rates about two axes go
     hand in hand, a fit can turn one against the other and be rid of noise. What an effect takes off the floor is
     therefore taken off its gain.
     """
-    if not refitted.chosen[-1].effect.rate_derivative:
-        return True
-    after = floors(refitted, fit(refitted, step.floor))
-    rows = np.sum([len(flight) * flight.known for flight in refitted.flights], axis=0)
-    noise = float((rows * np.maximum(1 - (after / step.floor) ** 2, 0.0)).sum())
-    return gain - noise >= _enough(step)
+    if not with_it.chosen[-1].effect.rate_derivative:
+        return gain
+    after = floors(with_it, fit(with_it, step.floor))
+    rows = np.sum([len(flight) * flight.known for flight in with_it.flights], axis=0)
+    return gain - float((rows * np.maximum(1 - (after / step.floor) ** 2, 0.0)).sum())
 
 
 def in_place_of(
@@ -204,15 +200,15 @@ def in_place_of(
     if chosen[index].effect.actuation is None:
         return ranked
     others = [other for place, other in enumerate(chosen) if place != index]
-    own, off = rescored(system(flights, [*others, chosen[index]]), step, settings), _OFF * step.above_floor
+    own = rescored(system(flights, [*others, chosen[index]]), step, settings)
     alike = [each.candidate for each in ranked[1:] if _late(each) and np.isfinite(each.gain)]
     sets: list[tuple[Candidate, ...]] = [(each,) for each in alike]
     if stands_for_two(chosen, index):
         sets += combinations(alike, 2)
-    numbers, worth = _numbers(own.chosen), step.above_floor - own.gain > _more(own, step, off)
+    numbers, worth = _numbers(own.chosen), step.above_floor - own.gain > _more(own, step)
     sets = [each for each in sets if worth or _numbers([*others, *each]) <= numbers]
     moved = [rescored(refined(flights, [*others, *each], step.floor), step, settings) for each in sets]
-    fair = [each for each in moved if _numbers(each.chosen) <= numbers or _is_better(each, own, step, off)]
+    fair = [each for each in moved if _numbers(each.chosen) <= numbers or _is_better(each, own, step)]
     return [own, *fair, *(scored for scored in ranked[1:] if not _late(scored))]
 
 
@@ -268,37 +264,43 @@ def _unseen(hypothesis: System, floor: Array, settings: GapSettings, *, moving: 
     return np.asarray(normal.solve(arranged.base if moving else np.arange(hypothesis.base.shape[2]))[1][:, 0])
 
 
-def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float, off: float = 0.0) -> list[Scored]:
-    """List the candidates that the chosen one does not beat.
+def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Scored]:
+    """List the candidates that the chosen one does not beat: of all that explain about as much, those not rare."""
+    known = _names(chosen.chosen)
+    others = [each for each in ranking if each.gain > _NEAR * chosen.gain and _names(each.chosen) != known]
+    own, *weights = likely([odds(chosen, other, above_floor) for other in others])
+    return [other for other, weight in zip(others, weights, strict=True) if weight >= RARE * own]
 
-    Beaten is what leaves more by more than the scatter over blocks, than next to nothing, and than formulas are off by.
+
+def odds(own: Scored, other: Scored, above_floor: float) -> Array:
+    """Compare two sets by what they leave of unseen blocks, beside what their formulas are off by.
+
+    Returns
+    -------
+    array, shape (block,)
+        Logarithm of the predictive density under the other one less that under the first.
     """
-    least = max(least_margin(above_floor, float(chosen.block_error.sum())), off)
-    return [
-        other
-        for other in ranking
-        if _names(other.chosen) != _names(chosen.chosen)
-        and other.gain > NEAR * chosen.gain
-        and not (more_left(other.block_error, chosen.block_error).sum() > least and surely_less(chosen, other))
-    ]
+    return np.asarray(-0.5 * more_left(other.block_error, own.block_error) / (1.0 + _off(own, above_floor)))
 
 
-def simplest(ranking: Sequence[Scored], above_floor: float, off: float = 0.0) -> Scored:
+def _off(scored: Scored, above_floor: float) -> float:
+    """Estimate what the formulas of a set are off by, in squared floors."""
+    return off_by(above_floor, float(scored.block_error.sum()), above_floor - scored.gain)
+
+
+def simplest(ranking: Sequence[Scored], above_floor: float) -> Scored:
     """Choose among the best candidates the one with the fewest free numbers.
 
     Parameters
     ----------
     ranking : sequence of Scored
         Best first.
-    off : float
-        What formulas are off by, in squared floors.
     """
-    best = ranking[0]
-    as_good = max(CLOSE * best.gain, off)
+    best, off = ranking[0], _off(ranking[0], above_floor)
     rivals = [
         other
-        for other in unbeaten(best, ranking, above_floor, off)
-        if best.gain - other.gain < max(as_good, _NUMBER * (_numbers(best.chosen) - _numbers(other.chosen)))
+        for other in unbeaten(best, ranking, above_floor)
+        if best.gain - other.gain < max(off, _NUMBER * (_numbers(best.chosen) - _numbers(other.chosen)))
     ]
     fewest = min(_numbers(each.chosen) for each in [best, *rivals])
     few = [each for each in [best, *rivals] if _numbers(each.chosen) == fewest]

@@ -12,7 +12,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, nuisance
-from cpfls_cli.gap.naming.ranking import least_gain, least_margin
+from cpfls_cli.gap.naming.ranking import least_gain, off_by
 from cpfls_cli.gap.naming.scoring import candidates_of
 from cpfls_cli.gap.settings import ERRORS
 from cpfls_cli.weak_form.windows import Windows
@@ -212,7 +212,7 @@ def judged(evidence: Evidence, columns: QuestionColumns, noise: float) -> Answer
     seen = beyond_numbers(evidence, columns)
     # An effect without a rival has to be worth a name.
     alone = not len(columns.rivals[0])
-    least = least_gain(seen, evidence.windows) if alone else least_margin(seen, evidence.rows)
+    least = least_gain(seen, evidence.windows) if alone else off_by(seen, evidence.rows)
     return Answer(apart(evidence, columns), least, noise)
 
 

@@ -12,7 +12,7 @@ from cpfls_cli.gap.balance.balance_system import System, left_over
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.residual.dependence import rank_dependence, state_signals, without_actuation
 from cpfls_cli.gap.residual.repeated import without_copies
-from cpfls_cli.gap.settings import ERRORS, GapSettings
+from cpfls_cli.gap.settings import CHANCE, COUNTS, ERRORS, GapSettings
 from cpfls_cli.playback.disturbance import ENDS, FoundGusts, gusts_in
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Instruments, Repeats, foretold, instruments, late, late_by
@@ -23,12 +23,6 @@ from cpfls_cli.weak_form.windows import Recording, Windows
 _FORETOLD = {"repeats": 1 / 2, "setpoints": 1 / 3, "none": 0.0}
 """Share of what is left that instruments may foretell, at 95 %, where it is called the air: the smaller part of it.
 Other runs show all that the vehicle does again, and a linear answer to setpoints about two thirds of it."""
-
-_CHANCE = 0.05
-"""Probability of chance up to which what is left grows with how much the vehicle moves."""
-
-_TELLS = 0.05
-"""Share that a curve of one signal has to explain to count, as of what follows a signal elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -180,7 +174,7 @@ def _like_air(
     state = dict(zip(names, asked.T, strict=True)) | {"time": np.concatenate([each["time"] for each in states])}
     index = hypothesis.flight_index
     ranked = rank_dependence(residual, index, block, state, settings.shifts, rng)
-    follows = [each.channel for each in ranked if each.p_value <= settings.significance and each.r2 > _TELLS]
+    follows = [each.channel for each in ranked if each.p_value <= settings.significance and each.r2 > COUNTS]
     like = told & ~np.isin(CHANNELS, follows)
     turning = residual[:, :3].any(axis=0)
     if not like[:3][turning].all() or _grows(residual[:, like], asked, index, block, settings.shifts, rng):
@@ -201,7 +195,7 @@ def _grows(
     sizes, moves = (_ranks(np.array([each[block == own].mean(axis=0) for own in np.unique(block)])) for each in rows)
     alike = float((moves.T @ sizes).max(initial=0.0))
     chance = [float((moves.T @ rng.permutation(sizes)).max(initial=0.0)) for _ in range(shifts)]
-    return sum(each >= alike for each in chance) < _CHANCE * (1 + shifts) - 1
+    return sum(each >= alike for each in chance) < CHANCE * (1 + shifts) - 1
 
 
 def _ranks(values: Array) -> Array:

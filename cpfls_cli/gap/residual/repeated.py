@@ -15,6 +15,7 @@ from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.gap.balance.balance_system import System, left_over
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
+from cpfls_cli.gap.settings import FEWEST_BLOCKS
 from cpfls_cli.playback.balances import BANDS, BANDS_HZ, band_windows, block_length, fitting_bands
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Instruments, instruments
@@ -22,8 +23,6 @@ from cpfls_cli.weak_form.windows import Recording, Windows
 
 _SLOWEST = (BANDS[-1][1], None), (0.0, BANDS_HZ[-1][0])
 """What the longest windows keep, a constant torque or the weight among it."""
-_FEWEST_BLOCKS = 4
-"""That tell an error, if a wide one."""
 
 
 class Band(NamedTuple):
@@ -147,9 +146,9 @@ class RepeatedRuns:
         sides = [_sides(left_over(hypothesis, n, linear), flight.inertial) for n, flight in enumerate(flights)]
         found = [self._of_band(band.windows, sides) for band in self.bands]
         blocks = np.array([len(of_band) for of_band in found])
-        if blocks[0] < _FEWEST_BLOCKS:
+        if blocks[0] < FEWEST_BLOCKS:
             return None
-        known = np.all([flight.known for flight in flights], axis=0)[:, None] & (blocks >= _FEWEST_BLOCKS)
+        known = np.all([flight.known for flight in flights], axis=0)[:, None] & (blocks >= FEWEST_BLOCKS)
         values, errors = np.where(known, np.stack([_with_errors(of_band) for of_band in found], axis=-1), np.nan)
         total, again, taken, share, explained = values
         body = flights[0].signals.vehicle

@@ -50,7 +50,7 @@ def test_search_goes_on_with_other_workers_after_one_was_lost(cpfls, words, whol
     monkeypatch.undo()
     assert (result.exit_code, result.stdout) == (1, "")
     error, note = result.stderr.splitlines()
-    assert error.startswith("cpfls: error: --workers 2: a worker process vanished")
+    assert error.startswith("cpfls: error: --workers 2: a worker process ended unexpectedly")
     assert "killed" in error
     assert note == f"cpfls: note: {output}.checkpoint: is intact; the same command with --resume goes on"
     assert [path.name for path in tmp_path.iterdir()] == ["model.h5.checkpoint"]

@@ -147,7 +147,7 @@ def test_what_cannot_be_done_is_said(whole, pipeline, tmp_path):
     write_record(
         partial, vehicle_models.record_of(vehicle_models.whole(effects=(ModelEffect("wind", {}, np.ones(3)),)))
     )
-    with pytest.raises(InputError, match="holds wind, which no state alone gives"):
+    with pytest.raises(InputError, match="holds wind, which depends on more than the state"):
         cpfls_cli.load_model(partial).step(whole.state(), [HOVER] * 4, PERIOD)
 
 

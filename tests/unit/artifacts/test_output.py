@@ -15,7 +15,7 @@ from cpfls_cli.artifacts.output import (
     check_output,
     filled_folder,
     locked,
-    write_texts,
+    write_files,
 )
 from cpfls_cli.errors import InputError, OutputError
 
@@ -63,7 +63,7 @@ def test_of_several_texts_all_are_written_or_none(tmp_path, monkeypatch):
 
     monkeypatch.setattr("os.fsync", fail_at_the_second)
     with pytest.raises(OutputError, match=r"model\.c: cannot be written: No space left on device"):
-        write_texts({tmp_path / "model.h": "header", tmp_path / "model.c": "source"})
+        write_files({tmp_path / "model.h": "header", tmp_path / "model.c": "source"})
     assert list(tmp_path.iterdir()) == []
 
 
@@ -102,13 +102,13 @@ def test_what_appears_while_a_command_is_at_work_is_kept(tmp_path):
         check_output(path, force=False)
     second.write_text("mine")
     with pytest.raises(OutputError, match=r"b\.txt: appeared while the command was running"):
-        write_texts({output: "new", second: "new"})
+        write_files({output: "new", second: "new"})
     assert [path.name for path in tmp_path.iterdir()] == ["b.txt"]
     assert second.read_text() == "mine"
     check_output(second, force=True)
-    write_texts({output: "new", second: "new"})
+    write_files({output: "new", second: "new"})
     # A command may write its own output again.
-    write_texts({output: "newer"})
+    write_files({output: "newer"})
     assert (output.read_text(), second.read_text()) == ("newer", "new")
 
 

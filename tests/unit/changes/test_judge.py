@@ -11,6 +11,7 @@ from cpfls_cli.changes.causes import Cause, causes
 from cpfls_cli.changes.judge import FALSE_ALARM, _Space, changed
 from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.changes.reference import Reference, kinds_of, load_directions, usual_covariance
+from cpfls_cli.commands.changed import _flown_unlike
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
@@ -102,7 +103,7 @@ def test_unchanged_flights_seldom_look_changed():
     rng = np.random.default_rng(5)
     reference = Reference.of(flights(6, rng), NAMES, QUAD)
     own = _Space(reference.covariance, reference.freedom, kinds_of(NAMES), causes(NAMES, QUAD))
-    chance, again = (np.sort(own.evidence(own.drawn(rng)).max(axis=0)) for _ in range(2))
+    chance, again = (np.sort(own.evidence(own.drawn(rng)[0]).max(axis=0)) for _ in range(2))
     assert 0.002 < np.mean(again > np.quantile(chance, 1 - FALSE_ALARM)) < 0.025
 
 
@@ -143,8 +144,8 @@ def test_what_shows_does():
     size = changed(before[:1], before[1:], QUAD, rng).shows["rotor M3"]
     reference = Reference.of(before[1:], NAMES, QUAD)
     own = _Space(reference.covariance, reference.freedom, kinds_of(NAMES), causes(NAMES, QUAD))
-    threshold = np.quantile(own.evidence(own.drawn(rng)).max(axis=0), 1 - FALSE_ALARM)
-    rows = own.drawn(rng, 400) - np.log(1 - size) * np.eye(10)[2]
+    threshold = np.quantile(own.evidence(own.drawn(rng)[0]).max(axis=0), 1 - FALSE_ALARM)
+    rows = own.drawn(rng, draws=400)[0] - np.log(1 - size) * np.eye(10)[2]
     assert np.mean(own.evidence(rows).max(axis=0) >= threshold) > 0.8
 
 
@@ -169,3 +170,51 @@ def test_speeds_and_commands_are_not_compared():
     rng = np.random.default_rng(9)
     before, today = flights(4, rng), [replace(flight, commanded=False) for flight in flights(1, rng)]
     assert not [name for name in changed(today, before, QUAD, rng).names if name.startswith("load ")]
+
+
+def test_a_change_since_a_flight_of_today_is_not_hidden_by_those_before():
+    rng = np.random.default_rng(11)
+    before = flights(8, rng)
+    weak = -np.log(0.75) * (np.arange(10) == 2)
+    today = [*flights(4, rng), *flights(2, rng, weak)]
+    found = changed(today, before, QUAD, rng)
+    assert found.p_value <= FALSE_ALARM
+    assert found.since == 4
+    assert found.found[0].cause.name == "rotor M3"
+    assert found.found[0].sizes[0].low < 0.25 < found.found[0].sizes[0].high
+
+
+def flown(count, rng, agility):
+    """Numbers of which delays go with how agile flights are flown."""
+    made = flights(count, rng)
+    sooner = -0.03 * np.log(1 + agility)
+    return [
+        replace(
+            flight,
+            agility=each,
+            values={name: x + less * name.startswith("late") for name, x in flight.values.items()},
+        )
+        for flight, each, less in zip(made, agility, sooner, strict=True)
+    ]
+
+
+def test_flights_that_are_flown_otherwise_are_no_change():
+    """Where the reference is flown alike delays tell little; where it is flown in many ways it tells how they go."""
+    rng = np.random.default_rng(12)
+    slow, fast = np.full(8, 0.5), np.array([3.0])
+    alike, many = flown(8, rng, slow), flown(8, rng, np.geomspace(0.3, 5.0, 8))
+    today = flown(1, rng, fast)
+    assert changed(today, alike, QUAD, rng).p_value > 0.05
+    assert changed([replace(today[0], agility=0.5)], alike, QUAD, rng).p_value <= FALSE_ALARM
+    of_many = changed(today, many, QUAD, rng)
+    assert of_many.p_value > 0.05
+    assert of_many.shows["late"] < 0.7 * changed(today, alike, QUAD, rng).shows["late"]
+
+
+def test_flights_that_are_flown_otherwise_are_said_to_be():
+    rng = np.random.default_rng(13)
+    before, today = flown(5, rng, np.linspace(0.4, 0.6, 5)), flown(1, rng, np.array([3.0]))
+    (words,) = _flown_unlike(changed(today, before, QUAD, rng), today, before)
+    assert words.startswith("flown unlike the reference: with accelerations of 3 m/s^2 (root mean square), those of")
+    assert "late count" in words
+    assert not [*_flown_unlike(changed(before[:1], before[1:], QUAD, rng), before[:1], before[1:])]

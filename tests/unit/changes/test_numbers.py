@@ -65,7 +65,7 @@ def test_a_weak_rotor_is_asked_for_more(usual):
 
 
 def test_a_load_on_a_cable():
-    """Mass and length of a load, beside five flights without, each of a day of its own."""
+    """Mass and length of a load, beside three flights without, each of a day of its own."""
     rng = np.random.default_rng(4)
 
     def of_a_day(seed, **closed_loop):
@@ -167,3 +167,13 @@ def test_how_late_a_rotor_answers():
         Recording("flight.h5", replace(signals, rotor_speed=speed, rotor_command=signals.speed))
     ).values
     assert [told[f"answer M{index}"] for index in range(1, 5)] == pytest.approx(late, abs=0.002)
+
+
+def test_a_gyroscope_of_another_scale(usual):
+    """Beside an attitude that is right; about one axis."""
+    flight = recorded()
+    rates = flight.signals.body_rate * [1.1, 1.0, 1.0]
+    told = flight_numbers(Recording("flight.h5", replace(flight.signals, body_rate=rates)))
+    more = [told.values[f"scale {axis}"] - usual.values[f"scale {axis}"] for axis in "xyz"]
+    assert more == pytest.approx([np.log(1.1), 0.0, 0.0], abs=1e-3)
+    assert abs(usual.values["scale x"]) < 0.02

@@ -118,6 +118,17 @@ def test_noise_of_the_accelerometer_moves_the_swing_no_more_than_without_its_ste
     assert size[1] > 0.03
 
 
+def test_a_jump_of_the_velocity_leaves_the_swing_before_it(flight):
+    """As at the end of a crash: beyond all numbers it hangs at rest, and what was before stays."""
+    jump = 300 * (np.arange(len(flight)) >= len(flight) - 12)[:, None] * np.cumsum(np.ones((len(flight), 3)), axis=0)
+    thrown = replace(flight, velocity=flight.velocity + jump, acceleration=None, specific_force=None)
+    calm = replace(thrown, velocity=flight.velocity)
+    swung, before = (swing(each, 0.05, 0.1) for each in (thrown, calm))
+    assert np.isfinite(swung).all()
+    half = len(flight) // 2
+    np.testing.assert_allclose(swung[:half], before[:half], atol=0.01)
+
+
 def test_force_is_what_the_load_needs_besides_its_weight(columns, flight):
     """Newton's law of the load itself, which the cable alone accelerates."""
     length, depth = 1.5, 0.1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from cpfls_cli.gap.naming.causes import impossible_ratios, wrong_numbers
+from cpfls_cli.gap.naming.causes import JudgedEffect, impossible_ratios, likely_sets, wrong_numbers
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.results import Estimate, NamedEffect
 
@@ -105,3 +105,23 @@ def test_numbers_that_no_vehicle_has_are_ratios_to_the_config():
 
 def test_numbers_that_a_vehicle_can_have_are_not_impossible():
     assert impossible_ratios([number("inertia_x", 2.9, 0.2), number("coupling_x", 50.0, 0.01)]) == {}
+
+
+def judged(name, odds):
+    return JudgedEffect(named(name), (), odds)
+
+
+def test_sets_are_listed_with_how_likely_they_are():
+    """A set that two looks come to is one; what is hardly possible is not listed."""
+    even, hardly = np.zeros(12), np.full(12, -9.0)
+    looks = [
+        judged("motor_lag", {("com_offset", "command_delay"): even, ("com_offset", "inflow"): hardly}),
+        judged("com_offset", {("motor_lag", "torque_bias"): even - 0.1, ("command_delay", "com_offset"): even}),
+    ]
+    sets = likely_sets(looks)
+    assert [set(each.effects) for each in sets] == [
+        {"motor_lag", "com_offset"}, {"com_offset", "command_delay"}, {"motor_lag", "torque_bias"},
+    ]  # fmt: skip
+    assert sets[0].likely == sets[1].likely > sets[2].likely
+    assert sum(each.likely for each in sets) == pytest.approx(1)
+    assert likely_sets([]) == ()

@@ -5,11 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cpfls_cli.effects.effect import Shape
 from cpfls_cli.gap.naming import confirmed
 from cpfls_cli.gap.naming.confirmed import Judge, Without
 from cpfls_cli.gap.naming.earned import Refusal
-from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import GapSettings
 
 NOTHING = np.zeros(6)
@@ -19,25 +17,17 @@ def channel(value, of=0):
     return np.array([value if index == of else 0.0 for index in range(6)])
 
 
-def refused(raised, after, monkeypatch, beyond=None, shapes=()):
+def refused(raised, after, monkeypatch, beyond=None):
     """Judge effects of which each takes so much off channel 0, where `after` floors are left with all of them.
 
-    A pair is what one takes off and the channel; `shapes` are those of the first.
+    A pair is what one takes off and the channel.
     """
     raised = {name: value if isinstance(value, tuple) else (value, 0) for name, value in raised.items()}
-    own = [shapes, *[()] * len(raised)]
-    grids = [tuple(Shape(number.name, "1", number.plausible, "") for number in of) for of in own]
-    chosen = [
-        SimpleNamespace(effect=SimpleNamespace(name=name, shapes=of)) for name, of in zip(raised, grids, strict=False)
-    ]
+    chosen = [SimpleNamespace(effect=SimpleNamespace(name=name)) for name in raised]
     floors = np.full(6, after)
     held_out = SimpleNamespace(after=None, size=lambda _: SimpleNamespace(floors=floors))
     monkeypatch.setattr(confirmed, "on_bound", lambda _found, _floor: beyond)
-    monkeypatch.setattr(confirmed, "is_free", lambda _candidate: True)
-    found = SimpleNamespace(
-        hypothesis=SimpleNamespace(chosen=chosen),
-        estimates=SimpleNamespace(effects=[of for of, _ in zip(own, raised, strict=False)]),
-    )
+    found = SimpleNamespace(hypothesis=SimpleNamespace(chosen=chosen))
     judgement = SimpleNamespace(found=found, held_out=held_out)
     without = {
         name: Without(channel(*value), NOTHING, np.sqrt(np.maximum(floors**2 + channel(*value), 0.0)))
@@ -88,25 +78,6 @@ def refused(raised, after, monkeypatch, beyond=None, shapes=()):
 )
 def test_names_stand_that_the_unseen_flights_need(raised, after, name, monkeypatch):
     found = refused(raised, after, monkeypatch)
-    assert (found.name if found else None) == name
-
-
-def shape(value, low, high):
-    return Estimate("sideways", "1", value, low, high, (0.4, 1.5))
-
-
-@pytest.mark.parametrize(
-    ("end", "raised", "name"),
-    [
-        (shape(1.5, 0.4, 2.6), {"curve": 3.7, "larger": 6.8}, "curve"),
-        (shape(0.5, 0.3, 0.7), {"curve": 3.7, "larger": 6.8}, None),
-        (shape(1.5, 0.4, 2.6), {"curve": 6.8, "smaller": 3.7}, None),
-        (shape(1.5, 0.4, 2.6), {"curve": 3.7, "larger": (60.0, 3)}, None),
-    ],
-    ids=["at the bound", "known to end", "the largest itself", "larger in another channel"],
-)
-def test_a_free_curve_beside_a_larger_effect_has_to_end_where_it_should(end, raised, name, monkeypatch):
-    found = refused(raised, 1.0, monkeypatch, shapes=(end,))
     assert (found.name if found else None) == name
 
 

@@ -45,6 +45,11 @@ def test_events_become_topics_with_stamps_of_milli_or_microseconds(read, version
     assert (contents.system, contents.warnings) == ("Crazyflie uSD", ())
 
 
+def test_stamps_beyond_half_of_their_range_are_read_exactly(read):
+    samples = [("tick", 2**64 - 3_000 + each, ()) for each in (0, 1_000, 2_000)]
+    assert read(usd({"tick": {}}, samples)).topics["tick"]["timestamp"].tolist() == [0, 0.001, 0.002]
+
+
 @pytest.mark.parametrize("broken", [log()[:-6], log(whole=False), log()[:-4] + b"\xff\xff" + log()[-4:]])
 def test_a_check_sum_that_is_wrong_is_warned_of_and_what_is_whole_is_read(read, broken):
     contents = read(broken)

@@ -125,7 +125,14 @@ def test_kinds_that_contradict_themselves_are_left_out(read):
         "BAD1": ("Qf", "TimeUS,A,B"),
         "BAD2": ("QX", "TimeUS,A"),
         "BAD3": ("Qff", "TimeUS,A,A"),
+        "BAD4": ("Qff", "TimeUS,,A"),
     }
-    content = dataflash({name: own for name, own in kinds.items() if name != "BAD2"}, ROWS)
+    rows = [*ROWS, ("BAD4", (1_000_000, 1.0, 2.0))]
+    content = dataflash({name: own for name, own in kinds.items() if name != "BAD2"}, rows)
     assert not {name for name in read(content).topics if name.startswith("BAD")}
     assert np.isfinite(read(content).topics["IMU"]["GyrX"]).all()
+
+
+def test_a_field_may_have_any_name(read):
+    content = dataflash({"OWN": ("Qf", "TimeUS,f0")}, [("OWN", (1_000_000, 1.5))])
+    assert read(content).topics["OWN"]["f0"].tolist() == [1.5]

@@ -4,11 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
+from cpfls_cli.artifacts.diagnosis import DiagnosisRecord, LikelySetGroup
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming.results import Estimate, NamedEffect
-from cpfls_cli.pages.effects import closest_sentence, coefficients_table, effect_sentence, effect_title, named_sentences
+from cpfls_cli.gap.naming.results import Estimate, LikelySet, NamedEffect
+from cpfls_cli.pages.effects import (
+    closest_sentence,
+    coefficients_table,
+    effect_sentence,
+    effect_title,
+    named_sentences,
+    sets_table,
+)
 from tests.builders import gap_artifacts as made
 
 OFFSET = NamedEffect(
@@ -73,3 +80,14 @@ def test_an_effect_stands_once_beside_its_coefficients():
     rows = coefficients_table("coefficients", record.effects).rows
     assert [row[0] for row in rows] == ["com_offset", "of_another_version"]
     assert [effect.name for effect in record.effects.named] == ["com_offset", "of_another_version"]
+
+
+def test_sets_stand_in_a_table_with_how_likely_each_is():
+    sets = (LikelySet(("com_offset", "motor_lag"), 0.954), LikelySet(("torque_bias", "motor_lag"), 0.046))
+    group = LikelySetGroup.of(sets)
+    assert group.rows() == list(sets)
+    listed = sets_table("sets", group.rows())
+    assert listed.rows == [
+        ["offset of the centre of mass and motor lag", "95 %"],
+        ["constant torque and motor lag", "5 %"],
+    ]

@@ -101,7 +101,7 @@ def test_a_vanished_scheduler_is_an_error_in_words(tmp_path, capfd):
         parts = workers.stream(GENES)
         next(parts)
         scheduler.kill()
-        with pytest.raises(ComputationError, match="Dask scheduler vanished: start it"):
+        with pytest.raises(ComputationError, match="Dask scheduler is gone: start it"):
             list(parts)
     assert capfd.readouterr() == ("", "")
 

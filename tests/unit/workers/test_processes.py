@@ -98,7 +98,7 @@ def test_the_evaluator_is_loaded_once_by_each_process_and_an_idle_one_that_was_k
         assert 1 <= len(set(loaded)) == len(loaded) <= 2
         assert os.getpid() not in loaded
         os.kill(loaded[0], signal.SIGKILL)
-        with pytest.raises(ComputationError, match="vanished"):
+        with pytest.raises(ComputationError, match="ended unexpectedly"):
             workers(GENES)
 
 
@@ -108,7 +108,7 @@ def test_failing_and_killed_workers_are_errors_in_words_and_leave_no_process():
         with pytest.raises(ComputationError, match="SettingError: cannot be unpickled") as caught:
             workers(column(*range(POISON + 5)))
         assert "evaluators.py" in caught.value.__notes__[0]
-        with pytest.raises(ComputationError, match=r"vanished \(killed by SIGKILL\).*take fewer workers"):
+        with pytest.raises(ComputationError, match=r"ended unexpectedly \(killed by SIGKILL\).*use fewer workers"):
             workers(column(*range(DEADLY_POISON - 5, DEADLY_POISON + 5)))
     assert set(multiprocessing.active_children()) <= before
 

@@ -70,7 +70,7 @@ def test_an_error_of_the_domain_keeps_its_message(kind):
 
 
 def test_too_little_memory_has_a_remedy():
-    with pytest.raises(WorkerError, match="ran out of memory: take fewer workers"):
+    with pytest.raises(WorkerError, match="ran out of memory: use fewer workers"):
         result_of(failing(MemoryError()))
 
 

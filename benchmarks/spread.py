@@ -1,0 +1,447 @@
+"""How often 1000 closed-loop flights of vehicles that were drawn hold the rates of a flight that was held out.
+
+    python benchmarks/spread.py simulated
+    python benchmarks/spread.py real DATA
+
+simulated: two vehicles of 45 g and 1.5 kg in gusts, whose truth is known. A path with sines of up to 5 Hz is flown four
+times, 20 s each; the constants, how they go together, and the gusts are found in these flights as `cpfls vehicle` does
+where flights repeat each other. Drawn vehicles then fly another path in closed loop, under the autopilot and with the
+motors that flew, each in gusts of its own and with the noise of the gyroscope: in JAX by one batched function of the
+export, which takes the samples as they are. Counted is how often the rates of flights that were held out, in gusts of
+their own, lie between the 2.5th and the 97.5th percentile of the 1000 at that instant.
+
+Beside it: all vehicles the estimate, in gusts; vehicles drawn, in still air; numbers drawn from their ranges each by
+itself; and the truth in its true gusts, which is what can be had.
+
+real: the nano-drone benchmark (see nanodrone.py for DATA). Constants and gusts are found in its training flights, each
+path of which was flown three or four times. The law of its autopilot is not known: how torque and thrust answer is
+found in how runs of one path differ. Vehicles drawn fly the test flights in closed loop, asked what the flight was
+asked: their rotors turn as logged, and answer the difference to the logged state by that law. About yaw these flights
+tell neither the moment of inertia nor gusts, so all keep the logged heading, and roll and pitch are counted.
+
+Needs jax (extra `simulators`); real needs pyarrow (extra `parquet`) too.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.shared.measure import pin_threads, table
+from benchmarks.shared.nanodrone_files import TEST, TRAINING, VEHICLE, flights
+
+pin_threads()
+
+import numpy as np
+
+try:
+    import jax
+    import jax.numpy as jnp
+except ImportError:
+    if __name__ == "__main__":
+        sys.exit("needs the package jax: pip install 'cpfls[simulators]'")
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.export.registry import exported
+from cpfls_cli.export.source import executed, jax_parameters
+from cpfls_cli.playback.constants import find_constants
+from cpfls_cli.playback.disturbance import find_gusts
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.gusts import Gusts
+from cpfls_cli.playback.instruments import Instruments, instruments
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.player import rotation_vectors
+from cpfls_cli.playback.settings import PlaybackSettings
+from cpfls_cli.playback.spread import Estimates, GustRanges, drawn
+from cpfls_cli.playback.vehicle import bodily, estimate_correlation, found_numbers
+from cpfls_cli.vehicle.rotors import allocation_matrix
+from cpfls_cli.vehicle.settings import VehicleSettings
+from tests.builders.exported_vehicles import sheet_of_vehicle
+from tests.builders.gusty_flights import (
+    EVERY,
+    GRAVITY,
+    GUSTS,
+    LARGE,
+    MEMORY_S,
+    SMALL,
+    STEP_S,
+    Flight,
+    Truth,
+    gusty_flights,
+    path_of,
+)
+
+COUNT, RUNS, HELD_OUT, SECONDS, REACH_HZ, SWING = 1000, 4, 5, 20.0, 5.0, 0.2
+SHOVE, SHOVE_MEMORY_S = 0.06, 1.0
+"""Of the flights of gusty_flights: acceleration by the largest gust, and its memory."""
+ENDS, TUMBLES = (2.5, 97.5), 50.0
+"""Percentiles; and a rate in rad/s that no controlled flight of these has."""
+VEHICLES = {"45 g": SMALL, "1.5 kg": LARGE}
+
+
+def main(part: str = "simulated", *words: str) -> None:
+    with jax.enable_x64(True):
+        PARTS[part](*words)
+
+
+class Found(NamedTuple):
+    """What flights tell: a model with its gusts, and how sure its numbers are."""
+
+    model: VehicleModel
+    known: Estimates
+
+
+def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
+    """Find constants and gusts by instruments, as `cpfls vehicle` does."""
+    given = instruments(flights)
+    constants = find_constants(vehicle, flights, given, PlaybackSettings().leave_out)
+    assert constants is not None
+    assert constants.tells, "instruments tell the body of these flights"
+    solved, spread = constants.fitted, constants.spread
+    numbers = tuple(bodily(vehicle, tuple(found_numbers(solved, spread))))
+    gusts = find_gusts(solved.model, given, {each.name: each.determined for each in numbers}, told=True)
+    if gusts is not None:
+        print(f"  of what is left comes again, by axis: {np.round(gusts.foretold, 2)}", file=sys.stderr)
+    held = None if gusts is None or gusts.gusts is None else gusts.gusts
+    model = replace(solved.model, gusts=held)
+    return Found(
+        model,
+        Estimates(
+            numbers=numbers,
+            correlation=estimate_correlation(solved, spread),
+            blocks=spread.blocks,
+            loop=np.ones((2, 3)),
+            gusts=None if held is None else gust_ranges(gusts),
+        ),
+    )
+
+
+def gust_ranges(found: Any) -> GustRanges:
+    """Take the gusts that are known, and none on other axes."""
+    there = np.isfinite(found.size)
+    full = [np.full(6, none) for none in (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)]
+    for values, name in zip(full, GustRanges._fields, strict=True):
+        values[: len(there)][there] = getattr(found, name)[there]
+    return GustRanges(*full)
+
+
+class Fleet(NamedTuple):
+    """Vehicles side by side: parameters of the functions in JAX, and gusts."""
+
+    module: Mapping[str, Any]
+    parameters: Array
+    gusts: Array
+    inertia: Array
+    mass: Array
+
+
+def fleet(nominal: VehicleModel, models: Sequence[VehicleModel], *, still: bool = False) -> Fleet:
+    """Export a vehicle once, and take the samples as they are."""
+    sheet = sheet_of_vehicle(replace(nominal, gusts=None))
+    module = executed(exported(sheet, "jax", "v.py").text)
+    none = Gusts(np.zeros(6), np.ones(6))
+    gusts = np.array([none if still or each.gusts is None else each.gusts for each in models])
+    return Fleet(
+        module,
+        jax_parameters(sheet, models),
+        gusts,
+        np.array([each.body.inertia for each in models]),
+        np.array([each.body.mass for each in models]),
+    )
+
+
+def pushed(fleet: Fleet, state: Any, gust: Any, step: float) -> Any:
+    """Add what gusts do in a step to velocity and rate, as docs/simulators.md says."""
+    rotation = state[:, 6:15].reshape(-1, 3, 3)
+    faster = jnp.einsum("nij,nj->ni", rotation, gust[:, 3:]) / fleet.mass[:, None]
+    spun = jnp.linalg.solve(fleet.inertia, gust[:, :3, None])[..., 0]
+    return state.at[:, 3:6].add(step * faster).at[:, 15:].add(step * spun)
+
+
+def tumbled(flown: Array) -> Array:
+    """Tell which flights turn faster than any that is controlled, or end beyond all numbers, shape (flight,)."""
+    return ~(np.abs(np.nan_to_num(flown, nan=np.inf)).max(axis=(1, 2)) < TUMBLES)
+
+
+def share_inside(flown: Array, measured: Array) -> Array:
+    """Tell how often what was measured lies between the percentiles of those that do not tumble, shape (..., 3)."""
+    low, high = np.percentile(flown[~tumbled(flown)], ENDS, axis=0)
+    return np.asarray(((low <= measured) & (measured <= high)).mean(axis=-2))
+
+
+# Simulated flights
+
+
+def simulated() -> None:
+    rows = []
+    for name, truth in VEHICLES.items():
+        training = gusty_flights(
+            [Flight(truth, GUSTS, 0, run, reach=REACH_HZ, swing=SWING) for run in range(RUNS)], SECONDS
+        )
+        told = found(unknown(truth), [replace(flight, setpoints={}) for flight in training])
+        aside = [Flight(truth, GUSTS, 7, 100 + run, reach=REACH_HZ, swing=SWING) for run in range(HELD_OUT)]
+        measured = np.stack([flight.motion.rate for flight in gusty_flights(aside, SECONDS)])
+        for kind, own in fleets(told, truth).items():
+            flown = closed_loop(truth, own, aside[0])
+            rows.append(row(name, kind, share_inside(flown, measured)))
+            print(rows[-1], file=sys.stderr, flush=True)
+    header = ("vehicle", "flown", "roll", "pitch", "yaw", "all", "one flight, least to most")
+    table("spread_simulated", header, rows)
+
+
+def row(name: str, kind: str, shares: Array) -> tuple[str, ...]:
+    """Write shares of flights, shape (flight, 3), in per cent."""
+    each = 100 * shares.mean(axis=1)
+    mean = [f"{value:.1f}" for value in 100 * shares.mean(axis=0)]
+    return name, kind, *mean, f"{each.mean():.1f}", f"{each.min():.1f} to {each.max():.1f}"
+
+
+def unknown(truth: Truth) -> VehicleSettings:
+    """State what anybody knows: the mass, the rotors, and an inertia that is off by a third."""
+    vehicle = truth.vehicle
+    moments = tuple(1.3 * moment for moment in vehicle.inertia_kg_m2[:3])
+    return replace(vehicle, inertia_kg_m2=moments)
+
+
+def fleets(told: Found, truth: Truth) -> dict[str, Fleet]:
+    """Make what is flown: the spread, and what it has to be better than."""
+    rng = np.random.default_rng(1)
+    together = drawn(told.model, told.known, COUNT, rng)
+    alone = replace(told.known, correlation=np.eye(len(told.known.numbers)))
+    by_itself = drawn(told.model, alone, COUNT, rng)
+    for number in told.known.numbers:
+        print(
+            f"  {number.name} {number.value:.3g} ({number.low:.3g} to {number.high:.3g}) {number.unit}", file=sys.stderr
+        )
+    true = VehicleModel(vehicle=truth.vehicle, gusts=true_gusts(truth))
+    return {
+        "spread": fleet(told.model, together.models),
+        "the estimate, in gusts": fleet(told.model, [told.model] * COUNT),
+        "spread, still air": fleet(told.model, together.models, still=True),
+        "each number by itself": fleet(told.model, by_itself.models),
+        "the true vehicle, true gusts": fleet(true, [true] * COUNT),
+    }
+
+
+def true_gusts(truth: Truth) -> Gusts:
+    """Give what blew."""
+    size = np.array([*(np.array(truth.inertia) * GUSTS), *[truth.mass * SHOVE * max(GUSTS)] * 3])
+    return Gusts(size, np.array([*MEMORY_S, *[SHOVE_MEMORY_S] * 3]))
+
+
+def closed_loop(truth: Truth, flying: Fleet, asked: Flight) -> Array:
+    """Fly all vehicles on a path under the autopilot of the truth; give rates as read, shape (flight, time, 3)."""
+    path = jnp.asarray(path_of(asked, round(SECONDS / STEP_S)))
+    count, module = len(flying.parameters), flying.module
+    hover, unmix = truth.mass * GRAVITY / 4 / truth.thrust_factor, np.linalg.inv(truth.mixer)
+    outer, loop = min(2.0, asked.bandwidth / 6), asked.bandwidth * np.array([1.0, 1.0, 0.4])
+    keep = jnp.exp(-STEP_S / flying.gusts[:, 1])
+    fresh = flying.gusts[:, 0] * jnp.sqrt(1 - keep**2)
+    terms = jax.vmap(lambda now, then: module["steady"](jnp.sqrt(0.5 * (now**2 + then**2))))
+    move = jax.vmap(lambda state, rotor, own: module["step"](state, rotor, STEP_S, own))
+
+    def autopilot(state: Any, wanted_at: Any, measured: Any) -> Any:
+        rotation = state[:, 6:15].reshape(-1, 3, 3)
+        wanted = (
+            wanted_at[6:9] + outer**2 * (wanted_at[:3] - state[:, :3]) + 1.6 * outer * (wanted_at[3:6] - state[:, 3:6])
+        )
+        wanted = jnp.clip(wanted, -6.0, 6.0) + jnp.array([0.0, 0.0, GRAVITY])
+        up = wanted / jnp.linalg.norm(wanted, axis=1, keepdims=True)
+        error = -jnp.einsum("nji,nj->ni", rotation, jnp.cross(up, rotation[:, :, 2]))
+        error = error.at[:, 2].set(
+            jnp.sin(wanted_at[9]) * rotation[:, 0, 0] - jnp.cos(wanted_at[9]) * rotation[:, 1, 0]
+        )
+        torque = jnp.array(truth.inertia) * (loop**2 * error - 1.4 * loop * measured)
+        thrust = truth.mass * (wanted * rotation[:, :, 2]).sum(axis=1, keepdims=True)
+        squared = jnp.concatenate([thrust, torque], axis=1) @ unmix.T
+        return jnp.sqrt(jnp.clip(squared, 0.05 * hover, 4 * hover))
+
+    def along(carried: Any, given: Any) -> Any:
+        state, speed, gust = carried
+        wanted_at, key = given
+        noise, new = jnp.split(jax.random.normal(key, (count, 9)), [3], axis=1)
+        measured = state[:, 15:] + truth.gyro_noise * noise
+        after = speed + STEP_S / truth.lag_s * (autopilot(state, wanted_at, measured) - speed)
+        moved = move(pushed(flying, state, gust, STEP_S), terms(speed, after), flying.parameters)
+        return (moved, after, keep * gust + fresh * new), measured
+
+    begun = jnp.concatenate([path[0, :6], jnp.eye(3).ravel(), jnp.zeros(3)])
+    first = jax.random.normal(jax.random.key(1), (count, 6)) * flying.gusts[:, 0]
+    start = jnp.tile(begun, (count, 1)), jnp.full((count, 4), jnp.sqrt(hover)), first
+    keys = jax.random.split(jax.random.key(2), len(path))
+
+    def ten(carried: Any, given: Any) -> Any:
+        moved, measured = jax.lax.scan(along, carried, given)
+        return moved, measured[0]
+
+    chunks = path.reshape(-1, EVERY, path.shape[1]), keys.reshape(-1, EVERY)
+    return np.asarray(jax.jit(lambda: jax.lax.scan(ten, start, chunks)[1])()).swapaxes(0, 1)
+
+
+# Real flights
+
+
+AXES = ("roll", "pitch")
+ANSWERS = {"thrust": (8, 11), "roll": (0, 3, 7, 10), "pitch": (1, 4, 6, 9)}
+"""What each answers of a difference of states: rotation, rate, velocity and position along the body axes."""
+
+
+class Law(NamedTuple):
+    """How thrust and torque answer a difference between two states, as accelerations.
+
+    Attributes
+    ----------
+    keep : array, shape (4,)
+        Share of an answer that is left a sample later.
+    gain : array, shape (4, 12)
+    """
+
+    keep: Array
+    gain: Array
+
+
+def real(folder: str) -> None:
+    training = flights(Path(folder), TRAINING)
+    told = found(VEHICLE, training)
+    for number in told.known.numbers:
+        print(
+            f"  {number.name} {number.value:.3g} ({number.low:.3g} to {number.high:.3g}) {number.unit}", file=sys.stderr
+        )
+    law = law_of(told.model, instruments(training))
+    print(f"  law: {law}", file=sys.stderr)
+    together = drawn(told.model, told.known, COUNT, np.random.default_rng(1))
+    flown = {
+        "spread": fleet(told.model, together.models),
+        "the estimate, in gusts": fleet(told.model, [told.model] * COUNT),
+        "spread, still air": fleet(told.model, together.models, still=True),
+    }
+    rows = []
+    for kind, own in flown.items():
+        shares, off, wide, lost = [], [], [], 0
+        for flight in flights(Path(folder), TEST):
+            turned, measured = twins(told.model, own, law, flight), flight.motion.rate[1:]
+            shares.append(share_inside(turned, measured)[:2])
+            low, middle, high = np.percentile(turned[~tumbled(turned)], (ENDS[0], 50.0, ENDS[1]), axis=0)
+            off.append(np.sqrt(((middle - measured) ** 2).mean(axis=0))[:2])
+            wide.append((high - low).mean(axis=0)[:2])
+            lost += int(tumbled(turned).sum())
+        sizes_ = (", ".join(f"{value:.2g}" for value in np.mean(each, axis=0)) for each in (off, wide))
+        rows.append((*row("nano-drone", kind, np.array(shares)), *sizes_, f"{lost} of {len(shares) * COUNT}"))
+        print(rows[-1], file=sys.stderr, flush=True)
+    header = ("vehicle", "flown", *AXES, "all", "one flight, least to most", "median off", "width", "tumbled")
+    table("spread_real", header, rows)
+
+
+def answers(model: VehicleModel, speed: Array) -> Array:
+    """Give thrust and torque of rotors as accelerations of the body, shape (time, 4)."""
+    return np.asarray(speed**2 @ allocation_matrix(model.vehicle).T / sizes(model))
+
+
+def sizes(model: VehicleModel) -> Array:
+    return np.append(model.body.mass, np.diag(model.body.inertia))
+
+
+def law_of(model: VehicleModel, given: Instruments) -> Law:
+    """Regress how answers differ between runs of a path on how their states did a sample before, by least squares.
+
+    What was asked of them is the same. An offset between two runs is that of their trims.
+    """
+    before, after = [], []
+    for number, run in enumerate(given.flown):
+        for other, place in given.repeats.beside[number].items():
+            known = np.isfinite(place)
+            there = known[1:] & known[:-1]
+            rows = np.hstack([answers(model, run.speed), states(run)]) - given.repeats.at(
+                number, other, np.hstack([answers(model, given.flown[other].speed), states(given.flown[other])])
+            )
+            turned = rotation_vectors(
+                np.where(known[:, None, None], nearest(given, number, other), np.eye(3)), run.motion.rotation
+            )
+            rows[:, 4:7] = turned
+            for part in (slice(7, 10), slice(10, 13), slice(13, 16)):
+                rows[:, part] = (
+                    rows[:, part] if part.start == 7 else np.einsum("tji,tj->ti", run.motion.rotation, rows[:, part])
+                )
+            centred = rows - rows[known].mean(axis=0)
+            before.append(centred[:-1][there])
+            after.append(centred[1:][there])
+    x, y = np.vstack(before), np.vstack(after)
+    keep, gain = np.zeros(4), np.zeros((4, 12))
+    for row_, columns in enumerate(ANSWERS.values()):
+        own = x[:, [row_, *(4 + column for column in columns)]]
+        solved = np.linalg.lstsq(own, y[:, row_], rcond=None)[0]
+        keep[row_], gain[row_, list(columns)] = solved[0], solved[1:]
+    return Law(keep, gain)
+
+
+def states(flight: PlaybackFlight) -> Array:
+    """Arrange place for a rotation, rate, velocity and position, shape (time, 12)."""
+    motion = flight.motion
+    return np.hstack([np.zeros_like(motion.rate), motion.rate, motion.velocity, motion.position])
+
+
+def nearest(given: Instruments, number: int, other: int) -> Array:
+    """Give rotations of another run at the same places of the path."""
+    mean = given.repeats.at(number, other, given.flown[other].motion.rotation.reshape(-1, 9)).reshape(-1, 3, 3)
+    first, _, last = np.linalg.svd(np.nan_to_num(mean) + 1e-12 * np.eye(3))
+    return np.asarray(first @ last)
+
+
+def difference(rotation: Any, own: Any) -> Any:
+    """Give the rotation from one to each of others about the body axes, small ones, shape (vehicle, 3)."""
+    away = jnp.einsum("ji,njk->nik", rotation, own)
+    pairs = ((2, 1), (0, 2), (1, 0))
+    return 0.5 * jnp.stack([away[:, row, column] - away[:, column, row] for row, column in pairs], axis=1)
+
+
+def about_z(angle: Any) -> Any:
+    """Turn about body z, shape (vehicle, 3, 3)."""
+    none, one, cosine, sine = jnp.zeros_like(angle), jnp.ones_like(angle), jnp.cos(angle), jnp.sin(angle)
+    rows = [[cosine, -sine, none], [sine, cosine, none], [none, none, one]]
+    return jnp.moveaxis(jnp.array(rows), 2, 0)
+
+
+def twins(model: VehicleModel, flying: Fleet, law: Law, flight: PlaybackFlight) -> Array:
+    """Fly all vehicles from the first logged state, asked what the flight was asked; rates, shape (flight, time, 3).
+
+    About yaw they keep what was logged: these flights tell neither the moment of inertia nor the gusts there.
+    """
+    motion, module, count = flight.motion, flying.module, len(flying.parameters)
+    period, unmix = motion.period, np.linalg.pinv(allocation_matrix(model.vehicle)) * sizes(model)
+    keep = jnp.exp(-period / flying.gusts[:, 1])
+    fresh = flying.gusts[:, 0] * jnp.sqrt(1 - keep**2)
+    logged = tuple(map(jnp.asarray, (*motion[:4], flight.speed)))
+    terms = jax.vmap(module["steady"])
+    move = jax.vmap(lambda state, rotor, own: module["step"](state, rotor, period, own))
+
+    def along(carried: Any, given: Any) -> Any:
+        state, answer, gust = carried
+        (position, velocity, rotation, rate, speed), key = given
+        own = state[:, 6:15].reshape(-1, 3, 3)
+        own = own @ about_z(-difference(rotation, own)[:, 2])
+        state = state.at[:, 6:15].set(own.reshape(-1, 9)).at[:, 17].set(rate[2])
+        turned = difference(rotation, own)
+        moved = jnp.concatenate([state[:, 3:6] - velocity, state[:, :3] - position], axis=1).reshape(-1, 2, 3)
+        along_body = jnp.einsum("nji,nkj->nki", own, moved).reshape(-1, 6)
+        squared = jnp.maximum(speed**2 + answer @ unmix.T, 0.0)
+        after = law.keep * answer + jnp.concatenate([turned, state[:, 15:] - rate, along_body], axis=1) @ law.gain.T
+        moved_on = move(pushed(flying, state, gust, period), terms(jnp.sqrt(squared)), flying.parameters)
+        return (moved_on, after, keep * gust + fresh * jax.random.normal(key, (count, 6))), moved_on[:, 15:]
+
+    begun = jnp.concatenate([part[0].ravel() for part in logged[:4]])
+    first = jax.random.normal(jax.random.key(1), (count, 6)) * flying.gusts[:, 0]
+    start = jnp.tile(begun, (count, 1)), jnp.zeros((count, 4)), first
+    keys = jax.random.split(jax.random.key(2), len(flight) - 1)
+    rows = tuple(each[:-1] for each in logged)
+    return np.asarray(jax.jit(lambda: jax.lax.scan(along, start, (rows, keys))[1])()).swapaxes(0, 1)
+
+
+PARTS: dict[str, Callable[..., None]] = {"simulated": simulated, "real": real}
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

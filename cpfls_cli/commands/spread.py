@@ -1,0 +1,53 @@
+"""Command `spread`: vehicles drawn from what flights say of one, for simulators that fly many."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
+from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.output import write_files
+from cpfls_cli.artifacts.rebuilt import estimates
+from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.commands.vehicle_sheets import sheet_of
+from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.export.samples import Samples, require_ending
+from cpfls_cli.export.text import identifier
+from cpfls_cli.pages.export import spread_answer, spread_summary
+from cpfls_cli.playback.spread import drawn
+from cpfls_cli.report.outcome import Outcome
+
+
+def run(job: Job, model: Path, count: int, seed: int) -> Outcome:
+    """Draw vehicles, and write them."""
+    ending = require_ending(str(job.output), job.output.suffix)
+    source = take_inputs(job, {"model": model})["model"]
+    check_outputs(job, job.output)
+    record = read_record(model, ModelRecord)
+    if not isinstance(record, VehicleRecord):
+        raise InputError(
+            f"{model}: is a model of `cpfls {record.FORMAT.made_by}`, which holds no covariance of its numbers; "
+            "`cpfls vehicle` finds a vehicle with one"
+        )
+    sheet = sheet_of(model, identifier(model.stem), source, force=job.force)
+    try:
+        spread = drawn(sheet.model, known := estimates(record), count, np.random.default_rng(seed))
+    except (InputError, ComputationError) as error:
+        raise type(error)(f"{model}: {error}") from None
+    numbers = {number.name: number for number in known.numbers}
+    samples = Samples(
+        sheet=sheet,
+        spread=spread,
+        numbers=numbers,
+        seed=seed,
+        untold=record.untold,
+        held=record.guess or (),
+    )
+    written = samples.written(ending)
+    if not job.dry_run:
+        write_files({job.output: written})
+    summary = {"dry_run": job.dry_run, "output": str(job.output), "bytes": len(written), **spread_summary(samples)}
+    return Outcome(summary, tuple(spread_answer(samples, job.output, len(written), job.dry_run)))

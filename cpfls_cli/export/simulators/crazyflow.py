@@ -1,0 +1,175 @@
+"""A vehicle for crazyflow and drone-models: a section of parameters of their first-principles dynamics, in TOML.
+
+With rotor speeds n in rpm, the velocity v in the world and R from body to world, these are
+
+    force = R (0, 0, sum f) + R drag_matrix R^T v,   f = rpm2thrust[1] n + rpm2thrust[2] n^2,
+    torque = (L, L, 0) (mixing_matrix f) + (0, 0, 1) (mixing_matrix t),   t = rpm2torque[1] n + rpm2torque[2] n^2,
+
+one curve for all rotors, and speeds follow commands by rotor_dyn_coef.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.effect import thrust_wrench, wrench
+from cpfls_cli.effects.scales import arm, hover_speed
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.errors import InputError
+from cpfls_cli.export.course import Course
+from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
+from cpfls_cli.export.numbers import numbers_of, places, spins
+from cpfls_cli.export.sheet import Sheet
+from cpfls_cli.export.text import comment_lines, number
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.rotors import RotorResponse
+
+STEP_S = 2.5e-3
+_FORCE_OF_VELOCITY = slice(3, 6), slice(1, 4)
+_DRAG = (*_FORCE_OF_VELOCITY, 0)
+"""Places in a table of weights."""
+
+_ARRAYS = "SCIPY_ARRAY_API"
+_ROTORS, _RPM = 4, 30 / np.pi
+_USE = (
+    "For crazyflow put the section into crazyflow/dynamics/first_principles/params.toml under the name of one of its "
+    "drones, for drone-models into drone_models/data/params.toml; or give it to the function itself, with "
+    "J_inv=inv(J). Commands are rotor speeds in rpm, in the order of the config. Gusts are dist_f and dist_t, both in "
+    "the world frame."
+)
+
+
+def crazyflow_held(model: VehicleModel) -> tuple[Held, Holds]:
+    """Take what these dynamics fly of a vehicle."""
+    if model.rotors != _ROTORS:
+        raise InputError(
+            f"crazyflow and drone-models mix four rotors, but this vehicle has {model.rotors}; --format mjcf, sdf, jax "
+            "and casadi take any number"
+        )
+    numbers, hover = numbers_of(model, _wrenches(model), alike=True), hover_speed(model.vehicle)
+
+    def holds(weights: Array) -> Array:
+        held = numbers.holds(weights)
+        held[_DRAG] = _in_hover(weights[_FORCE_OF_VELOCITY], hover)
+        return held
+
+    held = held_by(model, holds, RotorResponse(lag_s=model.response.lag_s), constant_body(model))
+    return replace(held, numbers=numbers.of(model.table.weights)), holds
+
+
+def _in_hover(weights: Array, hover: float) -> Array:
+    """Sum the terms of rotors that hover, from which on the drag of rotors is one of the body, shape (3, 3)."""
+    rotors = (weights.shape[2] - 1) // 4
+    turning = np.concatenate([[1.0], np.full(rotors, hover), np.full(rotors, hover**2), np.zeros(2 * rotors)])
+    return np.asarray(weights @ turning)
+
+
+def _wrenches(model: VehicleModel) -> Any:
+    """Give the part of the curves that is linear in the speed, for a unit of each number."""
+    turns = spins(model.vehicle)
+
+    def of(signals: Signals) -> Mapping[str, Array]:
+        speed = signals.speed
+        yaw = np.zeros((len(speed), 3))
+        yaw[:, 2] = speed @ turns
+        return {"thrust_linear": thrust_wrench(signals.hubs, speed), "yaw_linear": wrench(yaw)}
+
+    return of
+
+
+def crazyflow_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) -> str:
+    """Write a vehicle as a section of TOML, with what it does not hold."""
+    found, vehicle = held.numbers, sheet.model.vehicle
+    hubs, length = places(sheet.model, alike=True), arm(vehicle)
+    most = vehicle.rotor_speed_max_rad_s
+    rate = 1.0 / held.response.lag_s if held.response.lag_s else 0.0
+    given: dict[str, Any] = {
+        "gravity_vec": [0.0, 0.0, -held.body.gravity],
+        "mass": held.body.mass,
+        "J": held.body.inertia.tolist(),
+        "L": length,
+        "rpm2thrust": [0.0, found["thrust_linear"] / _RPM, found["thrust"] / _RPM**2],
+        "rpm2torque": [0.0, found["yaw_linear"] / _RPM, found["yaw"] / _RPM**2],
+        "rotor_dyn_coef": [rate, 0.0, rate, 0.0],
+        "mixing_matrix": [(hubs[:, 1] / length).tolist(), (-hubs[:, 0] / length).tolist(), spins(vehicle).tolist()],
+        "drag_matrix": held.table.weights[_DRAG].tolist(),
+        "prop_inertia": 0.0,
+        "thrust_min": 0.0,
+        "thrust_max": found["thrust_linear"] * most + found["thrust"] * most**2,
+    }
+    lag = () if rate else ("The rotors have no lag: give no rotor_vel, or commands and rotor_vel alike.",)
+    lines = [f"#{line}".rstrip() for line in comment_lines([*sheet.facts, "", *told, "", _USE, *lag])]
+    return "\n".join(
+        [*lines, "", f"[{sheet.name}]", *(f"{name} = {_written(each)}" for name, each in given.items()), ""]
+    )
+
+
+def _written(value: Any) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(map(_written, value))}]"
+    return number(value)
+
+
+def fly_crazyflow(text: str, course: Course) -> State:
+    """Fly an exported vehicle by the function of drone-models, by Runge-Kutta of order 4; see `Target.fly`."""
+    from scipy.spatial.transform import Rotation
+
+    dynamics = _dynamics()
+    (section,) = tomllib.loads(text).values()
+    unused = {"thrust_min", "thrust_max"}
+    given = {name: np.asarray(value) for name, value in section.items() if name not in unused}
+    given |= {"J_inv": np.linalg.inv(given["J"])}
+    rate = given["rotor_dyn_coef"][0]
+    before = course.lagged(RotorResponse(lag_s=1.0 / rate if rate else 0.0))
+    start, runs = course.start, len(course.starts)
+    now = [start.position, start.velocity, start.rotation, start.rate, _RPM * before]
+
+    def slopes(state: Sequence[Array], command: Array) -> list[Array]:
+        position, velocity, rotation, turning, speed = state
+        quaternion = Rotation.from_matrix(_turned(rotation)).as_quat()
+        speed = speed if rate else command
+        moved, _, faster, spun, wound = dynamics(position, quaternion, velocity, turning, command, speed, **given)
+        cross = np.cross(np.eye(3), turning[:, None])
+        return [moved, faster, rotation @ cross, spun, wound if rate else np.zeros((runs, _ROTORS))]
+
+    def ahead(state: Sequence[Array], by: Sequence[Array], step: float) -> list[Array]:
+        return [each + step * slope for each, slope in zip(state, by, strict=True)]
+
+    rows, step = [], course.period
+    for index, command in enumerate(_RPM * course.commands.swapaxes(0, 1), 1):
+        first = slopes(now, command)
+        second = slopes(ahead(now, first, 0.5 * step), command)
+        third = slopes(ahead(now, second, 0.5 * step), command)
+        fourth = slopes(ahead(now, third, step), command)
+        mean = [(a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(first, second, third, fourth, strict=True)]
+        now = ahead(now, mean, step)
+        now[2] = _turned(now[2])
+        if index % course.finer == 0:
+            rows.append(State(*now[:4]))
+    return State(*(np.stack(parts, axis=1) for parts in zip(*rows, strict=True)))
+
+
+def _dynamics() -> Any:
+    """Load the function, which refuses a SciPy that was loaded for NumPy alone; it gets nothing else here."""
+    before = os.environ.get(_ARRAYS)
+    os.environ[_ARRAYS] = "1"
+    try:
+        from drone_models.first_principles import dynamics
+    finally:
+        os.environ.pop(_ARRAYS)
+        os.environ.update({_ARRAYS: before} if before else {})
+    return dynamics
+
+
+def _turned(matrix: Array) -> Array:
+    """Give the nearest rotations to matrices, shape (run, 3, 3)."""
+    first, _, last = np.linalg.svd(matrix)
+    return np.asarray(first @ last)

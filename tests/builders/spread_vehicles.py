@@ -1,0 +1,89 @@
+"""The artifact of a vehicle with what its flights say of each number, as if it had been found in them."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from cpfls_cli.artifacts.disturbance import DisturbanceGroup
+from cpfls_cli.artifacts.vehicle_model import FoundNumbersGroup, LoopGroup
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.playback.gusts import GUST_AXES, Gusts
+from tests.builders.playback_flights import truth
+from tests.builders.vehicle_models import record_of
+
+BLOCKS = 30
+RELATIVE = 0.08
+"""Half of an interval, as a share of the value."""
+
+
+def numbers_of(model):
+    """Numbers of a model that a fit may find, with their units."""
+    vehicle, rotor = model.vehicle, model.vehicle.rotors[0]
+    moments = zip(("Ixx", "Iyy", "Izz"), vehicle.inertia_kg_m2, strict=False)
+    found = {f"inertia.{name}": (moment, "kg m^2") for name, moment in moments}
+    found |= {
+        "thrust_factor": (rotor.thrust_factor_n_s2, "N s^2"),
+        "drag_factor": (rotor.drag_factor_n_m_s2, "N m s^2"),
+    }
+    found |= {"lag.time_constant_s": (model.response.lag_s, "s")} if model.response.lag_s else {}
+    found |= {"delay.delay_s": (model.response.delay_s, "s")} if model.response.delay_s else {}
+    for effect in model.effects:
+        pairs = zip(CATALOGUE[effect.name].coefficients, effect.coefficients.tolist(), strict=True)
+        found |= {f"{effect.name}.{known.name}": (value, known.unit) for known, value in pairs}
+    return found
+
+
+def found_record(model=None, *, together=0.9, loop=None, gusts=True, relative=RELATIVE, **changed):
+    """An artifact; Izz and the drag factor go together, and so do the moments about roll and pitch a little."""
+    model = model or truth()
+    known = numbers_of(model)
+    values = np.array([value for value, _ in known.values()])
+    names = tuple(known)
+    correlation = np.eye(len(names))
+    for first, second, alike in (
+        ("inertia.Izz", "drag_factor", together),
+        ("inertia.Ixx", "inertia.Iyy", 0.5 * together),
+    ):
+        at = names.index(first), names.index(second)
+        correlation[at] = correlation[at[::-1]] = alike
+    positive = [name.startswith("inertia") or name.endswith("factor") for name in names]
+    size = inertia_and_mass(model.vehicle) * [3.4, 5.1, 2.0, 0.3, 0.3, 0.3]
+    memory = np.array([0.3, 1.2, 0.5, 1.0, 1.0, 1.0])
+    held = Gusts(size, memory) if gusts else None
+    low, high = np.ones(3), np.ones(3)
+    if loop is not None:
+        low, high = np.asarray(loop)
+    record = record_of(replace(model, gusts=held))
+    given = {
+        "found": FoundNumbersGroup(
+            name=names,
+            unit=tuple(unit for _, unit in known.values()),
+            value=values,
+            low=np.where(positive, values / (1 + relative), values * (1 - relative)),
+            high=values * (1 + relative),
+            stated=np.full(len(names), np.nan),
+            determined=np.array([name != "inertia.Izz" for name in names]),
+            at_bound=np.zeros(len(names), dtype=bool),
+        ),
+        "correlation": correlation,
+        "blocks": BLOCKS,
+        "loop": LoopGroup(low=low, high=high, explained=np.full(3, 0.99), shown=False),
+        "disturbance": None
+        if not gusts
+        else DisturbanceGroup(
+            told_by="repeats",
+            name=GUST_AXES,
+            size=size,
+            low=0.8 * size,
+            high=1.3 * size,
+            memory=memory,
+            memory_low=0.7 * memory,
+            memory_high=1.4 * memory,
+        ),
+    }
+    return replace(record, **{**given, **changed})
+
+
+def inertia_and_mass(vehicle):
+    """What torque about and force along each body axis move."""
+    return np.array([*vehicle.inertia_kg_m2[:3], *[vehicle.mass_kg] * 3])
