@@ -241,7 +241,7 @@ WORKFLOWS: tuple[tuple[str, tuple[str, ...]], ...] = (
         "I have logs and want a model",
         (
             "cpfls init logs/* --mass 1.2 --arm 0.16 -o study.yaml",
-            "cpfls vehicle study.yaml logs/* -o vehicle.h5",
+            "cpfls vehicle study.yaml logs/* --held-out today.csv -o vehicle.h5",
         ),
     ),
     (
@@ -262,7 +262,7 @@ WORKFLOWS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
         "I want gains",
         (
-            "cpfls vehicle study.yaml logs/* -o vehicle.h5",
+            "cpfls vehicle study.yaml logs/* --held-out today.csv -o vehicle.h5",
             "cpfls tune study.yaml vehicle.h5 --autopilot px4 -o gains.h5",
         ),
     ),

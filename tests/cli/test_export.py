@@ -339,7 +339,7 @@ def test_formats_are_named(cpfls, pipeline, tmp_path):
     assert "Invalid value for '--format': 'rust' is not one of 'json', 'c', 'python'" in result.stderr
     result = cpfls("export", pipeline.model, "--format", "sdff", "-o", tmp_path / "m.sdf")
     assert result.stderr.splitlines()[-1].startswith("Error: Invalid value for '--format': 'sdff' is not one of 'json'")
-    assert result.stderr.endswith("'jax' (did you mean 'sdf'?)\n")
+    assert result.stderr.endswith("'csv' (did you mean 'sdf'?)\n")
 
 
 def test_verbose_says_what_is_read_and_written(cpfls, pipeline, tmp_path):
