@@ -44,8 +44,9 @@ _SLOW_NAMES = tuple(
 POSITIVE = frozenset((*MOMENTS, THRUST, DRAG, "slow_actuation.slow_s"))
 """Numbers that are drawn by a factor, as their intervals are."""
 
-_FEWEST = 0.01
-"""Share of draws that has to be of possible vehicles: with less the estimate itself is hardly one."""
+_FEWEST, _AT_ONCE = 0.01, 1000
+"""Share of draws that has to be of possible vehicles: with less the estimate itself is hardly one; and the fewest draws
+that tell such a share."""
 _OF_A_GROUP = ": "
 """In the names of numbers that only another configuration has."""
 _EDGE = 1e-9
@@ -143,7 +144,7 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
     kept: list[tuple[Array, VehicleModel]] = []
     rejected, tried = Counter[str](), 0
     while len(kept) < count:
-        for row in _numbers_drawn(numbers, known, root, rng, count):
+        for row in _numbers_drawn(numbers, known, root, rng, max(count, _AT_ONCE)):
             if len(kept) < count:
                 tried += 1
                 why = _impossible(model, numbers, row)
