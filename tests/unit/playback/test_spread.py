@@ -118,6 +118,11 @@ def test_few_vehicles_are_drawn_where_many_draws_are_impossible():
         assert len(spread_of(found_record(loop=([0.5, 0.5, 0.3], [2, 2, 4]), relative=0.3), 2, seed).models) == 2
 
 
+def test_one_block_tells_no_interval():
+    with pytest.raises(InputError, match="too short to tell how sure its numbers are"):
+        spread_of(found_record(blocks=1))
+
+
 def test_a_number_that_no_vehicle_has_is_named():
     far = ModelEffect("com_offset", {}, np.array([0.4, 0.0]))
     with pytest.raises(ComputationError, match="no vehicle has such a com_offset"):
