@@ -286,7 +286,9 @@ def odds(own: Scored, other: Scored, above_floor: float) -> Array:
     """
     # A floor that is wrong scales what is left; only what is left above it is an error of formulas, one for all blocks.
     variance = NOISE + min(OFF**2 * above_floor, max(above_floor - own.gain, 0.0))
-    return np.asarray(-0.5 * more_left(other.block_error, own.block_error) / variance)
+    density = -0.5 * more_left(other.block_error, own.block_error) / variance
+    # In a rare block something else happens, which neither set knows: none says more than that.
+    return np.asarray(np.clip(density, np.log(RARE), -np.log(RARE)))
 
 
 def _off(scored: Scored, above_floor: float) -> float:
