@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,7 +90,8 @@ def noise_of(flights: Sequence[tuple[Array, Array]]) -> Noise | None:
     flights : sequence of (array, array)
         Times, shape (time,), s, and body rates, shape (time, 3), rad/s, which may lack samples.
     """
-    rates = [1 / float(np.median(np.diff(time))) for time, _ in flights if len(time) > _LEAST]
+    steps = [float(np.median(np.diff(time))) for time, _ in flights if len(time) > _LEAST]
+    rates = [1 / step for step in steps if step > 0]
     if not rates:
         return None
     slowest = min(rates)
@@ -98,9 +99,7 @@ def noise_of(flights: Sequence[tuple[Array, Array]]) -> Noise | None:
     window = np.hanning(count)[:, None]
     scale = 2 / (slowest * float((window**2).sum()))
     spectra = []
-    for time, rate in flights:
-        if len(time) <= _LEAST:
-            continue
+    for time, rate in (part for flight in flights for part in _between_pauses(*flight)):
         even = np.arange(time[0], time[-1], 1 / slowest)
         values = np.stack([np.interp(even, time, column) for column in rate.T], axis=1)
         for begin in range(0, len(even) - count + 1, count // 2):
@@ -110,3 +109,11 @@ def noise_of(flights: Sequence[tuple[Array, Array]]) -> Noise | None:
         return None
     frequency = np.fft.rfftfreq(count, 1 / slowest)
     return Noise(np.asarray(frequency[1:], dtype=float), np.mean(spectra, axis=0)[1:])
+
+
+def _between_pauses(time: Array, rate: Array) -> Iterator[tuple[Array, Array]]:
+    """Cut a log where it pauses longer than a window; a line over the pause would be a rate without noise."""
+    pauses = np.flatnonzero(np.diff(time) > _WINDOW_S) + 1
+    for part in zip(np.split(time, pauses), np.split(rate, pauses), strict=True):
+        if len(part[0]) > _LEAST:
+            yield part
