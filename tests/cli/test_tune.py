@@ -107,6 +107,12 @@ def test_the_page_draws_bode_nichols_and_steps(gains, cpfls, folder):
     assert "--autopilot px4 --gain-margin 6" in page
 
 
+def test_info_tells_the_answer_again(gains, cpfls, folder):
+    said = cpfls("info", folder / "px4.h5").stdout
+    assert gains["px4"].stdout.splitlines()[0] in said
+    assert cpfls("info", folder / "px4.h5", "-v").stdout.count("MC_ROLLRATE_P") == 1
+
+
 def test_rotors_in_another_order_are_told(gains):
     assert "mixer: rotors" not in gains["px4"].output
     assert (
