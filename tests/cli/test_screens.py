@@ -235,6 +235,5 @@ def _without_caption(table):
 
 def test_every_command_is_shown(screens):
     commands = set(typer.main.get_command(app).commands)
-    # The screen of spread, after which nothing has to come, is looked at in test_spread.py.
-    assert {each.command for each in screens.values()} >= commands - {*WHOLE, "vehicle", "verify-export", "spread"}
+    assert {each.command for each in screens.values()} >= commands - {*WHOLE, "vehicle", "verify-export"}
     assert set(screens) == {*NAMES, *OF_MODELS, *OF_OPEN_NUMBERS}
