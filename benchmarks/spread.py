@@ -116,18 +116,9 @@ def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
             correlation=estimate_correlation(solved, spread),
             blocks=spread.blocks,
             loop=np.ones((2, 3)),
-            gusts=None if held is None else gust_ranges(gusts),
+            gusts=None if held is None else GustRanges.of_known(*(getattr(gusts, name) for name in GustRanges._fields)),
         ),
     )
-
-
-def gust_ranges(found: Any) -> GustRanges:
-    """Take the gusts that are known, and none on other axes."""
-    there = np.isfinite(found.size)
-    full = [np.full(6, none) for none in (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)]
-    for values, name in zip(full, GustRanges._fields, strict=True):
-        values[: len(there)][there] = getattr(found, name)[there]
-    return GustRanges(*full)
 
 
 class Fleet(NamedTuple):

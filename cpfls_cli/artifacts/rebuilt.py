@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 
 from cpfls_cli.artifacts.audit import AuditGroup, AuditRepairGroup
-from cpfls_cli.artifacts.disturbance import DisturbanceGroup
 from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
 from cpfls_cli.artifacts.model import USUAL, EffectsGroup, InertiaFunctionsGroup, VehicleGroup
 from cpfls_cli.artifacts.spec import rows_of
@@ -20,7 +19,6 @@ from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.effects.registry import effect
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.playback.gusts import GUST_AXES
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.spread import Estimates, GustRanges
@@ -73,26 +71,15 @@ def estimates(record: VehicleRecord) -> Estimates:
             "`cpfls vehicle` again"
         )
     # Where instruments tell the constants no loop has widened their intervals.
-    told = record.instruments is not None
+    told, gusts = record.instruments is not None, record.disturbance
     loop = np.ones((2, 3)) if told else np.array([np.fmin(record.loop.low, 1.0), np.fmax(record.loop.high, 1.0)])
     return Estimates(
         numbers=[FoundNumber(**row) for row in rows_of(record.found)],
         correlation=record.correlation,
         blocks=record.blocks,
         loop=loop,
-        gusts=None if record.disturbance is None else _gust_ranges(record.disturbance),
+        gusts=None if gusts is None else GustRanges.of_known(*(getattr(gusts, name) for name in GustRanges._fields)),
     )
-
-
-def _gust_ranges(group: DisturbanceGroup) -> GustRanges | None:
-    """Extend what is known of gusts to all axes: none where no size is."""
-    there = np.flatnonzero(np.isfinite(group.size))
-    if not len(there):
-        return None
-    found = GustRanges(*(np.full(len(GUST_AXES), none) for none in (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)))
-    for name, values in found._asdict().items():
-        values[there] = getattr(group, name)[there]
-    return found
 
 
 def model_effects(group: EffectsGroup) -> tuple[ModelEffect, ...]:

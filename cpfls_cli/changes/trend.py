@@ -118,8 +118,8 @@ def trend(
     left_out = tuple(flight.name for flight in flights if not any(flight is each for each in kept))
     if len(kept) < (reference or FEWEST) + 1:
         raise InputError(
-            f"{len(kept)} flights tell the same numbers, and a trend needs {(reference or FEWEST) + 1} at least: those "
-            "of the reference and one more"
+            f"flights that tell the same numbers: {len(kept)}, and a trend needs {(reference or FEWEST) + 1} at least, "
+            "those of the reference and one more"
         )
     first = reference or max(FEWEST, len(kept) // 2)
     learned = Reference.of(kept[:first], names, vehicle)

@@ -176,7 +176,7 @@ def _flown_unlike(change: Change, today: Sequence[FlightNumbers], before: Sequen
         name.split()[0] for name, less in zip(change.names, unsure > _UNLIKE * change.deviation, strict=True) if less
     )
     if kinds:
-        now, then = ([flight.agility for flight in side] for side in (today, before))
+        now, then = ([flight.agility for flight in side if np.isfinite(flight.agility)] for side in (today, before))
         yield (
             f"flown unlike the reference: with accelerations of {_range(now)} m/s^2 (root mean square), those of "
             f"{_range(then)}; {joined(kinds)} count for less, as they go with it; take reference flights that are "

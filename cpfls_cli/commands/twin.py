@@ -160,7 +160,10 @@ def with_autopilot(study: Study, path: Path) -> tuple[ClosedLoopSettings, GainsG
     if name == CPFLS and by_simulation and made is not None:
         name = made.autopilot
     if name == CPFLS:
-        raise InputError(f"{path}: whose law flew it? name its autopilot: --autopilot {', '.join(AUTOPILOTS)}")
+        raise InputError(
+            f"{path}: is no planned path (cpfls/trajectory); to fly what was asked of the vehicle in it, name the "
+            f"autopilot whose law flew it: --autopilot {', '.join(AUTOPILOTS)}"
+        )
     autopilot = AUTOPILOTS[name]
     values, source = autopilot.defaults() | dict(settings.autopilot_parameters), "stated"
     if not settings.autopilot_parameters:

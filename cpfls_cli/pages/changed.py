@@ -39,6 +39,9 @@ _UNITS = {"m/s^2": "m/s²", "1": ""}
 _SHOWN_FIRST = ("rotor M1", "mass", "centre of mass", "vibration", "late", "gusts")
 """Of what would have shown, as much as a first screen has room for; of rotors the one that shows least."""
 
+_OTHERS = 3
+"""Of what would have shown, where nothing of that does."""
+
 _ALIKE = 3
 """Others that are told beside a change that is not sure."""
 
@@ -157,9 +160,9 @@ def would_have_shown(record: FoundRecord, vehicle: VehicleSettings) -> Iterator[
     smallest = dict(zip(record.shows.cause, record.shows.smallest.tolist(), strict=True))
     rotors = [size for name, size in smallest.items() if name.startswith("rotor ")]
     smallest["rotor M1"] = max(rotors, default=np.nan)
-    for name in _SHOWN_FIRST:
-        if np.isfinite(smallest.get(name, np.nan)):
-            yield smallest_words(name, smallest[name], vehicle)
+    listed = [name for name in _SHOWN_FIRST if np.isfinite(smallest.get(name, np.nan))]
+    others = [name for name, size in smallest.items() if np.isfinite(size)][:_OTHERS]
+    yield from (smallest_words(name, smallest[name], vehicle) for name in listed or others)
 
 
 def _tables(record: ChangedRecord, vehicle: VehicleSettings, index: int) -> Iterator[Table]:

@@ -12,7 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.inertia import (
     INERTIA_ENTRIES,
     INERTIA_PARAMETERS,
@@ -21,7 +21,7 @@ from cpfls_cli.inertia import (
     six_parameters,
     symmetric,
 )
-from cpfls_cli.playback.gusts import Gusts
+from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.parameters import LEARNED, PRODUCT_NAMES
 from cpfls_cli.playback.table import Remainder
@@ -44,8 +44,10 @@ _SLOW_NAMES = tuple(
 POSITIVE = frozenset((*MOMENTS, THRUST, DRAG, "slow_actuation.slow_s"))
 """Numbers that are drawn by a factor, as their intervals are."""
 
-_FEWEST = 0.01
-"""Share of draws that has to be of possible vehicles: with less the estimate itself is hardly one."""
+_FEWEST, _AT_ONCE = 0.01, 1000
+"""Share of draws that has to be of possible vehicles: with less the estimate itself is hardly one; and the fewest draws
+that tell such a share."""
+_FEWEST_BLOCKS = 2
 _OF_A_GROUP = ": "
 """In the names of numbers that only another configuration has."""
 _EDGE = 1e-9
@@ -86,6 +88,17 @@ class GustRanges(NamedTuple):
     memory: Array
     memory_low: Array
     memory_high: Array
+
+    @classmethod
+    def of_known(cls, *known: Array) -> GustRanges | None:
+        """Extend what is known of gusts, in the order of the fields, to all axes: none where no size is."""
+        there = np.isfinite(known[0])
+        if not there.any():
+            return None
+        found = cls(*(np.full(len(GUST_AXES), none) for none in (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)))
+        for values, own in zip(found, known, strict=True):
+            values[: len(there)][there] = own[there]
+        return found
 
 
 @dataclass(frozen=True)
@@ -129,6 +142,8 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
 
     Raises
     ------
+    InputError
+        If one block tells the numbers, which tells nothing of how sure they are.
     ComputationError
         If fewer than one draw of a hundred is of a possible vehicle.
 
@@ -137,13 +152,15 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
     Gelman et al., Bayesian Data Analysis, chapter 3 (t of a normal with unknown scale); Wallis 2014, the two-piece
     normal distribution.
     """
+    if known.blocks < _FEWEST_BLOCKS:
+        raise InputError("its flights are too short to tell how sure its numbers are; find it in longer ones")
     places = [place for place, each in enumerate(known.numbers) if each.value and _OF_A_GROUP not in each.name]
     model, numbers = _of_a_body(model, [known.numbers[place] for place in places])
     root = _root(known.correlation[np.ix_(places, places)])
     kept: list[tuple[Array, VehicleModel]] = []
     rejected, tried = Counter[str](), 0
     while len(kept) < count:
-        for row in _numbers_drawn(numbers, known, root, rng, count):
+        for row in _numbers_drawn(numbers, known, root, rng, max(count, _AT_ONCE)):
             if len(kept) < count:
                 tried += 1
                 why = _impossible(model, numbers, row)

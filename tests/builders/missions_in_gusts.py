@@ -30,7 +30,8 @@ def mission_of(truth, seconds=30.0, runs=4):
 
 def flown(mission, flights):
     """Fly a mission with each vehicle in its gusts; give its logged body rates and rotor speeds, (time, 3 and 4)."""
-    path = np.hstack([mission.position, mission.velocity, mission.acceleration])
+    heading = np.zeros((len(mission.position), 1))
+    path = np.hstack([mission.position, mission.velocity, mission.acceleration, heading])
     rngs, samples = [np.random.default_rng([77, each.draw]) for each in flights], len(path)
     memory = gusty_flights._memory
     pushes = [memory(rng, samples, MEMORY_S) * each.gusts for rng, each in zip(rngs, flights, strict=True)]

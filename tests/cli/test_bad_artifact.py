@@ -79,10 +79,15 @@ def test_missing_file_and_folder(refuse, study, tmp_path):
     assert refuse("check", tmp_path) == [f"{tmp_path}: is a folder, not an artifact"]
 
 
+def test_a_flight_in_the_place_of_a_path_asks_for_its_autopilot(refuse, pipeline, study, tmp_path):
+    (line,) = refuse("simulate", study, pipeline.flight, "-o", tmp_path / "out.h5")
+    assert line.startswith(f"{pipeline.flight}: is no planned path (cpfls/trajectory); ")
+    assert line.endswith("--autopilot px4, ardupilot, betaflight, crazyflie")
+
+
 @pytest.mark.parametrize(
     ("command", "given", "needed"),
     [
-        ("simulate", ["flight"], "cpfls/trajectory (made by `cpfls trajectory`)"),
         ("reduce", ["trajectory"], "cpfls/flight (made by `cpfls simulate` or `cpfls import`)"),
         ("identify", ["model"], "cpfls/flight (made by `cpfls simulate` or `cpfls import`)"),
         (

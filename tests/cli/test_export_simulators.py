@@ -107,6 +107,7 @@ def test_px4_gets_its_sensors_and_an_airframe(cpfls, vehicle, tmp_path):
     assert not list(model.iter("robotNamespace"))
     airframe = output.with_suffix(".airframe")
     assert subprocess.run(["sh", "-n", airframe], check=False).returncode == 0
+    assert "\n# @type Quadrotor x\n" in airframe.read_text()
     lines = [line.split() for line in airframe.read_text().splitlines() if line.startswith("param set-default")]
     parameters = {name: float(value) for _, _, name, value in lines}
     assert parameters["CA_ROTOR_COUNT"] == 4

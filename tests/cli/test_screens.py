@@ -139,6 +139,7 @@ def _of_autopilots(show, folder):
     (folder / "cross.yaml").write_text(STUDY)
     write_record(folder / "cross.h5", found_vehicle())
     show("tune", "tune", "cross.yaml", "cross.h5", "--autopilot", "px4", output="gains.h5")
+    show("spread", "spread", "cross.h5", "-n", "20", output="spread.json")
 
 
 def _of_open_numbers(show, folder):
@@ -173,7 +174,7 @@ NAMES = (
     *("init", "init of one", "import"),
 )
 """Runs by name."""
-OF_MODELS = ("predict", "replay", "report", "export")
+OF_MODELS = ("predict", "replay", "report", "export", "spread")
 """Of these the words are held beside their flights."""
 OF_OPEN_NUMBERS = (
     "open: trajectory",

@@ -23,6 +23,9 @@ _SENSORS = (
 )
 """Names by which PX4 finds them, kinds and rates in Hz; without noise."""
 
+_TYPES = {4: "Quadrotor x", 6: "Hexarotor x", 8: "Octorotor x"}
+"""Names of PX4's own groups of airframes, by the number of rotors; any other is one of its own."""
+
 _HOVER = (0.1, 0.8)
 """Documented range of MPC_THR_HOVER."""
 
@@ -61,7 +64,8 @@ def _airframe(sheet: Sheet, held: Held, told: Sequence[str]) -> str:
         parameters |= {f"SIM_GZ_EC_FUNC{rotor + 1}": str(101 + rotor), f"SIM_GZ_EC_MIN{rotor + 1}": "0"}
         parameters[f"SIM_GZ_EC_MAX{rotor + 1}"] = str(round(most))
     parameters |= {"THR_MDL_FAC": "1.0", "MPC_THR_HOVER": number(hover)}
-    head = ["#!/bin/sh", "#", f"# @name {sheet.name}", "#", "# @type Quadrotor", "#"]
+    kind = _TYPES.get(len(hubs), "Multirotor")
+    head = ["#!/bin/sh", "#", f"# @name {sheet.name}", "#", f"# @type {kind}", "#"]
     said = [
         *sheet.facts,
         "",

@@ -2,7 +2,8 @@
 
 URDF itself has mass, inertia and places. In gym-pybullet-drones rotor i pushes kf n^2 at prop_i_link with n in rpm, the
 body turns by km (-n_0^2 + n_1^2 - n_2^2 + n_3^2), and drag is (drag_coeff_xy, drag_coeff_xy, drag_coeff_z) times the
-velocity along the body axes times the sum of the rotor speeds in rad/s. `fly_urdf` is these equations, not PyBullet.
+velocity times the sum of the rotor speeds in rad/s: there along the axes of the world, here along those of the body,
+which are alike where level. `fly_urdf` is these equations, not PyBullet.
 """
 
 from __future__ import annotations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -27,8 +28,8 @@ from cpfls_cli.weak_form.resampling import blocks_of, mirror_shifted
 _CHANCE = 0.02
 """Probability of ranks up to which one is better: of fewer than six blocks none can be."""
 
-_DRAWS = 1000
-"""Of weights of blocks: what is likely is known to a hundredth or two."""
+_DRAWS = 10_000
+"""Of weights of blocks: a probability of a hundredth is known to a tenth of itself."""
 
 
 @dataclass(frozen=True)
@@ -203,6 +204,11 @@ def off_by(explained: float, left: float, above: float = 0.0) -> float:
     return min(OFF**2 * explained, max(above, 0.0) + (NOISE - 1) * left / len(CHANNELS))
 
 
+@cache
+def _weights(blocks: int) -> Array:
+    return np.asarray(blocks * np.random.default_rng(0).dirichlet(np.ones(blocks), _DRAWS))
+
+
 def likely(odds: Sequence[Array]) -> Array:
     """Compute how likely a set of effects is beside others, from how well each foretells blocks that no fit saw.
 
@@ -226,7 +232,6 @@ def likely(odds: Sequence[Array]) -> Array:
     if blocks < 2:
         # One block tells nothing of how far blocks differ.
         return np.full(len(odds) + 1, 1 / (len(odds) + 1))
-    weight = blocks * np.random.default_rng(0).dirichlet(np.ones(blocks), _DRAWS)
-    total = weight @ np.stack([np.zeros(blocks), *odds], axis=1)
+    total = _weights(blocks) @ np.stack([np.zeros(blocks), *odds], axis=1)
     density = np.exp(total - total.max(axis=1, keepdims=True))
     return np.asarray((density / density.sum(axis=1, keepdims=True)).mean(axis=0))

@@ -26,7 +26,7 @@ from cpfls_cli.gap.naming.ranking import (
 )
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import REFUSED, Scored, normal_equations, scoring_matrix
-from cpfls_cli.gap.settings import COUNTS, RARE, GapSettings
+from cpfls_cli.gap.settings import COUNTS, NOISE, OFF, RARE, GapSettings
 from cpfls_cli.rounding import ascending, less
 
 _BEAM = 3
@@ -265,11 +265,15 @@ def _unseen(hypothesis: System, floor: Array, settings: GapSettings, *, moving: 
 
 
 def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Scored]:
-    """List the candidates that the chosen one does not beat: of all that explain about as much, those not rare."""
-    known = _names(chosen.chosen)
+    """List the candidates that the chosen one does not beat: of all that explain about as much, those not rare.
+
+    What leaves no more than formulas and the floor are off by is not beaten, however sure that is.
+    """
+    known, off = _names(chosen.chosen), _off(chosen, above_floor)
     others = [each for each in ranking if each.gain > _NEAR * chosen.gain and _names(each.chosen) != known]
     own, *weights = likely([odds(chosen, other, above_floor) for other in others])
-    return [other for other, weight in zip(others, weights, strict=True) if weight >= RARE * own]
+    more = (float(more_left(other.block_error, chosen.block_error).sum()) for other in others)
+    return [each for each, weight, d in zip(others, weights, more, strict=True) if weight >= RARE * own or d <= off]
 
 
 def odds(own: Scored, other: Scored, above_floor: float) -> Array:
@@ -280,7 +284,11 @@ def odds(own: Scored, other: Scored, above_floor: float) -> Array:
     array, shape (block,)
         Logarithm of the predictive density under the other one less that under the first.
     """
-    return np.asarray(-0.5 * more_left(other.block_error, own.block_error) / (1.0 + _off(own, above_floor)))
+    # A floor that is wrong scales what is left; only what is left above it is an error of formulas, one for all blocks.
+    variance = NOISE + min(OFF**2 * above_floor, max(above_floor - own.gain, 0.0))
+    density = -0.5 * more_left(other.block_error, own.block_error) / variance
+    # In a rare block something else happens, which neither set knows: none says more than that.
+    return np.asarray(np.clip(density, np.log(RARE), -np.log(RARE)))
 
 
 def _off(scored: Scored, above_floor: float) -> float:
