@@ -23,6 +23,7 @@ from tests.builders.autopilots import STUDY, found_vehicle
 from tests.builders.changed_flights import write_flights
 from tests.builders.command_line import undrawn
 from tests.builders.shifted_flights import CONFIG, OFFSET, flight_table, save
+from tests.builders.spread_vehicles import found_record
 from tests.builders.studies import VEHICLE
 from tests.builders.unknown_logs import flat_log, flight, write_csv
 from tests.builders.vehicle_models import record_of
@@ -139,7 +140,8 @@ def _of_autopilots(show, folder):
     (folder / "cross.yaml").write_text(STUDY)
     write_record(folder / "cross.h5", found_vehicle())
     show("tune", "tune", "cross.yaml", "cross.h5", "--autopilot", "px4", output="gains.h5")
-    show("spread", "spread", "cross.h5", "-n", "20", output="spread.json")
+    write_record(folder / "drawn.h5", found_record())
+    show("spread", "spread", "drawn.h5", "-n", "20", output="spread.json")
 
 
 def _of_open_numbers(show, folder):
