@@ -13,6 +13,8 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 _CHANGE = 1e-4
 """Step of a derivative along a thrust curve."""
+_HALVES = 40
+"""Times that the range is halved to invert a thrust curve that only grows."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class ThrustCurve:
     low, high : float
         Signals at the ends of that range.
     series : bool
-        Whether the inverse is taken by its series of second order in e, as Betaflight does.
+        Whether the inverse is ``thrust (1 + e (1 - thrust)^2)``, as Betaflight takes it.
     """
 
     expo: float = 0.0
@@ -38,7 +40,7 @@ class ThrustCurve:
         """Give the signals for shares of the full thrust, shape (rotor,)."""
         share = np.clip(thrust, 0.0, 1.0)
         if self.series:
-            share = share * (1 + self.expo * (1 - share) * (1 + self.expo * (1 - 2 * share)))
+            share = self._reached(share)
         elif abs(self.expo) > 1e-9:
             straight = 1 - self.expo
             share = (np.sqrt(straight**2 + 4 * self.expo * share) - straight) / (2 * self.expo)
@@ -47,17 +49,17 @@ class ThrustCurve:
     def thrust(self, signal: Array) -> Array:
         """Give the shares of the full thrust that lead to signals, shape (rotor,)."""
         share = np.clip((np.asarray(signal) - self.low) / (self.high - self.low), 0.0, 1.0)
-        guess = self.expo * share**2 + (1 - self.expo) * share
         if not self.series:
-            return np.asarray(guess)
-        for _ in range(20):
-            # The series is steeper than 1/4 anywhere, and its inverse is near.
-            slope = (self._reached(guess + _CHANGE) - self._reached(guess - _CHANGE)) / (2 * _CHANGE)
-            guess = np.clip(guess - (self._reached(guess) - share) / np.maximum(slope, 0.25), 0.0, 1.0)
-        return np.asarray(guess)
+            return np.asarray(self.expo * share**2 + (1 - self.expo) * share)
+        low, high = np.zeros_like(share), np.ones_like(share)
+        for _ in range(_HALVES):
+            middle = 0.5 * (low + high)
+            beyond = self._reached(middle) > share
+            low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+        return np.asarray(0.5 * (low + high))
 
     def _reached(self, share: Array) -> Array:
-        return share * (1 + self.expo * (1 - share) * (1 + self.expo * (1 - 2 * share)))
+        return share * (1 + self.expo * (1 - share) ** 2)
 
 
 @dataclass(frozen=True)

@@ -79,7 +79,8 @@ class Autopilot:
     fixed : mapping of str to float
         Quantities of the law that are no parameters, by role.
     logged_as : mapping of str to tuple of str
-        Parameters that a line of a log's header holds, separated by commas; an empty name is left out.
+        Parameters that a line of a log's header holds, separated by commas; an empty name is left out. Of two lines
+        that hold one the later counts, unless it is 0.
     slope_of_error, integrates_first, holds_integral, series : bool
         As `AxisLaw`, `Law` and `ThrustCurve` have them.
     source : tuple of str
@@ -132,10 +133,11 @@ class Autopilot:
     def in_log(self, logged: Mapping[str, float | str]) -> dict[str, float]:
         """Take the parameters of the law out of what a log knows; empty where it is of another autopilot."""
         found = {each.name: logged[each.name] for each in self.parameters if each.name in logged}
-        for line, names in self.logged_as.items():
-            values = str(logged.get(line, "")).strip('"').split(",")
-            # What is 0 there is off, and another line says it.
-            found |= {name: value for name, value in zip(names, values, strict=False) if name and _number(value)}
+        for line in (each for each in self.logged_as if each in logged):
+            for name, value in zip(self.logged_as[line], str(logged[line]).strip('"').split(","), strict=False):
+                # What is 0 there is off where an earlier line says it too.
+                if name and (_number(value) or name not in found):
+                    found[name] = value
         return {name: _number(value) for name, value in found.items()}
 
     def of_log(self, logged: Mapping[str, float]) -> dict[str, float]:

@@ -44,6 +44,8 @@ _EFFECT_FORM = "write NAME=VALUE[,VALUE...] or NAME.coefficient=VALUE, see `cpfl
 def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None = None) -> Outcome:
     """Simulate a flight along a trajectory, or along the setpoints of a flight, and write it."""
     if is_log(trajectory) or holds(trajectory, FlightRecord):
+        if mode not in (None, "closed-loop"):
+            raise InputError(f"{trajectory}: --mode {mode}: along a flight all is flown in closed loop; leave it out")
         return import_module("cpfls_cli.commands.twin").run(job, trajectory, model)  # type: ignore[no-any-return]
     if model is not None and mode is None:
         whole = holds(model, VehicleRecord)

@@ -34,7 +34,7 @@ from cpfls_cli.report.numbers import number, percent
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.tuning.gains import AskedMargins, Proposal, proposal_of, with_filters
 from cpfls_cli.tuning.margins import evaluate
-from cpfls_cli.tuning.noise import Line, Noise, noise_of
+from cpfls_cli.tuning.noise import LEAST, Line, Noise, noise_of
 from cpfls_cli.tuning.plant import HoverPlant, Spread, hover_plant, spread_of
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -74,11 +74,7 @@ def run(
         *_hover_notes(own, today, hover, record),
         *work.notes,
         *([] if today or not flights else [f"no log tells parameters of {own.title}; its defaults stand beside"]),
-        *(
-            ["noise is not read: the config has no import.signals.body_rate (`cpfls init LOG` proposes it)"]
-            if flights and not _maps_rates(job.study)
-            else []
-        ),
+        *(_unheard(job.study) if flights and noise is None else []),
     ]
     heard = None if noise is None else _heard(own, noise, work.lines, (chosen, values))
     made = GainsRecord.of(own, model.name, asked, hover, sets, proposals, today, heard, warnings)
@@ -240,6 +236,14 @@ def _rates(flight: Path, study: Study) -> tuple[Array, Array]:
     rate = factor * np.stack(columns, axis=1)
     known = np.isfinite(rate).all(axis=1) & np.isfinite(stamps)
     return seconds * stamps[known], rate[known]
+
+
+def _unheard(study: Study) -> Iterator[str]:
+    """Say why logs tell no noise."""
+    if not _maps_rates(study):
+        yield "noise is not read: the config has no import.signals.body_rate (`cpfls init LOG` proposes it)"
+        return
+    yield f"noise is not read: no log holds {LEAST} samples and a second of body rates without a pause"
 
 
 def _maps_rates(study: Study) -> bool:

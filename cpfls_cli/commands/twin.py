@@ -55,7 +55,7 @@ def run(job: Job, path: Path, model: Path | None) -> Outcome:
     """Fly the setpoints of a flight again and write where simulated vehicles part from it."""
     inputs = begin(job, {"flight": path} | ({} if model is None else {"model": model}))
     job = with_numbers(job, "simulate", model)
-    study, (settings, gains) = job.study, _with_autopilot(job.study, path)
+    study, (settings, gains) = job.study, with_autopilot(job.study, path)
     (flight,) = flights_to_play([path], study)
     with settings_of("simulation", study):
         if settings.gusts:
@@ -151,7 +151,7 @@ def _vehicles(study: Study, model: Path | None) -> dict[str, VehicleModel | None
     return given if study.vehicle.unknown else stated | given
 
 
-def _with_autopilot(study: Study, path: Path) -> tuple[ClosedLoopSettings, GainsGroup]:
+def with_autopilot(study: Study, path: Path) -> tuple[ClosedLoopSettings, GainsGroup]:
     """Find whose law flies, and its gains: as stated, of the log, of the simulation that made the flight, or usual."""
     settings = study.simulation.closed_loop
     made = None if is_log(path) else stored_study(read_header(path).config, path).simulation.closed_loop
@@ -167,8 +167,8 @@ def _with_autopilot(study: Study, path: Path) -> tuple[ClosedLoopSettings, Gains
     autopilot = AUTOPILOTS[name]
     values, source = autopilot.defaults() | dict(settings.autopilot_parameters), "stated"
     if not settings.autopilot_parameters:
-        logged = _logged_parameters(path) if is_log(path) else {}
-        if set(logged) & set(autopilot.defaults()):
+        logged = autopilot.in_log(log_contents(path, ()).parameters) if is_log(path) else {}
+        if logged:
             values, source = autopilot.of_log(logged), "log"
         elif by_simulation and made is not None and made.autopilot == name:
             values, source = autopilot.defaults() | dict(made.autopilot_parameters), "simulation"
@@ -177,11 +177,6 @@ def _with_autopilot(study: Study, path: Path) -> tuple[ClosedLoopSettings, Gains
     gains = GainsGroup(source=source, name=tuple(values), value=np.array(list(values.values()), dtype=float))
     with settings_of("simulation", study):
         return replace(settings, autopilot=name, autopilot_parameters=values), gains
-
-
-def _logged_parameters(path: Path) -> dict[str, float]:
-    known = log_contents(path, ()).parameters
-    return {name: float(value) for name, value in known.items() if isinstance(value, int | float)}
 
 
 def _thrust_is_share(path: Path, study: Study) -> bool:

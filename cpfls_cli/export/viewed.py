@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ from cpfls_cli.export.tracks import (
     MEASURED,
     MODEL,
     SETPOINT,
+    WORLD_FRAME,
     Curve,
     Pose,
     Track,
@@ -324,9 +325,9 @@ def _of_response(title: str, record: ResponseRecord, study: Study) -> View:
 def _of_twin(title: str, record: TwinRecord, study: Study) -> View:
     begins = np.nan if record.clock is None else record.clock.begins
     time, last = _log_time(record.time, begins), len(record.vehicle) - 1
-    tracks = []
+    tracks, names = [], _vehicle_names(record.vehicle)
     for index, channel in enumerate(record.channel):
-        simulated = {_short(name): record.simulated[each, :, index] for each, name in enumerate(record.vehicle)}
+        simulated = {name: record.simulated[each, :, index] for each, name in enumerate(names)}
         difference = record.measured[:, index] - record.simulated[last, :, index]
         own = {MEASURED: record.measured[:, index], SETPOINT: record.setpoint[:, index], **simulated}
         tracks.append(
@@ -341,11 +342,21 @@ def _of_twin(title: str, record: TwinRecord, study: Study) -> View:
         )
     poses = [
         pose
-        for each, name in enumerate(record.vehicle)
-        for pose in _pose(_short(name), time, record.simulated[each, :, 3:6], record.position[each])
+        for each, name in enumerate(names)
+        for pose in _pose(name, time, record.simulated[each, :, 3:6], record.position[each])
     ]
     measured = _pose(BODY_FRAME, time, record.measured[:, 3:6], record.measured_position)
     return View(title, tracks, poses=[*measured, *poses], stamps=_stamps(study), on_log_clock=record.clock is not None)
+
+
+def _vehicle_names(vehicles: Sequence[str]) -> list[str]:
+    """Name simulated vehicles; a model whose file is called as something else here is told from it."""
+    names, taken = [], {MEASURED, SETPOINT, DIFFERENCE, BODY_FRAME, WORLD_FRAME}
+    for vehicle in vehicles:
+        name = _short(vehicle)
+        names.append(f"{name}_model" if name in taken else name)
+        taken.add(name)
+    return names
 
 
 _KINDS: dict[type[Record], Callable[[str, Any, Study], View]] = {

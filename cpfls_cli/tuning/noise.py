@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,9 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.law import Law
 
-_WINDOW_S, _LEAST = 1.0, 256
+_WINDOW_S = 1.0
+LEAST = 256
+"""Samples in a window, and of a log."""
 _FLOOR_SHARE = 0.25
 """Floor at a frequency: the median over so much of it on either side."""
 _LINE_DB, _LOWEST_LINE_HZ, _FROM_THE_END = 10.0, 25.0, 0.95
@@ -90,17 +92,16 @@ def noise_of(flights: Sequence[tuple[Array, Array]]) -> Noise | None:
     flights : sequence of (array, array)
         Times, shape (time,), s, and body rates, shape (time, 3), rad/s, which may lack samples.
     """
-    rates = [1 / float(np.median(np.diff(time))) for time, _ in flights if len(time) > _LEAST]
+    steps = [float(np.median(np.diff(time))) for time, _ in flights if len(time) > LEAST]
+    rates = [1 / step for step in steps if step > 0]
     if not rates:
         return None
     slowest = min(rates)
-    count = max(round(_WINDOW_S * slowest), _LEAST)
+    count = max(round(_WINDOW_S * slowest), LEAST)
     window = np.hanning(count)[:, None]
     scale = 2 / (slowest * float((window**2).sum()))
     spectra = []
-    for time, rate in flights:
-        if len(time) <= _LEAST:
-            continue
+    for time, rate in (part for flight in flights for part in _between_pauses(*flight)):
         even = np.arange(time[0], time[-1], 1 / slowest)
         values = np.stack([np.interp(even, time, column) for column in rate.T], axis=1)
         for begin in range(0, len(even) - count + 1, count // 2):
@@ -110,3 +111,11 @@ def noise_of(flights: Sequence[tuple[Array, Array]]) -> Noise | None:
         return None
     frequency = np.fft.rfftfreq(count, 1 / slowest)
     return Noise(np.asarray(frequency[1:], dtype=float), np.mean(spectra, axis=0)[1:])
+
+
+def _between_pauses(time: Array, rate: Array) -> Iterator[tuple[Array, Array]]:
+    """Cut a log where it pauses longer than a window; a line over the pause would be a rate without noise."""
+    pauses = np.flatnonzero(np.diff(time) > _WINDOW_S) + 1
+    for part in zip(np.split(time, pauses), np.split(rate, pauses), strict=True):
+        if len(part[0]) > LEAST:
+            yield part

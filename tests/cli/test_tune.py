@@ -107,6 +107,12 @@ def test_the_page_draws_bode_nichols_and_steps(gains, cpfls, folder):
     assert "--autopilot px4 --gain-margin 6" in page
 
 
+def test_info_tells_the_answer_again(gains, cpfls, folder):
+    said = cpfls("info", folder / "px4.h5").stdout
+    assert gains["px4"].stdout.splitlines()[0] in said
+    assert cpfls("info", folder / "px4.h5", "-v").stdout.count("MC_ROLLRATE_P") == 1
+
+
 def test_rotors_in_another_order_are_told(gains):
     assert "mixer: rotors" not in gains["px4"].output
     assert (
@@ -189,3 +195,16 @@ def test_without_a_mapping_a_log_gives_parameters_alone(cpfls, folder, tmp_path)
     record = read_record(tmp_path / "gains.h5", GainsRecord)
     assert (record.beside, record.noise) == ("today", None)
     assert any("the config has no import.signals.body_rate" in words for words in record.warning)
+
+
+def test_a_log_that_is_too_short_for_noise_is_told(cpfls, folder, tmp_path):
+    (tmp_path / "study.yaml").write_text(STUDY + LOGGED)
+    rows = [("IMU", (1_000_000 + 2500 * step, 0.1 * step, 0.2, 0.3)) for step in range(20)]
+    (tmp_path / "log.bin").write_bytes(dataflash({"IMU": ("Qfff", "TimeUS,GyrX,GyrY,GyrZ")}, rows))
+    result = cpfls(
+        *("tune", tmp_path / "study.yaml", folder / "vehicle.h5", "--autopilot", "px4"),
+        *("--flight", tmp_path / "log.bin", "-o", tmp_path / "gains.h5"),
+    )
+    assert result.exit_code == 0, result.stderr
+    record = read_record(tmp_path / "gains.h5", GainsRecord)
+    assert any("no log holds 256 samples" in words for words in record.warning)

@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.builders import ulogs
+from cpfls_cli.commands.twin import with_autopilot
+from cpfls_cli.config.study import Study
+from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
+from tests.builders import blackbox_logs, ulogs
 from tests.builders.autopilots import CROSS
 from tests.builders.twins import LOOP, PERIOD, flown
 
@@ -110,6 +113,8 @@ def test_what_cannot_be_flown_is_refused(refuse, logged, tmp_path):
     assert "--autopilot px4, ardupilot, betaflight, crazyflie" in said
     (said,) = refuse(*words, "--autopilot", "px4", "--gusts")
     assert "leave --gusts out" in said
+    (said,) = refuse(*words, "--autopilot", "px4", "--mode", "inverse")
+    assert "along a flight all is flown in closed loop" in said
     (said,) = refuse(*words, "--autopilot", "pixhawk")
     assert "pixhawk" in said
 
@@ -122,6 +127,16 @@ def test_it_is_looked_at_in_other_programs(cpfls, twin, tmp_path):
     assert float(cells["__time"]) == pytest.approx(1e-6 * ulogs.BEGIN)
     gap = float(cells["roll/measured"]) - float(cells["roll/vehicle"])
     assert float(cells["roll/difference"]) == pytest.approx(gap, abs=1e-7)
+
+
+def test_the_gains_of_a_blackbox_are_read_out_of_its_lines(tmp_path):
+    path = tmp_path / "log.bbl"
+    frames = b"".join(blackbox_logs.frames(blackbox_logs.flight(20)))
+    path.write_bytes(blackbox_logs.header(rollPID="60,90,40", iterm_limit="400") + frames + blackbox_logs.END)
+    study = Study(simulation=SimulationSettings(closed_loop=ClosedLoopSettings(autopilot="betaflight")))
+    _, gains = with_autopilot(study, path)
+    assert gains.source == "log"
+    assert dict(zip(gains.name, gains.value, strict=True))["p_roll"] == 60
 
 
 def test_a_flight_that_was_simulated_knows_its_autopilot(cpfls, tmp_path):

@@ -4,6 +4,8 @@ import csv
 import io
 import json
 import shutil
+from dataclasses import replace
+from pathlib import Path
 
 import h5py
 import jsonschema
@@ -12,8 +14,10 @@ import pytest
 import yaml
 from mcap.reader import make_reader
 
+from cpfls_cli.export.viewed import view_of
 from tests.builders.artifacts import edited
 from tests.builders.studies import VEHICLE
+from tests.builders.twins import twin_record
 
 BEGIN_US = 1_700_000_000_123_456
 TIME_US = BEGIN_US + 5_000 * np.arange(800)
@@ -180,3 +184,11 @@ def test_a_log_before_zero_has_no_stamp_in_mcap(cpfls, refuse, logged, tmp_path)
     assert "no stamps before 0" in said
     exported(cpfls, tmp_path / "flight.h5", tmp_path / "flight.csv")
     assert columns_of(tmp_path / "flight.csv")["__time"][0] == -5.0
+
+
+def test_a_model_that_is_called_as_the_vehicle_is_told_from_it():
+    record = replace(twin_record(), vehicle=("vehicle", "vehicle.h5"))
+    view = view_of(Path("twin.h5"), record)
+    (roll,) = (track for track in view.tracks if track.name == "roll")
+    assert list(roll.values) == ["measured", "setpoint", "vehicle", "vehicle_model", "difference"]
+    assert [pose.child for pose in view.poses] == ["body", "vehicle", "vehicle_model"]

@@ -106,7 +106,10 @@ BETAFLIGHT = Autopilot(
         "d_min": ("d_roll", "d_pitch", "d_yaw"),
         "d_max": ("d_max_roll", "d_max_pitch", "d_max_yaw"),
         "levelPID": ("angle_p_gain",),
+        # A filter that does not rise with throttle stands at its other cut-off; 0 in both is no filter.
+        "gyro_lpf1_static_hz": ("gyro_lpf1_dyn_min_hz",),
         "gyro_lpf1_dyn_hz": ("gyro_lpf1_dyn_min_hz",),
+        "dterm_lpf1_static_hz": ("dterm_lpf1_dyn_min_hz",),
         "dterm_lpf1_dyn_hz": ("dterm_lpf1_dyn_min_hz",),
         "gyro_notch_hz": ("gyro_notch1_hz",),
         "gyro_notch_cutoff": ("gyro_notch1_cutoff",),
@@ -119,7 +122,7 @@ BETAFLIGHT = Autopilot(
     left_out=(
         "feedforward of the sticks",
         "D that grows in fast moves (d_max), filters that rise with throttle, TPA, anti-gravity",
-        "smoothing of the angle at 50 Hz",
+        "smoothing of the angle at 50 Hz, the low-pass of yaw's P (yaw_lowpass_hz)",
         "the pilot, who holds the heading: here its error asks for a rate, 1 1/s",
     ),
     holds_integral=False,

@@ -76,6 +76,11 @@ def test_a_thrust_curve_and_its_inverse(curve):
     np.testing.assert_allclose(curve.thrust(curve.signal(shares)), shares, atol=1e-6)
 
 
+def test_the_thrust_curve_of_betaflight_is_its_own():
+    curve = AUTOPILOTS["betaflight"].law({"thrust_linear": 50.0}).curve
+    assert curve.signal(np.array([0.4])) == pytest.approx(0.055 + 0.945 * 0.4 * (1 + 0.5 * 0.6**2))
+
+
 @pytest.mark.parametrize("name", AUTOPILOTS)
 def test_defaults_lie_in_the_documented_ranges(name):
     autopilot = AUTOPILOTS[name]
@@ -98,6 +103,18 @@ def test_parameters_become_quantities_in_si_units():
 def test_what_a_log_lacks_is_as_it_was_before_it_existed():
     values = AUTOPILOTS["px4"].of_log({"MC_YAWRATE_P": 0.3})
     assert (values["MC_YAWRATE_P"], values["MC_YAW_TQ_CUTOFF"], values["MC_ROLLRATE_P"]) == (0.3, 0.0, 0.15)
+
+
+def test_a_header_of_betaflight_tells_what_is_off():
+    named = {"rollPID": "45,80,40", "d_min": "30,0,0", "pitchPID": "47,84,46", "yawPID": "45,80,0"}
+    filters = {"gyro_lpf1_static_hz": 0.0, "gyro_lpf1_dyn_hz": "0,0", "dterm_lpf1_static_hz": 90.0}
+    found = AUTOPILOTS["betaflight"].in_log(named | filters | {"dterm_lpf1_dyn_hz": "0,0", "levelPID": "55,50,75"})
+    # Until 4.5 D in calm flight is d_min, and where that is off it is that of the PID.
+    assert (found["d_roll"], found["d_pitch"], found["d_yaw"]) == (30, 46, 0)
+    assert (found["gyro_lpf1_dyn_min_hz"], found["dterm_lpf1_dyn_min_hz"]) == (0, 90)
+    assert found["angle_p_gain"] == 55
+    assert AUTOPILOTS["betaflight"].in_log({"rollPID": "45,80,40"}) == {"p_roll": 45, "i_roll": 80, "d_roll": 40}
+    assert AUTOPILOTS["px4"].in_log(named) == {}
 
 
 def test_the_error_of_an_attitude_is_the_rotation_to_the_asked_one():

@@ -81,3 +81,12 @@ def test_a_line_in_the_noise_is_found_beside_its_floor():
     quiet, loud = (noise.of_commands(AUTOPILOTS["px4"].law({"MC_ROLLRATE_K": k})) for k in (1.0, 2.0))
     assert loud[0] == pytest.approx(2 * quiet[0])
     assert noise_of([(time[:20], rate[:20])]) is None
+
+
+def test_a_log_that_pauses_is_as_noisy_as_before():
+    time, rng = np.arange(0, 10, 1 / 400), np.random.default_rng(1)
+    rate = 0.02 * rng.standard_normal((len(time), 3))
+    whole = noise_of([(time, rate)])
+    paused = noise_of([(time + 1e6 * (time > 5), rate)])
+    assert paused.density.mean() == pytest.approx(whole.density.mean(), rel=0.05)
+    assert noise_of([(np.zeros(len(time)), rate)]) is None
