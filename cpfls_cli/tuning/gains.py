@@ -105,6 +105,7 @@ def tuned(
     hover: HoverPlant,
     asked: AskedMargins,
     noise: Noise | None = None,
+    before: Mapping[str, float] | None = None,
 ) -> Tuned:
     """Find the gains of all axes.
 
@@ -119,14 +120,16 @@ def tuned(
         All parameters, by name: filters and limits as they will be, gains as they are.
     noise : Noise or None
         None for white noise.
+    before : mapping of str to float or None
+        All parameters as they fly today, whose jitter counts; None: `values`.
     """
-    before = autopilot.law(values)
+    today = autopilot.law(values if before is None else before)
     whole = dict(values) | {each.name: 1.0 for each in autopilot.parameters if each.role.endswith(".k")}
     law = autopilot.law(whole)
     wanted: dict[str, list[float]] = {}
     least, quieter = [], []
     for axis in range(len(AXES)):
-        search = _Search(law, axis, hover.corners(axis), asked.disk, noise, _LOUDER * _jitter(before, axis, noise))
+        search = _Search(law, axis, hover.corners(axis), asked.disk, noise, _LOUDER * _jitter(today, axis, noise))
         found, held = search.found(autopilot)
         least.append(held)
         quieter.append(_jitter(_with(law, axis, found), axis, noise) > _NEAR * search.loudest)
@@ -148,7 +151,7 @@ def with_filters(
     asked: AskedMargins,
     noise: Noise | None = None,
 ) -> Tuned:
-    """Find gains as `tuned`, and raise the low-passes of yaw alone where it lacks margin for them.
+    """Find gains as `tuned`, and raise the low-passes of yaw alone where it lacks margin or gets slower for them.
 
     Some come with cut-offs that suit heavy vehicles, and no gain makes up for what they are late.
     """
@@ -157,13 +160,27 @@ def with_filters(
     for _ in range(_RAISED):
         late = [each for role in _YAW_ALONE if (each := autopilot.by_role(role)) is not None]
         slow = [each for each in late if 0 < _valued(values, raised, each) < each.high]
-        if found.disk[2] >= _NEAR * asked.disk or not slow:
+        holds, turns = found.disk[2] >= _NEAR * asked.disk, _yaw_angle(autopilot, found)
+        if not slow or (holds and turns >= _yaw_angle(autopilot, values)):
             break
-        for each in slow:
-            raised[each.name] = proposal_of(each, min(2 * _valued(values, raised, each), each.high))
-        own = {**values, **{name: each.value for name, each in raised.items()}}
-        found = tuned(autopilot, own, hover, asked, noise)
+        more = raised | {
+            each.name: proposal_of(each, min(2 * _valued(values, raised, each), each.high)) for each in slow
+        }
+        own = {**values, **{name: each.value for name, each in more.items()}}
+        faster = tuned(autopilot, own, hover, asked, noise, values)
+        if holds and _yaw_angle(autopilot, faster) <= turns:
+            break
+        found, raised = faster, more
     return replace(found, proposals=[*found.proposals, *raised.values()])
+
+
+def _yaw_angle(autopilot: Autopilot, given: Tuned | Mapping[str, float]) -> float:
+    """Give how much rate an error of the yaw angle asks for, in the parameter's unit."""
+    angle = _parameter(autopilot, 2, "angle")
+    if angle is None:
+        return 0.0
+    values = {each.parameter.name: each.value for each in given.proposals} if isinstance(given, Tuned) else given
+    return values[angle.name]
 
 
 def _valued(values: Mapping[str, float], raised: Mapping[str, Proposal], parameter: Parameter) -> float:
