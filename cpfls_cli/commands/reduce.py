@@ -48,3 +48,10 @@ def _naming(flights: Sequence[Path]) -> Iterator[None]:
     except (ComputationError, ConfigError) as error:
         kind = ConfigError if isinstance(error, ConfigError) else ComputationError
         raise kind(f"{' '.join(str(path) for path in flights)}: {error}") from None
+    except np.linalg.LinAlgError:
+        # Numbers that a damaged file holds, of sizes that overflow in products.
+        names = " ".join(str(path) for path in flights)
+        raise ComputationError(
+            f"{names}: the regressor has numbers too far apart in size to choose samples; look at the flight's largest "
+            "values with `cpfls info`"
+        ) from None
