@@ -302,9 +302,7 @@ def _finite(row: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _parameters(
-    proposals: Sequence[Proposal], today: dict[str, float], names: Mapping[str, str]
-) -> ParametersGroup:
+def _parameters(proposals: Sequence[Proposal], today: dict[str, float], names: Mapping[str, str]) -> ParametersGroup:
     own = [each.parameter for each in proposals]
     high = np.array([each.high for each in own], dtype=float)
     return ParametersGroup(

@@ -85,8 +85,16 @@ def run(
     ]
     heard = None if noise is None else _heard(own, noise, work.lines, (chosen, values))
     made = GainsRecord.of(
-        own, model.name, asked, hover, sets, [each for each in proposals if _exists(each, today)], today, heard,
-        warnings, system,
+        own,
+        model.name,
+        asked,
+        hover,
+        sets,
+        [each for each in proposals if _exists(each, today)],
+        today,
+        heard,
+        warnings,
+        system,
     )
     suffix, text = parameter_file(made, job.output.name)
     file = job.output.with_suffix(suffix)
@@ -165,7 +173,9 @@ def _lacking(autopilot: Autopilot, today: Mapping[str, float], proposals: Sequen
     missing = [
         each.parameter.name
         for each in proposals
-        if today and each.parameter.name not in today and _exists(each, today)
+        if today
+        and each.parameter.name not in today
+        and _exists(each, today)
         and not (switched and ".notch" in each.parameter.role)
     ]
     if missing:
@@ -179,8 +189,8 @@ def _steps(autopilot: Autopilot, values: Mapping[str, float], today: Mapping[str
     """Say which rate of the law is assumed, where it is the gyroscope's and no log tells it."""
     if autopilot.by_role("loop.period") is not None and not today:
         yield (
-            f"{number(autopilot.law(values).rate_hz, 4)} steps of the law in a second are assumed; --flight LOG of your "
-            "vehicle tells them"
+            f"{number(autopilot.law(values).rate_hz, 4)} steps of the law in a second are assumed; a log of your "
+            "vehicle tells them (--flight)"
         )
 
 
@@ -236,9 +246,7 @@ class _Work:
         self.notes: list[str] = []
         self.spreads = self._spreads()
 
-    def proposed(
-        self, values: Mapping[str, float], today: Mapping[str, float]
-    ) -> tuple[list[Proposal], HoverPlant]:
+    def proposed(self, values: Mapping[str, float], today: Mapping[str, float]) -> tuple[list[Proposal], HoverPlant]:
         """Find gains with the thrust curve and the notches that go with them."""
         others = [*_curve(self.autopilot, self.model, self.study)]
         if self.lines and _follows(self.autopilot, today):

@@ -80,9 +80,9 @@ def _margins(record: GainsRecord, index: int) -> Table:
     caption = f"The least margins with {record.possible}, and how fast the best guess is."
     legend = (
         "Possible vehicles: the best guess, and the corners of the intervals that flights leave. dB and phase: what "
-        "the loop, cut at the command, bears of either alone. Disk: the phase that may be off while the gain is off by "
-        "as much, cut at the command or at the angle, the less. Angle: where it follows at half power. Overshoot, rise: "
-        "of a step."
+        "the loop, cut at the command, bears of either alone. Disk: the phase that may be off while the gain is off "
+        "by as much, cut at the command or at the angle, the less. Angle: where it follows at half power. Overshoot, "
+        "rise: of a step."
     )
     return Table(f"gains-margins-{index}", caption, header, rows, frozenset({0, 1}), legend=legend)
 

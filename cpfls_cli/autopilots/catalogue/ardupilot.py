@@ -98,13 +98,16 @@ ARDUPILOT = Autopilot(
         Parameter("INS_HNTCH_FREQ", "all.measured.notch", 80.0, 10.0, 495.0, "its centre", "Hz", step=1.0),
         Parameter("INS_HNTCH_BW", "all.measured.notch_width", 40.0, 5.0, 250.0, "its width", "Hz", step=1.0),
         Parameter(
-            "INS_HNTCH_HMNCS", "all.measured.notch_harmonics", 3.0, 0.0, 65535.0, "1 for a notch at its centre alone",
+            "INS_HNTCH_HMNCS",
+            "all.measured.notch_harmonics",
+            3.0,
+            0.0,
+            65535.0,
+            "1 for a notch at its centre alone",
             step=1.0,
         ),
         Parameter("INS_HNTCH_MODE", "all.measured.notch_mode", 1.0, 0.0, 5.0, "0 for a notch that stays", step=1.0),
-        Parameter(
-            "INS_HNTCH_REF", "all.measured.notch_follows", 0.0, 0.0, 1.0, "0 for a notch that stays", step=0.01
-        ),
+        Parameter("INS_HNTCH_REF", "all.measured.notch_follows", 0.0, 0.0, 1.0, "0 for a notch that stays", step=0.01),
         Parameter(
             "SCHED_LOOP_RATE", "loop.rate", 400.0, 50.0, 400.0, "steps of the rate control in a second", "Hz", step=1.0
         ),

@@ -59,7 +59,14 @@ BETAFLIGHT = Autopilot(
         *_axis("yaw", (45.0, 80.0, 0.0, 0.0)),
         Parameter("angle_p_gain", "tilt.angle", 50.0, 0.0, 200.0, "angle to rate in angle mode", "0.1/s", 0.1, 1.0),
         Parameter(
-            "iterm_limit", "all.integral_limit", 400.0, 0.0, 500.0, "most of the integral", scale=1 / _FULL, step=1.0
+            "iterm_limit",
+            "all.integral_limit",
+            400.0,
+            0.0,
+            500.0,
+            "most of the integral; since 2025.12 a share of the command's",
+            scale=1 / _FULL,
+            step=1.0,
         ),
         Parameter(
             "pidsum_limit",
@@ -110,11 +117,24 @@ BETAFLIGHT = Autopilot(
             step=1.0,
         ),
         Parameter(
-            "pid_process_denom", "loop.every", 2.0, 1.0, 16.0, "samples of the gyroscope for a step of the law", step=1.0
+            "pid_process_denom",
+            "loop.every",
+            2.0,
+            1.0,
+            16.0,
+            "samples of the gyroscope for a step of the law",
+            step=1.0,
         ),
         Parameter(
-            "looptime", "loop.period", 125.0, 31.0, 1000.0, "from sample to sample of the gyroscope, as logs tell it",
-            "us", 1e-6, 1.0,
+            "looptime",
+            "loop.period",
+            125.0,
+            31.0,
+            1000.0,
+            "from sample to sample of the gyroscope, as logs tell it",
+            "us",
+            1e-6,
+            1.0,
         ),
         Parameter("thrust_linear", "motors.expo", 0.0, 0.0, 150.0, "thrust curve of the motors", "%", 0.01, 1.0),
     ),

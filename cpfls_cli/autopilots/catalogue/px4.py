@@ -76,7 +76,14 @@ PX4 = Autopilot(
         ),
         Parameter("IMU_GYRO_NF1_BW", "all.measured.notch2_width", 20.0, 0.0, 100.0, "its width", "Hz", step=1.0),
         Parameter(
-            "IMU_GYRO_RATEMAX", "loop.rate", 400.0, 100.0, 2000.0, "steps of the rate control in a second", "Hz", step=1.0
+            "IMU_GYRO_RATEMAX",
+            "loop.rate",
+            400.0,
+            100.0,
+            2000.0,
+            "steps of the rate control in a second",
+            "Hz",
+            step=1.0,
         ),
         Parameter("THR_MDL_FAC", "motors.expo", 0.0, 0.0, 1.0, "thrust curve of the motors", step=0.01),
         Parameter("MPC_THR_HOVER", "motors.hover", 0.5, 0.1, 0.8, "thrust that hovers", step=0.01),
