@@ -27,38 +27,23 @@ def _axis(axis: str, letters: str, limit: str, gains: tuple[float, ...], filters
         ),
         Parameter(f"{rate}_FF", f"{axis}.ff", 0.0, 0.0, 0.5, f"{loop}, feedforward", "s"),
         Parameter(f"{rate}_IMAX", f"{axis}.integral_limit", 0.5, 0.0, 1.0, f"{loop}, most of the integral", step=0.01),
-        Parameter(
-            f"{rate}_FLTT",
-            f"{axis}.target.first",
-            target,
-            1.0 if yaw else 5.0,
-            50.0 if yaw else 100.0,
-            f"{loop}, low-pass of the target",
-            "Hz",
-            step=0.1,
-            absent=0.0,
-        ),
-        Parameter(
-            f"{rate}_FLTE",
-            f"{axis}.error.first",
-            error,
-            0.0,
-            20.0 if yaw else 100.0,
-            f"{loop}, low-pass of the error",
-            "Hz",
-            step=0.1,
-            absent=0.0,
-        ),
-        Parameter(
-            f"{rate}_FLTD",
-            f"{axis}.slope.first",
-            slope,
-            5.0,
-            50.0 if yaw else 100.0,
-            f"{loop}, low-pass of the derivative",
-            "Hz",
-            step=0.1,
-            absent=0.0,
+        *(
+            # Until 3.6 logs have one of them only.
+            Parameter(
+                f"{rate}_{name}",
+                f"{axis}.{role}.first",
+                own,
+                *ends,
+                f"{loop}, low-pass of the {what}",
+                "Hz",
+                step=0.1,
+                absent=0.0,
+            )
+            for name, role, own, ends, what in (
+                ("FLTT", "target", target, (1.0, 50.0) if yaw else (5.0, 100.0), "target"),
+                ("FLTE", "error", error, (0.0, 20.0 if yaw else 100.0), "error"),
+                ("FLTD", "slope", slope, (5.0, 50.0 if yaw else 100.0), "derivative"),
+            )
         ),
         Parameter(
             limit,
