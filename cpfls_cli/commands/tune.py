@@ -149,7 +149,7 @@ def _todays(autopilot: Autopilot, logs: Sequence[_Log]) -> tuple[_Log | None, li
             return log, refused
     if not logs:
         return None, []
-    beside = f"the defaults of {firmware.title} stand beside"
+    beside = f"the defaults of {firmware.title} stand beside, and the file is for that version"
     return None, [*refused, beside if refused else f"no log tells gains of {autopilot.title}; {beside}"]
 
 
