@@ -9,10 +9,12 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
+from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.next_flight.logged import Logging, planned_signals
 from cpfls_cli.gap.next_flight.room import HarmonicPath, Room
-from cpfls_cli.gap.next_flight.separation import Answer, Evidence, Question, gathered, judged, shared_noise
+from cpfls_cli.gap.next_flight.separation import Answer, Evidence, Question, answered, shared_noise
 from cpfls_cli.rounding import ascending, less
 from cpfls_cli.weak_form.windows import windows
 
@@ -24,12 +26,6 @@ _LONGER, _SHORTER = 1.5, 0.9
 _ONE_AXIS, _ANEW = 0.5, 0.2
 """Shares of the trials that change one axis only, and of those the ones that draw it anew."""
 
-_HOPELESS = 0.01
-"""Share of enough below which a question hardly counts any more: no path may be able to tell."""
-
-# Size in m and rad, and duration in s, of a flight that nobody flies.
-_A_LITTLE, _A_WHILE = 0.01, 2.0
-
 
 @dataclass(frozen=True)
 class Goal:
@@ -38,7 +34,7 @@ class Goal:
     Attributes
     ----------
     known : tuple of Evidence
-        What the flights already flown say on each question; no rows without such flights.
+        What the flights already flown say on each question; no blocks without such flights.
     noise : float
         See `shared_noise`.
     """
@@ -49,35 +45,39 @@ class Goal:
     logging: Logging
     noise: float
 
-    def answers(self, signals: Signals | None, again: int = 1) -> tuple[Answer, ...]:
-        """Judge what the known flights, each taken `again` times, say together with one along given signals."""
-        flights = [] if signals is None else [self.logging.weak(signals)]
-        answers = []
-        for question, known in zip(self.questions, self.known, strict=True):
-            fresh, columns = gathered(question, flights or [self._empty()], self.logging.floor)
-            both = known.taken(again)
-            answers.append(judged(both + fresh if flights else both, columns, self.noise))
-        return tuple(answers)
+    def answers(self, signals: Signals | None) -> tuple[Answer, ...]:
+        """Judge what the known flights say together with one along given signals; None: with themselves once more."""
+        if signals is None:
+            evidence = [known.beside(known) for known in self.known]
+        else:
+            there = [self.logging.weak(signals)]
+            fresh = [self.logging.gathered(each, there) for each in self.questions]
+            evidence = [one.beside(known) for one, known in zip(fresh, self.known, strict=True)]
+        of_effect: dict[str, list[int]] = {}
+        for index, question in enumerate(self.questions):
+            of_effect.setdefault(question.true.candidate.effect.name, []).append(index)
+        answers = {
+            index: answer
+            for asked in of_effect.values()
+            for index, answer in zip(asked, answered([evidence[each] for each in asked], self.noise), strict=True)
+        }
+        return tuple(answers[index] for index in range(len(self.questions)))
 
     def score(self, path: HarmonicPath) -> float:
-        """Score a path: harmonic mean over the questions of what it tells, 1 for just enough; the worst counts most."""
+        """Score a path: logarithm of one over how likely a wrong set is after it, on average over the true ones."""
         answers = self.answers(planned_signals(self.room.planned(path), self.room, self.logging))
-        return 1 / float(np.mean([1 / (answer.apart / answer.enough + _HOPELESS) for answer in answers]))
-
-    def _empty(self) -> WeakFlight:
-        """Give any flight that moves a little, for the places of the columns."""
-        shaken = np.full((4, 1), _A_LITTLE)
-        path = HarmonicPath(np.zeros(4), np.ones((4, 1), dtype=int), shaken, shaken, _A_WHILE)
-        return self.logging.weak(planned_signals(self.room.planned(path), self.room, self.logging))
+        effects = {question.true.candidate.effect.name for question in self.questions}
+        return float(np.log(len(effects) / sum(answer.likely for answer in answers)))
 
     def known_from(self, question: Question, flights: Sequence[WeakFlight]) -> Evidence:
         """Gather what the flights already flown say; nothing where they lack a signal of an effect in question."""
+        if not flights:
+            return Evidence.none(0)
         rival = [] if question.rival is None else [question.rival]
         effects = [question.true.candidate.effect, *rival, *(each.candidate.effect for each in question.besides)]
-        seen = all(any(not effect.missing(flight.signals) for flight in flights) for effect in effects)
-        if flights and seen:
-            return gathered(question, flights, self.logging.floor)[0]
-        return gathered(question, [self._empty()], self.logging.floor)[0].taken(0)
+        if all(any(not effect.missing(flight.signals) for flight in flights) for effect in effects):
+            return self.logging.gathered(question, flights)
+        return Evidence.none(1 + int(block_index(system(flights), self.logging.settings).max()))
 
 
 def goal(questions: Sequence[Question], flights: Sequence[WeakFlight], room: Room, logging: Logging) -> Goal:
