@@ -110,14 +110,18 @@ class QuestionGroup:
     true: tuple[str, ...] = dataset("effect that is taken to be there", "question")
     rival: tuple[str, ...] = dataset("effect that it is told from; empty: from no effect at all", "question")
     size: tuple[str, ...] = dataset("numbers of the effect that is there", "question")
-    likely: Array = dataset("how likely the rival is expected to be after this flight, if the effect is there", "question")
+    likely: Array = dataset(
+        "how likely the rival is expected to be after this flight, if the effect is there", "question"
+    )
     likely_flown: Array = dataset(
         "the same along the path that the autopilot of `simulation.closed_loop` flies", "question", gaps=True
     )
-    sure: Array = dataset("probability that the flight settles it: that the rival is rare beside the effect", "question")
+    sure: Array = dataset(
+        "probability that the flight settles it: that the rival is rare beside the effect", "question"
+    )
     flown: Array = dataset("`sure` along the path that the autopilot flies", "question", gaps=True)
     again: Array = dataset("`sure` where the known flights are flown again instead", "question", gaps=True)
-    random: Array = dataset("`sure` of the median of random paths within the same limits", "question")
+    random: Array = dataset("`sure` of a middling one of random paths within the same limits", "question")
     least: Array = dataset("share of the size from which on it is settled; nan where no size is", "question", gaps=True)
     smallest: tuple[str, ...] = dataset(
         "the numbers at that share; empty where there is none, or shapes alone size the effect", "question"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
 
 import numpy as np
 
@@ -206,7 +205,7 @@ def _told(study: Study, asked: Goal, flight: NextFlight, planned: Trajectory) ->
     """Judge the path that was found, as planned and as flown, beside other flights."""
     room, logging = asked.room, asked.logging
     answers = asked.answers(planned_signals(planned, room, logging))
-    others = [asked.answers(planned_signals(room.planned(path), room, logging)) for path in flight.random]
+    usual = asked.answers(planned_signals(room.planned(flight.random[len(flight.random) // 2]), room, logging))
     again = asked.answers(None)
     flown, notes = _flown(study, asked, planned)
     names = [(each.true.candidate.effect.name, each.rival.name if each.rival else "") for each in asked.questions]
@@ -219,7 +218,7 @@ def _told(study: Study, asked: Goal, flight: NextFlight, planned: Trajectory) ->
         likely_flown=np.array([each.likely if each else np.nan for each in flown]),
         flown=np.array([each.sure if each else np.nan for each in flown]),
         again=np.array([each.sure if len(each.evidence.gram) else np.nan for each in again]),
-        random=np.array([median(of_path[row].sure for of_path in others) for row in range(len(names))]),
+        random=np.array([each.sure for each in usual]),
         least=np.array([each.least_size for each in answers]),
         smallest=tuple(_smallest(*pair) for pair in zip(asked.questions, answers, strict=True)),
         advice=tuple(advice_words(CATALOGUE[true], CATALOGUE.get(rival)) for true, rival in names),

@@ -14,8 +14,6 @@ from cpfls_cli.report.content import Block, Folded, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, number, whole_percent
 from cpfls_cli.words import joined
 
-_RARE = 0.001
-
 
 def size_words(effect: Effect, values: Mapping[str, float]) -> str:
     """Write the numbers of an effect that are not zero."""
@@ -38,7 +36,7 @@ def notes_blocks(notes: Sequence[str]) -> Iterator[Block]:
 def question_blocks(name: str, asked: QuestionGroup) -> Iterator[Block]:
     """Say what a flight will tell and how sure, beside other flights, and what to do with it."""
     worst = float(np.nanmin(np.minimum(asked.sure, np.where(np.isnan(asked.flown), 1.0, asked.flown))))
-    told, right = _told(asked), f"{_percent(worst)} of such flights"
+    told, right = _told(asked), f"{whole_percent(worst)} of such flights"
     if asked.settled:
         yield Text(f"This flight tells {told}: it settles each in {right} or more.", "good")
     else:
@@ -48,7 +46,9 @@ def question_blocks(name: str, asked: QuestionGroup) -> Iterator[Block]:
             "warning",
         )
     for true, (own, rivals) in asked.expected(asked.likely).items():
-        after = ", ".join(f"{each or 'none'} {_percent(likely)}" for each, likely in ({true: own} | rivals).items())
+        after = ", ".join(
+            f"{each or 'none'} {whole_percent(likely)}" for each, likely in ({true: own} | rivals).items()
+        )
         yield Text(f"Expected after this flight: {after}, if it is {true}.")
     yield _table(name, asked)
     yield Folded("what each outcome will mean", list(_meaning(asked)), shown=True)
@@ -60,11 +60,6 @@ def _meaning(asked: QuestionGroup) -> Iterator[Text]:
         "Fly it, then diagnose it together with the flights so far, the new one among those that train: cpfls gap "
         "CONFIG FLIGHT... NEW-FLIGHT --held-out FLIGHT -o FOLDER"
     )
-
-
-def _percent(share: float) -> str:
-    """Write a probability in per cent; what is nearly sure is not called sure."""
-    return f"{100 * (1 - _RARE):g} %" if share > 1 - _RARE else whole_percent(share)
 
 
 def _told(asked: QuestionGroup) -> str:
@@ -82,15 +77,15 @@ def _table(name: str, asked: QuestionGroup) -> Table:
         [
             row["true"],
             row["rival"] or "nothing",
-            *(UNKNOWN if np.isnan(row[key]) else _percent(row[key]) for key in shares),
+            *(UNKNOWN if np.isnan(row[key]) else whole_percent(row[key]) for key in shares),
         ]
         for row in rows_of(asked)
     ]
     caption = "How this flight, with those that are there, tells what is true."
     legend = (
         "The probability that the flight settles it: that the other one is then less than a hundredth as likely. "
-        "Beside it the same along the path that the autopilot of simulation.closed_loop flies, of the median of random flights in the "
-        "same room, and of the known flights flown once more."
+        "Beside it the same along the path that the autopilot of simulation.closed_loop flies, of a middling one of "
+        "random flights in the same room, and of the known flights flown once more."
     )
     return Table(name, caption, header, rows, frozenset({0, 1}), legend=legend)
 

@@ -14,17 +14,9 @@ from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.next_flight.logged import Logging, planned_signals
 from cpfls_cli.gap.next_flight.room import HarmonicPath, Room
-from cpfls_cli.gap.next_flight.separation import Answer, Evidence, Question, answered, shared_noise
+from cpfls_cli.gap.next_flight.separation import DRAWS, FEW_DRAWS, Answer, Evidence, Question, answered, shared_noise
 from cpfls_cli.rounding import ascending, less
 from cpfls_cli.weak_form.windows import windows
-
-# Shares of a path by which it is changed: first by what makes another one of it, then by what still shows.
-_FIRST_STEP, _SMALLEST_STEP = 0.3, 0.02
-_LONGER, _SHORTER = 1.5, 0.9
-"""Of the step after a success and a failure: in balance where one trial in five succeeds."""
-
-_ONE_AXIS, _ANEW = 0.5, 0.2
-"""Shares of the trials that change one axis only, and of those the ones that draw it anew."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +37,7 @@ class Goal:
     logging: Logging
     noise: float
 
-    def answers(self, signals: Signals | None) -> tuple[Answer, ...]:
+    def answers(self, signals: Signals | None, draws: int = DRAWS) -> tuple[Answer, ...]:
         """Judge what the known flights say together with one along given signals; None: with themselves once more."""
         if signals is None:
             evidence = [known.beside(known) for known in self.known]
@@ -59,13 +51,15 @@ class Goal:
         answers = {
             index: answer
             for asked in of_effect.values()
-            for index, answer in zip(asked, answered([evidence[each] for each in asked], self.noise), strict=True)
+            for index, answer in zip(
+                asked, answered([evidence[each] for each in asked], self.noise, draws), strict=True
+            )
         }
         return tuple(answers[index] for index in range(len(self.questions)))
 
     def score(self, path: HarmonicPath) -> float:
         """Score a path: logarithm of one over how likely a wrong set is after it, on average over the true ones."""
-        answers = self.answers(planned_signals(self.room.planned(path), self.room, self.logging))
+        answers = self.answers(planned_signals(self.room.planned(path), self.room, self.logging), FEW_DRAWS)
         effects = {question.true.candidate.effect.name for question in self.questions}
         return float(np.log(len(effects) / sum(answer.likely for answer in answers)))
 
@@ -117,8 +111,7 @@ def next_flight(
 ) -> NextFlight:
     """Search for the path that tells most.
 
-    The best of some random paths is changed at random as long as that helps, with a step that grows with success and
-    shrinks with failure.
+    The best of some random paths is changed at random as long as that helps, by steps that shrink to nothing.
 
     Parameters
     ----------
@@ -128,7 +121,7 @@ def next_flight(
     References
     ----------
     Atkinson and Fedorov 1975, The design of experiments for discriminating between two rival models, Biometrika 62
-    (T-optimality). Rechenberg 1973 (the one-fifth rule).
+    (T-optimality).
     """
     settings, room = asked.room.settings.next_flight, asked.room
     total = settings.starts + settings.iterations
@@ -139,23 +132,21 @@ def next_flight(
         progress(number + 1, total, f"best random path {max(score for score, _ in scored):.3f}")
     scored = ascending(scored, lambda pair: pair[0])
     best, path = scored[-1]
-    history, step = [], _FIRST_STEP
+    history = []
     for number in range(settings.iterations):
-        trial = room.fitted(_changed(path, step, room, rng))
+        trial = room.fitted(_changed(path, 1 - number / settings.iterations, room, rng))
         score = asked.score(trial)
-        better = less(best, score)
-        step = min(max(step * (_LONGER if better else _SHORTER), _SMALLEST_STEP), 1.0)
-        best, path = (score, trial) if better else (best, path)
+        best, path = (score, trial) if less(best, score) else (best, path)
         history.append(best)
         progress(settings.starts + number + 1, total, f"best path {best:.3f}")
     return NextFlight(path, tuple(path for _, path in scored), np.array(history))
 
 
 def _changed(path: HarmonicPath, step: float, room: Room, rng: np.random.Generator) -> HarmonicPath:
-    """Change amplitudes in proportion to the velocities of their axes, of one axis or of all; or draw an axis anew."""
-    axes = np.arange(4)[:, None]
-    chosen = axes == rng.integers(4) if rng.random() < _ONE_AXIS else axes >= 0
-    if not chosen.all() and rng.random() < _ANEW:
+    """Change all axes, or one, in proportion to their velocities, or draw one anew: each as often."""
+    axes, kind = np.arange(4)[:, None], rng.integers(3)
+    chosen = axes == rng.integers(4) if kind else axes >= 0
+    if kind > 1:
         other = room.drawn(rng)
         pairs = ((getattr(other, name), getattr(path, name)) for name in ("order", "cosine", "sine"))
         order, cosine, sine = (np.where(chosen, anew, old) for anew, old in pairs)

@@ -1,14 +1,13 @@
-"""How well flights tell rivals apart: how likely each would be after them, by what it leaves of the one that is true."""
+"""How well flights tell rivals apart: how likely each is after them, by what it leaves of the one that is true."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.special import ndtr, ndtri
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
@@ -22,6 +21,8 @@ from cpfls_cli.rounding import ROUNDING
 from cpfls_cli.weak_form.windows import Windows
 
 _NOWHERE = np.zeros(0, dtype=int)
+DRAWS, FEW_DRAWS = 200, 8
+"""Draws of the noise for a probability to some per cent, and for comparing flights by the same draws."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,8 @@ class Evidence:
         Whether the rival has the coefficient 1.
     off : float
         What formulas are off by, see `formulas_off`.
+    known : int
+        Blocks, the first ones, that are flown already: their noise is what it is, and not drawn.
     """
 
     gram: Array
@@ -78,6 +81,7 @@ class Evidence:
     rivals: tuple[IntArray, ...]
     unit: bool
     off: float
+    known: int = 0
 
     @classmethod
     def none(cls, blocks: int) -> Evidence:
@@ -87,7 +91,8 @@ class Evidence:
     def beside(self, known: Evidence) -> Evidence:
         """Put blocks of other flights before these."""
         shape = (len(known.gram), *self.gram.shape[1:])
-        return replace(self, gram=np.concatenate([np.broadcast_to(known.gram, shape), self.gram]))
+        gram = np.concatenate([np.broadcast_to(known.gram, shape), self.gram])
+        return replace(self, gram=gram, known=len(known.gram))
 
     @cached_property
     def left(self) -> Array:
@@ -115,19 +120,22 @@ class Evidence:
         weight[free] -= vectors[:, kept] @ along / scale
         return np.asarray(np.maximum(np.einsum("i,bij,j->b", weight, self.gram, weight), 0.0))
 
-    def odds(self, size: float = 1.0, luck: float = 0.0) -> Array:
+    def odds(self, noise: float, draw: Array, size: float = 1.0) -> Array:
         """Compute the logarithm of the rival's predictive density less that of the true effect, shape (block,).
 
         Parameters
         ----------
+        noise : float
+            See `shared_noise`.
+        draw : array, shape (block,)
+            Of the noise in what the two differ by, in standard deviations.
         size : float
             Of the true effect, as a share of its own.
-        luck : float
-            What noise adds to the difference over all blocks; each has its part as its own noise is large.
         """
+        error = np.where(np.arange(len(self.left)) < self.known, 0.0, 2 * size * np.sqrt(noise * self.left))
+        more = size**2 * self.left + error * draw
         variance = NOISE + size**2 * (self.variance - NOISE)
-        lucky = luck * self.left / max(np.sqrt(self.left.sum()), ROUNDING)
-        return np.asarray(np.clip(-(0.5 * size**2 * self.left + size * lucky) / variance, np.log(RARE), -np.log(RARE)))
+        return np.asarray(np.clip(-0.5 * more / variance, np.log(RARE), -np.log(RARE)))
 
 
 def formulas_off(hypothesis: System, floor: Array) -> float:
@@ -195,6 +203,7 @@ class Answer:
     own: float
     likely: float
     sure: float
+    noise: float
 
     @property
     def settled(self) -> bool:
@@ -203,13 +212,18 @@ class Answer:
 
     @property
     def least_size(self) -> float:
-        """Share of the effect's size from which on noise leaves no rival, if linear in it; nan where no size is."""
-        found = _root(lambda size: _beaten(self.evidence.odds(size)), 0.0, 1 / np.sqrt(ROUNDING))
-        return found if np.isfinite(found) else np.nan
+        """Share of the effect's size from which on it is settled, if linear in it; nan where no size is."""
+
+        def beaten(size: float) -> float:
+            own, other = _tables([self.evidence], self.noise, FEW_DRAWS, size).mean(axis=0)
+            return float(np.log(RARE) - np.log(other / own))
+
+        largest = 1 / np.sqrt(ROUNDING)
+        return float(brentq(beaten, 0.0, largest)) if beaten(largest) > 0 else np.nan
 
 
-def answered(evidence: Sequence[Evidence], noise: float) -> list[Answer]:
-    """Foretell the table of how likely each set of effects is where one effect is true, on average over the noise.
+def answered(evidence: Sequence[Evidence], noise: float, draws: int = DRAWS) -> list[Answer]:
+    """Foretell the table of how likely each set of effects is where one effect is true, over draws of the noise.
 
     Parameters
     ----------
@@ -218,30 +232,21 @@ def answered(evidence: Sequence[Evidence], noise: float) -> list[Answer]:
     noise : float
         See `shared_noise`.
     """
-    lucks, weights = np.polynomial.hermite_e.hermegauss(3)
-    tables = [likely([each.odds(luck=np.sqrt(noise) * luck) for each in evidence]) for luck in lucks]
-    own, *others = (weights / weights.sum() @ np.array(tables)).tolist()
-    return [Answer(each, own, other, _sure(each, noise)) for each, other in zip(evidence, others, strict=True)]
+    tables = _tables(evidence, noise, draws)
+    own, *others = tables.mean(axis=0).tolist()
+    # What all draws say is not certain.
+    sure = (0.5 + (tables[:, 1:] < RARE * tables[:, :1]).sum(axis=0)) / (1 + draws)
+    return [
+        Answer(*each)
+        for each in zip(evidence, [own] * len(others), others, sure.tolist(), [noise] * len(others), strict=True)
+    ]
 
 
-def _sure(evidence: Evidence, noise: float) -> float:
-    """Compute the probability that the rival is beaten, to first order in the noise of all blocks together."""
-    # Beyond it a probability is rounding.
-    most = float(ndtri(1 - ROUNDING))
-    return float(ndtr(-_root(lambda luck: _beaten(evidence.odds(luck=np.sqrt(noise) * luck)), -most, most)))
-
-
-def _beaten(odds: Array) -> float:
-    """Compute by how much the logarithm of the odds of a rival is below that of rare ones; more is better."""
-    own, other = likely([odds])
-    return float(np.log(RARE) - np.log(other / own))
-
-
-def _root(of: Callable[[float], float], low: float, high: float) -> float:
-    """Find where a growing function passes zero; infinite where it does not reach it."""
-    if of(low) >= 0:
-        return -np.inf
-    return float(brentq(of, low, high)) if of(high) > 0 else np.inf
+def _tables(evidence: Sequence[Evidence], noise: float, draws: int, size: float = 1.0) -> Array:
+    """Draw how likely the true effect and each rival will be, shape (draw, 1 + rival); the same draws for all paths."""
+    rng, blocks = np.random.default_rng(0), len(evidence[0].gram)
+    drawn = rng.standard_normal((draws, len(evidence), blocks))
+    return np.array([likely([e.odds(noise, d, size) for e, d in zip(evidence, one, strict=True)]) for one in drawn])
 
 
 def shared_noise(windows: Windows) -> float:
