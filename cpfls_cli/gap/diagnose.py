@@ -120,12 +120,12 @@ def diagnose(
     prepared = Preparation(windows, model, settings, audited)
     flights = _Flights(prepared.repaired(training), prepared.logged(held), prepared.repaired(held))
     named = _named(flights, settings, rng, progress)
-    gusts, quiet, told = None, named.judge.floor, 0
+    gusts, quiet, told = None, named.judge.floor, -1
     if named.judge.remainder(named.judgement.found).unexplained:
         given = known_motion(training)
         gusts = _gusts(named, given, settings, rng)
         # Beside what is named then, more channels may turn out to be nothing but gusts.
-        while gusts is not None and gusts.told.sum() > told:
+        while gusts is not None and gusts.split.any() and gusts.told.sum() > told:
             told, quiet = int(gusts.told.sum()), np.minimum(quiet, gusts.noise(windows))
             flights = flights.in_air(gusts)
             named = _by_instruments(_named(flights, settings, rng, progress), given, settings)
@@ -188,8 +188,7 @@ class _Flights(NamedTuple):
 
     def in_air(self, gusts: Air) -> _Flights:
         """Give all of them the floor of their air."""
-        floor = gusts.floor(self.training[0].windows)
-        return _Flights(*(in_air(flights, floor) for flights in self))
+        return _Flights(*(in_air(flights, gusts.floor(self.training, flights)) for flights in self))
 
 
 class _Named(NamedTuple):
