@@ -269,8 +269,6 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings, *,
         names = {refused.name for refused in out}
         kept = [each for each in found.hypothesis.chosen if each.effect.name not in names]
         fit = fitted(judge.training, kept, judge.floor, settings)
-    if late:
-        return named._replace(judgement=judge.judge(found), refusals=refusals)
     found, alike = told_apart(found, named.effects, given, judge.floor, settings)
     return named._replace(judgement=judge.judge(found), refusals=refusals, alike=alike)
 
