@@ -409,8 +409,8 @@ def _concluded(
 
 
 def _late(judged: Sequence[JudgedEffect]) -> bool:
-    """Tell whether anything lies between command and rotors: in gusts its fits see the loop, and do not compare."""
-    return any(CATALOGUE[each.effect.name].actuation is not None for each in judged)
+    """Tell whether anything makes the rotors late: in gusts its fits see the loop, and do not compare."""
+    return any(CATALOGUE[each.effect.name].late for each in judged)
 
 
 def _pull(hypothesis: System, floor: Array) -> Array:
