@@ -22,7 +22,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, has_force
 from cpfls_cli.gap.balance.weak_flight import Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
-from cpfls_cli.gap.naming.by_instruments import by_instruments, told_apart, untold_actuation
+from cpfls_cli.gap.naming.by_instruments import by_instruments, may_be_nothing, told_apart, untold_actuation
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     impossible_ratios,
@@ -33,7 +33,7 @@ from cpfls_cli.gap.naming.causes import (
     wrong_numbers,
 )
 from cpfls_cli.gap.naming.confirmed import Judge, Judgement, differences
-from cpfls_cli.gap.naming.earned import NamedFit, Refusal, earned, fitted, nothing_by_size
+from cpfls_cli.gap.naming.earned import NamedFit, Refusal, earned, fitted
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.naming.leftover import Leftover, beside_the_unnamed, not_excited, untried
@@ -258,7 +258,10 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings, *,
     judge, refusals, fit = named.judge, list(named.refusals), named.judgement.found
     while True:
         found = by_instruments(fit, given, judge.floor, settings)
-        out = [Refusal(name, "judged by what instruments tell, it may be 0") for name in nothing_by_size(found)]
+        out = [
+            Refusal(name, "judged by what instruments tell, it may be 0")
+            for name in may_be_nothing(found, given, judge.floor, settings)
+        ]
         out += [
             Refusal(name, "a loop that answers gusts looks as late, and instruments do not tell which it is")
             for name in ([] if late else untold_actuation(fit, found))

@@ -65,14 +65,21 @@ class FoundGusts(GustRanges):
         known either.
     noise : array, shape (axis, 2)
         Variance of the white noise beside it, and of that which a derivative is taken of, as of samples.
-    foretold, foretold_error : array, shape (axis,)
-        Share of all that is left which instruments foretell, and its standard error; NaN without instruments.
+    foretold : array, shape (axis,)
+        Share of all that is left which instruments foretell; NaN without instruments.
+    foretold_without : array, shape (block, axis)
+        The same without each block, for its errors.
     """
 
     told_by: Told
     noise: Array
     foretold: Array
-    foretold_error: Array
+    foretold_without: Array
+
+    @property
+    def foretold_error(self) -> Array:
+        """Standard errors of the shares that are foretold, shape (axis,)."""
+        return jackknife_error(self.foretold_without)
 
     @property
     def gusts(self) -> Gusts | None:
@@ -221,21 +228,21 @@ def gusts_in(sides: Sequence[Array], given: Instruments, told_by: Told) -> Found
     shared = np.sqrt(2 * runs / (2 * runs - 1)) if told_by == "repeats" else 1.0
     axes = [_Axis(band, power, powers.pieces) for power in powers.power.swapaxes(0, 1)]
     columns = np.array([axis.bound() if told_by == "none" else axis.found(shared) for axis in axes])
-    foretold, error = _share_foretold(powers)
+    foretold, without = _share_foretold(powers)
     none = np.full(len(axes), np.nan) if told_by == "none" else 1.0
     ends = dict(zip(RANGES, columns.T[: len(RANGES)], strict=True))
-    shares = {"foretold": none * foretold, "foretold_error": none * shared * error}
+    shares = {"foretold": none * foretold, "foretold_without": none * (foretold + shared * (without - foretold))}
     return FoundGusts(**ends, told_by=told_by, noise=columns[:, len(RANGES) :], **shares)
 
 
 def _share_foretold(powers: _Powers) -> tuple[Array, Array]:
-    """Compute the shares of all that is left which instruments foretell, and their standard errors, shape (axis,)."""
+    """Compute the shares of all that is left which instruments foretell, shape (axis,), and without each block."""
     both = np.where(np.arange(powers.power.shape[2]) > 0, 2.0, 1.0)
     kept, whole = powers.power @ both, powers.whole @ both
     # An axis that a flight does not know has nothing that could be foretold.
     whole = np.where(whole.any(axis=0), whole, np.nan)
     without = 1 - (kept.sum(axis=0) - kept) / (whole.sum(axis=0) - whole)
-    return 1 - kept.sum(axis=0) / whole.sum(axis=0), jackknife_error(without)
+    return 1 - kept.sum(axis=0) / whole.sum(axis=0), without
 
 
 def _powers(sides: Sequence[Array], given: Instruments, band: _Band, told_by: Told) -> _Powers:

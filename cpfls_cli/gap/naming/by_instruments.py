@@ -13,14 +13,14 @@ from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.refine import fit_within_bounds, refined, shape_columns
-from cpfls_cli.gap.naming.earned import NamedFit, fitted
+from cpfls_cli.gap.naming.earned import NamedFit, fitted, nothing_by_size
 from cpfls_cli.gap.naming.estimate import Estimates, estimates_of
 from cpfls_cli.gap.naming.ranking import more_left, rank_effects, surely
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import information
 from cpfls_cli.gap.naming.search import alternative
 from cpfls_cli.gap.residual.air import foretold_rows
-from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.settings import CHANCE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
 
 _PER_WINDOW = 8
@@ -70,22 +70,69 @@ def by_instruments(found: NamedFit, given: Instruments, floor: Array, settings: 
     Söderström and Stoica 2002 (instrumental variables in closed loop); Staiger and Stock 1997 (weak instruments).
     """
     hypothesis, linear = found.hypothesis, found.estimates.linear
-    moving = _movable(hypothesis, floor)
-    runs = list(_runs(hypothesis, linear, given, floor, settings))
-    blocks = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(run.block for run in runs)]))
-    if len(blocks) < _FEWEST_BLOCKS:
+    crossed, moving = _products(found, given, floor, settings)
+    if len(crossed) < _FEWEST_BLOCKS:
         return found
-    crossed = np.array([sum(_crossed(run, run.block == block) for run in runs) for block in blocks])
-    moving &= _strength(crossed) > _STRONG
     kept = crossed[:, np.append(moving, False)][:, :, np.append(moving, True)]
     values, prior = np.concatenate([linear, hypothesis.shape_values]), _prior(hypothesis)[moving]
     whole = kept.sum(axis=0)
     change, *without = (_solved(sums, values[moving], prior) for sums in (whole, *(whole - kept)))
-    left_out = np.tile(values, (len(blocks), 1))
+    left_out = np.tile(values, (len(crossed), 1))
     left_out[:, moving] += without
     values[moving] += change
     there = hypothesis.with_shapes(values[len(linear) :]) if len(hypothesis.shapes) else hypothesis
     return NamedFit(there, found.block, _told(found, estimates_of(there, values, left_out), moving))
+
+
+def may_be_nothing(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> list[str]:
+    """Name the effects that may be 0 by what instruments tell.
+
+    Where an effect is 0, what is left without it does not go with what instruments know of it. That is asked at its
+    shapes instead of whether its numbers may be 0, which instruments may tell badly from each other: a drag from the
+    wind that it acts in. One that they do not tell is asked by its interval.
+
+    Parameters
+    ----------
+    found : NamedFit
+        By instruments.
+    given : Instruments
+        Of the same flights.
+    floor : array, shape (6,)
+
+    References
+    ----------
+    Anderson and Rubin 1949 (a test that weak instruments do not mislead); Hotelling 1931.
+    """
+    crossed, moving = _products(found, given, floor, settings)
+    nothing, places = nothing_by_size(found), {candidate.key: place for candidate, place in found.hypothesis.places}
+    values = np.append(found.estimates.linear, found.hypothesis.shape_values)
+    first, names = len(found.estimates.linear), []
+    for candidate in found.hypothesis.chosen:
+        shapes = slice(first, first := first + len(candidate.effect.shapes))
+        own = np.zeros_like(moving)
+        own[places.get(candidate.key, slice(0))] = True
+        own, others = own & moving, ~own & moving
+        others[shapes] = False
+        told = own.any() and len(crossed) >= _FEWEST_BLOCKS
+        absent = _chance(crossed, own, others, values) > CHANCE if told else candidate.effect.name in nothing
+        names += [candidate.effect.name] if absent else []
+    return names
+
+
+def _chance(crossed: Array, own: BoolArray, others: BoolArray, values: Array) -> float:
+    """Compute the probability of what instruments show of an effect if its own numbers are 0, others free."""
+    from scipy.special import fdtrc
+
+    scale = np.sqrt(np.maximum(np.abs(np.diagonal(crossed.sum(axis=0))), np.finfo(float).tiny))[:-1]
+    products = crossed[:, :-1, :-1] / np.outer(scale, scale)
+    right = crossed[:, :-1, -1] / scale + products[:, :, own] @ (values * scale)[own]
+    whole = products.sum(axis=0)
+    free = whole[np.ix_(others, others)]
+    left = right - products[:, :, others] @ np.linalg.solve(free, right.sum(axis=0)[others])
+    each = left[:, own] - left[:, others] @ np.linalg.solve(free.T, whole[np.ix_(own, others)].T)
+    blocks, count = each.shape
+    size = each.sum(axis=0) @ np.linalg.solve(np.atleast_2d(np.cov(each.T)), each.mean(axis=0))
+    return float(fdtrc(count, blocks - count, size * (blocks - count) / (count * (blocks - 1))))
 
 
 def untold_actuation(before: NamedFit, after: NamedFit) -> list[str]:
@@ -149,6 +196,24 @@ def _reproduced(found: NamedFit, given: Instruments, floor: Array, settings: Gap
             own = run.block == block
             total[block] = total.get(block, 0.0) + float((run.rows[own, :, -1] * run.known[own, :, -1]).sum())
     return np.array([total[block] for block in sorted(total)]) * (2 / _PER_WINDOW)
+
+
+def _products(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> tuple[Array, BoolArray]:
+    """Multiply what instruments know of each number, and of what is left, with what they move, by block.
+
+    Returns
+    -------
+    array, shape (block, number + 1, number + 1)
+    array of bool, shape (number,)
+        Of numbers that are free, and that instruments tell.
+    """
+    moving = _movable(found.hypothesis, floor)
+    runs = list(_runs(found.hypothesis, found.estimates.linear, given, floor, settings))
+    blocks = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(run.block for run in runs)]))
+    if len(blocks) < _FEWEST_BLOCKS:
+        return np.zeros((len(blocks), len(moving) + 1, len(moving) + 1)), moving
+    crossed = np.array([sum(_crossed(run, run.block == block) for run in runs) for block in blocks])
+    return crossed, moving & (_strength(crossed) > _STRONG)
 
 
 def _movable(hypothesis: System, floor: Array) -> BoolArray:

@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.gap.balance.balance_system import System, left_over
+from cpfls_cli.blocks import jackknife_error
+from cpfls_cli.gap.balance.balance_system import System, floors, left_over
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.residual.dependence import rank_dependence, state_signals, without_actuation
 from cpfls_cli.gap.residual.repeated import without_copies
-from cpfls_cli.gap.settings import CHANCE, COUNTS, ERRORS, GapSettings
+from cpfls_cli.gap.settings import COUNTS, ERRORS, RARE, GapSettings
 from cpfls_cli.playback.disturbance import FoundGusts, gusts_in
-from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.gusts import RANGES
 from cpfls_cli.playback.instruments import Instruments, Repeats, foretold, instruments, late, late_by
 from cpfls_cli.rounding import levelled
@@ -24,6 +25,9 @@ from cpfls_cli.weak_form.windows import Recording, Windows
 _FORETOLD = {"repeats": 1 / 2, "setpoints": 1 / 3, "none": 0.0}
 """Share of what is left that instruments may foretell, at 95 %, where it is called the air: the smaller part of it.
 Other runs show all that the vehicle does again, and a linear answer to setpoints about two thirds of it."""
+
+_HELD_M = 1.0
+"""How far a vehicle that holds its position may be blown; where the setpoint is left over from before, it flies on."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +82,14 @@ class Air:
 
 
 def known_motion(recordings: Sequence[Recording]) -> Instruments:
-    """Find what of flights was asked for from outside of their loops; a copy of a flight repeats none."""
-    given = instruments([LoggedFlight.of(each.name, each.signals).playback for each in recordings])
+    """Find what of flights was asked for from outside of their loops; a copy of a flight repeats none.
+
+    Flights that were asked to stay where they are, and did, were asked for nothing that moves.
+    """
+    flights = [LoggedFlight.of(each.name, each.signals).playback for each in recordings]
+    given = instruments(flights)
+    if given.kind == "none" and all(_held(flight) for flight in flights):
+        given = replace(given, setpoints=tuple(np.ones((len(run), 1)) for run in given.flown), names=("position",))
     different = set(without_copies(recordings))
     copies = {number for number, run in enumerate(given.runs) if run.flight not in different}
     beside = tuple(
@@ -88,6 +98,17 @@ def known_motion(recordings: Sequence[Recording]) -> Instruments:
     )
     likeness = {pair: alike for pair, alike in given.repeats.likeness.items() if copies.isdisjoint(pair)}
     return replace(given, repeats=Repeats(beside, likeness))
+
+
+def _held(flight: PlaybackFlight) -> bool:
+    """Tell whether a flight was asked to stay at one place all the time, and was never far from it."""
+    asked, position = flight.setpoints.get("position"), flight.motion.position
+    return (
+        asked is not None
+        and flight.has_position
+        and not np.ptp(asked, axis=0).any()
+        and bool(np.abs(position - np.median(position, axis=0)).max() < _HELD_M)
+    )
 
 
 def air(
@@ -126,14 +147,40 @@ def air(
     if found is None or bound is None:
         return None
     known = np.all([flight.known for flight in hypothesis.flights], axis=0)
-    told = known & np.isfinite(found.size) & (found.foretold + ERRORS * found.foretold_error < _FORETOLD[given.kind])
+    residual = hypothesis.left(linear)
+    sensors = floors(replace(hypothesis, flights=tuple(in_air(hypothesis.flights, np.zeros(6)))), linear)
+    moved = np.mean(about_flight_mean(residual, hypothesis.flight_index) ** 2, axis=0) / sensors**2
+    told = known & np.isfinite(found.size) & _gusty(found, np.where(known, moved, 0.0), _FORETOLD[given.kind])
     if given.kind == "setpoints" and told.any():
-        told &= _like_air(hypothesis, linear, block, given, settings, rng, told)
+        turns = residual[:, :3].any(axis=0)
+        everywhere = bool((np.isfinite(found.size[:3]) | ~turns).all())
+        told &= everywhere & _like_air(hypothesis, residual, block, given, settings, rng)
     # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
     sized = told | (given.kind == "repeats")
     parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in RANGES}
     parts = {name: np.where(known, values, np.nan) for name, values in parts.items()}
     return Air(replace(found, **parts), told, known & np.isfinite(found.size) & sized)
+
+
+def _gusty(found: FoundGusts, moved: Array, most: float) -> BoolArray:
+    """Mark channels of which instruments foretell surely less than a share, by themselves or with the others of a kind.
+
+    Air turns a vehicle about every axis, and pushes it along every one: what is sure of all torques or all forces is
+    believed of each of them of which it is more likely than not.
+
+    Parameters
+    ----------
+    moved : array, shape (6,)
+        Mean square of what is left, in squared floors of the sensors.
+    """
+    own = found.foretold + ERRORS * found.foretold_error < most
+    for kind in (slice(3), slice(3, 6)):
+        weight = np.where(np.isfinite(found.foretold[kind]), np.maximum(moved[kind] - 1, 0.0), 0.0)
+        weight /= max(weight.sum(), np.finfo(float).tiny)
+        share, without = (np.nan_to_num(each[..., kind]) @ weight for each in (found.foretold, found.foretold_without))
+        if weight.any() and share + ERRORS * jackknife_error(without) < most:
+            own[kind] |= found.foretold[kind] < most
+    return own
 
 
 def _seconds(flights: Sequence[WeakFlight]) -> float:
@@ -171,20 +218,18 @@ def foretold_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) -
 
 def _like_air(
     hypothesis: System,
-    linear: Array,
+    residual: Array,
     block: IntArray,
     given: Instruments,
     settings: GapSettings,
     rng: np.random.Generator,
-    told: BoolArray,
 ) -> BoolArray:
     """Mark channels of which the air is believed where setpoints do not foretell them.
 
     Setpoints foretell no effect that is not linear in what they ask for. So a channel may follow no curve of a signal,
-    as far as they foretell that; the air turns the vehicle about all axes; and it does so as much in gentle flight as
-    in fierce.
+    as far as they foretell that; and the air turns and pushes as much in gentle flight as in fierce.
     """
-    flights, residual = hypothesis.flights, hypothesis.left(linear)
+    flights = hypothesis.flights
     if [run.flight for run in given.runs] != list(range(len(flights))):
         return np.zeros(6, dtype=bool)
     states = [without_actuation(state_signals(*pair)) for pair in zip(flights, hypothesis.signals, strict=True)]
@@ -195,11 +240,8 @@ def _like_air(
     index = hypothesis.flight_index
     ranked = rank_dependence(residual, index, block, state, settings.shifts, rng)
     follows = [each.channel for each in ranked if each.p_value <= settings.significance and each.r2 > COUNTS]
-    like = told & ~np.isin(CHANNELS, follows)
-    turning = residual[:, :3].any(axis=0)
-    if not like[:3][turning].all() or _grows(residual[:, like], asked, index, block, settings.shifts, rng):
-        return np.zeros(6, dtype=bool)
-    return like
+    like = ~np.isin(CHANNELS, follows)
+    return like & (not _grows(residual[:, like], asked, index, block, settings.shifts, rng))
 
 
 def _grows(
@@ -215,7 +257,7 @@ def _grows(
     sizes, moves = (_ranks(np.array([each[block == own].mean(axis=0) for own in np.unique(block)])) for each in rows)
     alike = float((moves.T @ sizes).max(initial=0.0))
     chance = [float((moves.T @ rng.permutation(sizes)).max(initial=0.0)) for _ in range(shifts)]
-    return sum(each >= alike for each in chance) < CHANCE * (1 + shifts) - 1
+    return sum(each >= alike for each in chance) <= max(RARE * (1 + shifts) - 1, 0)
 
 
 def _ranks(values: Array) -> Array:

@@ -24,7 +24,7 @@ FOUND = FoundGusts(
     told_by="repeats",
     noise=np.zeros((6, 2)),
     foretold=np.full(6, 0.1),
-    foretold_error=np.full(6, 0.05),
+    foretold_without=np.full((9, 6), 0.1),
 )
 
 
