@@ -240,14 +240,13 @@ def _like_air(
     index = hypothesis.flight_index
     ranked = rank_dependence(residual, index, block, state, settings.shifts, rng)
     follows = [each.channel for each in ranked if each.p_value <= settings.significance and each.r2 > COUNTS]
-    like = ~np.isin(CHANNELS, follows)
-    return like & (not _grows(residual[:, like], asked, index, block, settings.shifts, rng))
+    return ~np.isin(CHANNELS, follows) & ~_growing(residual, asked, index, block, settings.shifts, rng)
 
 
-def _grows(
+def _growing(
     residual: Array, asked: Array, flight_index: IntArray, block: IntArray, shifts: int, rng: np.random.Generator
-) -> bool:
-    """Tell whether what is left surely grows with how much a signal moves, by ranks over blocks of time.
+) -> BoolArray:
+    """Mark channels of which what is left surely grows with how much a signal moves, by ranks over blocks of time.
 
     References
     ----------
@@ -255,9 +254,9 @@ def _grows(
     """
     rows = [about_flight_mean(values, flight_index) ** 2 for values in (residual, asked)]
     sizes, moves = (_ranks(np.array([each[block == own].mean(axis=0) for own in np.unique(block)])) for each in rows)
-    alike = float((moves.T @ sizes).max(initial=0.0))
-    chance = [float((moves.T @ rng.permutation(sizes)).max(initial=0.0)) for _ in range(shifts)]
-    return sum(each >= alike for each in chance) <= max(RARE * (1 + shifts) - 1, 0)
+    alike = (moves.T @ sizes).max(axis=0, initial=0.0)
+    chance = np.array([(moves.T @ rng.permutation(sizes)).max(initial=0.0) for _ in range(shifts)])
+    return np.asarray((chance[:, None] >= alike).sum(axis=0) <= max(RARE * (1 + shifts) - 1, 0))
 
 
 def _ranks(values: Array) -> Array:
