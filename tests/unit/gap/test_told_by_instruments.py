@@ -1,0 +1,81 @@
+"""What instruments say of an effect, and of what is left: whether it is 0, whether it is the air."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import ttest_1samp
+
+from cpfls_cli.blocks import jackknife_error
+from cpfls_cli.gap.naming.by_instruments import _chance
+from cpfls_cli.gap.residual.air import _growing, _gusty, _held
+
+BLOCKS, WINDOWS = 20, 12
+OWN, OTHER = np.array([True, False]), np.array([False, True])
+
+
+def crossed(values, rng):
+    """Products by block of two numbers that move alike, in gusts that the loop mixes into both."""
+    known = rng.standard_normal((BLOCKS, WINDOWS, 2)) @ np.array([[1.0, 0.8], [0.0, 0.6]])
+    gust = rng.standard_normal((BLOCKS, WINDOWS, 1))
+    moved = known + gust * [0.7, -0.5]
+    left = gust[..., 0]
+    rows = np.concatenate([moved, (left + moved @ np.array(values))[..., None]], axis=2)
+    known = np.concatenate([known, np.zeros((BLOCKS, WINDOWS, 1))], axis=2)
+    return np.einsum("bwk,bwl->bkl", known, rows)
+
+
+def test_what_is_nothing_is_taken_for_something_as_often_as_chance_does():
+    rng = np.random.default_rng(1)
+    # The other number is not 0, and refitted.
+    chances = np.array([_chance(crossed([0.0, 2.0], rng), OWN, OTHER, np.zeros(2)) for _ in range(400)])
+    assert 0.02 < (chances < 0.05).mean() < 0.09
+    assert 0.4 < chances.mean() < 0.6
+    assert _chance(crossed([2.0, 2.0], rng), OWN, OTHER, np.zeros(2)) < 1e-3
+
+
+def test_alone_it_is_a_test_of_means():
+    products = crossed([0.2, 0.0], np.random.default_rng(2))
+    nothing = np.zeros(2, dtype=bool)
+    expected = ttest_1samp(products[:, 0, -1], 0.0).pvalue
+    assert _chance(products, OWN, nothing, np.zeros(2)) == pytest.approx(expected)
+
+
+def shares(*foretold, scatter=0.0):
+    """Shares that are foretold of six channels, errors of one channel apart from those of others."""
+    without = np.tile(foretold, (18, 1))
+    for channel, each in enumerate(foretold):
+        without[3 * channel : 3 * channel + 3, channel] = each + scatter * np.array([-1.0, 1.0, 0.0])
+    return SimpleNamespace(
+        foretold=np.array(foretold), foretold_without=without, foretold_error=jackknife_error(without)
+    )
+
+
+def test_what_is_sure_of_all_torques_is_believed_of_each():
+    found = shares(0.0, 0.1, 0.2, 0.0, 0.4, 0.4, scatter=0.1)
+    assert not (found.foretold + 2 * found.foretold_error < 1 / 3)[2]
+    assert _gusty(found, np.full(6, 9.0), 1 / 3).tolist() == [True, True, True, True, False, False]
+    # The more of what is left lies where it is foretold, the less is believed of the others.
+    assert not _gusty(found, np.array([1.0, 1.0, 9.0, 1.0, 1.0, 1.0]), 1 / 3)[2]
+
+
+def test_what_grows_with_the_motion_is_no_air_in_its_own_channel():
+    rng = np.random.default_rng(3)
+    block = np.repeat(np.arange(24), 20)
+    speed = np.repeat(rng.uniform(0.2, 3.0, 24), 20)[:, None] * rng.standard_normal((480, 1))
+    left = rng.standard_normal((480, 6))
+    left[:, 4] *= np.abs(np.repeat(np.sqrt(np.bincount(block, speed[:, 0] ** 2) / 20), 20))
+    found = _growing(left, speed, np.zeros(480, dtype=int), block, 199, rng)
+    assert found.tolist() == [False, False, False, False, True, False]
+
+
+@pytest.mark.parametrize(
+    ("asked", "reach", "held"),
+    [([0.0, 0.0, 2.0], 0.3, True), ([0.0, 0.0, 2.0], 3.0, False), (None, 0.3, False)],
+    ids=["it stays", "it flies though the setpoint stands still", "nothing is known"],
+)
+def test_who_is_asked_to_stay_and_does_is_asked_for_nothing(asked, reach, held):
+    flown = reach * np.sin(np.linspace(0, 20, 200))[:, None] * [1.0, 0.5, 0.2] + [0.0, 0.0, 2.0]
+    setpoints = {} if asked is None else {"position": np.tile(asked, (200, 1))}
+    flight = SimpleNamespace(setpoints=setpoints, has_position=True, motion=SimpleNamespace(position=flown))
+    assert _held(flight) is held
