@@ -152,9 +152,9 @@ def air(
     moved = np.mean(about_flight_mean(residual, hypothesis.flight_index) ** 2, axis=0) / sensors**2
     told = known & np.isfinite(found.size) & _gusty(found, np.where(known, moved, 0.0), _FORETOLD[given.kind])
     if given.kind == "setpoints" and told.any():
-        turns = residual[:, :3].any(axis=0)
-        everywhere = bool((np.isfinite(found.size[:3]) | ~turns).all())
-        told &= everywhere & _like_air(hypothesis, residual, block, given, settings, rng)
+        sized, moves = np.isfinite(found.size), residual.any(axis=0)
+        blows = (sized | ~moves)[:3].all() and (sized[3:].any() or not moves[3:].any())
+        told &= blows & _like_air(hypothesis, residual, block, given, settings, rng)
     # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
     sized = told | (given.kind == "repeats")
     parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in RANGES}
