@@ -13,7 +13,7 @@ from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.diagnose import considered
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
-from cpfls_cli.gap.naming.scoring import REFUSED, candidates_of, normal_equations, score, scoring_matrix
+from cpfls_cli.gap.naming.scoring import candidates_of, normal_equations, score, scoring_matrix
 from cpfls_cli.weak_form.windows import common_windows
 
 
@@ -82,7 +82,7 @@ def _gains(flights, chosen, effects, settings):
     normal = normal_equations(arranged, hypothesis.residual, floor, block_index(hypothesis, settings))
     scored, _ = score(arranged, normal.beside(arranged.base), hypothesis)
     # The score is asked only which columns the bounds leave.
-    admitted = [each for each in scored if each.gain != REFUSED]
+    admitted = [each for each in scored if np.isfinite(each.gain)]
     matrix = arranged.matrix.reshape(-1, arranged.matrix.shape[2])
     right = (hypothesis.residual / floor).reshape(-1)
     least = _Normal(matrix, right)

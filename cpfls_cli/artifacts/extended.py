@@ -32,7 +32,7 @@ class LeftOutGroup:
         "root mean square of torque (x y z, N m) and force (x y z, N)", "left_out", "6", units="SI", frame=BODY
     )
     ends: Array = dataset(
-        "how far off half a second of playback ends without it: position (m), velocity (m/s), attitude (rad), body "
+        "how far off a free run of gap.horizon_s ends without it: position (m), velocity (m/s), attitude (rad), body "
         "rate (rad/s); NaN for what a flight does not show",
         "left_out",
         "4",

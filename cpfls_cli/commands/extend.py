@@ -103,5 +103,5 @@ def extended(
     require_body(extension.model, stated)
     played = played_pairs(held, whole, given, rates_fade(training, study.gap.horizon_s))
     playback = PlaybackChangeGroup.of_pairs(played, errors_by_horizon(played, study.gap.horizon_s))
-    missing = left_out(whole, whole.beside_table, held)
+    missing = left_out(whole, whole.beside_table, held, study.gap.horizon_s)
     return ExtendedRecord.of(extension, stated, whole, playback, missing)

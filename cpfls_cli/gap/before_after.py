@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, Preparation, weak_flight
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, Preparation, dense, weak_flight
 from cpfls_cli.gap.extended import ExtendedModel, plain
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.residual.repeated import ComesAgain, RepeatedRuns
@@ -24,10 +24,8 @@ from cpfls_cli.playback.replay import MODEL, STATED, Played, Replay, drawn_runs,
 from cpfls_cli.rounding import largest
 from cpfls_cli.weak_form.windows import Recording, Windows, common_windows
 
-# Samples between starts of free runs, which are alike.
 _EVERY = 5
-# Shown: two free runs of a second, which is when they part; an effect left out is measured where errors still add up.
-_STRETCH_S, _RUN_S, _LEFT_S = 2.0, 1.0, 0.5
+"""Samples between starts of free runs, which are alike."""
 
 
 @dataclass(frozen=True)
@@ -92,29 +90,33 @@ class LeftOut(NamedTuple):
     ends: Array
 
 
-def left_out(model: VehicleModel, names: Sequence[str], recordings: Sequence[Recording]) -> list[LeftOut]:
+def left_out(
+    model: VehicleModel, names: Sequence[str], recordings: Sequence[Recording], horizon_s: float
+) -> list[LeftOut]:
     """Play a model back along flights, as it is and without single effects.
 
     Parameters
     ----------
     names : sequence of str
         Of effects.
+    horizon_s : float, s
+        At which the ends of free runs are compared; errors still add up there.
 
     Raises
     ------
     InputError
         If a flight lacks a signal that an effect needs.
     """
-    return [_left_out(model, name, recordings) for name in names]
+    return [_left_out(model, name, recordings, horizon_s) for name in names]
 
 
-def _left_out(model: VehicleModel, name: str, recordings: Sequence[Recording]) -> LeftOut:
+def _left_out(model: VehicleModel, name: str, recordings: Sequence[Recording], horizon_s: float) -> LeftOut:
     others = tuple(effect for effect in model.effects if effect.name != name)
     squares, ends, runs, samples = np.zeros(6), np.zeros(4), 0, 0
     for pair in played_pairs(recordings, model, replace(model, effects=others)):
         difference = pair.model.wrench(pair.flight) - pair.stated.wrench(pair.logged)
         squares, samples = squares + (difference**2).sum(axis=0), samples + len(difference)
-        horizon = min(max(1, round(_LEFT_S / pair.flight.motion.period)), len(pair.flight) - 1)
+        horizon = min(max(1, round(horizon_s / pair.flight.motion.period)), len(pair.flight) - 1)
         starts = pair.flight.starts(horizon, _EVERY)
         both = [pair.runs(prediction, starts, horizon) for prediction in (MODEL, STATED)]
         off = np.where(pair.flight.shown, apart(*both), np.nan)
@@ -161,34 +163,35 @@ class WorstStretch:
     axis: int
 
 
-def worst_stretch(pairs: Sequence[PlayedPair]) -> WorstStretch:
-    """Find where free runs of the model as given, one second each and one after another, are farthest off.
+def worst_stretch(pairs: Sequence[PlayedPair], horizon_s: float, shown_s: float) -> WorstStretch:
+    """Find where free runs of the model as given, one after another, are farthest off.
+
+    Parameters
+    ----------
+    horizon_s, shown_s : float, s
+        Length of a run, and of all that are shown.
 
     Raises
     ------
     InputError
         If a flight is shorter than one run.
     """
-    samples = max(2, round(_RUN_S / pairs[0].flight.motion.period))
-    found = [_worst(index, pair, samples) for index, pair in enumerate(pairs)]
+    samples = max(2, round(horizon_s / pairs[0].flight.motion.period))
+    most = max(1, round(shown_s / horizon_s))
+    found = [_worst(index, pair, samples, most) for index, pair in enumerate(pairs)]
     return largest(found, lambda stretch: float(((stretch.before - stretch.measured) ** 2).mean()))
 
 
-def _worst(index: int, pair: PlayedPair, samples: int) -> WorstStretch:
+def _worst(index: int, pair: PlayedPair, samples: int, most: int) -> WorstStretch:
     starts = pair.flight.starts(samples - 1, samples)
     before = drawn_runs(pair.as_given, starts, samples - 1).model
     after = drawn_runs(pair, starts, samples - 1)
     square = ((before - after.measured) ** 2).sum(axis=1)
-    joined = min(len(starts), round(_STRETCH_S / _RUN_S))
+    joined = min(len(starts), most)
     begin = int(np.convolve(square.sum(axis=1), np.ones(joined), mode="valid").argmax())
     runs = slice(begin, begin + joined)
     axis = int(square[runs].sum(axis=0).argmax())
     return WorstStretch(index, int(starts[begin]), after.measured[runs], before[runs], after.model[runs], axis)
-
-
-# Shown around a stretch at least, and points in a window of a picture, which look like a curve.
-_SHORTEST_S = 4.0
-_PER_WINDOW = 16
 
 
 @dataclass(frozen=True)
@@ -283,7 +286,7 @@ def before_after(
         whiteness(unseen.after * unseen.known, index, stride),
         stride * windows.hop * windows.period,
         _picture(held, found[0], windows, model, settings),
-        worst_stretch(played),
+        worst_stretch(played, settings.horizon_s, settings.block_s),
         *_again(training, held, model, settings),
     )
 
@@ -306,16 +309,16 @@ def _picture(
     held: Sequence[Recording], stretch: GapStretch, windows: Windows, model: ExtendedModel, settings: GapSettings
 ) -> StretchCurves:
     channel = CHANNELS.index(stretch.channel)
-    dense = replace(windows, hop=max(1, len(windows.weight) // _PER_WINDOW))
+    close = dense(windows)
     recording = held[stretch.flight]
     raw, repaired = (
-        weak_flight(recording.name, signals, dense, model.base, settings.force, settings.axes)
+        weak_flight(recording.name, signals, close, model.base, settings.force, settings.axes)
         for signals in (recording.signals, model.repaired(recording.signals))
     )
-    time = dense.centres(recording.signals.time)
-    middle, half = 0.5 * (stretch.start_s + stretch.end_s), 0.5 * max(_SHORTEST_S, stretch.end_s - stretch.start_s)
+    time = close.centres(recording.signals.time)
+    middle, half = 0.5 * (stretch.start_s + stretch.end_s), 0.5 * max(settings.block_s, stretch.end_s - stretch.start_s)
     shown = np.abs(time - middle) <= half
     measured = repaired.averaged(repaired.inertial)[shown, channel]
-    logged = dense.average(raw.signals.wrench)[shown, channel]
+    logged = close.average(raw.signals.wrench)[shown, channel]
     after = measured - model.residual([repaired])[shown, channel]
     return StretchCurves(stretch.flight, stretch.channel, time[shown], measured, logged, after)

@@ -20,7 +20,7 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, has_force
-from cpfls_cli.gap.balance.weak_flight import Preparation, WeakFlight
+from cpfls_cli.gap.balance.weak_flight import TURNING, Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.by_instruments import by_instruments, may_be_nothing, told_apart, untold_actuation
 from cpfls_cli.gap.naming.causes import (
@@ -45,13 +45,6 @@ from cpfls_cli.gap.settings import NOISE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.windows import Recording, common_windows
-
-_EXCITED_FLOORS = 3.0
-"""Standard deviation of the inertial torque, in floors, above which a flight moves: a third of it is noise at most."""
-
-
-_OPEN = (GapVerdict.UNEXPLAINED, GapVerdict.PARTIAL)
-"""Verdicts that leave a gap, which may be that of another vehicle."""
 
 _FEWEST_COMPARED = 2
 """Training flights that the held-out ones are compared with: of one nobody knows what it differs by from the next."""
@@ -148,7 +141,9 @@ def diagnose(
     concluded = partial(_concluded, judged, faults, judgement, remainder)
     further = (notes, steps, excited, settings, torque_alone, audited, alike)
     diagnosis = concluded(differ, *further)
-    if diagnosis.verdict in _OPEN and (between := _changed_between(training, held)):
+    # A gap that is left may be that of another vehicle.
+    left = diagnosis.verdict in (GapVerdict.UNEXPLAINED, GapVerdict.PARTIAL)
+    if left and (between := _changed_between(training, held)):
         diagnosis = concluded(between, *further)
     return DiagnosisRun(diagnosis, gusts, audited, hypothesis, estimates, judgement.held_out)
 
@@ -279,7 +274,7 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings, *,
 def _excited(hypothesis: System, floor: Array) -> bool:
     """Tell whether anything moved enough to show a gap, above the floor of the sensors alone."""
     inertial = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
-    return bool((inertial[:, :3].std(axis=0) > _EXCITED_FLOORS * floor[:3]).any())
+    return bool((inertial[:, :3].std(axis=0) > TURNING * floor[:3]).any())
 
 
 def _doubts(unnamed: Sequence[str], judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[str]:

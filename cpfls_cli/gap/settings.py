@@ -29,14 +29,8 @@ VISIBLE = 0.3
 Beside noise it makes the channel 4 % larger; less than that floors are off by.
 """
 
-WORSE = 1.1
-"""Ratio of root mean squares from which on a channel got worse: halves of one flight differ by less."""
-
 ERRORS = 2.0
 """Standard errors by which a difference is sure, 95 % two-sided."""
-
-SURE = 3.0
-"""Standard errors by which one of several numbers is sure: three or four are asked, on few blocks."""
 
 COUNTS = 0.05
 """Share of a gap, in squares, from which on a part of it counts: an effect, a channel, what follows a signal."""

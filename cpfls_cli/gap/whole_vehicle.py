@@ -24,8 +24,6 @@ from cpfls_cli.simulation.model import late_effects
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
 
-_INERTIA, _COUPLING = slice(0, 3), slice(3, 6)
-
 
 def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings, inertia: Array | None = None) -> VehicleModel:
     """Turn a model with effects into that of a whole vehicle.
@@ -112,9 +110,9 @@ def _numbers(parameters: Array, vehicle: VehicleSettings, corrected: Array) -> t
     """Take the numbers that no inertia tensor holds: coupling of rates, scale of thrust, place of the sensor."""
     stated, refitted = np.array(vehicle.inertia_kg_m2[:3]), np.diag(corrected)
     kept = parameters.copy()
-    kept[_INERTIA] = 0.0
+    kept[:3] = 0.0
     # A coupling multiplies the mean of two moments of inertia, which are now the corrected ones.
-    kept[_COUPLING] *= [stated[list(pair)].sum() / refitted[list(pair)].sum() for pair in ((1, 2), (2, 0), (0, 1))]
+    kept[3:6] *= [stated[list(pair)].sum() / refitted[list(pair)].sum() for pair in ((1, 2), (2, 0), (0, 1))]
     return (ModelEffect(VEHICLE_NUMBERS.name, {}, kept),) if kept.any() else ()
 
 

@@ -27,7 +27,8 @@ from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.parameters import DRAG, INERTIA, LEARNED, LOG_INERTIA, FreeNumbers, blocks_of, needs_velocity
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_FEWEST_BLOCKS = 8
+ENOUGH_BLOCKS = 8
+"""Whose scatter tells an error by instruments."""
 _LONGEST_S = 8.0
 """Length from which on a run tells something in all bands."""
 _FLAT = 0.85
@@ -40,7 +41,7 @@ _LEAST = 1e-6
 """Of the power of a band that is never taken for what comes again."""
 _FARTHEST = 1.0
 """Natural sizes of a step."""
-_STRONG = 10.0
+STRONG = 10.0
 """F statistic of an instrument below which it is weak, and its interval no interval."""
 _APART = 3.0
 """Standard errors by which bands may differ on a moment of inertia."""
@@ -215,7 +216,7 @@ def find_constants(
     # Of drag factor and moment of inertia about yaw only the ratio is known: both would drift along it.
     held = {DRAG} if {DRAG, LOG_INERTIA[2]} <= set(free.index) else set()
     problem = _problem(setting, np.ones(len(balances.bands), dtype=bool), blocks, tried, held)
-    if len(problem.sums.crossed) < _FEWEST_BLOCKS:
+    if len(problem.sums.crossed) < ENOUGH_BLOCKS:
         return None
     for slowest in range(len(balances.bands_hz) - 1, 0, -1):
         faster = problem.bands.copy()
@@ -338,7 +339,7 @@ def _settled(
     problem = setting.problem(free, values, bands, held)
     absent = free.values({name: free.numbers[place].absent for name, place in free.index.items()})
     # The weakest first: apart from a number that nothing tells, nothing tells the others either.
-    while len(problem.places) and (strength := _f_statistics(problem)).min() < _STRONG:
+    while len(problem.places) and (strength := _f_statistics(problem)).min() < STRONG:
         weakest = int(problem.places[np.argmin(strength)])
         values[weakest] = absent[weakest]
         held = held | {free.numbers[weakest].name}
@@ -383,7 +384,7 @@ def _constants(problem: _Problem) -> Constants:
     """
     free, places, total = problem.free, problem.places, problem.weighed.sum(axis=0)
     told = np.zeros(len(free.numbers), dtype=bool)
-    told[places] = _f_statistics(problem) >= _STRONG
+    told[places] = _f_statistics(problem) >= STRONG
     if DRAG in problem.held and (yaw := free.index.get(LOG_INERTIA[2])) is not None:
         told[yaw] = False
     explained, error = _explained_in_all(problem)

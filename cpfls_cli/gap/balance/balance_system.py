@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Columns, Shape
@@ -17,12 +18,6 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 NEGLIGIBLE = 0.003
 """Share of the torque or force below which nobody could use a correction; sampling alone leaves about as much."""
-_QUIET_AXIS = 0.3
-"""Torque of the most active axis that counts on every axis: what is negligible about one is so about the others."""
-_SCATTERING = 0.2
-"""Share of its largest variance from which on a window is one that scatters."""
-_LEAST_RATIO = 1.5
-"""Mean square inside the scattering stretches over that outside from which scatter is believed."""
 
 
 @dataclass(frozen=True)
@@ -218,11 +213,9 @@ def left_over(hypothesis: System, number: int, coefficients: Array) -> Columns:
 
 
 def _activity(hypothesis: System) -> Array:
-    """Compute the root mean square of the inertial torque and force of each channel about its mean."""
+    """Compute the root mean square of inertial torque and force: what is negligible about one axis is so about all."""
     rows = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
-    torque = np.sqrt(np.mean(rows[:, :3] ** 2, axis=0))
-    weight = np.sqrt(np.mean(rows[:, 3:] ** 2))
-    return np.array([*np.maximum(torque, _QUIET_AXIS * torque.max()), *[weight] * 3])
+    return np.repeat([np.sqrt(np.mean(rows[:, kind] ** 2)) for kind in (slice(0, 3), slice(3, 6))], 3)
 
 
 def scatter_variance(hypothesis: System) -> Array:
@@ -262,7 +255,7 @@ def relative_scatter(hypothesis: System, linear: Array, floor: Array) -> float:
 
 
 def scatter_size(variance: Array, residual: Array, floor: Array) -> float:
-    """Estimate the relative scatter, one number for all channels, from the residual.
+    """Estimate the relative scatter, one number for all channels, by its likelihood in the residual.
 
     Parameters
     ----------
@@ -277,14 +270,24 @@ def scatter_size(variance: Array, residual: Array, floor: Array) -> float:
         Mean square of the relative scatter over a window; 0 where stretches that should scatter do not stand out.
     """
     expected = variance / floor**2
-    if not expected.any():
+    scatters = expected.any(axis=0)
+    if not scatters.any():
         return 0.0
-    square = (residual / floor) ** 2
-    inside = expected > _SCATTERING * expected.max(axis=0, initial=0.0, keepdims=True) * np.sign(expected.max(axis=0))
-    inside &= expected > 0
-    if not inside.any() or square[inside].mean() < _LEAST_RATIO * max(1.0, square[~inside].mean()):
-        return 0.0
-    return float(max(0.0, (square[inside] - 1).sum() / expected[inside].sum()))
+    expected, square = expected[:, scatters], (residual / floor)[:, scatters] ** 2
+
+    def beside(size: float) -> tuple[Array, float]:
+        """Give the shape of the variance, and its scale: what is left everywhere is no scatter."""
+        shape = 1 + size * expected
+        return shape, max(1.0, float(np.mean(square / shape)))
+
+    def unlikely(size: float) -> float:
+        shape, scale = beside(size)
+        return float(np.sum(np.log(shape * scale) + square / (shape * scale)))
+
+    most = float(np.max(square[expected > 0] / expected[expected > 0]))
+    size = float(minimize_scalar(unlikely, bounds=(0.0, most), method="bounded").x) if most > 0 else 0.0
+    # One number more has to be worth its while (Schwarz 1978).
+    return size * beside(size)[1] if unlikely(0.0) - unlikely(size) > np.log(square.size) else 0.0
 
 
 def window_noise(hypothesis: System, residual: Array, floor: Array) -> Array:

@@ -8,41 +8,27 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from scipy.optimize import least_squares, lsq_linear, minimize_scalar
+from scipy.optimize import lsq_linear, minimize_scalar
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.catalogue.parameter_error import Change, physical, too_light
 from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.gap.balance.balance_system import System, has_force, is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.rounding import at_most, levelled, smallest
+from cpfls_cli.rounding import ROUNDING, at_most, levelled, smallest
 
-# Of one shape between the neighbours of its grid point, to a thousandth of that; of all shapes from there.
-_EVALUATIONS = 14
-_JOINT_EVALUATIONS = 8
-# Of central differences, as a share of a shape: they are off by its square.
-_STEP = 1e-3
-# Gauss-Newton steps, which settle in two or three, and shares of one that are tried where it goes too far.
-_STEPS = 6
-_SHARES = (1.0, 0.5, 0.2)
-# Singular values, as a share of the largest, that are rounding.
-_LEAST_SIZE = 1e-9
 _MOST_NOISE = 0.5
 """Share of the squares of any combination of columns that is believed to be noise at most: beyond it, what is left of
 it is uncertain."""
 _SETTLED = 1e-2
 """Change of the sum of squares, in variances, below which a fit stands still: a tenth of a standard error."""
-_ON_BOUND = 1e-6
-"""Share of its range that a coefficient is from its bound at most to be on it."""
-_SEEN = 1.0
-"""Standard deviations by which a coefficient on its bound moves all windows together at least, if it is to be found."""
 
 
 def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> System:
     """Refine the shapes of the chosen effects by minimising the squared residual.
 
-    The newest shapes first, one by one between the points of their grids; then, where there are several, all together,
-    because a lag and a delay, say, trade with each other.
+    The newest shapes first, one by one between the points of their grids; then, where there are several, all together
+    (`refitted`), because a lag and a delay, say, trade with each other.
 
     Parameters
     ----------
@@ -62,7 +48,7 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     for index, shape in rounds * newest:
         best[index] = _improved(flights, best, index, shape, floor, rotor_wrench)
     hypothesis = system(flights, best)
-    return _together(hypothesis, floor, rotor_wrench) if len(hypothesis.shapes) > 1 else hypothesis
+    return refitted(hypothesis, floor) if len(hypothesis.shapes) > 1 else hypothesis
 
 
 @dataclass(frozen=True)
@@ -94,7 +80,7 @@ class Equations:
         length = np.linalg.norm(self.columns, axis=0)
         scale = np.where(length > 0, length, 1.0)
         triangle = np.asarray(np.linalg.qr(self.columns / scale, mode="r"))
-        inverse = np.linalg.pinv(triangle, rcond=_LEAST_SIZE) / scale[:, None]
+        inverse = np.linalg.pinv(triangle, rcond=ROUNDING) / scale[:, None]
         noise = self.noise[:, :-1] @ inverse
         share, axes = np.linalg.eigh(noise.T @ noise)
         return triangle * scale, inverse, np.maximum(share, 0.0), axes
@@ -115,6 +101,11 @@ class Equations:
         kept = np.sqrt(1.0 - self.trusted * share)
         right = inverse.T @ (self.columns.T @ self.right - self.trusted * (self.noise[:, :-1].T @ self.noise[:, -1]))
         return kept[:, None] * (axes.T @ triangle), axes.T @ right / kept
+
+    @property
+    def errors(self) -> Array:
+        """Standard errors of the coefficients, shape (column,)."""
+        return np.asarray(np.linalg.norm(self._apart[1], axis=1))
 
     def around(self, linear: Array, kept: BoolArray, moving: Array) -> Equations:
         """Subtract what coefficients explain, keep the columns of some, and add weighted columns without noise.
@@ -167,7 +158,7 @@ def _least_squares(matrix: Array, right: Array) -> Array:
     """Solve with columns brought to one length; a column of zeros gets the coefficient 0."""
     length = np.linalg.norm(matrix, axis=0)
     scale = 1.0 / np.where(length > 0, length, 1.0)
-    return np.asarray(np.linalg.lstsq(matrix * scale, right, rcond=_LEAST_SIZE)[0] * scale)
+    return np.asarray(np.linalg.lstsq(matrix * scale, right, rcond=ROUNDING)[0] * scale)
 
 
 def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = False) -> tuple[Array, BoolArray]:
@@ -192,28 +183,19 @@ def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = F
     least = np.zeros(3, dtype=bool)
     change = _change(hypothesis, length > 0, least if of_vehicle else None)
     at = np.linalg.lstsq(change.matrix, linear - change.offset, rcond=None)[0]
-    out = _unseen(hypothesis, change, length)
-    within = ((at >= change.low) & (at <= change.high)).all()
-    if within and not out.any() and _without_lever(hypothesis, linear) is None:
-        return linear, np.zeros(len(linear), dtype=bool)
+    out = np.zeros(len(linear), dtype=bool)
+    if ((at >= change.low) & (at <= change.high)).all() and _without_lever(hypothesis, linear, rows.errors) is None:
+        return linear, out
     columns, right = rows.root
     while True:
         at, linear = _bounded(columns, right, change, out)
-        leverless = _without_lever(hypothesis, linear)
+        leverless = _without_lever(hypothesis, linear, rows.errors)
         light = too_light(linear) & ~least if of_vehicle else least
         if leverless is None and not light.any():
             return linear, out | _held(change, at, least if of_vehicle else None)
         out |= leverless if leverless is not None else False
         least = least | light
         change = _change(hypothesis, length > 0, least if of_vehicle else None)
-
-
-def _unseen(hypothesis: System, change: Change, length: Array) -> BoolArray:
-    """Mark coefficients of effects that even on a bound would move all windows together by less than noise does."""
-    most = np.maximum(np.abs(change.low), np.abs(change.high))
-    unseen = np.where(np.isfinite(most), most, 1.0) * length < _SEEN
-    unseen[hypothesis.places[0][1]] = False
-    return np.asarray(unseen & np.isfinite(most) & (length > 0))
 
 
 def _bounded(root: Array, right: Array, change: Change, out: BoolArray) -> tuple[Array, Array]:
@@ -230,8 +212,7 @@ def _bounded(root: Array, right: Array, change: Change, out: BoolArray) -> tuple
 
 def _held(change: Change, at: Array, least: BoolArray | None) -> BoolArray:
     """Mark coefficients on a bound; on one of an axis' two bounds it is its coupling that gives way."""
-    near = _ON_BOUND * np.where(np.isfinite(change.high - change.low), change.high - change.low, 0.0)
-    held = change.matrix.any(axis=0) & ((at <= change.low + near) | (at >= change.high - near))
+    held = change.matrix.any(axis=0) & (at_most(at, change.low) | at_most(change.high, at))
     if least is not None:
         moments, couplings = held[:3], held[3:6]
         held[:6] = np.concatenate([moments & couplings | least, moments | couplings | least])
@@ -255,15 +236,15 @@ def _change(hypothesis: System, shown: BoolArray, least: BoolArray | None) -> Ch
     return change
 
 
-def _without_lever(hypothesis: System, linear: Array) -> BoolArray | None:
-    """Mark torques that are impossible beside the force of their effect; None if all are possible."""
+def _without_lever(hypothesis: System, linear: Array, errors: Array) -> BoolArray | None:
+    """Mark torques that are surely impossible beside the force of their effect; None if all are possible."""
     out = np.zeros(len(linear), dtype=bool)
     if not has_force(hypothesis.flights):
         return None
     for candidate, place in hypothesis.places:
         if candidate.effect.lever is not None:
             own = linear[place]
-            out[place] = ~candidate.effect.lever(own, np.zeros(len(own)), hypothesis.vehicle) & (own != 0)
+            out[place] = ~candidate.effect.lever(own, errors[place], hypothesis.vehicle) & (own != 0)
     return out if out.any() else None
 
 
@@ -301,19 +282,18 @@ def refitted(hypothesis: System, weight: Array) -> System:
     rotor_wrench = system(hypothesis.flights).rotor_wrench
     error = _squares(hypothesis, weight, rotor_wrench)
     low, high = np.array([shape.bounds(hypothesis.vehicle) for shape in hypothesis.shapes]).T
-    for _ in range(_STEPS):
-        step = _newton_step(hypothesis, weight / compensation(rotor_wrench, hypothesis.rotor_wrench), rotor_wrench)
-        for share in _SHARES:
-            ahead = hypothesis.with_shapes(np.clip(hypothesis.shape_values + share * step, low, high))
+    while True:
+        step, gain = _newton_step(hypothesis, weight, rotor_wrench)
+        # Half of a step that goes too far.
+        while gain >= _SETTLED:
+            ahead = hypothesis.with_shapes(np.clip(hypothesis.shape_values + step, low, high))
             left = _squares(ahead, weight, rotor_wrench)
-            if at_most(left, error):
+            if error - left >= _SETTLED:
                 break
+            step, gain = step / 2, gain / 2
         else:
             return hypothesis
-        hypothesis, gained, error = ahead, error - left, left
-        if gained < _SETTLED:
-            break
-    return hypothesis
+        hypothesis, error = ahead, left
 
 
 def _exact(hypothesis: System, weight: Array) -> System:
@@ -340,12 +320,17 @@ def _squares(hypothesis: System, weight: Array, rotor_wrench: Array) -> float:
     return float(((left / weight) ** 2).sum())
 
 
-def _newton_step(hypothesis: System, weight: Array, rotor_wrench: Array) -> Array:
-    """Solve for the change of the shapes, with the coefficients that no bound holds beside them, shape (shape,)."""
+def _newton_step(hypothesis: System, weight: Array, rotor_wrench: Array) -> tuple[Array, float]:
+    """Solve for the change of the shapes, with the coefficients that no bound holds beside them, shape (shape,).
+
+    With it what it takes off the squares where the residual is linear in them.
+    """
+    weight = weight / compensation(rotor_wrench, hypothesis.rotor_wrench)
     linear, held = fit_within_bounds(hypothesis, weight)
     shapes = shape_columns(hypothesis, linear, rotor_wrench)
     rows = equations(hypothesis, weight).around(linear, ~held, shapes / weight[..., None])
-    return np.asarray(rows.solve()[-shapes.shape[2] :])
+    step, (columns, right) = rows.solve(), rows.root
+    return step[-shapes.shape[2] :], float(right @ columns @ step)
 
 
 def _improved(
@@ -364,10 +349,9 @@ def _improved(
 
     value = candidate.shape[shape.name]
     bracket = _bracket(_steps(shape, value), value)
-    optimum = minimize_scalar(
-        error, bounds=bracket, method="bounded", options={"maxiter": _EVALUATIONS, "xatol": 1e-3 * np.ptp(bracket)}
-    )
-    return candidate.at({shape.name: float(optimum.x)})
+    between = minimize_scalar(error, bounds=bracket, method="bounded", options={"xatol": 1e-3 * np.ptp(bracket)})
+    # It comes near the ends of the bracket, where a bound may be, and never there.
+    return candidate.at({shape.name: smallest((float(between.x), *bracket), error)})
 
 
 def _in_deepest_valley(
@@ -402,25 +386,6 @@ def _bracket(grid: Sequence[float], value: float) -> tuple[float, float]:
     return float(grid[max(0, nearest - 1)]), float(grid[min(len(grid) - 1, nearest + 1)])
 
 
-def _together(hypothesis: System, floor: Array, rotor_wrench: Array) -> System:
-    """Move all shapes at once, within their bounds and for a few steps."""
-    low, high = np.array([shape.bounds(hypothesis.vehicle) for shape in hypothesis.shapes]).T
-
-    def error(shares: Array) -> Array:
-        return weighted_residual(hypothesis.with_shapes(low + shares * (high - low)), floor, rotor_wrench).reshape(-1)
-
-    optimum = least_squares(
-        error,
-        np.clip((hypothesis.shape_values - low) / (high - low), 1e-6, 1 - 1e-6),
-        bounds=(0.0, 1.0),
-        diff_step=[1e-3],
-        max_nfev=_JOINT_EVALUATIONS,
-        xtol=1e-4,
-        ftol=1e-5,
-    )
-    return hypothesis.with_shapes(low + optimum.x * (high - low))
-
-
 def shape_columns(hypothesis: System, linear: Array, rotor_wrench: Array | None = None) -> Array:
     """Differentiate what the hypothesis explains by each of its shapes, by central differences.
 
@@ -447,7 +412,8 @@ def shape_columns(hypothesis: System, linear: Array, rotor_wrench: Array | None 
         return left * after / before
 
     for number, unit in enumerate(np.eye(len(values))):
-        step = _STEP * (abs(values[number]) or 1.0)
+        # Central differences are off by its square, and by rounding over it.
+        step = np.finfo(float).eps ** (1 / 3) * (abs(values[number]) or 1.0)
         ahead, behind = (residual_at(values + change * unit) for change in (step, -step))
         columns[..., number] = (behind - ahead) / (2 * step)
     return columns

@@ -21,10 +21,11 @@ from cpfls_cli.gap.balance.noise_floor import channel_cut_offs, noise_floor
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.weak_form.windows import Recording, Windows
 
-_AXES = ("x", "y", "z")
-
-_TURNING = 4.0
+TURNING = 4.0
 """Inertial torque in floors from which on noise shrinks an inertia by less than a sixteenth."""
+
+PER_WINDOW = 8
+"""Windows that begin within one where what they see is followed in time: more than twice the fastest wave they pass."""
 
 CHANNELS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
 """Rows of the balance in each window, body axes, N m and N."""
@@ -162,7 +163,7 @@ def weak_flight(
     windows: Windows,
     model: InertiaModel | None,
     force: bool,
-    axes: Sequence[str] = _AXES,
+    axes: Sequence[str] = "xyz",
     floor: Array | None = None,
 ) -> WeakFlight:
     """Compute the inertial torque and force of a flight.
@@ -198,7 +199,7 @@ def _weak_flight(
     sides = rotation_balance(signals, model), translation_balance(signals) if with_force else Columns(nothing)
     momenta = [nothing if side.momentum is None else side.momentum for side in sides]
     inertial = Columns(np.concatenate([side.direct for side in sides], axis=1), np.concatenate(momenta, axis=1))
-    known = np.array([signals.torque is not None and axis in axes for axis in _AXES] + [with_force] * 3)
+    known = np.array([signals.torque is not None and axis in axes for axis in "xyz"] + [with_force] * 3)
     everything = np.ones(len(nuisance().effect.coefficients))
     cut_off = channel_cut_offs(signals, model is not None)
     flight = WeakFlight(name, signals, windows, inertial, known, everything, cut_off)
@@ -206,8 +207,13 @@ def _weak_flight(
         floor = noise_floor(flight.residual(signals), windows, cut_off)
     # Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to lose the noise
     # of the gyroscope, which is not what anybody asked.
-    turning = flight.averaged(inertial)[:, :3].std(axis=0) > _TURNING * floor[:3]
+    turning = flight.averaged(inertial)[:, :3].std(axis=0) > TURNING * floor[:3]
     return replace(flight, turns=shown(turning))
+
+
+def dense(windows: Windows) -> Windows:
+    """Let windows follow each other so closely that what they see can be followed in time."""
+    return replace(windows, hop=max(1, len(windows.weight) // PER_WINDOW))
 
 
 def columns_of(candidate: Candidate, signals: Signals) -> Columns:

@@ -13,6 +13,7 @@ from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.refine import fit_within_bounds, refined, shape_columns
+from cpfls_cli.gap.balance.weak_flight import PER_WINDOW, dense
 from cpfls_cli.gap.naming.earned import NamedFit, fitted, nothing_by_size
 from cpfls_cli.gap.naming.estimate import Estimates, estimates_of
 from cpfls_cli.gap.naming.ranking import more_left, rank_effects, surely
@@ -21,16 +22,8 @@ from cpfls_cli.gap.naming.scoring import information
 from cpfls_cli.gap.naming.search import alternative
 from cpfls_cli.gap.residual.air import foretold_rows
 from cpfls_cli.gap.settings import CHANCE, GapSettings
+from cpfls_cli.playback.constants import ENOUGH_BLOCKS, STRONG
 from cpfls_cli.playback.instruments import Instruments
-
-_PER_WINDOW = 8
-"""Windows that begin within one: between them what another run has is interpolated."""
-
-_FEWEST_BLOCKS = 8
-"""Whose scatter tells an error."""
-
-_STRONG = 10.0
-"""F of an instrument from which on it tells a number (Staiger and Stock 1997)."""
 
 
 class _Run(NamedTuple):
@@ -71,7 +64,7 @@ def by_instruments(found: NamedFit, given: Instruments, floor: Array, settings: 
     """
     hypothesis, linear = found.hypothesis, found.estimates.linear
     crossed, moving = _products(found, given, floor, settings)
-    if len(crossed) < _FEWEST_BLOCKS:
+    if len(crossed) < ENOUGH_BLOCKS:
         return found
     kept = crossed[:, np.append(moving, False)][:, :, np.append(moving, True)]
     values, prior = np.concatenate([linear, hypothesis.shape_values]), _prior(hypothesis)[moving]
@@ -113,7 +106,7 @@ def may_be_nothing(found: NamedFit, given: Instruments, floor: Array, settings: 
         own[places.get(candidate.key, slice(0))] = True
         own, others = own & moving, ~own & moving
         others[shapes] = False
-        told = own.any() and len(crossed) >= _FEWEST_BLOCKS
+        told = own.any() and len(crossed) >= ENOUGH_BLOCKS + own.sum()
         absent = _chance(crossed, own, others, values) > CHANCE if told else candidate.effect.name in nothing
         names += [candidate.effect.name] if absent else []
     return names
@@ -195,7 +188,7 @@ def _reproduced(found: NamedFit, given: Instruments, floor: Array, settings: Gap
         for block in np.unique(run.block):
             own = run.block == block
             total[block] = total.get(block, 0.0) + float((run.rows[own, :, -1] * run.known[own, :, -1]).sum())
-    return np.array([total[block] for block in sorted(total)]) * (2 / _PER_WINDOW)
+    return np.array([total[block] for block in sorted(total)])
 
 
 def _products(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> tuple[Array, BoolArray]:
@@ -210,10 +203,10 @@ def _products(found: NamedFit, given: Instruments, floor: Array, settings: GapSe
     moving = _movable(found.hypothesis, floor)
     runs = list(_runs(found.hypothesis, found.estimates.linear, given, floor, settings))
     blocks = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(run.block for run in runs)]))
-    if len(blocks) < _FEWEST_BLOCKS:
+    if len(blocks) < ENOUGH_BLOCKS:
         return np.zeros((len(blocks), len(moving) + 1, len(moving) + 1)), moving
     crossed = np.array([sum(_crossed(run, run.block == block) for run in runs) for block in blocks])
-    return crossed, moving & (_strength(crossed) > _STRONG)
+    return crossed, moving & (_strength(crossed) > STRONG)
 
 
 def _movable(hypothesis: System, floor: Array) -> BoolArray:
@@ -255,7 +248,7 @@ def _solved(sums: Array, values: Array, prior: Array) -> Array:
 def _crossed(run: _Run, of_block: BoolArray) -> Array:
     """Sum products of what is known of each number and what all of them move, as of windows half of which overlap."""
     known, rows = run.known[of_block], run.rows[of_block]
-    return np.asarray(np.einsum("wck,wcl->kl", known, rows, optimize=True) * (2 / _PER_WINDOW))
+    return np.asarray(np.einsum("wck,wcl->kl", known, rows, optimize=True) * (2 / PER_WINDOW))
 
 
 def _told(before: NamedFit, after: Estimates, moved: BoolArray) -> Estimates:
@@ -276,8 +269,7 @@ def _told(before: NamedFit, after: Estimates, moved: BoolArray) -> Estimates:
 
 def _runs(hypothesis: System, linear: Array, given: Instruments, floor: Array, settings: GapSettings) -> Iterator[_Run]:
     """Lay windows over runs, and beside them what instruments know."""
-    usual = hypothesis.flights[0].windows
-    windows = replace(usual, hop=max(1, len(usual.weight) // _PER_WINDOW))
+    windows = dense(hypothesis.flights[0].windows)
     there = system([replace(flight, windows=windows, seen={}) for flight in hypothesis.flights], hypothesis.chosen)
     columns = [there.base, shape_columns(there, linear), there.left(linear)[..., None]]
     rows = np.concatenate(columns, axis=2) / floor[:, None]

@@ -21,18 +21,9 @@ from cpfls_cli.gap.naming.ranking import likely, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
 from cpfls_cli.gap.naming.scoring import Scored
 from cpfls_cli.gap.naming.search import alternatives, beside_its_like, chance_beside_its_like, in_place_of, odds
-from cpfls_cli.gap.settings import ERRORS, RARE, SURE, GapSettings
+from cpfls_cli.gap.settings import COUNTS, ERRORS, RARE, GapSettings
 from cpfls_cli.rounding import ascending, at_most
 from cpfls_cli.vehicle.settings import VehicleSettings
-
-_MATTERS = 0.02
-"""Relative error of a moment of inertia or of the thrust from which on it is told."""
-
-_LEAST_SHARE = 0.2
-"""Share of the gap of its own channel that a refitted number of the vehicle has to take off unseen flights."""
-
-# In which a number of the vehicle shows.
-_CHANNEL = {"inertia_x": 0, "inertia_y": 1, "inertia_z": 2, "thrust_scale": 5}
 
 
 @dataclass(frozen=True)
@@ -84,7 +75,7 @@ def judge_effect(
         _frequency(own, ranking),
         effect_sentence(candidate.effect, estimates.effects[index], flights[0].signals.vehicle),
     )
-    rivals = tuple(alternatives(own, ranking, step.above_floor))
+    rivals = tuple(alternatives(own, ranking, step.above_floor, settings))
     compared = {
         tuple(each.effect.name for each in other.chosen): odds(own, other, step.above_floor)
         for other in ranking
@@ -164,18 +155,18 @@ def wrong_numbers(
     pull : array, shape (parameter,)
         Error of each number that noise in the motion can make: a noisy acceleration asks for less inertia.
     """
+    # Each shows in a channel of its own.
+    shown = dict(zip(NUMBERS, (*removed[:3], removed[5]), strict=True))
     pairs = zip(estimates.parameters, pull, strict=True)
     wrong = [
         number
         for number, drawn in pairs
-        if abs(number.value) > ERRORS * drawn
-        and _is_wrong(number, effects)
-        and removed[_CHANNEL[number.name]] >= _LEAST_SHARE
+        if abs(number.value) > ERRORS * drawn and _is_wrong(number, effects) and shown[number.name] >= COUNTS
     ]
     if not wrong:
         return None
-    share = float(max(removed[_CHANNEL[number.name]] for number in wrong))
-    p_value = min(2 * float(ndtr(-3.92 * abs(n.value) / (n.high - n.low))) if n.high > n.low else 0.0 for n in wrong)
+    share = float(max(shown[number.name] for number in wrong))
+    p_value = min(_chance(number) for number in wrong)
     name, sentence = VEHICLE_NUMBERS.name, VEHICLE_NUMBERS.sentence
     return NamedEffect(name, None, np.zeros(0), tuple(wrong), p_value, share, 1.0, sentence)
 
@@ -192,16 +183,22 @@ def impossible_ratios(numbers: Sequence[Estimate]) -> dict[str, float]:
 
 
 def _is_wrong(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
-    """Tell whether a number is surely wrong, by as much as matters and more than named effects account for."""
+    """Tell whether a number is surely wrong, by more than named effects account for."""
     if number.name not in NUMBERS:
         return False
-    half = 0.5 * (number.high - number.low)
     accounted = 0.0
     for effect in effects:
         accounts = CATALOGUE[effect.name].accounts
         if accounts is not None:
             accounted += accounts(number.name, {c.name: c.value for c in effect.coefficients})
-    return abs(number.value) > max(SURE / ERRORS * half, _MATTERS) and abs(number.value) > accounted
+    # At the rate of errors of names, over all numbers that are asked.
+    return len(NUMBERS) * _chance(number) <= RARE and abs(number.value) > accounted
+
+
+def _chance(number: Estimate) -> float:
+    """Compute the probability that a number as far from 0 is chance."""
+    half = 0.5 * (number.high - number.low)
+    return 2 * float(ndtr(-1.96 * abs(number.value) / half)) if half > 0 else 0.0
 
 
 def sensor_fault(

@@ -18,7 +18,7 @@ from cpfls_cli.gap.naming.estimate import channel_weight, estimates
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out, share_removed
 from cpfls_cli.gap.naming.leftover import Leftover, leftover
 from cpfls_cli.gap.naming.ranking import RankedStep, block_index
-from cpfls_cli.gap.settings import CLEAR, ERRORS, NOISE, OFF, VISIBLE, WORSE, GapSettings
+from cpfls_cli.gap.settings import CLEAR, ERRORS, NOISE, OFF, VISIBLE, GapSettings
 from cpfls_cli.rounding import ascending, largest, levelled, smallest
 
 
@@ -144,7 +144,7 @@ class Without(NamedTuple):
     def worsened(self, after: Array) -> Array:
         """Compute how much worse the effect makes channels that it leaves `after` floors in, as ratios; 0 if unsure."""
         surely = -self.raised > ERRORS * self.error
-        worse = (after > CLEAR) & (after > WORSE * self.left) & surely
+        worse = (after > CLEAR) & (-self.raised > VISIBLE**2) & surely
         return np.where(worse, after / np.maximum(self.left, 1e-9), 0.0)
 
 

@@ -17,10 +17,7 @@ from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, free_est
 from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.rounding import levelled
-
-_ON_BOUND = 1e-3
-"""Share of its range that a number is from its bound at most to be on it."""
+from cpfls_cli.rounding import levelled, tied
 
 
 class NamedFit(NamedTuple):
@@ -137,10 +134,8 @@ def _reached(numbers: Sequence[Estimate]) -> dict[str, str]:
     """Name the numbers that sit on a bound other than zero, and the bound."""
     found = {}
     for number in numbers:
-        low, high = number.plausible
-        near = _ON_BOUND * (high - low)
-        for bound in (low, high):
-            if bound and abs(number.value - bound) <= near:
+        for bound in number.plausible:
+            if bound and tied(np.array(number.value), np.array(bound)):
                 found[number.name] = f"{bound:.3g} {number.unit}"
     return found
 

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import takewhile
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.blocks import mean_error
+from cpfls_cli.blocks import half_width, mean_error
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, left_over, system, window_noise
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, dense
 from cpfls_cli.gap.naming.earned import NamedFit, bends_of, fitted
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect, NotExcited, Unexplained
-from cpfls_cli.gap.naming.scoring import Scored
 from cpfls_cli.gap.naming.search import of_motion
 from cpfls_cli.gap.residual.dependence import (
     Dependence,
@@ -28,11 +26,9 @@ from cpfls_cli.gap.residual.dependence import (
     without_actuation,
 )
 from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
-from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, FEWEST_BLOCKS, NOISE, SURE, VISIBLE, GapSettings
+from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, FEWEST_BLOCKS, NOISE, RARE, VISIBLE, GapSettings
+from cpfls_cli.rounding import ROUNDING
 from cpfls_cli.vehicle.settings import VehicleSettings
-
-_PER_WINDOW = 6
-"""Hops in a window where bands are looked for: ten samples of the fastest wave that a window passes."""
 
 _USUAL_OF_BOUND = 0.2
 """A coefficient that is large but not unheard of, as a share of its bound."""
@@ -95,14 +91,12 @@ def _band(hypothesis: System, linear: Array, settings: GapSettings, rng: np.rand
     """Search for a narrow band with windows dense enough to exclude aliases."""
     rows, rates = [], []
     for number, flight in enumerate(hypothesis.flights):
-        windows = flight.windows
-        dense = replace(windows, hop=max(1, len(windows.weight) // _PER_WINDOW))
-        remainder = left_over(hypothesis, number, linear)
-        direct = dense.average(remainder.direct)
-        rows.append(direct if remainder.momentum is None else direct + dense.derivative(remainder.momentum))
-        rates.append(dense.average(flight.signals.body_rate))
-    hop = max(1, len(hypothesis.flights[0].windows.weight) // _PER_WINDOW) * hypothesis.flights[0].windows.period
-    return narrow_band(rows, rates, hop, settings.shifts, rng, settings.significance)
+        windows, remainder = dense(flight.windows), left_over(hypothesis, number, linear)
+        direct = windows.average(remainder.direct)
+        rows.append(direct if remainder.momentum is None else direct + windows.derivative(remainder.momentum))
+        rates.append(windows.average(flight.signals.body_rate))
+    hop_s = dense(hypothesis.flights[0].windows).hop * hypothesis.flights[0].windows.period
+    return narrow_band(rows, rates, hop_s, settings.shifts, rng, settings.significance)
 
 
 def _unexplained(
@@ -149,8 +143,9 @@ def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[
         return ["neither"] * torque.shape[1]
     power = (torque - torque.mean(axis=0)) * (body_rate - body_rate.mean(axis=0))
     means = np.array([power[block == number].mean(axis=0) for number in numbers])
-    mean, error = means.mean(axis=0), mean_error(means)
-    sure = np.abs(mean) > SURE * error
+    # Any of the axes, at the rate of errors of names.
+    mean, seldom = means.mean(axis=0), 0.5 * RARE / means.shape[1]
+    sure = np.abs(mean) > half_width(mean_error(means), len(means), 1 - seldom)
     return ["neither" if not s else "feeds" if m > 0 else "drains" for m, s in zip(mean, sure, strict=True)]
 
 
@@ -202,22 +197,14 @@ def _beyond_chance(
     """Add effects to the chosen ones as long as one explains more than chance, and more than noise."""
     flights, chosen = step.hypothesis.flights, list(step.hypothesis.chosen)
     for _ in range(settings.effects_max):
-        added = _first_beyond_chance(step)
+        more = (each for each in step.ranking if step.p_value(each.gain) <= CHANCE)
+        moving = ((each, of_motion(each.gain, step, system(flights, each.chosen))) for each in more)
+        added = next((each.candidate for each, gain in moving if step.p_value(gain) <= CHANCE), None)
         if added is None:
             break
-        chosen.append(added.candidate)
+        chosen.append(added)
         step = rank_effects(flights, chosen, effects, settings, rng)
     return chosen
-
-
-def _first_beyond_chance(step: RankedStep) -> Scored | None:
-    beyond = takewhile(lambda scored: step.p_value(scored.gain) <= CHANCE, step.ranking)
-    return next((each for each in beyond if _shows_motion(each, step)), None)
-
-
-def _shows_motion(scored: Scored, step: RankedStep) -> bool:
-    """Tell whether chance does not explain as much as an effect does but for noise."""
-    return step.p_value(of_motion(scored.gain, step, system(step.hypothesis.flights, scored.chosen))) <= CHANCE
 
 
 def _both(number: Estimate, others: Sequence[Estimate]) -> Estimate:
@@ -301,4 +288,4 @@ def _beyond_base(base: Array, columns: Array) -> Array:
     flat, tested = base.reshape(-1, base.shape[2]), columns.reshape(-1, columns.shape[2])
     length = np.linalg.norm(flat, axis=0)
     scaled = flat / np.where(length > 0, length, 1.0)
-    return np.asarray((tested - scaled @ np.linalg.lstsq(scaled, tested, rcond=1e-9)[0]).reshape(columns.shape))
+    return np.asarray((tested - scaled @ np.linalg.lstsq(scaled, tested, rcond=ROUNDING)[0]).reshape(columns.shape))

@@ -9,7 +9,6 @@ from functools import cache
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.blocks import mean_error
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, channel_size, floors, system
 from cpfls_cli.gap.balance.refine import fit
@@ -21,12 +20,9 @@ from cpfls_cli.gap.naming.scoring import (
     score,
     scoring_matrix,
 )
-from cpfls_cli.gap.settings import COUNTS, ERRORS, NOISE, OFF, RARE, VISIBLE, GapSettings
+from cpfls_cli.gap.settings import CHANCE, COUNTS, NOISE, OFF, RARE, VISIBLE, GapSettings
 from cpfls_cli.rounding import tied
 from cpfls_cli.weak_form.resampling import blocks_of, mirror_shifted
-
-_CHANCE = 0.02
-"""Probability of ranks up to which one is better: of fewer than six blocks none can be."""
 
 _DRAWS = 10_000
 """Of weights of blocks: a probability of a hundredth is known to a tenth of itself."""
@@ -54,6 +50,11 @@ class RankedStep:
     chance: Array
     above_floor: float
     block: IntArray
+
+    def worth_a_name(self, explained: float = 0.0) -> float:
+        """Compute what an effect has to explain of what a part explained leaves of the gap, in squared floors."""
+        gap = max(self.above_floor - explained, 0.0)
+        return max(COUNTS * gap, VISIBLE**2 * len(self.hypothesis.residual))
 
     def p_value(self, gain: float) -> float:
         """Compute the probability that chance explains as much, over the whole catalogue.
@@ -146,12 +147,8 @@ def rows(hypothesis: System) -> int:
 
 
 def surely(margin: Array) -> bool:
-    """Tell whether margins over blocks are above 0 by more than they scatter."""
-    if len(margin) < 2 or margin.sum() <= 0:
-        return False
-    spread = len(margin) * float(mean_error(margin))
-    # Effects act in some blocks and not in others: where sizes differ that much, ranks tell more than the mean.
-    return bool(margin.sum() > ERRORS * spread or chance_of_ranks(margin) < _CHANCE)
+    """Tell whether margins over blocks are above 0 by more than they scatter: by ranks, as sizes differ that much."""
+    return chance_of_ranks(margin) < CHANCE
 
 
 def more_left(one: Array, other: Array) -> Array:
@@ -174,17 +171,6 @@ def chance_of_ranks(margin: Array) -> float:
         smaller[rank:] += smaller[:-rank]
         smaller /= 2
     return float(1.0 - smaller.sum())
-
-
-def least_gain(above_floor: float, windows: int) -> float:
-    """Compute what an effect has to explain to be worth a name, in squared floors.
-
-    Parameters
-    ----------
-    above_floor : float
-        The gap, in squared floors.
-    """
-    return max(COUNTS * above_floor, VISIBLE**2 * windows)
 
 
 def off_by(explained: float, left: float, above: float = 0.0) -> float:

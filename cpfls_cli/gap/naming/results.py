@@ -10,10 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, OFF, GapSettings
-
-_SECOND_CAUSE = 0.03
-"""Share of the gap, in squared floors, from which on what is left is a cause of its own."""
+from cpfls_cli.gap.settings import CLEAR, COUNTS, GapSettings
 
 
 class GapVerdict(StrEnum):
@@ -242,8 +239,7 @@ def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> 
     filled = effects > 1 and bool((after > CLEAR).any())
     largest = np.repeat([np.nanmax(before[kind], initial=0.0) for kind in (slice(0, 3), slice(3, 6))], 3)
     clear = (before > CLEAR) & (before**2 > COUNTS * largest**2)
-    large = (after > ERRORS * CLEAR) & (after > OFF * before)
-    return filled or bool((clear & (_is_left(after, before, named_share) | large)).any())
+    return filled or bool((clear & _is_left(after, before, named_share)).any())
 
 
 def _is_left(after: Array, before: Array, named_share: float) -> BoolArray:
@@ -266,5 +262,5 @@ def matters(unexplained: Unexplained, before: Array, named_share: float) -> bool
     follows = unexplained.signal is not None or unexplained.frequency_hz is not None
     kind = slice(0, 3) if unexplained.axis.startswith("torque") else slice(3, 6)
     largest = float(np.nanmax(before[kind] ** 2, initial=1.0))
-    second = follows and unexplained.share * unexplained.floors**2 > _SECOND_CAUSE * largest
+    second = follows and unexplained.share * unexplained.floors**2 > COUNTS * largest
     return second or bool(_is_left(np.array(unexplained.floors), np.sqrt(largest), named_share))

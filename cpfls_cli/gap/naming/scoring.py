@@ -19,9 +19,6 @@ from cpfls_cli.rounding import ascending
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.resampling import Beside, Folds, folds
 
-REFUSED = -np.inf
-"""Gain of a candidate with a coefficient beyond its bounds: below that of any other."""
-
 
 @dataclass(frozen=True)
 class Scored:
@@ -181,7 +178,7 @@ def _scored(placed: PlacedCandidate, error: Array, beside: Beside, vehicle: Vehi
     """Score a candidate that leaves `error` of the blocks with all its columns."""
     (candidate, columns, _), before = placed, beside.before[:, 0]
     if len(columns) == 0:
-        return Scored(candidate, columns, REFUSED, before, np.zeros(0))
+        return Scored(candidate, columns, -np.inf, before, np.zeros(0))
     if candidate.effect.unit_coefficient:
         return Scored(candidate, columns, float((before - error).sum()), error, np.ones(1))
     kept = np.ones(len(columns), dtype=bool)
@@ -190,7 +187,7 @@ def _scored(placed: PlacedCandidate, error: Array, beside: Beside, vehicle: Vehi
         fitted[kept], unsure[kept] = beside.fit(columns[kept])
         keep, admissible = within_bounds(candidate.effect, fitted, unsure, vehicle)
         if not admissible or not (kept & keep).any():
-            return Scored(candidate, columns, REFUSED, before, fitted)
+            return Scored(candidate, columns, -np.inf, before, fitted)
         if (kept & keep == kept).all():
             break
         kept &= keep

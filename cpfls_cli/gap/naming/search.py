@@ -17,7 +17,6 @@ from cpfls_cli.gap.naming.ranking import (
     best_floor,
     block_index,
     chance_of_ranks,
-    least_gain,
     likely,
     log_odds,
     more_left,
@@ -26,20 +25,12 @@ from cpfls_cli.gap.naming.ranking import (
     rows,
 )
 from cpfls_cli.gap.naming.results import Alternative
-from cpfls_cli.gap.naming.scoring import REFUSED, Scored, normal_equations, scoring_matrix
-from cpfls_cli.gap.settings import COUNTS, OFF, RARE, GapSettings
+from cpfls_cli.gap.naming.scoring import Scored, normal_equations, scoring_matrix
+from cpfls_cli.gap.settings import OFF, RARE, GapSettings
 from cpfls_cli.rounding import ascending, less
 
 _BEAM = 3
 """Sets that are followed at once: a lag, a delay and a filter each do alone most of what two of them do."""
-
-
-_NEAR = 0.6
-"""Share of what a name explains from which on another one could stand for it: of less a half would have no name."""
-
-_NUMBER = 8.0
-"""What a free number has to explain, in squared floors: the logarithm of the residuals of a few flights (Schwarz 1978).
-"""
 
 
 def forward_selection(
@@ -72,49 +63,27 @@ def forward_selection(
         progress(len(steps))
         if len(chosen) >= settings.effects_max:
             return chosen, steps
-        grown = _moved(flights, step, settings) if acceptable(step, settings) else []
+        grown = [scored for scored in step.ranking if scored.gain > 0] if acceptable(step, settings) else []
         grown += grown_elsewhere(flights, beam[1:], step, effects, settings)
         if not grown:
             return chosen, steps
-        best = simplest(ascending(grown, lambda scored: -scored.gain), step.above_floor)
+        number = float(np.log(rows(step.hypothesis)))
+        best = simplest(ascending(grown, lambda scored: -scored.gain), step.above_floor, number)
         refitted = refined(flights, best.chosen, step.floor)
-        if of_motion(best.gain, step, refitted) < _enough(step):
+        if of_motion(best.gain, step, refitted) < step.worth_a_name():
             return chosen, steps
-        kept = needed(refitted, step, settings)
-        # What is dropped can undo what was added; a set that was there before would come round again for ever.
-        if _names(kept) in tried:
+        # A set that was there before would come round again for ever.
+        if _names(refitted.chosen) in tried:
             return chosen, steps
-        tried.add(_names(kept))
+        tried.add(_names(refitted.chosen))
         step.hypothesis.cache.clear()
-        beam = [kept, *(scored.chosen for scored in grown if scored is not best)][:_BEAM]
+        beam = [refitted.chosen, *(scored.chosen for scored in grown if scored is not best)][:_BEAM]
 
 
 def acceptable(step: RankedStep, settings: GapSettings) -> bool:
     """Tell whether the best candidate explains more than chance and a relevant part of the residual."""
-    if not step.ranking or step.ranking[0].gain == REFUSED:
-        return False
-    best = step.ranking[0]
-    return best.gain >= _enough(step) and step.p_value(best.gain) <= settings.significance
-
-
-def _enough(step: RankedStep) -> float:
-    """Compute the least gain of an effect that is named, in squared floors."""
-    return least_gain(step.above_floor, len(step.hypothesis.residual))
-
-
-def _moved(flights: Sequence[WeakFlight], step: RankedStep, settings: GapSettings) -> list[Scored]:
-    """List the candidates that explain something; those between command and rotors, if the best is, with shapes moved.
-
-    Between the points of a grid an effect with more shapes comes closer to what one with fewer is.
-    """
-    best = step.ranking[0]
-    near = [scored for scored in step.ranking if scored.gain > 0]
-    alike = [scored for scored in near if _late(scored)]
-    beside_late = any(each.effect.actuation is not None for each in best.others)
-    if best not in alike or not (beside_late or len(alike) > 1):
-        return near
-    moved = [rescored(refined(flights, scored.chosen, step.floor), step, settings) for scored in alike]
-    return ascending(moved, lambda scored: -scored.gain)
+    best = max((scored.gain for scored in step.ranking), default=-np.inf)
+    return best >= step.worth_a_name() and step.p_value(best) <= settings.significance
 
 
 def grown_elsewhere(
@@ -130,7 +99,7 @@ def grown_elsewhere(
     """
     chosen = step.hypothesis.chosen
     two = bool(sets) and stands_for_two(chosen, len(chosen) - 1)
-    if not sets or not (two or step.above_floor > _enough(step)):
+    if not sets or not (two or step.above_floor > step.worth_a_name()):
         return []
     most = _numbers(chosen) + two
     own, found = rescored(step.hypothesis, step, settings), list[Scored]()
@@ -152,27 +121,8 @@ def _is_better(scored: Scored, own: Scored, step: RankedStep) -> bool:
     """
     gain, off = scored.gain - own.gain, step.above_floor - scored.gain
     if _numbers(scored.chosen) > _numbers(own.chosen):
-        return gain >= max(_more(own, step), off) and not unbeaten(scored, [own], step.above_floor)
+        return gain >= max(step.worth_a_name(own.gain), off) and not unbeaten(scored, [own], step.above_floor)
     return bool(less(0.0, gain, step.above_floor))
-
-
-def _more(own: Scored, step: RankedStep) -> float:
-    """Compute the least gain, in squared floors, of what is added to a set."""
-    return least_gain(max(step.above_floor - own.gain, 0.0), len(step.hypothesis.residual))
-
-
-def needed(refitted: System, step: RankedStep, settings: GapSettings) -> tuple[Candidate, ...]:
-    """Drop effects that the newest one made needless."""
-    kept = refitted
-    for candidate in refitted.chosen[:-1]:
-        index = [each.effect.name for each in kept.chosen].index(candidate.effect.name)
-        others = [each for place, each in enumerate(kept.chosen) if place != index]
-        alike = beside_its_like(kept.chosen, index)
-        without = refined(kept.flights, others, step.floor) if alike else system(kept.flights, others)
-        left, before = (rescored(each, step, settings).block_error.sum() for each in (without, kept))
-        if less(left - before, COUNTS * max(left - rows(kept), 0.0), left):
-            kept = refined(kept.flights, others, step.floor)
-    return kept.chosen
 
 
 def of_motion(gain: float, step: RankedStep, with_it: System) -> float:
@@ -206,7 +156,7 @@ def in_place_of(
     sets: list[tuple[Candidate, ...]] = [(each,) for each in alike]
     if stands_for_two(chosen, index):
         sets += combinations(alike, 2)
-    numbers, worth = _numbers(own.chosen), step.above_floor - own.gain > _more(own, step)
+    numbers, worth = _numbers(own.chosen), step.above_floor - own.gain > step.worth_a_name(own.gain)
     sets = [each for each in sets if worth or _numbers([*others, *each]) <= numbers]
     moved = [rescored(refined(flights, [*others, *each], step.floor), step, settings) for each in sets]
     fair = [each for each in moved if _numbers(each.chosen) <= numbers or _is_better(each, own, step)]
@@ -266,15 +216,11 @@ def _unseen(hypothesis: System, floor: Array, settings: GapSettings, *, moving: 
 
 
 def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Scored]:
-    """List the candidates that the chosen one does not beat: of all that explain about as much, those not rare.
-
-    What leaves no more than formulas and the floor are off by is not beaten, however sure that is.
-    """
-    known, off = _names(chosen.chosen), _off(chosen, above_floor)
-    others = [each for each in ranking if each.gain > _NEAR * chosen.gain and _names(each.chosen) != known]
+    """List the candidates that the chosen one does not beat: those that are not rare beside it."""
+    known = _names(chosen.chosen)
+    others = [each for each in ranking if np.isfinite(each.gain) and _names(each.chosen) != known]
     own, *weights = likely([odds(chosen, other, above_floor) for other in others])
-    more = (float(more_left(other.block_error, chosen.block_error).sum()) for other in others)
-    return [each for each, weight, d in zip(others, weights, more, strict=True) if weight >= RARE * own or d <= off]
+    return [each for each, weight in zip(others, weights, strict=True) if weight >= RARE * own]
 
 
 def odds(own: Scored, other: Scored, above_floor: float) -> Array:
@@ -289,42 +235,46 @@ def odds(own: Scored, other: Scored, above_floor: float) -> Array:
     return log_odds(more_left(other.block_error, own.block_error), off)
 
 
-def _off(scored: Scored, above_floor: float) -> float:
-    """Estimate what the formulas of a set are off by, in squared floors."""
-    return off_by(above_floor, float(scored.block_error.sum()), above_floor - scored.gain)
-
-
-def simplest(ranking: Sequence[Scored], above_floor: float) -> Scored:
+def simplest(ranking: Sequence[Scored], above_floor: float, number: float) -> Scored:
     """Choose among the best candidates the one with the fewest free numbers.
 
     Parameters
     ----------
     ranking : sequence of Scored
         Best first.
+    number : float
+        What a free number has to explain, in squared floors: the logarithm of the number of residuals (Schwarz 1978).
     """
-    best, off = ranking[0], _off(ranking[0], above_floor)
+    best = ranking[0]
+    # What formulas are off by.
+    off = off_by(above_floor, float(best.block_error.sum()), above_floor - best.gain)
     rivals = [
         other
         for other in unbeaten(best, ranking, above_floor)
-        if best.gain - other.gain < max(off, _NUMBER * (_numbers(best.chosen) - _numbers(other.chosen)))
+        if best.gain - other.gain < max(off, number * (_numbers(best.chosen) - _numbers(other.chosen)))
     ]
     fewest = min(_numbers(each.chosen) for each in [best, *rivals])
     few = [each for each in [best, *rivals] if _numbers(each.chosen) == fewest]
     most = max(each.gain for each in few)
     # What no number could tell apart is told by what is usual: rotors always lag.
     return min(
-        (each for each in few if most - each.gain < _NUMBER),
+        (each for each in few if most - each.gain < number),
         key=lambda scored: sorted(each.effect.order for each in scored.chosen),
     )
 
 
-def alternatives(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Alternative]:
-    """List the rivals of a chosen effect, without effects that hold it as a special case."""
+def alternatives(
+    chosen: Scored, ranking: Sequence[Scored], above_floor: float, settings: GapSettings
+) -> list[Alternative]:
+    """List the rivals of a chosen effect that explain a fair part of what it does.
+
+    Those that hold it as a special case are none.
+    """
     effect, known = chosen.candidate.effect, _names(chosen.chosen)
     found = []
     for scored in unbeaten(chosen, ranking, above_floor):
         *beside, other = (each.effect for each in scored.chosen if each.effect.name not in known)
-        if effect.name not in other.holds:
+        if effect.name not in other.holds and scored.gain > settings.partial_share * chosen.gain:
             found.append(alternative(effect, other, float(scored.gain / chosen.gain), *(each.name for each in beside)))
     return found
 

@@ -19,7 +19,7 @@ from cpfls_cli.gap.naming.results import Alternative, NamedEffect
 from cpfls_cli.gap.naming.scoring import candidates_of, information
 from cpfls_cli.gap.next_flight.separation import Question, SizedEffect, answered, gathered, shared_noise
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.rounding import smallest
+from cpfls_cli.rounding import ROUNDING, smallest
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -151,7 +151,7 @@ def fitted_effects(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], f
     right = np.concatenate([(balance.residual / floor).reshape(-1), np.zeros(len(prior))])
     length = np.linalg.norm(matrix, axis=0)
     scale = 1.0 / np.where(length > 0, length, 1.0)
-    linear = np.linalg.lstsq(matrix * scale, right, rcond=1e-9)[0] * scale
+    linear = np.linalg.lstsq(matrix * scale, right, rcond=ROUNDING)[0] * scale
     by_name = {each.effect.name: linear[place] for each, place in balance.places}
     return tuple(SizedEffect(each, by_name.get(each.effect.name, np.ones(1))) for each in chosen)
 

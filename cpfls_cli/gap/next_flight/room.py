@@ -6,23 +6,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import null_space
+from scipy.optimize import brentq
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import ComputationError, SettingError
-from cpfls_cli.rounding import at_most
+from cpfls_cli.rounding import ROUNDING, at_most
 from cpfls_cli.simulation.room_left import ROTOR_SHARE, hover_squared, rotor_load
 from cpfls_cli.trajectory.attitude import along
+from cpfls_cli.trajectory.limits import LIMIT_NAMES
 from cpfls_cli.trajectory.planning import Trajectory, sample_times
 from cpfls_cli.trajectory.settings import TrajectorySettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_AT_REST = 4
-"""Derivatives that vanish at both ends: with the snap the angular acceleration does."""
-
 _SLOPES = (0.5, 3.5)
 """Powers of the frequency by which amplitudes fall: from shaking to drifting."""
-
-_NAMES = ("displacement", "velocity", "acceleration", "jerk", "snap", "crackle", "pop")
 
 
 @dataclass(frozen=True)
@@ -64,7 +61,7 @@ class HarmonicPath:
             (-self.cosine, -self.sine),
             (-self.sine, self.cosine),
         )
-        sizes = [np.array(turns[power % len(turns)]) * frequency**power for power in range(len(_NAMES))]
+        sizes = [np.array(turns[power % len(turns)]) * frequency**power for power in range(1 + len(LIMIT_NAMES))]
         of_cosine, of_sine = np.stack(sizes, axis=-1)
         values = (np.cos(phase) @ of_cosine + np.sin(phase) @ of_sine).transpose(2, 1, 0)
         values[0] += self.centre
@@ -92,10 +89,12 @@ class HarmonicPath:
     def resting(self) -> HarmonicPath:
         """Take off what would leave velocity, acceleration, jerk, snap and the turning of yaw at the ends."""
         cosine, sine = np.empty_like(self.cosine), np.empty_like(self.sine)
+        # With the snap the angular acceleration vanishes.
+        highest = 1 + LIMIT_NAMES.index("snap")
         for axis, order in enumerate(self.order):
             scaled = order / order.max()
             for values, kept, first in ((self.cosine, cosine, 2), (self.sine, sine, 1)):
-                space = null_space(np.stack([scaled**power for power in range(first, _AT_REST + 1, 2)]))
+                space = null_space(np.stack([scaled**power for power in range(first, highest + 1, 2)]))
                 kept[axis] = space @ (space.T @ values[axis])
         return replace(self, cosine=cosine, sine=sine)
 
@@ -137,7 +136,7 @@ def harmonic_trajectory(path: HarmonicPath, sample_time: float, gravity: float) 
     motion = path.sample(time)
     position, heading = motion[..., :3], motion[:3, :, 3]
     lengths = np.linalg.norm(np.concatenate([(position[0] - position[0, 0])[None], position[1:]]), axis=2).max(axis=1)
-    maxima = dict(zip(_NAMES, lengths.tolist(), strict=True))
+    maxima = dict(zip(("displacement", *LIMIT_NAMES), lengths.tolist(), strict=True))
     return Trajectory(
         duration=path.duration, legs=(), maxima=maxima, runs=(), **along(time, position, heading, gravity)
     )
@@ -148,8 +147,6 @@ TILT_MAX = np.radians(35.0)
 
 # Waves of an axis, as many as a person could still fly.
 _HARMONICS = 10
-# Of a bisection, to a thousandth.
-_HALVINGS = 10
 
 
 @dataclass(frozen=True)
@@ -204,14 +201,13 @@ class Room:
         return largest.scaled(self._share(largest))
 
     def _share(self, path: HarmonicPath) -> float:
-        """Find the largest share of a path that keeps the limits on motion and rotors, by bisection."""
-        if at_most(self.load(path), 1.0):
-            return 1.0
-        low, high = 0.0, 1.0
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if self.load(path.scaled(middle)) <= 1 else (low, middle)
-        return low
+        """Find the largest share of a path that keeps the limits on motion and rotors."""
+
+        def beyond(share: float) -> float:
+            # Free fall is infinitely far beyond.
+            return min(self.load(path.scaled(share)), 1.0 / ROUNDING) - 1.0
+
+        return 1.0 if at_most(beyond(1.0), 0.0, 1.0) else float(brentq(beyond, 0.0, 1.0))
 
     def load(self, path: HarmonicPath) -> float:
         """Compute the largest share of any limit on motion, tilt and rotors that a path takes."""

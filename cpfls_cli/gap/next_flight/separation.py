@@ -20,7 +20,6 @@ from cpfls_cli.gap.settings import OFF, RARE, GapSettings
 from cpfls_cli.rounding import ROUNDING
 from cpfls_cli.weak_form.windows import Windows
 
-_NOWHERE = np.zeros(0, dtype=int)
 DRAWS, FEW_DRAWS = 200, 8
 """Draws of the noise for a probability to some per cent, and for comparing flights by the same draws."""
 
@@ -86,7 +85,8 @@ class Evidence:
     @classmethod
     def none(cls, blocks: int) -> Evidence:
         """Make blocks that say nothing."""
-        return cls(np.zeros((blocks, 1, 1)), _NOWHERE, (_NOWHERE,), unit=False, off=0.0)
+        nowhere = np.zeros(0, dtype=int)
+        return cls(np.zeros((blocks, 1, 1)), nowhere, (nowhere,), unit=False, off=0.0)
 
     def beside(self, known: Evidence) -> Evidence:
         """Put blocks of other flights before these."""
@@ -102,7 +102,7 @@ class Evidence:
     @cached_property
     def off_by(self) -> float:
         """What formulas are off by, in squared floors."""
-        return float(self.off * self._left(_NOWHERE).sum())
+        return float(self.off * self._left(np.zeros(0, dtype=int)).sum())
 
     def _left(self, rival: IntArray) -> Array:
         total, weight = self.gram.sum(axis=0), np.zeros(self.gram.shape[1])
@@ -180,7 +180,7 @@ def gathered(
     return Evidence(
         np.array([part.T @ part for part in parts]),
         np.concatenate(places[1 : 1 + len(free)]),
-        tuple(places[1 + len(free) :]) or (_NOWHERE,),
+        tuple(places[1 + len(free) :]) or (np.zeros(0, dtype=int),),
         bool(tried) and tried[0].effect.unit_coefficient,
         off,
     )

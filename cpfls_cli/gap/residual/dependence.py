@@ -11,20 +11,18 @@ from numpy.polynomial import chebyshev
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
+from cpfls_cli.gap.settings import FEWEST_BLOCKS
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.resampling import about_flight_mean, folds, mirror_shifted
 
-# Curves with two bends, and with six zeros around a circle: what formulas leave out is hardly more crooked.
 _DEGREE = 4
-_HARMONICS = (1, 2, 3)
-# Beyond them a curve stays constant.
-_OUTER_PERCENT = 0.5
-# Without one of two, a curve would know half of the flight only.
-_FEWEST_BLOCKS = 3
+"""Of curves, and of waves around a circle: what formulas leave out is hardly more crooked."""
+
+OUTER_PERCENT = 0.5
+"""Of a signal at either end, where a few windows would decide."""
+
 ANGLES = ("roll", "yaw")
 """Signals that come back after a full turn."""
-
-_ACTUATION = ("rotor torque", "rotor speed", "thrust")
 
 
 class Dependence(NamedTuple):
@@ -55,7 +53,7 @@ def rank_dependence(
 ) -> tuple[Dependence, ...]:
     """Rank what each signal alone explains of each channel.
 
-    The curve is a quartic polynomial of the scaled signal, for roll and yaw three harmonics. Curve and residual are
+    The curve is a quartic polynomial of the scaled signal, for roll and yaw four harmonics. Curve and residual are
     taken about their mean over each flight, so that differences between flights, of which there are few, explain
     nothing. Neighbouring windows are alike, which makes tests for independent rows useless: here the residual of each
     flight is shifted in time against the signals (`mirror_shifted`), and the best share of all channels and signals is
@@ -88,7 +86,7 @@ def rank_dependence(
     for name, signal in state.items():
         for channels, rows in _where_known(residual, flight_index, np.isfinite(signal)):
             curve = _curve(name, signal[rows])
-            if curve.size and len(np.unique(block[rows])) >= _FEWEST_BLOCKS:
+            if curve.size and len(np.unique(block[rows])) >= FEWEST_BLOCKS:
                 curve = about_flight_mean(curve, flight_index[rows])
                 share = _explained(curve, draws[np.ix_(rows, channels)], block[rows])
                 shares += [(int(channel), name, by_draw) for channel, by_draw in zip(channels, share, strict=True)]
@@ -115,9 +113,9 @@ def _where_known(residual: Array, flight_index: IntArray, finite: BoolArray) -> 
 
 def _curve(name: str, signal: Array) -> Array:
     if name in ANGLES:
-        turns = np.multiply.outer(signal, _HARMONICS)
+        turns = np.multiply.outer(signal, np.arange(1, _DEGREE + 1))
         return np.concatenate([np.sin(turns), np.cos(turns)], axis=1)
-    low, high = np.percentile(signal, [_OUTER_PERCENT, 100 - _OUTER_PERCENT])
+    low, high = np.percentile(signal, [OUTER_PERCENT, 100 - OUTER_PERCENT])
     if not high > low:
         return np.zeros((len(signal), 0))
     # Beyond the outer percents the curve stays constant, or a few windows would decide a quartic.
@@ -185,7 +183,7 @@ def without_actuation(state: Mapping[str, Array]) -> dict[str, Array]:
     -------
     dict of str to array, shape (window,)
     """
-    return {name: values for name, values in state.items() if not name.startswith(_ACTUATION)}
+    return {name: values for name, values in state.items() if not name.startswith(("rotor", "thrust"))}
 
 
 def _instantaneous(signals: Signals) -> Iterator[tuple[str, Array]]:

@@ -12,25 +12,20 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.blocks import mean_error
+from cpfls_cli.gap.balance.noise_floor import CORRELATIONS
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.settings import ERRORS
 
 Energy = Literal["feeds", "drains", "neither"]
 
-# Shorter flights have no background to stand out from.
-_FEWEST_ROWS = 64
-# Half width of the main lobe of a Hann taper, in reciprocals of the flight.
 _LOBE_CYCLES = 2
-# Power is averaged over segments, each long enough to be a band.
-_PERIODS_PER_SEGMENT = 4
-# Frequencies for each reciprocal of the flight: between two, a line loses 2 % of its power.
+"""Half width of the main lobe of a Hann taper, in reciprocals of the flight: slower is no band but a drift."""
+
 _FINER = 4
-# Slower is no band but a drift.
-_LOWEST_CYCLES = 2
-# Width of the running median, six times a line's.
+"""Frequencies for each reciprocal of the flight: between two, a line loses 2 % of its power."""
+
 _MEDIAN_CYCLES = 24
-# A background is no steeper, or it would be taken for a line at 0.
-_STRONGEST_CORRELATION = 0.95
+"""Width of the running median, six times a line's."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +69,7 @@ def narrow_band(
 
     The periodogram over all flights is divided by its background; the largest ratio of all frequencies and channels is
     compared with that of noise drawn from the background. Rows from windows of 0.4 s at a hop of 0.2 s show lines up
-    to 2.5 Hz, but those from 2.5 to 5 Hz look like 2.5 to 0 Hz; at a hop of a sixth of the window the windows let
+    to 2.5 Hz, but those from 2.5 to 5 Hz look like 2.5 to 0 Hz; at a hop of an eighth of the window the windows let
     through nothing that could be mistaken, and lines are seen up to about two periods per window.
 
     Parameters
@@ -93,13 +88,13 @@ def narrow_band(
     Returns
     -------
     NarrowBand or None
-        None where no flight has 64 rows, or all rows are 0.
+        None where no flight is long enough to have a background, or all rows are 0.
 
     References
     ----------
     Besag and Clifford 1991, sequential Monte Carlo p-values.
     """
-    kept = [number for number, rows in enumerate(residual) if len(rows) >= _FEWEST_ROWS and rows.any()]
+    kept = [number for number, rows in enumerate(residual) if len(rows) > 2 * _MEDIAN_CYCLES and rows.any()]
     if not kept:
         return None
     flights, rates = [residual[number] for number in kept], [body_rate[number] for number in kept]
@@ -150,10 +145,10 @@ def _between_bins(power: Array, peak: int, on: Grid) -> float:
 def _mean_power(
     channel: int, frequency: float, hop_s: float, residual: Sequence[Array], body_rate: Sequence[Array]
 ) -> tuple[float, float]:
-    """Average residual times rate in the band over segments of four periods, with the error of the mean."""
+    """Average residual times rate in the band over segments that resolve it, with the error of the mean."""
     if channel >= body_rate[0].shape[1]:
         return 0.0, 0.0
-    length = int(np.ceil(_PERIODS_PER_SEGMENT / (frequency * hop_s)))
+    length = int(np.ceil(2 * _LOBE_CYCLES / (frequency * hop_s)))
     pairs = zip(residual, body_rate, strict=True)
     products = np.concatenate(
         [_products(rows[:, channel], rate[:, channel], length, frequency * hop_s) for rows, rate in pairs]
@@ -190,7 +185,7 @@ class Grid:
     samples: int
     frequency: Array
     resolution: int = _FINER
-    lowest: int = _FINER * _LOWEST_CYCLES
+    lowest: int = _FINER * _LOBE_CYCLES
 
 
 def grid(lengths: Sequence[int], period: float) -> Grid:
@@ -245,7 +240,8 @@ def background(power: Array, on: Grid) -> Array:
     """
     turn = np.pi * on.frequency / on.frequency[-1]
     correlation = (power @ np.cos(turn) / power.sum(axis=-1))[..., None]
-    correlation = np.clip(correlation, -_STRONGEST_CORRELATION, _STRONGEST_CORRELATION)
+    # A background is no steeper, or it would be taken for a line at 0.
+    correlation = np.clip(correlation, -CORRELATIONS[-1], CORRELATIONS[-1])
     shape = 1 / (1 - 2 * correlation * np.cos(turn) + correlation**2)
     return np.asarray(shape * _running_median(power / shape, on))
 

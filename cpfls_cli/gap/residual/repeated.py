@@ -21,9 +21,6 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.weak_form.windows import Recording, Windows
 
-_SLOWEST = (BANDS[-1][1], None), (0.0, BANDS_HZ[-1][0])
-"""What the longest windows keep, a constant torque or the weight among it."""
-
 
 class Band(NamedTuple):
     """Windows, and the frequencies that they pass, about.
@@ -241,7 +238,9 @@ def _bands(period: float) -> Iterator[Band]:
     if fitting:
         (shortest, _), (_, highest) = fitting[0]
         yield Band(band_windows(period, shortest, None), 0.0, highest)
-        yield from (Band(band_windows(period, *band), *hz) for band, hz in (*fitting, _SLOWEST))
+        yield from (Band(band_windows(period, *band), *hz) for band, hz in fitting)
+        # What the longest windows keep, a constant torque or the weight among it.
+        yield Band(band_windows(period, BANDS[-1][1], None), 0.0, BANDS_HZ[-1][0])
 
 
 def _sides(left: Columns, taken: Columns) -> Array:

@@ -12,18 +12,16 @@ from scipy.special import chdtrc
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
+from cpfls_cli.gap.residual.dependence import OUTER_PERCENT
+from cpfls_cli.gap.settings import FEWEST_BLOCKS
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.resampling import about_flight_mean
 
-# A zero crossing of the residual makes no gap small.
-_AVERAGED_WINDOWS = 5
-# Of the time is called worst, pauses up to this long with it.
 _OUTSTANDING_SHARE = 0.1
+"""Of the time is called worst."""
+
 _LONGEST_PAUSE_S = 1.0
-# Left out of the range of a map, or a few windows would make its cells wide.
-_OUTER_PERCENT = 1.0
-# Windows of the longest flight for each lag of its correlation.
-_FEWEST_PER_LAG = 4
+"""With pauses up to this long in it, over which what is left is averaged: a zero crossing makes no gap small."""
 
 
 class GapStretch(NamedTuple):
@@ -71,13 +69,16 @@ def _of_channel(
     channel: int, residual: Array, centres: Array, flight_index: IntArray, level: float
 ) -> Iterator[GapStretch]:
     flights = [np.flatnonzero(flight_index == flight) for flight in np.unique(flight_index)]
+    hops = [float(np.ptp(centres[rows[:2]])) for rows in flights]
+    pauses = [round(_LONGEST_PAUSE_S / hop) if hop else 0 for hop in hops]
     # What is averaged over neighbours has no zero crossings; the filter's running sum can end below 0 by rounding.
-    square = [uniform_filter1d(residual[rows] ** 2, _AVERAGED_WINDOWS, mode="nearest") for rows in flights]
-    size = [np.sqrt(np.maximum(each, 0.0)) for each in square]
+    size = [
+        np.sqrt(np.maximum(uniform_filter1d(residual[rows] ** 2, max(1, pause), mode="nearest"), 0.0))
+        for rows, pause in zip(flights, pauses, strict=True)
+    ]
     least = max(level, float(np.quantile(np.concatenate(size), 1 - _OUTSTANDING_SHARE)))
-    for rows, local in zip(flights, size, strict=True):
-        hop = float(centres[rows[1]] - centres[rows[0]]) if len(rows) > 1 else 0.0
-        for run in _runs(local >= least, round(_LONGEST_PAUSE_S / hop) if hop else 0):
+    for rows, local, hop, pause in zip(flights, size, hops, pauses, strict=True):
+        for run in _runs(local >= least, pause):
             inside = rows[run]
             rms = float(np.sqrt(np.mean(residual[inside] ** 2)))
             start, end = float(centres[inside[0]]) - hop / 2, float(centres[inside[-1]]) + hop / 2
@@ -112,7 +113,7 @@ class HeatMap:
 def heat_map(residual: Array, first: Array, second: Array, bins: int = 12) -> HeatMap:
     """Average a residual over the cells of two signals.
 
-    The outer cells also take the one per cent of windows beyond each end of the grid, so that a few windows do not
+    The outer cells also take the half per cent of windows beyond each end of the grid, so that a few windows do not
     stretch it.
 
     Parameters
@@ -137,7 +138,7 @@ def heat_map(residual: Array, first: Array, second: Array, bins: int = 12) -> He
 def _edges(signal: Array, bins: int) -> Array:
     if not len(signal):
         return np.linspace(0.0, 1.0, bins + 1)
-    low, high = np.percentile(signal, [_OUTER_PERCENT, 100 - _OUTER_PERCENT])
+    low, high = np.percentile(signal, [OUTER_PERCENT, 100 - OUTER_PERCENT])
     # A signal that stands still still needs cells of some width.
     return np.linspace(low, high if high > low else low + max(1e-9, 1e-9 * abs(low)), bins + 1)
 
@@ -182,7 +183,7 @@ def whiteness(residual: Array, flight_index: IntArray, stride: int = 2, lags: in
     """
     flights = [residual[flight_index == number][::stride] for number in np.unique(flight_index)]
     longest = max((len(centred) for centred in flights), default=0)
-    lags = min(lags, longest // _FEWEST_PER_LAG)
+    lags = min(lags, longest // FEWEST_BLOCKS)
     centred = [about_flight_mean(flight, np.zeros(len(flight), dtype=int)) for flight in flights]
     used = sum(len(flight) for flight in centred)
     square = np.sum([(flight**2).sum(axis=0) for flight in centred], axis=0)

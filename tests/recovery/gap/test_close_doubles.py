@@ -154,7 +154,7 @@ def rivals_of(flights, chosen, name):
     step = rank_effects(flights, others, effects, SETTINGS, None, also=(chosen[index],))
     own, *ranking = in_place_of(flights, chosen, index, step, SETTINGS)
     assert own.candidate.effect.name == name
-    return {rival.name for rival in alternatives(own, ranking, step.above_floor)}
+    return {rival.name for rival in alternatives(own, ranking, step.above_floor, SETTINGS)}
 
 
 def test_a_lag_and_a_delay_are_no_notch_and_no_low_pass():
@@ -179,7 +179,7 @@ def test_a_lag_with_a_short_delay_is_a_rival_as_the_pair_that_it_is():
     effects = [CATALOGUE[each] for each in (*STILL, "low_pass_filter")]
     step = rank_effects(flights, (), effects, SETTINGS, None, also=(low,))
     own, *ranking = in_place_of(flights, refined(flights, [low], step.floor).chosen, 0, step, SETTINGS)
-    pairs = {frozenset((rival.name, rival.beside)) for rival in alternatives(own, ranking, step.above_floor)}
+    pairs = {frozenset((rival.name, rival.beside)) for rival in alternatives(own, ranking, step.above_floor, SETTINGS)}
     assert pairs == {frozenset(("motor_lag", "command_delay"))}
 
 

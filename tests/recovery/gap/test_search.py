@@ -10,7 +10,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
-from cpfls_cli.gap.naming.search import acceptable, forward_selection, grown_elsewhere, needed
+from cpfls_cli.gap.naming.search import acceptable, forward_selection, grown_elsewhere
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import candidate, fly, weak
 
@@ -78,13 +78,6 @@ def test_a_poor_choice_is_replaced_by_what_serves_better():
     step = rank_effects(known, [candidate("torque_bias"), candidate("linear_damping")], TRIED, SETTINGS, None)
     (better,) = grown_elsewhere(known, [[candidate("com_offset")]], step, TRIED, SETTINGS)
     assert sorted(names(better.chosen)) == ["com_offset", "linear_damping"]
-
-
-def test_a_needless_effect_is_dropped():
-    known = flights((candidate("com_offset"), [0.004, -0.003]))
-    step = rank_effects(known, [candidate("torque_bias")], TRIED, SETTINGS, None)
-    both = refined(known, [candidate("torque_bias"), candidate("com_offset")], step.floor)
-    assert names(needed(both, step, SETTINGS)) == ["com_offset"]
 
 
 def test_what_is_chosen_is_not_looked_at_again_and_each_effect_is_listed_once():

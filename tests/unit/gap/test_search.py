@@ -52,7 +52,7 @@ def of(step, name):
 
 
 def rivals(step, own):
-    found = alternatives(of(step, own), step.ranking, step.above_floor)
+    found = alternatives(of(step, own), step.ranking, step.above_floor, SETTINGS)
     return {each.name: each for each in found}
 
 
@@ -75,8 +75,8 @@ def test_the_special_case_is_an_alternative_of_its_superset(step):
 
 def test_the_fewest_numbers_win_among_equals(step):
     first = [of(step, name) for name in ("general", "special", "twin", "other")]
-    assert simplest(first, step.above_floor).candidate.effect.name in ("special", "twin")
-    assert simplest([of(step, "general"), of(step, "other")], step.above_floor).candidate.effect.name == "general"
+    assert simplest(first, step.above_floor, 8.0).candidate.effect.name in ("special", "twin")
+    assert simplest([of(step, "general"), of(step, "other")], step.above_floor, 8.0).candidate.effect.name == "general"
 
 
 def test_more_numbers_alone_make_no_superset(step):
@@ -122,7 +122,7 @@ def test_a_number_more_has_to_explain_something(less, wins):
     to_and_fro = 20.0 * (-1.0) ** np.arange(BLOCKS)
     two = Scored(Candidate(replace(GENERAL, name="two numbers"), {}), np.arange(2), 100.0, OWN.block_error, np.ones(2))
     one = with_errors("one number", 100.0 - BLOCKS * less, OWN.block_error + to_and_fro + less)
-    assert simplest([two, one], 100.0).candidate.effect.name == wins
+    assert simplest([two, one], 100.0, 8.0).candidate.effect.name == wins
 
 
 @pytest.mark.parametrize(("less", "wins"), [(0.5, "usual"), (1.0, "best")])
@@ -132,7 +132,7 @@ def test_what_no_number_tells_apart_is_what_is_usual(less, wins):
     effect = replace(hand_made("usual", (1.3, 0)), order=SPECIAL.order - 1)
     gain, errors = 1e4 - BLOCKS * less, OWN.block_error + to_and_fro + less
     usual = Scored(Candidate(effect, {}), np.array([0]), gain, errors, np.ones(1))
-    assert simplest([best, usual], 1e4).candidate.effect.name == wins
+    assert simplest([best, usual], 1e4, 8.0).candidate.effect.name == wins
 
 
 def test_systems_without_flights_of_the_signal_have_no_columns():

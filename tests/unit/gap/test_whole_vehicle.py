@@ -123,13 +123,13 @@ def test_what_is_left_out_is_measured_along_flights():
     steady = np.full((60, 4), 1000.0)
     flown = replace(signals(), voltage=np.linspace(1.0, 0.8, 60), commanded=True, rotor_speed=steady)
     extended = replace(plain(None), effects=(fitted("torque_bias", 0.01, 0.0, 0.0), sag))
-    (left,) = left_out(whole_vehicle(extended, QUAD), ["battery_sag"], [Recording("flight", flown)])
+    (left,) = left_out(whole_vehicle(extended, QUAD), ["battery_sag"], [Recording("flight", flown)], 0.5)
     assert left.name == "battery_sag"
     lost = (1.0 - actuated(flown, extended.chosen).speed ** 2 / flown.speed**2) * flown.thrust[:, None]
     assert left.wrench[5] == pytest.approx(np.sqrt((lost[:, 0] ** 2).mean()), rel=0.02)
     assert left.ends[1] > 0.1
     still = replace(flown, velocity=None, acceleration=None, position=None)
-    (unseen,) = left_out(whole_vehicle(extended, QUAD), ["battery_sag"], [Recording("flight", still)])
+    (unseen,) = left_out(whole_vehicle(extended, QUAD), ["battery_sag"], [Recording("flight", still)], 0.5)
     np.testing.assert_array_equal(np.isfinite(unseen.ends), [False, False, True, True])
     assert Off.of(unseen.ends).sentence.endswith(" degrees")
 
