@@ -41,7 +41,7 @@ from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.residual.air import Air, air, in_air, known_motion
-from cpfls_cli.gap.settings import NOISE, GapSettings
+from cpfls_cli.gap.settings import CHANCE, NOISE, RARE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.windows import Recording, common_windows
@@ -210,10 +210,12 @@ def _named(
     return _Named(effects, steps, judge, first if differ else judgement, [*refusals, *unconfirmed], differ)
 
 
-def _gusts(named: _Named, given: Instruments, settings: GapSettings, rng: np.random.Generator) -> Air | None:
+def _gusts(
+    named: _Named, given: Instruments, settings: GapSettings, rng: np.random.Generator, doubt: float = RARE
+) -> Air | None:
     """Find gusts in what is left of the training flights."""
     hypothesis, block, estimates = named.judgement.found
-    return air(hypothesis, estimates.linear, block, given, settings, rng)
+    return air(hypothesis, estimates.linear, block, given, settings, rng, doubt)
 
 
 def _beside_gusts(
@@ -231,7 +233,10 @@ def _beside_gusts(
     """
     without = _by_instruments(named, given, settings, late=False)
     gusts = _gusts(without, given, settings, rng)
-    if gusts is None or gusts.told.sum() >= told or _names(without) == _names(named):
+    if _names(without) == _names(named):
+        return without, gusts
+    doubted = _gusts(without, given, settings, rng, CHANCE)
+    if doubted is None or doubted.told.sum() >= told:
         return without, gusts
     late = _by_instruments(named, given, settings, late=True)
     beside = _gusts(late, given, settings, rng)

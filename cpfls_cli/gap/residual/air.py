@@ -118,6 +118,7 @@ def air(
     given: Instruments,
     settings: GapSettings,
     rng: np.random.Generator,
+    doubt: float = RARE,
 ) -> Air | None:
     """Find gusts in what a hypothesis leaves of flights.
 
@@ -131,6 +132,8 @@ def air(
     block : array of int, shape (window,)
     given : Instruments
         Of the same flights.
+    doubt : float
+        Probability of chance up to which what grows with the motion is no air.
 
     Returns
     -------
@@ -154,7 +157,7 @@ def air(
     if given.kind == "setpoints" and told.any():
         sized, moves = np.isfinite(found.size), residual.any(axis=0)
         blows = (sized | ~moves)[:3].all() and (sized[3:].any() or not moves[3:].any())
-        told &= blows & _like_air(hypothesis, residual, block, given, settings, rng)
+        told &= blows & _like_air(hypothesis, residual, block, given, settings, rng, doubt)
     # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
     sized = told | (given.kind == "repeats")
     parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in RANGES}
@@ -223,6 +226,7 @@ def _like_air(
     given: Instruments,
     settings: GapSettings,
     rng: np.random.Generator,
+    doubt: float,
 ) -> BoolArray:
     """Mark channels of which the air is believed where setpoints do not foretell them.
 
@@ -240,11 +244,17 @@ def _like_air(
     index = hypothesis.flight_index
     ranked = rank_dependence(residual, index, block, state, settings.shifts, rng)
     follows = [each.channel for each in ranked if each.p_value <= settings.significance and each.r2 > COUNTS]
-    return ~np.isin(CHANNELS, follows) & ~_growing(residual, asked, index, block, settings.shifts, rng)
+    return ~np.isin(CHANNELS, follows) & ~_growing(residual, asked, index, block, settings.shifts, rng, doubt)
 
 
 def _growing(
-    residual: Array, asked: Array, flight_index: IntArray, block: IntArray, shifts: int, rng: np.random.Generator
+    residual: Array,
+    asked: Array,
+    flight_index: IntArray,
+    block: IntArray,
+    shifts: int,
+    rng: np.random.Generator,
+    doubt: float = RARE,
 ) -> BoolArray:
     """Mark channels of which what is left surely grows with how much a signal moves, by ranks over blocks of time.
 
@@ -256,7 +266,7 @@ def _growing(
     sizes, moves = (_ranks(np.array([each[block == own].mean(axis=0) for own in np.unique(block)])) for each in rows)
     alike = (moves.T @ sizes).max(axis=0, initial=0.0)
     chance = np.array([(moves.T @ rng.permutation(sizes)).max(initial=0.0) for _ in range(shifts)])
-    return np.asarray((chance[:, None] >= alike).sum(axis=0) <= max(RARE * (1 + shifts) - 1, 0))
+    return np.asarray((chance[:, None] >= alike).sum(axis=0) <= max(doubt * (1 + shifts) - 1, 0))
 
 
 def _ranks(values: Array) -> Array:
