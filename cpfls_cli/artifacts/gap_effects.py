@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.spec import BODY, columns_of, dataset, group, record, r
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS, effect
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
 from cpfls_cli.gap.naming.results import Estimate, NamedEffect
-from cpfls_cli.gap.settings import CLEAR, WORSE
+from cpfls_cli.gap.settings import CLEAR, OFF
 from cpfls_cli.playback.replay import AFTER, BEFORE, MODEL, NOTHING_MOVES, STATED
 
 if TYPE_CHECKING:
@@ -34,8 +34,8 @@ def above_noise(floors: Array) -> BoolArray:
 
 
 def worse_axes(before: Array, after: Array) -> list[int]:
-    """List the axes about which a clear gap grows; both gaps have shape (6,) and are in floors."""
-    return [int(c) for c in np.flatnonzero((before[:3] > CLEAR) & (after[:3] > WORSE * before[:3]))]
+    """List the axes about which a clear gap grows by more than formulas are off by; both, shape (6,), are in floors."""
+    return [int(c) for c in np.flatnonzero((before[:3] > CLEAR) & (after[:3] > (1 + OFF) * before[:3]))]
 
 
 def gap_summary(value: Array, floors: Array) -> dict[str, Any]:
