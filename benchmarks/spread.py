@@ -117,16 +117,18 @@ def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
             blocks=spread.blocks,
             loop=np.ones((2, 3)),
             gusts=None if held is None else GustRanges.of_known(*(getattr(gusts, name) for name in RANGES)),
+            lack=None if gusts is None else gusts.lack,
         ),
     )
 
 
 class Fleet(NamedTuple):
-    """Vehicles side by side: parameters of the functions in JAX, and gusts."""
+    """Vehicles side by side: parameters of the functions in JAX, gusts, and what comes like them."""
 
     module: Mapping[str, Any]
     parameters: Array
     gusts: Array
+    lack: Array
     inertia: Array
     mass: Array
 
@@ -136,14 +138,43 @@ def fleet(nominal: VehicleModel, models: Sequence[VehicleModel], *, still: bool 
     sheet = sheet_of_vehicle(replace(nominal, gusts=None))
     module = executed(exported(sheet, "jax", "v.py").text)
     none = Gusts(np.zeros(6), np.ones(6))
-    gusts = np.array([none if still or each.gusts is None else each.gusts for each in models])
+    blowing = [(none, none) if still else (each.gusts or none, each.lack or none) for each in models]
+    gusts, lack = (np.array(own) for own in zip(*blowing, strict=True))
     return Fleet(
         module,
         jax_parameters(sheet, models),
         gusts,
+        lack,
         np.array([each.body.inertia for each in models]),
         np.array([each.body.mass for each in models]),
     )
+
+
+class Air(NamedTuple):
+    """Torque and force that act on vehicles beside those of their models: gusts and what comes like them."""
+
+    keep: Any
+    fresh: Any
+    white: Any
+
+    @classmethod
+    def of(cls, flying: Fleet, step: float) -> Air:
+        """Play them as docs/spread.md says."""
+        size, memory = (np.stack([flying.gusts[:, row], flying.lack[:, row]]) for row in (0, 1))
+        keep = jnp.exp(-step / memory)
+        return cls(keep, size * jnp.sqrt(1 - keep**2), flying.gusts[:, 2] / np.sqrt(step))
+
+    def first(self, key: Any) -> Any:
+        """Draw both processes, shape (2, vehicle, 6)."""
+        return jax.random.normal(key, self.keep.shape) * self.fresh / jnp.sqrt(1 - self.keep**2)
+
+    def after(self, now: Any, key: Any) -> Any:
+        """Draw them a step later."""
+        return self.keep * now + self.fresh * jax.random.normal(key, now.shape)
+
+    def push(self, now: Any, key: Any) -> Any:
+        """Add the white part, shape (vehicle, 6)."""
+        return now.sum(axis=0) + self.white * jax.random.normal(key, self.white.shape)
 
 
 def pushed(fleet: Fleet, state: Any, gust: Any, step: float) -> Any:
@@ -231,8 +262,7 @@ def closed_loop(truth: Truth, flying: Fleet, asked: Flight) -> Array:
     count, module = len(flying.parameters), flying.module
     hover, unmix = truth.mass * GRAVITY / 4 / truth.thrust_factor, np.linalg.inv(truth.mixer)
     outer, loop = min(2.0, asked.bandwidth / 6), asked.bandwidth * np.array([1.0, 1.0, 0.4])
-    keep = jnp.exp(-STEP_S / flying.gusts[:, 1])
-    fresh = flying.gusts[:, 0] * jnp.sqrt(1 - keep**2)
+    air = Air.of(flying, STEP_S)
     terms = jax.vmap(lambda now, then: module["steady"](jnp.sqrt(0.5 * (now**2 + then**2))))
     move = jax.vmap(lambda state, rotor, own: module["step"](state, rotor, STEP_S, own))
 
@@ -255,15 +285,14 @@ def closed_loop(truth: Truth, flying: Fleet, asked: Flight) -> Array:
     def along(carried: Any, given: Any) -> Any:
         state, speed, gust = carried
         wanted_at, key = given
-        noise, new = jnp.split(jax.random.normal(key, (count, 9)), [3], axis=1)
-        measured = state[:, 15:] + truth.gyro_noise * noise
+        felt, blown, new = jax.random.split(key, 3)
+        measured = state[:, 15:] + truth.gyro_noise * jax.random.normal(felt, (count, 3))
         after = speed + STEP_S / truth.lag_s * (autopilot(state, wanted_at, measured) - speed)
-        moved = move(pushed(flying, state, gust, STEP_S), terms(speed, after), flying.parameters)
-        return (moved, after, keep * gust + fresh * new), measured
+        shoved = pushed(flying, state, air.push(gust, blown), STEP_S)
+        return (move(shoved, terms(speed, after), flying.parameters), after, air.after(gust, new)), measured
 
     begun = jnp.concatenate([path[0, :6], jnp.eye(3).ravel(), jnp.zeros(3)])
-    first = jax.random.normal(jax.random.key(1), (count, 6)) * flying.gusts[:, 0]
-    start = jnp.tile(begun, (count, 1)), jnp.full((count, 4), jnp.sqrt(hover)), first
+    start = jnp.tile(begun, (count, 1)), jnp.full((count, 4), jnp.sqrt(hover)), air.first(jax.random.key(1))
     keys = jax.random.split(jax.random.key(2), len(path))
 
     def ten(carried: Any, given: Any) -> Any:
@@ -404,8 +433,7 @@ def twins(model: VehicleModel, flying: Fleet, law: Law, flight: PlaybackFlight) 
     """
     motion, module, count = flight.motion, flying.module, len(flying.parameters)
     period, unmix = motion.period, np.linalg.pinv(allocation_matrix(model.vehicle)) * sizes(model)
-    keep = jnp.exp(-period / flying.gusts[:, 1])
-    fresh = flying.gusts[:, 0] * jnp.sqrt(1 - keep**2)
+    air = Air.of(flying, period)
     logged = tuple(map(jnp.asarray, (*motion[:4], flight.speed)))
     terms = jax.vmap(module["steady"])
     move = jax.vmap(lambda state, rotor, own: module["step"](state, rotor, period, own))
@@ -421,12 +449,13 @@ def twins(model: VehicleModel, flying: Fleet, law: Law, flight: PlaybackFlight) 
         along_body = jnp.einsum("nji,nkj->nki", own, moved).reshape(-1, 6)
         squared = jnp.maximum(speed**2 + answer @ unmix.T, 0.0)
         after = law.keep * answer + jnp.concatenate([turned, state[:, 15:] - rate, along_body], axis=1) @ law.gain.T
-        moved_on = move(pushed(flying, state, gust, period), terms(jnp.sqrt(squared)), flying.parameters)
-        return (moved_on, after, keep * gust + fresh * jax.random.normal(key, (count, 6))), moved_on[:, 15:]
+        blown, new = jax.random.split(key)
+        shoved = pushed(flying, state, air.push(gust, blown), period)
+        moved_on = move(shoved, terms(jnp.sqrt(squared)), flying.parameters)
+        return (moved_on, after, air.after(gust, new)), moved_on[:, 15:]
 
     begun = jnp.concatenate([part[0].ravel() for part in logged[:4]])
-    first = jax.random.normal(jax.random.key(1), (count, 6)) * flying.gusts[:, 0]
-    start = jnp.tile(begun, (count, 1)), jnp.zeros((count, 4)), first
+    start = jnp.tile(begun, (count, 1)), jnp.zeros((count, 4)), air.first(jax.random.key(1))
     keys = jax.random.split(jax.random.key(2), len(flight) - 1)
     rows = tuple(each[:-1] for each in logged)
     return np.asarray(jax.jit(lambda: jax.lax.scan(along, start, (rows, keys))[1])()).swapaxes(0, 1)

@@ -169,16 +169,35 @@ class GustsGroup:
     torque_memory: Array = dataset("time in which a gust falls to 37 %", "axis", units="s", frame=BODY)
     force: Array = dataset("standard deviation; 0 for none", "axis", units="N", frame=BODY)
     force_memory: Array = dataset("time in which a gust falls to 37 %", "axis", units="s", frame=BODY)
+    torque_white: Array | None = dataset(
+        "white noise beside it, as of a step of 1 s", "axis", units="N m s^0.5", frame=BODY, default=None
+    )
+    force_white: Array | None = dataset(
+        "white noise beside it, as of a step of 1 s", "axis", units="N s^0.5", frame=BODY, default=None
+    )
 
     @classmethod
     def of(cls, gusts: Gusts) -> Self:
         """Arrange gusts."""
-        (torque, force), (turning, pushing) = (values.reshape(2, 3) for values in gusts)
-        return cls(torque=torque, torque_memory=turning, force=force, force_memory=pushing)
+        (torque, force), (turning, pushing), (torque_white, force_white) = (values.reshape(2, 3) for values in gusts)
+        return cls(
+            torque=torque,
+            torque_memory=turning,
+            force=force,
+            force_memory=pushing,
+            torque_white=torque_white,
+            force_white=force_white,
+        )
 
     def gusts(self) -> Gusts:
         """Rebuild them."""
-        return Gusts(np.append(self.torque, self.force), np.append(self.torque_memory, self.force_memory))
+        return Gusts(np.append(self.torque, self.force), np.append(self.torque_memory, self.force_memory), self.white)
+
+    @property
+    def white(self) -> Array:
+        """White noise of torque and force, 0 in files of before, shape (6,)."""
+        torque, force = (np.zeros(3) if own is None else own for own in (self.torque_white, self.force_white))
+        return np.append(torque, force)
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -188,6 +207,8 @@ class GustsGroup:
             "torque_memory_s": self.torque_memory.tolist(),
             "force_n": self.force.tolist(),
             "force_memory_s": self.force_memory.tolist(),
+            "torque_white_n_m_sqrt_s": self.white[:3].tolist(),
+            "force_white_n_sqrt_s": self.white[3:].tolist(),
         }
 
 

@@ -21,6 +21,7 @@ from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.playback.gusts import RANGES, GustRanges
 from cpfls_cli.playback.history import Observer
+from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.spread import Estimates
 from cpfls_cli.playback.table import Remainder
@@ -80,6 +81,7 @@ def estimates(record: VehicleRecord) -> Estimates:
         blocks=record.blocks,
         loop=loop,
         gusts=None if gusts is None else GustRanges.of_known(*(getattr(gusts, name) for name in RANGES)),
+        lack=None if gusts is None or gusts.lack is None else Lack(**vars(gusts.lack)),
     )
 
 
