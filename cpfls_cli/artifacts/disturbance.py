@@ -40,11 +40,15 @@ class GustAxis(NamedTuple):
 
 @record
 class LackGroup:
-    """What comes again and a model lacks: its parts are off by shares of themselves, and a rest is like none of them."""
+    """What comes again and a model lacks: its parts are off by shares of themselves, and a rest is like no part."""
 
     part: tuple[str, ...] = dataset("parts of the model", "formula")
     share: Array = dataset(
-        "covariance of the shares by which torque or force of the parts are off", "gust", "formula", "formula", gaps=True
+        "covariance of the shares by which torque or force of the parts are off",
+        "gust",
+        "formula",
+        "formula",
+        gaps=True,
     )
     size: Array = dataset("standard deviation of the rest, N m or N", "gust", units="SI", gaps=True)
     memory: Array = dataset("time in which the rest falls to 37 %", "gust", units="s", gaps=True)

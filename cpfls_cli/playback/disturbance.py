@@ -257,11 +257,8 @@ def gusts_in(
     white = np.array([np.nan if told_by == "none" else axis.white for axis in axes])
     lack = None
     if parts and told_by != "none":
-        foretold_parts = _foretold_parts(parts, given, band, told_by)
-        each = [
-            axis.lack(power, own) for axis, power, own in zip(axes, powers.left.swapaxes(0, 1), foretold_parts, strict=True)
-        ]
-        lack = Lack.of(tuple(parts), each)
+        rows = zip(axes, powers.left.swapaxes(0, 1), _foretold_parts(parts, given, band, told_by), strict=True)
+        lack = Lack.of(tuple(parts), [axis.lack(power, own) for axis, power, own in rows])
     foretold, error = _share_foretold(powers)
     none = np.full(len(axes), np.nan) if told_by == "none" else 1.0
     ends = dict(zip(RANGES, columns.T[: len(RANGES)], strict=True))
@@ -307,20 +304,18 @@ def _powers(sides: Sequence[Array], given: Instruments, band: _Band, told_by: To
     return _Powers(np.array(power), np.array(whole), np.array(count, dtype=np.int64), np.concatenate(each_left))
 
 
-def _foretold_parts(
-    parts: Mapping[str, Sequence[Array]], given: Instruments, band: _Band, told_by: Told
-) -> _Complex:
+def _foretold_parts(parts: Mapping[str, Sequence[Array]], given: Instruments, band: _Band, told_by: Told) -> _Complex:
     """Give parts of a model as instruments foretell them, shape (axis, piece, part, frequency)."""
     values = [np.stack(own, axis=2) for own in zip(*parts.values(), strict=True)]
     flat = [own.reshape(len(own), -1) for own in values]
     if told_by == "repeats":
-        laid = [
-            band.laid(flight, given.repeats.others(number, flat) if given.repeats.beside[number] else np.nan * own, band.weight)
-            for number, (flight, own) in enumerate(zip(given.flown, flat, strict=True))
+        flat = [
+            given.repeats.others(number, flat) if given.repeats.beside[number] else np.nan * own
+            for number, own in enumerate(flat)
         ]
-    else:
-        own = [band.laid(flight, columns, band.weight) for flight, columns in zip(given.flown, flat, strict=True)]
-        laid = _expected(given, own, band)
+    laid = [band.laid(flight, columns, band.weight) for flight, columns in zip(given.flown, flat, strict=True)]
+    if told_by == "setpoints":
+        laid = _expected(given, laid, band)
     known = np.concatenate([each[np.isfinite(each).all(axis=(1, 2))] for each in laid])
     return known.reshape(len(known), values[0].shape[1], len(parts), -1).swapaxes(0, 1)
 

@@ -162,9 +162,7 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
         tuple(number.name for number in numbers),
         np.array([number.value for number in numbers]),
         np.array([row for row, _ in kept]).reshape(count, len(numbers)),
-        tuple(
-            replace(each, gusts=own, **off) for each, own, off in zip(made, gusts, lacking, strict=True)
-        ),
+        tuple(replace(each, gusts=own, **off) for each, own, off in zip(made, gusts, lacking, strict=True)),
         tried,
         dict(rejected.most_common()),
     )
@@ -193,7 +191,7 @@ def _of_a_body(model: VehicleModel, numbers: Sequence[FoundNumber]) -> tuple[Veh
 
 
 def _root(correlation: Array) -> Array:
-    """Take a root of a correlation or covariance that rounding, or fewer blocks than numbers, leave without full rank."""
+    """Take a root of a correlation or covariance, which rounding or few blocks may leave without full rank."""
     sizes, axes = np.linalg.eigh(correlation)
     return np.asarray(axes * np.sqrt(np.maximum(sizes, 0.0)))
 
