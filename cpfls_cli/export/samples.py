@@ -28,8 +28,8 @@ _CONVENTIONS = (
     "k, and all entries k belong together: numbers that the flights tell only by their ratio differ together. Rotor i "
     "pushes thrust_factor w^2 along z and turns the body by -spin drag_factor w^2 about z; with thrust_linear a, w^2 "
     "becomes w^2 + a w_h w, w_h the speed that hovers under the square alone. Commands act after delay_s through a "
-    "first-order lag of motor_lag_s. Torque and force of a part of the model are to be multiplied, axis by axis, with 1 "
-    "+ off.PART: by so much its formula is off. Gusts and what is lacking act beside it, by the recipe of gusts."
+    "first-order lag of motor_lag_s. Torque and force of a part of the model are to be multiplied, axis by axis, with "
+    "1 + off.PART: by so much its formula is off. Gusts and what is lacking act beside it, by the recipe of gusts."
 )
 _ENDS = (2.5, 97.5)
 
