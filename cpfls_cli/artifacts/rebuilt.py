@@ -19,8 +19,8 @@ from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.effects.registry import effect
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.gusts import RANGES, GustRanges
+from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.spread import Estimates
 from cpfls_cli.playback.table import Remainder

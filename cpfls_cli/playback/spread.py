@@ -20,7 +20,7 @@ from cpfls_cli.inertia import (
     six_parameters,
     symmetric,
 )
-from cpfls_cli.playback.gusts import Gusts, GustRanges
+from cpfls_cli.playback.gusts import GustRanges, Gusts
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.parameters import LEARNED, PRODUCT_NAMES
 from cpfls_cli.playback.table import Remainder

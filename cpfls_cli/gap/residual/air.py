@@ -14,8 +14,8 @@ from cpfls_cli.gap.residual.dependence import rank_dependence, state_signals, wi
 from cpfls_cli.gap.residual.repeated import without_copies
 from cpfls_cli.gap.settings import CHANCE, COUNTS, ERRORS, GapSettings
 from cpfls_cli.playback.disturbance import FoundGusts, gusts_in
-from cpfls_cli.playback.gusts import RANGES
 from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.gusts import RANGES
 from cpfls_cli.playback.instruments import Instruments, Repeats, foretold, instruments, late, late_by
 from cpfls_cli.rounding import levelled
 from cpfls_cli.weak_form.resampling import about_flight_mean
