@@ -129,6 +129,10 @@ class ChangedRecord(FoundRecord):
     p_value: float = dataset("probability that flights of an unchanged vehicle look as much like any change")
     by_flight: Array = dataset("the same of each flight of today alone", "today")
     since_flight: int = dataset("index of the flight of today from which on it looks most as if it had changed")
+    fewest: int | None = dataset(
+        "reference flights that tell what flights of the vehicle differ by; of fewer, what is usual stands for it",
+        default=None,
+    )
 
     @classmethod
     def of(
@@ -141,6 +145,7 @@ class ChangedRecord(FoundRecord):
         *,
         false_alarm: float,
         named_from: float,
+        fewest: int,
     ) -> Self:
         """Arrange a change, with the units of its numbers and causes by name."""
         hover, hover_deviation = _in_common(change, today)
@@ -162,6 +167,7 @@ class ChangedRecord(FoundRecord):
             since_flight=change.since,
             false_alarm=false_alarm,
             named_from=named_from,
+            fewest=fewest,
             **found_groups(change.found, change.shows, units),
             warning=tuple(warnings),
         )
@@ -170,6 +176,16 @@ class ChangedRecord(FoundRecord):
     def changed(self) -> bool:
         """Whether the vehicle is said to have changed."""
         return self.p_value <= self.false_alarm
+
+    @property
+    def short_of(self) -> int:
+        """How many more reference flights would tell what flights differ by, which is assumed without them."""
+        return max((self.fewest or 0) - len(self.before), 0)
+
+    @property
+    def verdict(self) -> str:
+        """What is said first: that nothing changed only where flights of the vehicle tell what it differs by."""
+        return "CHANGED" if self.changed else "NO CHANGE SEEN" if self.short_of else "NO CHANGE"
 
     @property
     def since(self) -> int | None:
@@ -192,7 +208,9 @@ class ChangedRecord(FoundRecord):
         """What changed for machines."""
         since = self.since
         return {
+            "verdict": self.verdict,
             "changed": self.changed,
+            "reference_flights_lacking": self.short_of,
             "p": self.p_value,
             "by_flight": dict(zip(self.today, self.by_flight.tolist(), strict=True)),
             "since": None if since is None else self.today[since],

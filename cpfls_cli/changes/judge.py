@@ -157,33 +157,57 @@ def judged(
     """
     names = reference.names
     apart, covariance = reference.apart(today)
-    listed = causes(names, vehicle)
-    space = _Space(covariance, reference.freedom, kinds_of(names), listed)
-    since_each = np.array([apart[start:].mean(axis=0) for start in starts])
-    drawn = space.drawn(rng, [len(today) - start for start in starts])
-    most = space.evidence(drawn.reshape(-1, len(names))).max(axis=0).reshape(drawn.shape[:2])
+    listed, kinds = causes(names, vehicle), kinds_of(names)
+
+    def held(flights: Sequence[FlightNumbers]) -> tuple[_Space, Array, float]:
+        """Hold flights against what they, and no others of today, can be off by: their mean and its evidence."""
+        beside, own = reference.apart(flights)
+        space = _Space(own, reference.freedom, listed)
+        mean = space.whitened(beside.mean(axis=0))
+        return space, mean, float(space.strongest(mean[:, None])[0])
+
+    spaces, means, strongest = zip(*(held(today[start:]) for start in starts), strict=True)
+    drawn = drawn_by_chance(rng, kinds, reference.freedom, [len(today) - start for start in starts])
+    most = np.array([space.strongest(rows) for space, rows in zip(spaces, drawn, strict=True)])
     chance, alone = np.sort(most.max(axis=0)), np.sort(most[-1])
-    evidence = space.evidence(np.vstack([since_each, apart])).max(axis=0)
-    p_value = beyond_chance(chance, evidence[: len(starts)].max())
-    best = int(np.argmax(evidence[: len(starts)]))
-    since, found = starts[best], tuple[Found, ...]()
+    best = int(np.argmax(strongest))
+    p_value, since, found = beyond_chance(chance, strongest[best]), starts[best], tuple[Found, ...]()
     if p_value <= FALSE_ALARM:
-        found = _found(space, since_each[best], chance)
-        since = _since(space, apart, found, starts)
-        found = _found(space, apart[since:].mean(axis=0), chance) or found
+        found = _found(spaces[best], means[best], chance)
+        since = _since(spaces[best], apart, found, starts)
+        at = list(starts).index(since)
+        found = _found(spaces[at], means[at], chance) or found
     threshold = float(np.quantile(chance, 1 - FALSE_ALARM))
-    white = np.linalg.solve(space.root, drawn[0, :_SHOWN].T)
     return Change(
         names,
         reference,
         apart,
         np.sqrt(np.diag(covariance)),
         p_value,
-        np.array([beyond_chance(alone, each) for each in evidence[len(starts) :]]),
+        np.array([beyond_chance(alone, held([flight])[2]) for flight in today]),
         since,
         found,
-        {cause.name: space.shows(index, threshold, white) for index, cause in enumerate(listed)},
+        {cause.name: spaces[0].shows(index, threshold, drawn[0][:, :_SHOWN]) for index, cause in enumerate(listed)},
     )
+
+
+def drawn_by_chance(
+    rng: np.random.Generator, kinds: Sequence[str], freedom: float, counts: Sequence[int] = (1,), draws: int = _DRAWS
+) -> Array:
+    """Draw means of so many of the last flights of an unchanged day, whitened, shape (count, number, draw).
+
+    Each kind has a scatter of its own to be off by; numbers of two kinds do not go together.
+    """
+    kind = np.unique(kinds, return_inverse=True)[1]
+    scale = np.sqrt(freedom / rng.chisquare(freedom, (draws, kind.max() + 1)))[:, kind]
+    day, own = rng.normal(size=(2, draws, len(kind)))
+    means, total, flights = [], np.zeros_like(own), 0
+    for count in sorted(counts):
+        # The mean of so many of them, of which some are in the mean before.
+        total, flights = total + np.sqrt(count - flights) * rng.normal(size=own.shape), count
+        means.append((scale * (np.sqrt(_IN_COMMON) * day + np.sqrt(1 - _IN_COMMON) * total / count)).T)
+    order = np.argsort(np.argsort(counts, kind="stable"), kind="stable")
+    return np.array(means)[order]
 
 
 def beyond_chance(chance: Array, value: float) -> float:
@@ -194,42 +218,34 @@ def beyond_chance(chance: Array, value: float) -> float:
 class _Space:
     """Densities of numbers under no change and under each one, as mixtures of normal ones."""
 
-    def __init__(self, covariance: Array, freedom: float, kinds: Sequence[str], listed: Sequence[Cause]) -> None:
+    def __init__(self, covariance: Array, freedom: float, listed: Sequence[Cause]) -> None:
         # Slow to load, and who reads a record computes nothing.
         from scipy.special import chdtri
 
         self.listed, self.freedom = listed, freedom
-        self.kind = np.unique(kinds, return_inverse=True)[1]
         self.root = np.linalg.cholesky(covariance)
         self.scales = freedom / chdtri(freedom, 1 - _QUANTILES)
-        self.white = [np.linalg.solve(self.root, cause.directions) for cause in listed]
+        self.white = [self.whitened(cause.directions) for cause in listed]
         self.prior = np.log([cause.prior for cause in listed])
 
-    def drawn(self, rng: np.random.Generator, counts: Sequence[int] = (1,), draws: int = _DRAWS) -> Array:
-        """Draw means of so many of the last flights of an unchanged day, shape (count, draw, number).
+    def whitened(self, apart: Array) -> Array:
+        """Turn numbers into such that do not go together, of variance 1, along the first axis."""
+        return np.asarray(np.linalg.solve(self.root, apart))
 
-        Each kind has a scatter of its own to be off by.
-        """
-        scale = np.sqrt(self.freedom / rng.chisquare(self.freedom, (draws, self.kind.max() + 1)))[:, self.kind]
-        day, own = rng.normal(size=(2, draws, len(self.root)))
-        means, total, flights = [], np.zeros_like(own), 0
-        for count in sorted(counts):
-            # The mean of so many of them, of which some are in the mean before.
-            total, flights = total + np.sqrt(count - flights) * rng.normal(size=own.shape), count
-            means.append(np.sqrt(_IN_COMMON) * day + np.sqrt(1 - _IN_COMMON) * total / count)
-        order = np.argsort(np.argsort(counts, kind="stable"), kind="stable")
-        return np.asarray(scale * (np.array(means)[order] @ self.root.T))
+    def strongest(self, rows: Array) -> Array:
+        """Compute the logarithm of the largest evidence of a change, shape (row,)."""
+        return np.asarray(self.evidence(rows).max(axis=0))
 
-    def evidence(self, apart: Array, beside: Array | None = None) -> Array:
+    def evidence(self, rows: Array, beside: Array | None = None) -> Array:
         """Compute the logarithm of the evidence of each change, shape (cause, row).
 
         Parameters
         ----------
-        apart : array, shape (row, number)
+        rows : array, shape (number, row)
+            Whitened.
         beside : array, shape (number, size), or None
             Whitened directions of changes that are there anyway.
         """
-        rows = np.linalg.solve(self.root, apart.T)
         base = rows[:, :0] if beside is None else beside
         without = self._density(rows, base)
         known = base.shape[1]
@@ -272,7 +288,7 @@ class _Space:
         above = ndtr(mean / error[:, None])
         return np.asarray(np.log(2 * (_LOSES * above + (1 - _LOSES) * (1 - above))).sum(axis=0))
 
-    def sizes(self, apart: Array, chosen: Sequence[int], of: int) -> tuple[Size, ...]:
+    def sizes(self, row: Array, chosen: Sequence[int], of: int) -> tuple[Size, ...]:
         """Estimate the sizes of one of several changes that are there, in its unit.
 
         What is told of any size counts as as likely; a prior of what is usual would draw large ones in.
@@ -281,7 +297,6 @@ class _Space:
         told = np.arange(first, first + self.listed[of].told)
         directions = np.hstack([self.white[index] for index in chosen])
         directions[:, told] *= _ANY
-        row = np.linalg.solve(self.root, apart)
         logarithms, means, variances = [], [], []
         for scale in self.scales:
             inverse = np.linalg.inv(directions.T @ directions / scale + np.eye(directions.shape[1]))
@@ -311,11 +326,11 @@ class _Space:
         return cause.size(_SIZES[first] * cause.usual) if first < len(_SIZES) else float("inf")
 
 
-def _found(space: _Space, apart: Array, chance: Array) -> tuple[Found, ...]:
+def _found(space: _Space, row: Array, chance: Array) -> tuple[Found, ...]:
     """Name one change after another while each explains more than chance beside the others."""
     chosen: list[int] = []
     while len(chosen) < _MOST:
-        evidence = _beside(space, apart, chosen)
+        evidence = _beside(space, row, chosen)
         best = int(np.argmax(evidence))
         if beyond_chance(chance, float(evidence[best])) > FALSE_ALARM:
             break
@@ -323,10 +338,10 @@ def _found(space: _Space, apart: Array, chance: Array) -> tuple[Found, ...]:
         # What came first was chosen for what the others do too.
         for index in [*chosen] * 2:
             others = [other for other in chosen if other != index]
-            chosen = [*others, int(np.argmax(_beside(space, apart, others)))]
+            chosen = [*others, int(np.argmax(_beside(space, row, others)))]
     found = []
     for index in chosen:
-        evidence = _beside(space, apart, [other for other in chosen if other != index])
+        evidence = _beside(space, row, [other for other in chosen if other != index])
         share = np.exp(evidence - evidence.max())
         share /= share.sum()
         order = np.argsort(-share, kind="stable")
@@ -337,7 +352,7 @@ def _found(space: _Space, apart: Array, chance: Array) -> tuple[Found, ...]:
         )
         own = space.listed[index]
         belief = sum(share[at] for at, other in enumerate(space.listed) if at == index or own.holds(other))
-        found.append(Found(own, space.sizes(apart, chosen, index), float(belief), alike))
+        found.append(Found(own, space.sizes(row, chosen, index), float(belief), alike))
     return tuple(found)
 
 
@@ -346,8 +361,8 @@ def _since(space: _Space, apart: Array, found: Sequence[Found], starts: Sequence
 
     Along what was found: what else flights of a day have in common tells nothing of it.
     """
-    along = np.hstack([np.linalg.solve(space.root, each.cause.directions[:, : each.cause.told]) for each in found])
-    shown = np.linalg.solve(space.root, apart.T).T @ np.linalg.svd(along, full_matrices=False)[0]
+    along = np.hstack([space.whitened(each.cause.directions[:, : each.cause.told]) for each in found])
+    shown = space.whitened(apart.T).T @ np.linalg.svd(along, full_matrices=False)[0]
 
     def apart_from(start: int) -> float:
         after = shown[start:]
@@ -356,10 +371,10 @@ def _since(space: _Space, apart: Array, found: Sequence[Found], starts: Sequence
     return min(starts, key=apart_from)
 
 
-def _beside(space: _Space, apart: Array, there: Sequence[int]) -> Array:
+def _beside(space: _Space, row: Array, there: Sequence[int]) -> Array:
     """Compute the logarithm of the evidence of each change beside those that are there, shape (cause,)."""
     beside = np.hstack([space.white[index] for index in there]) if there else None
-    evidence = space.evidence(apart[None], beside)[:, 0]
+    evidence = space.evidence(row[:, None], beside)[:, 0]
     rotors = frozenset[str]().union(*(space.listed[index].rotors for index in there))
     for index, cause in enumerate(space.listed):
         if index in there or cause.rotors & rotors:

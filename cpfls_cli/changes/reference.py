@@ -114,7 +114,7 @@ class Reference:
         beside = _measured(flights, self.names) / len(flights) - self.measured
         more = self.more_agile(flights)
         values -= np.outer(more, self.by_agility)
-        unlike = np.abs(more).max() * self.agility_error
+        unlike = np.abs(more).mean() * self.agility_error
         covariance = self.covariance + np.diag(np.maximum(beside, 0.0))
         covariance += np.outer(unlike, unlike) * 0.5 * (_alike(self.names) + np.eye(len(self.names)))
         voltage = np.array([flight.voltage for flight in flights])

@@ -655,7 +655,12 @@ def changed(
         ),
     ],
     fail_on_change: Annotated[
-        bool, typer.Option("--fail-on-change", help="End with exit code 1 where something has changed, for scripts.")
+        bool,
+        typer.Option(
+            "--fail-on-change",
+            help="End with exit code 1 where something has changed, for scripts; with one or two reference flights 0 "
+            "says only that nothing is beyond what is usual of vehicles.",
+        ),
     ] = False,
     *,
     common: Common,

@@ -122,7 +122,9 @@ def _record(job: Job, flights: Mapping[str, FlightNumbersRecord], notes: Sequenc
         *notes,
         *(f"{own.flight}: {words}" for own in (*of_today, *of_before) for words in own.warning),
     ]
-    return ChangedRecord.of(change, today, before, units, warnings, false_alarm=FALSE_ALARM, named_from=NAMED)
+    return ChangedRecord.of(
+        *(change, today, before, units, warnings), false_alarm=FALSE_ALARM, named_from=NAMED, fewest=FEWEST
+    )
 
 
 def units_of(names: Sequence[str], vehicle: VehicleSettings) -> dict[str, str]:
@@ -136,11 +138,6 @@ def _warnings(
 ) -> Iterator[str]:
     """Say what the comparison lacks."""
     flights = [*before, *today]
-    if len(before) < FEWEST:
-        yield (
-            f"{len(before)} reference flight{'s' if len(before) > 1 else ''}: {FEWEST} or more would tell what differs "
-            "from day to day; what is usual stands for it"
-        )
     if len({own.commanded for own in flights}) > 1:
         speeds, commands = ([own.flight for own in flights if own.commanded == of] for of in (False, True))
         yield (
@@ -171,6 +168,13 @@ def _warnings(
 def _flown_unlike(change: Change, today: Sequence[FlightNumbers], before: Sequence[FlightNumbers]) -> Iterator[str]:
     """Say that today's flights are flown unlike those of the reference, where that makes them tell less."""
     reference = change.reference
+    without = [flight.name for flight in [*before, *today] if not np.isfinite(flight.agility)]
+    if without:
+        yield (
+            f"without attitude: {joined(without) if len(without) < len(before) + len(today) else 'all flights'}; how "
+            f"{'any flight' if not np.isfinite(reference.agility) else 'it'} is flown is not known, and another way of "
+            "flying can look like a change; import the attitude, or fly alike"
+        )
     unsure = np.abs(reference.more_agile(today)).max() * reference.agility_error
     kinds = dict.fromkeys(
         name.split()[0] for name, less in zip(change.names, unsure > _UNLIKE * change.deviation, strict=True) if less

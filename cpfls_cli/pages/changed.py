@@ -78,10 +78,21 @@ def answer(changed: Source[ChangedRecord], index: int = 1) -> Iterator[Block]:
 
 def changed_box(record: ChangedRecord, vehicle: VehicleSettings) -> Box:
     """Say in a sentence what changed, or that nothing did."""
+    lacks = [_assumed(record)] if record.short_of else []
     if not record.changed:
-        return Box("NO CHANGE", "nothing beyond what flights of this vehicle differ by", (), "good")
+        beyond = "what is usual of vehicles" if lacks else "what flights of this vehicle differ by"
+        return Box(record.verdict, f"nothing beyond {beyond}", lacks, "warning" if lacks else "good")
     first, *more = (sentence(told(record, index, vehicle)) for index in range(len(record.found.cause)))
-    return Box("CHANGED", first, [f"And: {each[:1].lower()}{each[1:]}" for each in more], "warning")
+    return Box(record.verdict, first, [*(f"And: {each[:1].lower()}{each[1:]}" for each in more), *lacks], "warning")
+
+
+def _assumed(record: ChangedRecord) -> str:
+    """Say that what flights differ by is assumed."""
+    few, more = len(record.before), record.short_of
+    return (
+        f"It is held against what is usual, and not against what your own flights differ by, which {few} reference "
+        f"flight{'s' if few > 1 else ''} cannot tell; give {more} more, of other days."
+    )
 
 
 def told(record: FoundRecord, index: int, vehicle: VehicleSettings) -> str:

@@ -37,6 +37,19 @@ def test_of_flights_as_before_nothing_is_named(changed):
     assert " of the centre of mass" in result.stdout
 
 
+@pytest.mark.parametrize(
+    ("before", "words"), [((1, 2), "which 2 reference flights"), ((1,), "which 1 reference flight")]
+)
+def test_of_few_reference_flights_it_is_said_that_what_they_differ_by_is_assumed(changed, folder, before, words):
+    result = changed("same.csv", before=before, options=["--fail-on-change"])
+    assert result.exit_code == 0
+    assert result.stdout.startswith("NO CHANGE SEEN: nothing beyond what is usual of vehicles")
+    assert f"{words} cannot tell; give {3 - len(before)} more" in " ".join(result.stdout.split())
+    told = json.loads((folder / "out" / "changed.json").read_text())
+    assert (told["verdict"], told["reference_flights_lacking"]) == ("NO CHANGE SEEN", 3 - len(before))
+    assert "NO CHANGE SEEN" in (folder / "out" / "report.html").read_text()
+
+
 def test_a_weak_rotor_is_named_with_its_loss(changed, folder):
     result = changed("weak1.csv", "weak2.csv", options=["--json", "--fail-on-change"])
     assert result.exit_code == 1
@@ -91,13 +104,13 @@ def test_values_of_an_option_follow_one_another_or_it_is_repeated(cpfls, changed
 
 
 def test_what_the_comparison_lacks_is_said(changed, folder, tmp_path):
-    assert "note: 2 reference flights: " in changed("same.csv", before=(1, 2)).stderr
     # One flight shows no rotor, but an offset of the accelerometer.
     assert " of the accelerometer along x" in changed("same.csv", before=(1,)).stdout
     slow = save(tmp_path / "slow.csv", flight_table(31, rate_hz=50.0), HEADER)
     speeds = save(tmp_path / "speeds.csv", flight_table(32), HEADER.replace("c1,c2,c3,c4,volts", "om1,om2,om3,om4,no"))
     short = save(tmp_path / "short.csv", flight_table(33, duration=2.0), HEADER)
     notes = changed(slow, short, options=["-v"]).stderr
+    assert "without attitude: all flights; how any flight is flown is not known" in notes
     assert "another sampling rate than the usual one of the reference, 100 Hz: slow.csv (50 Hz)" in notes
     assert "note: left out: short.csv: flies for " in notes
     assert "not compared, for not all flights tell it: vibration gyroscope x" in notes

@@ -13,7 +13,8 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.residual.dependence import rank_dependence, state_signals, without_actuation
 from cpfls_cli.gap.residual.repeated import without_copies
 from cpfls_cli.gap.settings import CHANCE, COUNTS, ERRORS, GapSettings
-from cpfls_cli.playback.disturbance import ENDS, FoundGusts, gusts_in
+from cpfls_cli.playback.disturbance import FoundGusts, gusts_in
+from cpfls_cli.playback.gusts import RANGES
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Instruments, Repeats, foretold, instruments, late, late_by
 from cpfls_cli.rounding import levelled
@@ -115,7 +116,7 @@ def air(
         told &= _like_air(hypothesis, linear, block, given, settings, rng, told)
     # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
     sized = told | (given.kind == "repeats")
-    parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in ENDS}
+    parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in RANGES}
     parts = {name: np.where(known, values, np.nan) for name, values in parts.items()}
     return Air(replace(found, **parts), told)
 

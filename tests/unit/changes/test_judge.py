@@ -1,6 +1,7 @@
 """The statistic of changes beside other formulas: densities by quadrature and by SciPy, a hover solved for loads."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from scipy.integrate import quad
 from scipy.stats import multivariate_t, norm
 
 from cpfls_cli.changes.causes import Cause, causes
-from cpfls_cli.changes.judge import FALSE_ALARM, _Space, changed
+from cpfls_cli.changes.judge import FALSE_ALARM, _Space, changed, drawn_by_chance
 from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.changes.reference import Reference, kinds_of, load_directions, usual_covariance
 from cpfls_cli.commands.changed import _flown_unlike
@@ -56,13 +57,13 @@ def test_directions_of_loads(what):
 def space(listed, freedom=6.0, size=3):
     rng = np.random.default_rng(2)
     root = rng.normal(size=(size, size))
-    return _Space(root @ root.T + np.eye(size), freedom, ["load"] * size, listed), root @ root.T + np.eye(size)
+    return _Space(root @ root.T + np.eye(size), freedom, listed), root @ root.T + np.eye(size)
 
 
 def test_density_of_no_change_is_a_multivariate_t():
     own, covariance = space([])
     rows = np.random.default_rng(1).normal(size=(5, 3))
-    told = own._density(np.linalg.solve(own.root, rows.T), np.zeros((3, 0)))
+    told = own._density(own.whitened(rows.T), np.zeros((3, 0)))
     expected = multivariate_t(shape=covariance, df=6.0).logpdf(rows)
     # The quadrature has twelve points; what all have in common is left out.
     assert told - told[0] == pytest.approx(expected - expected[0], abs=0.15)
@@ -82,7 +83,7 @@ def test_evidence_by_quadrature(losses):
         return np.exp(-0.5 * apart @ precision @ apart) * norm.pdf(size) * sign
 
     expected = np.log(quad(density, -9, 9, points=[0.0])[0]) + 0.5 * row @ precision @ row
-    assert own.evidence(row[None])[0, 0] == pytest.approx(expected, abs=1e-6)
+    assert own.evidence(own.whitened(row[:, None]))[0, 0] == pytest.approx(expected, abs=1e-6)
 
 
 def flights(count, rng, change=None, names=NAMES, voltage=np.nan):
@@ -102,8 +103,8 @@ def test_unchanged_flights_seldom_look_changed():
     """Of the predictive distribution itself: a share of 0.01 within what 2000 draws tell."""
     rng = np.random.default_rng(5)
     reference = Reference.of(flights(6, rng), NAMES, QUAD)
-    own = _Space(reference.covariance, reference.freedom, kinds_of(NAMES), causes(NAMES, QUAD))
-    chance, again = (np.sort(own.evidence(own.drawn(rng)[0]).max(axis=0)) for _ in range(2))
+    own = _Space(reference.covariance, reference.freedom, causes(NAMES, QUAD))
+    chance, again = (own.strongest(drawn_by_chance(rng, kinds_of(NAMES), reference.freedom)[0]) for _ in range(2))
     assert 0.002 < np.mean(again > np.quantile(chance, 1 - FALSE_ALARM)) < 0.025
 
 
@@ -143,10 +144,11 @@ def test_what_shows_does():
     before = flights(8, rng)
     size = changed(before[:1], before[1:], QUAD, rng).shows["rotor M3"]
     reference = Reference.of(before[1:], NAMES, QUAD)
-    own = _Space(reference.covariance, reference.freedom, kinds_of(NAMES), causes(NAMES, QUAD))
-    threshold = np.quantile(own.evidence(own.drawn(rng)[0]).max(axis=0), 1 - FALSE_ALARM)
-    rows = own.drawn(rng, draws=400)[0] - np.log(1 - size) * np.eye(10)[2]
-    assert np.mean(own.evidence(rows).max(axis=0) >= threshold) > 0.8
+    own = _Space(reference.covariance, reference.freedom, causes(NAMES, QUAD))
+    drawn = partial(drawn_by_chance, kinds=kinds_of(NAMES), freedom=reference.freedom)
+    threshold = np.quantile(own.strongest(drawn(rng)[0]), 1 - FALSE_ALARM)
+    rows = drawn(rng, draws=400)[0] + own.whitened(-np.log(1 - size) * np.eye(10)[2])[:, None]
+    assert np.mean(own.strongest(rows) >= threshold) > 0.8
 
 
 def test_less_voltage_asks_for_more():
