@@ -37,7 +37,7 @@ from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, planned_si
 from cpfls_cli.gap.next_flight.rivals import physical_values, questions_left, usual
 from cpfls_cli.gap.next_flight.room import HarmonicPath, Room, room_of
 from cpfls_cli.gap.next_flight.search import goal, next_flight
-from cpfls_cli.gap.next_flight.separation import Question, SizedEffect, apart, beyond_numbers, gathered
+from cpfls_cli.gap.next_flight.separation import Question, SizedEffect, formulas_off
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.simulation.measured import measure
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
@@ -152,9 +152,10 @@ def ambiguous(name: str, rival: str, rng: np.random.Generator) -> OpenSet | None
     logging = Logging(LOGGED, False, floor, SETTINGS)
     weak = logging.weak(planned_signals(short.planned(first), short, logging))
     hidden = usual(CATALOGUE[name], vehicle)
-    evidence, columns = gathered(Question(hidden, CATALOGUE[rival]), [weak], floor)
-    seen, told = beyond_numbers(evidence, columns), apart(evidence, columns)
-    size = rng.uniform(1.5, 5.0) * np.sqrt(evidence.rows / 6 / max(seen, 1e-9))
+    told, seen = (
+        float(logging.gathered(Question(hidden, other), [weak]).left.sum()) for other in (CATALOGUE[rival], None)
+    )
+    size = rng.uniform(1.5, 5.0) * np.sqrt(len(weak) * weak.known.sum() / 6 / max(seen, 1e-9))
     # Flights that cannot carry the effect, or that tell it from the rival without doubt, are no open sets.
     if size > 2.0 or told * size**2 > 60 or hidden.candidate.effect.unit_coefficient:
         return None
@@ -208,8 +209,9 @@ def settle(opened: OpenSet, rng: np.random.Generator) -> dict[str, tuple[str, fl
     prepared = Preparation(common_windows(training, SETTINGS), None, SETTINGS, opened.diagnosis.audit)
     weak = prepared.repaired(training)
     floor = best_floor(opened.diagnosis.hypothesis)
-    questions = questions_left(diagnosis.effects, diagnosis.alternatives, (), weak, floor)
-    asked = goal(questions, weak, opened.room, Logging(LOGGED, False, floor, SETTINGS))
+    off = formulas_off(opened.diagnosis.hypothesis, floor)
+    questions = questions_left(diagnosis.effects, diagnosis.alternatives, (), weak, floor, SETTINGS)
+    asked = goal(questions, weak, opened.room, Logging(LOGGED, False, floor, SETTINGS, None, off))
     found = next_flight(asked, rng)
     paths: dict[str, HarmonicPath] = {
         "planned": found.path,

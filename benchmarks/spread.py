@@ -52,12 +52,12 @@ from cpfls_cli.export.source import executed, jax_parameters
 from cpfls_cli.playback.constants import find_constants
 from cpfls_cli.playback.disturbance import find_gusts
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.gusts import Gusts
+from cpfls_cli.playback.gusts import RANGES, GustRanges, Gusts
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import rotation_vectors
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.spread import Estimates, GustRanges, drawn
+from cpfls_cli.playback.spread import Estimates, drawn
 from cpfls_cli.playback.vehicle import bodily, estimate_correlation, found_numbers
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -116,7 +116,7 @@ def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
             correlation=estimate_correlation(solved, spread),
             blocks=spread.blocks,
             loop=np.ones((2, 3)),
-            gusts=None if held is None else GustRanges.of_known(*(getattr(gusts, name) for name in GustRanges._fields)),
+            gusts=None if held is None else GustRanges.of_known(*(getattr(gusts, name) for name in RANGES)),
         ),
     )
 

@@ -123,6 +123,22 @@ class DelayGroup:
 
 
 @record
+class AutopilotGroup:
+    """What the log knew of the autopilot: parameters of a control law that is known here, as the law names them."""
+
+    system: str = dataset("what wrote the log, and its version; empty where it does not say")
+    name: tuple[str, ...] = dataset("as the autopilot writes it", "parameter")
+    value: Array = dataset("in its own unit", "parameter")
+
+    @classmethod
+    def of(cls, system: str, parameters: Mapping[str, float]) -> Self | None:
+        """Keep parameters; None where there are none."""
+        if not parameters:
+            return None
+        return cls(system=system, name=tuple(parameters), value=np.array(list(parameters.values()), dtype=float))
+
+
+@record
 class NoiseGroup:
     """Noise that a simulation added."""
 
@@ -336,6 +352,7 @@ class FlightRecord(Record):
     clock: ClockGroup | None = group(default=None)
     quality: QualityGroup | None = group(default=None)
     delay: DelayGroup | None = group(default=None)
+    autopilot: AutopilotGroup | None = group(default=None)
     noise: NoiseGroup | None = group(default=None)
     effects: FlownEffectsGroup | None = group(default=None)
     tracking: TrackingGroup | None = group(default=None)
@@ -374,6 +391,7 @@ class FlightRecord(Record):
             **setpoints,
             clock=ClockGroup(begins=report.first_stamp_s + report.span_s[0]),
             quality=QualityGroup.of(findings, report.warnings, report.cut_off_hz, report.updated_hz),
+            autopilot=AutopilotGroup.of(report.system, report.parameters),
             delay=DelayGroup(
                 value=report.delay_s,
                 tried=None if estimate is None else estimate.delays,

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.response import CurveGroup
 from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record, rows_of
 
@@ -116,7 +116,13 @@ class GainsRecord(Record):
     signal: float = dataset("of the motors in hover, from 0 to 1")
     axis: tuple[str, ...] = dataset("roll, pitch, yaw", "axis")
     set_of: tuple[str, ...] = dataset("proposed, today (of the log) or default", "set", path="set")
-    plants: int = dataset("plants about each axis, that of the best guess and the corners of the intervals")
+    plants: int = dataset("plants about roll, that of the best guess and the corners of the intervals")
+    axis_plants: IntArray | None = dataset("the same about each axis", "axis", default=None)
+    rate: float | None = dataset("steps of the law in a second", units="Hz", default=None)
+    firmware: str | None = dataset(
+        "version that the parameters are for: that of the log, or the one whose names and ranges are known",
+        default=None,
+    )
     command: MarginsGroup = group()
     command_worst: MarginsGroup = group()
     angle: MarginsGroup = group()
@@ -149,8 +155,9 @@ class GainsRecord(Record):
         today: dict[str, float],
         noise: NoiseGroup | None,
         warnings: Sequence[str],
+        system: str = "",
     ) -> Self:
-        """Arrange gains with what they give, the proposed set first."""
+        """Arrange gains with what they give, the proposed set first; `system` is what wrote the log of today's."""
         found = list(sets.values())
         worst = [
             min(own, key=lambda each: float(np.abs(1 + each.command).min())).command
@@ -179,6 +186,9 @@ class GainsRecord(Record):
             axis=AXES,
             set_of=tuple(sets),
             plants=len(hover.corners(0)),
+            axis_plants=np.array([len(hover.corners(axis)) for axis in range(len(AXES))]),
+            rate=found[0].rate_hz,
+            firmware=autopilot.firmware.of(system),
             command=MarginsGroup.of([each.command for each in found]),
             command_worst=MarginsGroup.of([each.command_worst for each in found]),
             angle=MarginsGroup.of([each.angle for each in found]),
@@ -195,7 +205,7 @@ class GainsRecord(Record):
             step=angles[:, 0].reshape(flat),
             step_low=angles.min(axis=1).reshape(flat),
             step_high=angles.max(axis=1).reshape(flat),
-            parameter=_parameters(proposals, today),
+            parameter=_parameters(proposals, today, autopilot.firmware.names(system)),
             noise=noise,
             warning=tuple(warnings),
         )
@@ -204,6 +214,15 @@ class GainsRecord(Record):
     def rows(self) -> list[ParameterRow]:
         """The parameters one by one."""
         return [ParameterRow(**row) for row in rows_of(self.parameter)]
+
+    @property
+    def possible(self) -> str:
+        """How many vehicles are possible, about each axis where they differ."""
+        numbers = [self.plants] * len(self.axis) if self.axis_plants is None else self.axis_plants.tolist()
+        if len(set(numbers)) == 1:
+            return f"{numbers[0]} possible vehicles"
+        counts = ", ".join(map(str, numbers[:-1]))
+        return f"{counts} and {numbers[-1]} possible vehicles about {', '.join(self.axis[:-1])} and {self.axis[-1]}"
 
     @property
     def beside(self) -> str:
@@ -225,6 +244,8 @@ class GainsRecord(Record):
         """The gains for machines."""
         return {
             "autopilot": self.autopilot,
+            "firmware": self.firmware,
+            "rate_hz": self.rate,
             "vehicle": self.vehicle_name,
             "asked": {"gain_db": self.asked_gain, "phase_deg": self.asked_phase, "disk_deg": self.asked_disk},
             "disk_required_deg": self.required,
@@ -281,11 +302,11 @@ def _finite(row: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _parameters(proposals: Sequence[Proposal], today: dict[str, float]) -> ParametersGroup:
+def _parameters(proposals: Sequence[Proposal], today: dict[str, float], names: Mapping[str, str]) -> ParametersGroup:
     own = [each.parameter for each in proposals]
     high = np.array([each.high for each in own], dtype=float)
     return ParametersGroup(
-        name=tuple(each.name for each in own),
+        name=tuple(names.get(each.name, each.name) for each in own),
         meaning=tuple(each.meaning for each in own),
         unit=tuple(each.unit for each in own),
         today=np.array([today.get(each.name, np.nan) for each in own], dtype=float),

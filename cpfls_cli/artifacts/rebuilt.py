@@ -19,9 +19,10 @@ from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.effects.registry import effect
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.fuzzy.inputs import InputRange
+from cpfls_cli.playback.gusts import RANGES, GustRanges
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
-from cpfls_cli.playback.spread import Estimates, GustRanges
+from cpfls_cli.playback.spread import Estimates
 from cpfls_cli.playback.table import Remainder
 from cpfls_cli.playback.vehicle import FoundNumber
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
@@ -78,7 +79,7 @@ def estimates(record: VehicleRecord) -> Estimates:
         correlation=record.correlation,
         blocks=record.blocks,
         loop=loop,
-        gusts=None if gusts is None else GustRanges.of_known(*(getattr(gusts, name) for name in GustRanges._fields)),
+        gusts=None if gusts is None else GustRanges.of_known(*(getattr(gusts, name) for name in RANGES)),
     )
 
 

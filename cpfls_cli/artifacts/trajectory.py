@@ -11,6 +11,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, columns_of, dataset, group, record, rows_of
+from cpfls_cli.gap.settings import RARE
 
 if TYPE_CHECKING:
     from cpfls_cli.simulation.room_left import RoomLeft
@@ -109,19 +110,55 @@ class QuestionGroup:
     true: tuple[str, ...] = dataset("effect that is taken to be there", "question")
     rival: tuple[str, ...] = dataset("effect that it is told from; empty: from no effect at all", "question")
     size: tuple[str, ...] = dataset("numbers of the effect that is there", "question")
-    log_bayes: Array = dataset("expected logarithm of the Bayes factor for it", "question")
-    sure: Array = dataset("probability that a diagnosis with this flight names it", "question")
-    flown: Array = dataset(
+    likely: Array = dataset(
+        "how likely the rival is expected to be after this flight, if the effect is there", "question"
+    )
+    likely_flown: Array = dataset(
         "the same along the path that the autopilot of `simulation.closed_loop` flies", "question", gaps=True
     )
-    wrong: Array = dataset("probability that a diagnosis names the rival", "question")
+    sure: Array = dataset(
+        "probability that the flight settles it: that the rival is rare beside the effect", "question"
+    )
+    flown: Array = dataset("`sure` along the path that the autopilot flies", "question", gaps=True)
     again: Array = dataset("`sure` where the known flights are flown again instead", "question", gaps=True)
-    random: Array = dataset("`sure` of the median of random paths within the same limits", "question")
-    least: Array = dataset("share of the size from which on it is named with probability 0.975", "question")
+    random: Array = dataset("`sure` of a middling one of random paths within the same limits", "question")
+    least: Array = dataset("share of the size from which on it is settled; nan where no size is", "question", gaps=True)
     smallest: tuple[str, ...] = dataset(
-        "the numbers at that share; empty where shapes alone size the effect", "question"
+        "the numbers at that share; empty where there is none, or shapes alone size the effect", "question"
     )
     advice: tuple[str, ...] = dataset("the flight that the catalogue advises", "question")
+
+    @property
+    def settled(self) -> bool:
+        """Whether each effect, if it is there, is expected to be sure to the rate of errors of names."""
+        tables = (self.expected(each) for each in (self.likely, np.nan_to_num(self.likely_flown)))
+        return all(max(sets.values()) <= RARE * own for table in tables for own, sets in table.values())
+
+    def expected(self, likely: Array) -> dict[str, tuple[float, dict[str, float]]]:
+        """By the effect that is there, how likely it and each of its rivals are; "" stands for no effect at all.
+
+        Parameters
+        ----------
+        likely : array, shape (question,)
+            `likely`, or `likely_flown`.
+        """
+        tables: dict[str, dict[str, float]] = {}
+        for true, rival, each in zip(self.true, self.rival, likely.tolist(), strict=True):
+            tables.setdefault(true, {})[rival] = each
+        return {true: (1 - sum(rivals.values()), rivals) for true, rivals in tables.items()}
+
+    @property
+    def expected_summary(self) -> list[dict[str, Any]]:
+        """The expected tables for machines, in the form of that of a diagnosis."""
+        return [
+            {
+                "if": true,
+                "sets": [
+                    {"effects": [name] if name else [], "likely": each} for name, each in ({true: own} | rivals).items()
+                ],
+            }
+            for true, (own, rivals) in self.expected(self.likely).items()
+        ]
 
     @property
     def summary(self) -> list[dict[str, Any]]:
@@ -227,7 +264,11 @@ class TrajectoryRecord(Record):
             "max_acceleration_rad_s2": _largest(self.attitude_acceleration),
             **({"runs": rows_of(self.run)} if self.run else {}),
             **({"excited": self.excited.summary} if self.excited else {}),
-            **({"questions": self.question.summary} if self.question else {}),
+            **(
+                {"expected": self.question.expected_summary, "questions": self.question.summary}
+                if self.question
+                else {}
+            ),
         }
 
     def derivative(self, name: str) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -15,6 +15,8 @@ _CHANGE = 1e-4
 """Step of a derivative along a thrust curve."""
 _HALVES = 40
 """Times that the range is halved to invert a thrust curve that only grows."""
+_SHARES, _TRIED = np.linspace(0.0, 1.0, 101), 1e-3
+"""Shares of the full thrust along which a curve is to make thrust straight, and the step in which it is looked for."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,28 @@ class ThrustCurve:
 
     def _reached(self, share: Array) -> Array:
         return share * (1 + self.expo * (1 - share) ** 2)
+
+
+def straightening(curve: ThrustCurve, linear: float, most: float) -> float:
+    """Find the `expo` of a curve with which thrust comes nearest to a straight line of what is asked for.
+
+    Parameters
+    ----------
+    linear : float
+        l of what the motors give, ``signal^2 + l signal``.
+    most : float
+        Largest that may be found.
+    """
+    ends = np.array([curve.low, curve.high])
+    least, full = ends**2 + linear * ends
+
+    def bent(expo: float) -> float:
+        signal = replace(curve, expo=expo).signal(_SHARES)
+        given = (signal**2 + linear * signal - least) / (full - least)
+        return float(((given - _SHARES) ** 2).sum())
+
+    tried = np.arange(0.0, most + 0.5 * _TRIED, _TRIED)
+    return float(tried[np.argmin([bent(each) for each in tried])])
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -26,7 +27,6 @@ _ORDER: tuple[tuple[Stage, FilterKind, str], ...] = (
     ("output", "first", "output.first"),
 )
 """Filters that a law may have, in the order in which a signal passes them."""
-EVERYWHERE = ("motors.expo", "motors.low", "motors.high", "motors.hover")
 
 
 @dataclass(frozen=True)
@@ -67,13 +67,66 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Firmware:
+    """The version of an autopilot whose names, defaults and ranges these are, and what others have otherwise.
+
+    Attributes
+    ----------
+    title : str
+    systems : tuple of str
+        First words by which a log names the program that wrote it.
+    oldest : tuple of int
+        First version whose gains count as these do.
+    older : str
+        What is otherwise in logs of before.
+    renamed : tuple of (tuple of int, mapping of str to str)
+        A version, and from names here to those of the versions before it.
+    """
+
+    title: str
+    systems: tuple[str, ...]
+    oldest: tuple[int, int] = (0, 0)
+    older: str = ""
+    renamed: tuple[tuple[tuple[int, int], Mapping[str, str]], ...] = ()
+
+    def wrote(self, system: str) -> bool:
+        """Tell whether a log is of this autopilot, by what it says wrote it; one that says nothing may be."""
+        return not system or system.split()[0] in self.systems
+
+    def too_old(self, system: str) -> bool:
+        """Tell whether gains of a log count otherwise."""
+        version = version_of(system)
+        return version is not None and version < self.oldest
+
+    def of(self, system: str) -> str:
+        """Name the version that a file is for: that of a log where it tells one."""
+        return system if system and version_of(system) is not None else self.title
+
+    def names(self, system: str) -> Mapping[str, str]:
+        """Give the names of a log's version where they are others."""
+        version, names = version_of(system), dict[str, str]()
+        for before, others in self.renamed:
+            if version is not None and version < before:
+                names |= others
+        return names
+
+
+def version_of(system: str) -> tuple[int, int] | None:
+    """Read the version out of what wrote a log, such as ``Betaflight 4.5.1 (77d01ba3b)``; None where it has none."""
+    found = re.search(r"(?:^|[\sV])(\d+)\.(\d+)", system)
+    return (int(found[1]), int(found[2])) if found else None
+
+
+@dataclass(frozen=True)
 class Autopilot:
     """An autopilot: what is fixed in its law, and its parameters.
 
     Attributes
     ----------
     name, title : str
+    firmware : Firmware
     rate_hz : float
+        Steps in a second, where no parameter says otherwise.
     mixer : MixerRule
     parameters : tuple of Parameter
     fixed : mapping of str to float
@@ -81,6 +134,8 @@ class Autopilot:
     logged_as : mapping of str to tuple of str
         Parameters that a line of a log's header holds, separated by commas; an empty name is left out. Of two lines
         that hold one the later counts, unless it is 0.
+    filtered : tuple of str
+        First letters of the columns in which its logs hold the gyroscope behind the filters of the law.
     slope_of_error, integrates_first, holds_integral, series : bool
         As `AxisLaw`, `Law` and `ThrustCurve` have them.
     source : tuple of str
@@ -94,6 +149,7 @@ class Autopilot:
 
     name: str
     title: str
+    firmware: Firmware
     rate_hz: float
     mixer: MixerRule
     parameters: tuple[Parameter, ...]
@@ -102,6 +158,7 @@ class Autopilot:
     cross: tuple[tuple[int, int, int], ...]
     fixed: Mapping[str, float] = field(default_factory=dict)
     logged_as: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    filtered: tuple[str, ...] = ()
     slope_of_error: bool = False
     integrates_first: bool = True
     holds_integral: bool = True
@@ -131,14 +188,15 @@ class Autopilot:
         return {each.name: each.default for each in self.parameters}
 
     def in_log(self, logged: Mapping[str, float | str]) -> dict[str, float]:
-        """Take the parameters of the law out of what a log knows; empty where it is of another autopilot."""
+        """Take the parameters of the law out of what a log knows; empty where it holds no gain of a rate."""
         found = {each.name: logged[each.name] for each in self.parameters if each.name in logged}
         for line in (each for each in self.logged_as if each in logged):
             for name, value in zip(self.logged_as[line], str(logged[line]).strip('"').split(","), strict=False):
                 # What is 0 there is off where an earlier line says it too.
                 if name and (_number(value) or name not in found):
                     found[name] = value
-        return {name: _number(value) for name, value in found.items()}
+        gains = {each.name for each in self.parameters if each.role.endswith(".p")}
+        return {name: _number(value) for name, value in found.items()} if gains & set(found) else {}
 
     def of_log(self, logged: Mapping[str, float]) -> dict[str, float]:
         """Give all parameters, where those of a log are known; what it lacks as before it existed, or at the default.
@@ -174,13 +232,18 @@ class Autopilot:
         low, high = roles.get("motors.low", 0.0), roles.get("motors.high", 1.0)
         return Law(
             autopilot=self.name,
-            rate_hz=self.rate_hz,
+            rate_hz=self._rate(roles),
             axes=(axes[0], axes[1], axes[2]),
             curve=ThrustCurve(roles.get("motors.expo", 0.0), low, high, self.series),
             mixer=self.mixer,
             integrates_first=self.integrates_first,
             holds_integral=self.holds_integral,
         )
+
+    def _rate(self, roles: Mapping[str, float]) -> float:
+        """Give the steps in a second; a rate of 0 is one that no parameter limits."""
+        period = roles.get("loop.period", 0.0) * roles.get("loop.every", 1.0)
+        return roles.get("loop.rate", 0.0) or (1.0 / period if period > 0 else self.rate_hz)
 
 
 def _number(text: float | str) -> float:

@@ -226,6 +226,7 @@ class ExportFormat(StrEnum):
     PX4 = "px4"
     CRAZYFLOW = "crazyflow"
     URDF = "urdf"
+    ARDUPILOT = "ardupilot"
     MJCF = "mjcf"
     ROTORPY = "rotorpy"
     CASADI = "casadi"
@@ -250,6 +251,7 @@ class Flown(StrEnum):
     PX4 = "px4"
     CRAZYFLOW = "crazyflow"
     URDF = "urdf"
+    ARDUPILOT = "ardupilot"
     MJCF = "mjcf"
     ROTORPY = "rotorpy"
     CASADI = "casadi"
@@ -724,10 +726,10 @@ def export(
             "--format",
             help="json: every parameter, with names and units; c: C99 source and header, no dependencies; python: a "
             "module that needs NumPy only; sdf (Gazebo), px4 (its Gazebo, with the airframe), mjcf (MuJoCo), urdf "
-            "(gym-pybullet-drones, Isaac), crazyflow (and drone-models), rotorpy, casadi, jax: the vehicle for a "
-            "simulator or a library; mcap (Foxglove), csv (PlotJuggler): what a flight, prediction, replay, gap or "
-            "response holds, on the log's own clock; default: by the suffix of FILE (.json, .c, .py, .xml, .sdf, "
-            ".urdf, .toml, .mcap, .csv).",
+            "(gym-pybullet-drones, Isaac), crazyflow (and drone-models), ardupilot (a frame of its SITL), rotorpy, "
+            "casadi, jax: the vehicle for a simulator or a library; mcap (Foxglove), csv (PlotJuggler): what a "
+            "flight, prediction, replay, gap or response holds, on the log's own clock; default: by the suffix of "
+            "FILE (.json, .c, .py, .xml, .sdf, .urdf, .toml, .mcap, .csv).",
         ),
     ] = None,
     name: Annotated[

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
 
 import numpy as np
 
@@ -39,7 +38,7 @@ from cpfls_cli.gap.next_flight.logged import (
 from cpfls_cli.gap.next_flight.rivals import physical_values, questions_between, questions_left, require_tellable
 from cpfls_cli.gap.next_flight.room import Room, room_of
 from cpfls_cli.gap.next_flight.search import Goal, NextFlight, goal, next_flight
-from cpfls_cli.gap.next_flight.separation import Answer, Question
+from cpfls_cli.gap.next_flight.separation import Answer, Question, formulas_off
 from cpfls_cli.pages.next_flight import advice_words, notes_blocks, size_words
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trajectory import answer, demand_sentences, figure_names, path_figures, plan_blocks
@@ -160,17 +159,18 @@ def _left_open(study: Study, path: Path) -> Case:
     prepared = Preparation(common_windows(recordings, study.gap), base, study.gap, audit(record.audit))
     flights = tuple(prepared.repaired(recordings))
     named = [each for each in record.effects.effects() if each.candidate is not None]
-    floor = best_floor(system(flights, [each.candidate for each in named if each.candidate is not None]))
+    explained = system(flights, [each.candidate for each in named if each.candidate is not None])
+    floor = best_floor(explained)
     rivals, unseen = _open_effects(study, record, flights, path)
     # What a diagnosis did not weigh is asked for at usual sizes.
-    weighed = questions_left(named, rivals, unseen, flights, floor)
+    weighed = questions_left(named, rivals, unseen, flights, floor, study.gap)
     questions = weighed or _between(study)
     effects = [each.true.candidate.effect for each in questions]
     logged = logged_signals(flights[0].signals)
     more = needed_signals(effects) - logged
     notes = (f"log {', '.join(sorted(more))} too: the flights so far lack it, and without it no flight can tell",)
     commanded = any("command" in each.needs for each in effects) or flights[0].signals.commanded
-    logging = Logging(logged | more, commanded, floor, study.gap, base)
+    logging = Logging(logged | more, commanded, floor, study.gap, base, formulas_off(explained, floor))
     return Case(questions, flights, logging, notes if more else ())
 
 
@@ -205,21 +205,20 @@ def _told(study: Study, asked: Goal, flight: NextFlight, planned: Trajectory) ->
     """Judge the path that was found, as planned and as flown, beside other flights."""
     room, logging = asked.room, asked.logging
     answers = asked.answers(planned_signals(planned, room, logging))
-    others = [asked.answers(planned_signals(room.planned(path), room, logging)) for path in flight.random]
-    again = asked.answers(None, again=2)
-    known = any(evidence.rows for evidence in asked.known)
+    usual = asked.answers(planned_signals(room.planned(flight.random[len(flight.random) // 2]), room, logging))
+    again = asked.answers(None)
     flown, notes = _flown(study, asked, planned)
     names = [(each.true.candidate.effect.name, each.rival.name if each.rival else "") for each in asked.questions]
     return QuestionGroup(
         true=tuple(true for true, _ in names),
         rival=tuple(rival for _, rival in names),
         size=tuple(size_words(each.true.candidate.effect, physical_values(each.true)) for each in asked.questions),
-        log_bayes=np.array([each.log_bayes for each in answers]),
+        likely=np.array([each.likely for each in answers]),
         sure=np.array([each.sure for each in answers]),
-        flown=np.array(flown),
-        wrong=np.array([each.wrong for each in answers]),
-        again=np.array([each.sure if known else np.nan for each in again]),
-        random=np.array([median(of_path[row].sure for of_path in others) for row in range(len(names))]),
+        likely_flown=np.array([each.likely if each else np.nan for each in flown]),
+        flown=np.array([each.sure if each else np.nan for each in flown]),
+        again=np.array([each.sure if len(each.evidence.gram) else np.nan for each in again]),
+        random=np.array([each.sure for each in usual]),
         least=np.array([each.least_size for each in answers]),
         smallest=tuple(_smallest(*pair) for pair in zip(asked.questions, answers, strict=True)),
         advice=tuple(advice_words(CATALOGUE[true], CATALOGUE.get(rival)) for true, rival in names),
@@ -227,18 +226,18 @@ def _told(study: Study, asked: Goal, flight: NextFlight, planned: Trajectory) ->
 
 
 def _smallest(question: Question, answer: Answer) -> str:
-    """Write the size from which on an effect is surely told, where it is linear in its numbers."""
+    """Write the size from which on a question is settled, where an effect is linear in its numbers."""
     effect = question.true.candidate.effect
-    if effect.unit_coefficient or effect.physical is not None:
+    if effect.unit_coefficient or effect.physical is not None or np.isnan(answer.least_size):
         return ""
     names = {coefficient.name for coefficient in effect.coefficients}
     values = physical_values(question.true).items()
     return size_words(effect, {name: answer.least_size * value for name, value in values if name in names})
 
 
-def _flown(study: Study, asked: Goal, planned: Trajectory) -> tuple[list[float], list[str]]:
+def _flown(study: Study, asked: Goal, planned: Trajectory) -> tuple[list[Answer | None], list[str]]:
     """Fly the plan in closed loop with each effect that may be true; not known where no autopilot flies it."""
-    sure, notes = [], []
+    found, notes = [], []
     loop = study.simulation.closed_loop
     judged: dict[str, tuple[Answer, ...] | None] = {}
     for row, question in enumerate(asked.questions):
@@ -252,5 +251,5 @@ def _flown(study: Study, asked: Goal, planned: Trajectory) -> tuple[list[float],
                 judged[name] = None
                 notes.append(f"with {name} the flight was not simulated in closed loop: {error}")
         answers = judged[name]
-        sure.append(answers[row].sure if answers else np.nan)
-    return sure, notes
+        found.append(answers[row] if answers else None)
+    return found, notes

@@ -69,7 +69,8 @@ def _outcome(output: Path, page: Page, given: Sources, repeated: Sequence[str]) 
         "missing": list(page.missing),
         "bytes": size,
     }
-    counts = f"{len(page.sections)} sections, {len(page.figures)} figures, {len(page.tables)} tables, {size} bytes"
+    parts = {"section": page.sections, "figure": page.figures, "table": page.tables}
+    counts = ", ".join(f"{len(own)} {name}{'' if len(own) == 1 else 's'}" for name, own in parts.items())
     lacks = [Text(f"not given: {', '.join(page.missing)}")] if page.missing else []
     warnings = (Text(sentence, "warning") for sentence in repeated)
-    return Outcome(summary, (Text(counts), *lacks, *model_verdicts(given), *warnings))
+    return Outcome(summary, (Text(f"{counts}, {size} bytes"), *lacks, *model_verdicts(given), *warnings))

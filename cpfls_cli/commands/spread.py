@@ -17,7 +17,8 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.export.samples import Samples, require_ending
 from cpfls_cli.export.text import identifier
 from cpfls_cli.pages.export import spread_answer, spread_summary
-from cpfls_cli.playback.spread import drawn
+from cpfls_cli.playback.spread import drawn, require_sure
+from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome
 
 
@@ -34,7 +35,10 @@ def run(job: Job, model: Path, count: int, seed: int) -> Outcome:
         )
     sheet = sheet_of(model, identifier(model.stem), source, force=job.force)
     try:
-        spread = drawn(sheet.model, known := estimates(record), count, np.random.default_rng(seed))
+        require_sure(known := estimates(record))
+        if job.dry_run:
+            return _nothing_written(job, model, count)
+        spread = drawn(sheet.model, known, count, np.random.default_rng(seed))
     except (InputError, ComputationError) as error:
         raise type(error)(f"{model}: {error}") from None
     numbers = {number.name: number for number in known.numbers}
@@ -47,7 +51,11 @@ def run(job: Job, model: Path, count: int, seed: int) -> Outcome:
         held=record.guess or (),
     )
     written = samples.written(ending)
-    if not job.dry_run:
-        write_files({job.output: written})
-    summary = {"dry_run": job.dry_run, "output": str(job.output), "bytes": len(written), **spread_summary(samples)}
-    return Outcome(summary, tuple(spread_answer(samples, job.output, len(written), job.dry_run)))
+    write_files({job.output: written})
+    summary = {"dry_run": False, "output": str(job.output), "bytes": len(written), **spread_summary(samples)}
+    return Outcome(summary, tuple(spread_answer(samples, job.output, len(written))))
+
+
+def _nothing_written(job: Job, model: Path, count: int) -> Outcome:
+    line = Text(f"{job.output}: would be written; {count} vehicles would be drawn from {model}")
+    return Outcome({"dry_run": True, "output": str(job.output)}, (line,))

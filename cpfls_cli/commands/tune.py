@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.gains import AXES, DEFAULT, PROPOSED, TODAY, GainsRecord, NoiseGroup
 from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
 from cpfls_cli.artifacts.model import ModelRecord
@@ -16,6 +17,7 @@ from cpfls_cli.artifacts.output import refuse_own, write_text
 from cpfls_cli.artifacts.parameters import DELAY, DRAG, FOUND_AS, INERTIA, LAG, THRUST, parameters_of
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.autopilots.motors import straightening
 from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.commands.numbers import to_fly, with_numbers
@@ -42,6 +44,8 @@ from cpfls_cli.words import joined
 
 _ASSUMED_LAG = (0.7, 1.3)
 _ASSUMED_GAIN = (0.8, 1.25)
+_STAYS = {"on": 1.0, "harmonics": 1.0, "mode": 0.0, "follows": 0.0}
+"""What makes a notch of an autopilot one that stays at its centre."""
 _OFF = 0.2
 """Hover thrust of a log that is further from the model's says that the largest rotor speed is another."""
 
@@ -58,26 +62,40 @@ def run(
     record = _trusted(job, model)
     job = with_numbers(job, "tune", model, whole=True)
     vehicle = read_model(model, job.study)
-    logged = [log_contents(flight, ()).parameters for flight in flights]
-    today = next((found for found in map(own.in_log, logged) if found), {})
+    logs = [_read(flight, job.study) for flight in flights]
+    known, refused = _todays(own, logs)
+    today, system = ({}, "") if known is None else (known.of(own), known.system)
     if job.dry_run:
         return nothing_written(job)
-    noise = noise_of([_rates(flight, job.study) for flight in flights])
-    work = _Work(own, record, vehicle, job.study, asked, noise)
     values = own.of_log(today) if today else own.defaults()
-    proposals, hover = work.proposed(values)
+    noise = _noise(own, values, logs)
+    work = _Work(own, record, vehicle, job.study, asked, noise)
+    proposals, hover = work.proposed(values, today)
     chosen = values | {each.parameter.name: each.value for each in proposals}
     sets = {PROPOSED: evaluate(own.law(chosen), hover)}
     sets[TODAY if today else DEFAULT] = evaluate(own.law(values), work.hover(values))
     warnings = [
+        *refused,
         *_mixer_notes(own, vehicle.vehicle),
         *_hover_notes(own, today, hover, record),
         *work.notes,
-        *([] if today or not flights else [f"no log tells parameters of {own.title}; its defaults stand beside"]),
-        *(_unheard(job.study) if flights and noise is None else []),
+        *_lacking(own, today, proposals),
+        *_steps(own, values, today),
+        *([] if noise is not None or not flights else _unheard(job.study, logs)),
     ]
     heard = None if noise is None else _heard(own, noise, work.lines, (chosen, values))
-    made = GainsRecord.of(own, model.name, asked, hover, sets, proposals, today, heard, warnings)
+    made = GainsRecord.of(
+        own,
+        model.name,
+        asked,
+        hover,
+        sets,
+        [each for each in proposals if _exists(each, today)],
+        today,
+        heard,
+        warnings,
+        system,
+    )
     suffix, text = parameter_file(made, job.output.name)
     file = job.output.with_suffix(suffix)
     refuse_own(file, job.output)
@@ -87,6 +105,97 @@ def run(
     blocks = (*answer(source_of(job, whole)), Text(f"{file}: written, for the ground station"))
     to_report = ("cpfls", "report", job.config, job.output, "-o", job.output.with_suffix(".html"))
     return Outcome(whole.summary | {"file": str(file)}, blocks, next=(to_report,))
+
+
+@dataclass(frozen=True)
+class _Log:
+    """What a log, or a flight that was imported from one, tells of its autopilot."""
+
+    name: str
+    system: str
+    parameters: Mapping[str, float | str]
+    time: Array
+    rate: Array
+    column: str
+    """The one that holds the body rate about x."""
+
+    def of(self, autopilot: Autopilot) -> dict[str, float]:
+        """Give the parameters of a law."""
+        return autopilot.in_log(self.parameters)
+
+
+def _read(flight: Path, study: Study) -> _Log:
+    """Read a log, or what an imported flight keeps of its log, which is low-passed and so tells no noise."""
+    nothing = (np.zeros(0), np.zeros((0, 3)), "")
+    if holds(flight, FlightRecord):
+        kept = read_record(flight, FlightRecord).autopilot
+        if kept is None:
+            return _Log(flight.name, "", {}, *nothing)
+        return _Log(flight.name, kept.system, dict(zip(kept.name, kept.value.tolist(), strict=True)), *nothing)
+    contents = log_contents(flight, ())
+    rates = _rates(flight, study) if _maps_rates(study) else nothing
+    return _Log(flight.name, contents.system, contents.parameters, *rates)
+
+
+def _todays(autopilot: Autopilot, logs: Sequence[_Log]) -> tuple[_Log | None, list[str]]:
+    """Find the log that tells today's parameters, and say why others do not."""
+    firmware, refused = autopilot.firmware, list[str]()
+    for log in logs:
+        if not firmware.wrote(log.system):
+            refused.append(f"{log.name}: written by {log.system}, so its parameters are not those of {autopilot.title}")
+        elif firmware.too_old(log.system):
+            refused.append(f"{log.name}: written by {log.system}; {firmware.older}, so its parameters are not used")
+        elif log.of(autopilot):
+            return log, refused
+    if not logs:
+        return None, []
+    beside = f"the defaults of {firmware.title} stand beside, and the file is for that version"
+    return None, [*refused, beside if refused else f"no log tells gains of {autopilot.title}; {beside}"]
+
+
+def _noise(autopilot: Autopilot, values: Mapping[str, float], logs: Sequence[_Log]) -> Noise | None:
+    """Estimate the noise of the gyroscope in front of the filters of the law."""
+    noise = noise_of([(log.time, log.rate) for log in logs])
+    behind = [log.column.startswith(autopilot.filtered) for log in logs if log.column]
+    return noise.before_filters(autopilot.law(values)) if noise is not None and all(behind) else noise
+
+
+def _exists(proposal: Proposal, today: Mapping[str, float]) -> bool:
+    """Tell whether to write a parameter: not one that the log lacks and that would stay as it is without it."""
+    parameter = proposal.parameter
+    return not today or parameter.name in today or proposal.value != parameter.absent
+
+
+def _lacking(autopilot: Autopilot, today: Mapping[str, float], proposals: Sequence[Proposal]) -> Iterator[str]:
+    """Say which parameters of the file the log does not hold."""
+    # Behind a switch that is off a log leaves all out.
+    switched = any(name in today for name in _switches(autopilot))
+    missing = [
+        each.parameter.name
+        for each in proposals
+        if today
+        and each.parameter.name not in today
+        and _exists(each, today)
+        and not (switched and ".notch" in each.parameter.role)
+    ]
+    if missing:
+        yield (
+            f"{joined(missing)}: not in the log; {'its' if len(missing) == 1 else 'their'} default counts as today's, "
+            "and another version may name it otherwise"
+        )
+
+
+def _steps(autopilot: Autopilot, values: Mapping[str, float], today: Mapping[str, float]) -> Iterator[str]:
+    """Say which rate of the law is assumed, where it is the gyroscope's and no log tells it."""
+    if autopilot.by_role("loop.period") is not None and not today:
+        yield (
+            f"{number(autopilot.law(values).rate_hz, 4)} steps of the law in a second are assumed; a log of your "
+            "vehicle tells them (--flight)"
+        )
+
+
+def _switches(autopilot: Autopilot) -> list[str]:
+    return [each.name for each in autopilot.parameters if each.role.endswith("_on")]
 
 
 def _require_control() -> None:
@@ -137,9 +246,16 @@ class _Work:
         self.notes: list[str] = []
         self.spreads = self._spreads()
 
-    def proposed(self, values: Mapping[str, float]) -> tuple[list[Proposal], HoverPlant]:
+    def proposed(self, values: Mapping[str, float], today: Mapping[str, float]) -> tuple[list[Proposal], HoverPlant]:
         """Find gains with the thrust curve and the notches that go with them."""
-        others = [*_curve(self.autopilot, self.model, self.study), *_notches(self.autopilot, self.lines)]
+        others = [*_curve(self.autopilot, self.model, self.study)]
+        if self.lines and _follows(self.autopilot, today):
+            self.notes.append(
+                f"a line at {number(self.lines[0].hz, 3)} Hz stands in the noise behind a notch that follows the "
+                "motors; it is left as it is, and here it stands at its centre"
+            )
+        else:
+            others += _notches(self.autopilot, self.lines)
         whole = {**values, **{each.parameter.name: each.value for each in others}}
         hover = self.hover(whole)
         found = with_filters(self.autopilot, whole, hover, self.asked, self.noise)
@@ -196,12 +312,16 @@ def _curve(autopilot: Autopilot, model: VehicleModel, study: Study) -> Iterator[
         return
     lift = sum(rotor.thrust_factor_n_s2 for rotor in model.vehicle.rotors)
     hovering = np.sqrt(model.vehicle.mass_kg * model.vehicle.gravity_m_s2 / lift)
-    straight = model.thrust_linear * hovering / model.vehicle.rotor_speed_max_rad_s
-    curve = autopilot.law().curve
-    span = curve.high - curve.low
-    # Thrust is signal^2 + straight signal; between the ends of the range a square and a straight part are left.
-    square, line = span**2, span * (2 * curve.low + straight)
-    yield proposal_of(parameter, square / (square + line) / parameter.scale)
+    linear = model.thrust_linear * hovering / model.vehicle.rotor_speed_max_rad_s
+    wanted = straightening(autopilot.law().curve, float(linear), parameter.scale * parameter.high)
+    yield proposal_of(parameter, wanted / parameter.scale)
+
+
+def _follows(autopilot: Autopilot, today: Mapping[str, float]) -> bool:
+    """Tell whether the notch of a log follows the motors."""
+    roles = ("notch_on", "notch_mode", "notch_follows")
+    own = [autopilot.by_role(f"all.measured.{role}") for role in roles]
+    return all(each is not None and today.get(each.name, 0.0) > 0 for each in own)
 
 
 def _notches(autopilot: Autopilot, lines: Sequence[Line]) -> Iterator[Proposal]:
@@ -210,10 +330,11 @@ def _notches(autopilot: Autopilot, lines: Sequence[Line]) -> Iterator[Proposal]:
         centre = autopilot.by_role(f"all.measured.{name}")
         if centre is None:
             return
-        on, width = autopilot.by_role(f"all.measured.{name}_on"), autopilot.by_role(f"all.measured.{name}_width")
+        width = autopilot.by_role(f"all.measured.{name}_width")
         lower = autopilot.by_role(f"all.measured.{name}_lower")
-        if on is not None:
-            yield proposal_of(on, 1.0)
+        for role, value in _STAYS.items():
+            if (fixed := autopilot.by_role(f"all.measured.{name}_{role}")) is not None:
+                yield proposal_of(fixed, value)
         yield proposal_of(centre, line.hz)
         if width is not None:
             yield proposal_of(width, line.width_hz)
@@ -221,29 +342,29 @@ def _notches(autopilot: Autopilot, lines: Sequence[Line]) -> Iterator[Proposal]:
             yield proposal_of(lower, line.hz - 0.5 * line.width_hz)
 
 
-def _rates(flight: Path, study: Study) -> tuple[Array, Array]:
-    """Read times and body rates of a log, as it has them; none where the config does not say which they are."""
-    if not _maps_rates(study):
-        return np.zeros(0), np.zeros((0, 3))
+def _rates(flight: Path, study: Study) -> tuple[Array, Array, str]:
+    """Read times and body rates of a log, as it has them, and the column of the first."""
     read = read_log(flight, study.import_)
     mapped = {str(name): given for name, given in read.settings.signals.items()}.get("body_rate")
     stamps = read.columns.get(read.settings.time_column or "timestamp")
     if mapped is None or stamps is None:
-        return np.zeros(0), np.zeros((0, 3))
+        return np.zeros(0), np.zeros((0, 3)), ""
     columns = [read.columns[name] for name in mapped.columns]
     factor = np.pi / 180 if "deg" in str(mapped.unit) else 1.0
     seconds = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[read.settings.time_unit]
     rate = factor * np.stack(columns, axis=1)
     known = np.isfinite(rate).all(axis=1) & np.isfinite(stamps)
-    return seconds * stamps[known], rate[known]
+    return seconds * stamps[known], rate[known], mapped.columns[0]
 
 
-def _unheard(study: Study) -> Iterator[str]:
+def _unheard(study: Study, logs: Sequence[_Log]) -> Iterator[str]:
     """Say why logs tell no noise."""
-    if not _maps_rates(study):
+    if all(not log.column and not len(log.time) for log in logs) and _maps_rates(study):
+        yield "noise is not read: imported flights are low-passed and resampled; name the log itself with --flight too"
+    elif not _maps_rates(study):
         yield "noise is not read: the config has no import.signals.body_rate (`cpfls init LOG` proposes it)"
-        return
-    yield f"noise is not read: no log holds {LEAST} samples and a second of body rates without a pause"
+    else:
+        yield f"noise is not read: no log holds {LEAST} samples and a second of body rates without a pause"
 
 
 def _maps_rates(study: Study) -> bool:

@@ -81,8 +81,9 @@ class Course:
         return less_measured(states, self.flight.motion, self.starts[:, None] + 1 + np.arange(self.horizon))
 
 
-Wrench = Callable[[Array, Array, Array], tuple[Array, Array]]
-"""From rotor speeds, velocity through the air and body rate of each run to torque and force, body frame, (run, 3)."""
+Wrench = Callable[[Array, Array, Array, Array], tuple[Array, Array]]
+"""From rotor speeds, velocity through the air, body rate and attitude (body to world) of each run to torque and force,
+body frame, (run, 3)."""
 
 
 def fly_body(course: Course, mass: float, inertia: Array, wrench: Wrench, lag: float) -> State:
@@ -100,7 +101,7 @@ def fly_body(course: Course, mass: float, inertia: Array, wrench: Wrench, lag: f
     for step, command in enumerate(course.commands.swapaxes(0, 1), 1):
         speed = speed if lag else command
         air = np.einsum("nji,nj->ni", state.rotation, state.velocity)
-        torque, force = wrench(speed, air, state.rate)
+        torque, force = wrench(speed, air, state.rate, state.rotation)
         linear = np.einsum("nij,nj->ni", state.rotation, force) / mass + gravity
         moment = torque - np.cross(state.rate, state.rate @ inertia)
         velocity, rate = state.velocity + period * linear, state.rate + period * np.linalg.solve(inertia, moment.T).T

@@ -33,7 +33,7 @@ HORIZON_S = 0.5
 _RUNS, _PERIOD, _FREQUENCIES = 24, 0.01, (0.7, 2.0, 5.0)
 _SPEED_SPREAD, _VELOCITY, _RATE, _TILT = 0.05, 1.5, 1.0, 0.25
 
-_NOTHING, _ROUNDING = 1e-9, 1e-12
+NOTHING, _ROUNDING = 1e-9, 1e-12
 """Distance in SI that half a second without a part may end off, and torque or force: below both are rounding."""
 
 _LAG, _DELAY, _SLOW = "lag of the rotors", "delay of the rotors", "slow actuation"
@@ -41,6 +41,7 @@ _LINEAR = "part of the thrust that is linear in the speed"
 _ROTORS = "what differs between rotors, and their places"
 _LEARNED = "the learned part, without a name"
 _NO_BODY = "inertia with a moment larger than the sum of the others, which no body has: the nearest possible is used"
+_PRODUCTS = "products of inertia"
 _WIND = "wind of its flights, {:.3g} and {:.3g} m/s along x and y of the world, which the simulated world must provide"
 FUZZY = "inertia that depends on the attitude"
 
@@ -192,7 +193,7 @@ def missing(
     if any(wind):
         blown = replace(whole, wind=wind)
         found.append(_of_player(_WIND.format(*wind), whole, blown, flight, floor))
-    return [each for each in found if each.off is None or max(each.off) > _NOTHING]
+    return [each for each in found if each.off is None or max(each.off) > NOTHING]
 
 
 def together(model: VehicleModel, held: Held) -> Off:
@@ -227,7 +228,8 @@ def _others(model: VehicleModel, held: Held, whole: Player, flight: PlaybackFlig
     if whole.fuzzy is not None and held.fuzzy is None:
         yield FUZZY, replace(whole, fuzzy=None, body=held.body)
     elif np.any(held.body.inertia != whole.body.inertia):
-        yield _NO_BODY, replace(whole, body=held.body._replace(gravity=whole.body.gravity))
+        known = np.array_equal(np.diag(held.body.inertia), np.diag(whole.body.inertia))
+        yield _PRODUCTS if known else _NO_BODY, replace(whole, body=held.body._replace(gravity=whole.body.gravity))
     if held.body.gravity != whole.body.gravity:
         yield "gravity", replace(whole, body=whole.body._replace(gravity=held.body.gravity))
 

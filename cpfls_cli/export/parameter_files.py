@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.artifacts.gains import GainsRecord, ParameterRow
+from cpfls_cli.autopilots.registry import AUTOPILOTS
 
 _FLOAT = 9
 """Type of MAVLink, as QGroundControl writes it."""
@@ -33,10 +34,18 @@ def parameter_file(record: GainsRecord, name: str) -> tuple[str, str]:
     """
     form = _FORMS[record.autopilot]
     head = [
+        f"# For {_version(record)}.",
         f"# {record.title}: gains of cpfls for {record.vehicle_name}, see {name}",
         *(f"# {each}" for each in form.how),
     ]
     return form.suffix, "\n".join([*head, *form.lines(record.rows)]) + "\n"
+
+
+def _version(record: GainsRecord) -> str:
+    """Name the version of the firmware that the file is for, and whose documented ranges it has."""
+    known = AUTOPILOTS[record.autopilot].firmware.title
+    own = record.firmware or known
+    return own if own == known else f"{own}, as the log says; documented ranges and defaults are those of {known}"
 
 
 def _comments(rows: Sequence[ParameterRow], line: Callable[[ParameterRow], str]) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,16 +11,17 @@ import numpy as np
 
 from cpfls_cli.errors import InputError, install_command
 from cpfls_cli.export.course import Course
-from cpfls_cli.export.holding import Held, Holds, Missing, missing, together
+from cpfls_cli.export.holding import NOTHING, Held, Holds, Missing, Off, missing, probe_flight, together
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.sheet import Sheet
+from cpfls_cli.export.simulators import ardupilot
 from cpfls_cli.export.simulators.crazyflow import STEP_S, crazyflow_held, crazyflow_text, fly_crazyflow
 from cpfls_cli.export.simulators.functions import casadi_text, fly_casadi, fly_jax, jax_text
 from cpfls_cli.export.simulators.mjcf import fly_mjcf, mjcf_held, mjcf_text
 from cpfls_cli.export.simulators.px4 import AIRFRAME, px4_text
 from cpfls_cli.export.simulators.rotorpy import fly_rotorpy, rotorpy_held, rotorpy_text
 from cpfls_cli.export.simulators.sdf import fly_sdf, sdf_held, sdf_text
-from cpfls_cli.export.simulators.urdf import fly_urdf, urdf_held, urdf_text
+from cpfls_cli.export.simulators.urdf import OTHERWISE, fly_urdf, fly_urdf_as_held, urdf_held, urdf_text
 from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
@@ -65,12 +66,18 @@ class Target(Form):
         takes the very steps of a playback.
     fly : callable
         From the text of the file and a course to states at the samples behind each start, shape (run, horizon, ...).
+    fly_as_held : callable or None
+        The same without what the target does otherwise than any sum of weights; None where that is nothing.
+    otherwise : str
+        What that is, in words.
     """
 
     fly: Callable[[str, Course], State]
     package: str
     step_s: float = np.inf
     levels: int = 0
+    fly_as_held: Callable[[str, Course], State] | None = None
+    otherwise: str = ""
 
 
 def _whole(model: VehicleModel) -> tuple[Held, Holds]:
@@ -107,6 +114,20 @@ TARGETS = {
         package="",
         step_s=1e-3,
         levels=4,
+        fly_as_held=fly_urdf_as_held,
+        otherwise=OTHERWISE,
+    ),
+    "ardupilot": Target(
+        "ArduPilot's SITL",
+        ".json",
+        ardupilot.ardupilot_held,
+        ardupilot.ardupilot_text,
+        fly=ardupilot.fly_ardupilot,
+        package="",
+        step_s=ardupilot.STEP_S,
+        levels=4,
+        fly_as_held=ardupilot.fly_ardupilot_as_held,
+        otherwise=ardupilot.OTHERWISE,
     ),
     "rotorpy": Target("RotorPy", ".py", rotorpy_held, rotorpy_text, fly=fly_rotorpy, package="rotorpy", levels=4),
     "casadi": Target("CasADi", ".py", _whole, casadi_text, fly=fly_casadi, package="casadi"),
@@ -153,20 +174,39 @@ def exported(sheet: Sheet, form: str, file: str) -> Exported:
         held, holds = chosen.held(sheet.model)
     except InputError as error:
         raise InputError(f"{sheet.file}: {error}") from None
-    left, told = _left(sheet, held, holds, chosen.title)
+    left, told = _left(sheet, held, holds, chosen)
     files = [Path(file).with_suffix(ending).name for ending in (chosen.also, chosen.ending) if ending]
     return Exported({name: chosen.write(sheet, held, told, name) for name in files}, held, left, told)
 
 
-def _left(sheet: Sheet, held: Held, holds: Holds, title: str) -> tuple[tuple[Missing, ...], tuple[str, ...]]:
+def _left(sheet: Sheet, held: Held, holds: Holds, form: Form) -> tuple[tuple[Missing, ...], tuple[str, ...]]:
     """List what is left of a vehicle, and say so."""
     about_hover = missing(sheet.model, held, holds, np.array(sheet.floor), sheet.wind)
-    left = (*about_hover, *sheet.outside)
+    otherwise = [*_otherwise(sheet, held, form)] if isinstance(form, Target) and form.otherwise else []
+    left = (*about_hover, *otherwise, *sheet.outside)
     told = tuple(each.sentence for each in left)
     if len(about_hover) - any(sheet.wind) > 1:
         off = together(sheet.model, held).sentence
-        told = (*told, f"In all, {title} ends {off} off after half a second about hover.")
-    return left, told or (f"{title} holds all of it.",)
+        told = (*told, f"In all, {form.title} ends {off} off after half a second about hover.")
+    return left, told or (f"{form.title} holds all of it.",)
+
+
+def _otherwise(sheet: Sheet, held: Held, target: Target) -> Iterator[Missing]:
+    """Tell how far half a second about hover ends off by what a target does otherwise than a sum of weights."""
+    assert target.fly_as_held is not None, "what is otherwise is flown both ways"
+    text, course = target.write(sheet, held, (), f"uav{target.ending}"), _probe_course(sheet.model, held, target.step_s)
+    ends = [course.errors(fly(text, course))[:, -1] for fly in (target.fly, target.fly_as_held)]
+    off = Off.of(np.linalg.norm(ends[0] - ends[1], axis=2).mean(axis=0))
+    if max(off) > NOTHING:
+        yield Missing(target.otherwise, 0.0, 0.0, np.nan, off)
+
+
+def _probe_course(model: VehicleModel, held: Held, step_s: float) -> Course:
+    """Arrange the flight about hover for a target: a run of each of its stretches."""
+    flight = probe_flight(model)
+    horizon = len(flight) // len(flight.stretches) - 1
+    finer = max(1, round(flight.motion.period / step_s))
+    return Course(flight, flight.starts(horizon, 1), horizon, finer, gravity=held.body.gravity)
 
 
 def require_package(form: str) -> None:

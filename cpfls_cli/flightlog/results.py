@@ -84,6 +84,10 @@ class ImportReport:
         Plain sentences for the user.
     flown_at : float
         When the log begins, s since 1970 began (UTC); NaN where it does not tell.
+    system : str
+        What wrote the log, and its version; empty where it does not say.
+    parameters : mapping from str to float
+        Of the control law that flew, by the autopilot's own names.
     """
 
     samples_read: int
@@ -107,6 +111,8 @@ class ImportReport:
     delay: DelayEstimate | None = None
     warnings: tuple[str, ...] = ()
     flown_at: float = nan
+    system: str = ""
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,11 +10,12 @@ from types import MappingProxyType
 from typing import Final
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.config.study import Study, settings_of
 from cpfls_cli.errors import CpflsError, InputError
 from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.flightlog.results import ImportedFlight, ImportReport, LogSignals
-from cpfls_cli.logs.formats import read_log
+from cpfls_cli.logs.formats import LogColumns, read_log
 from cpfls_cli.units import SPEED_UNITS
 from cpfls_cli.vehicle.rotors import body_wrench
 
@@ -42,11 +43,21 @@ def imported(log: Path, study: Study) -> ImportedFlight:
             # The delay is a parameter too: the part of the flight that is held out must not choose it.
             delay_share=study.identification.training_share,
         )
-    warnings = (*flight.report.warnings, *read.warnings)
-    first = read.begins + flight.report.first_stamp_s
-    return replace(
-        flight, report=replace(flight.report, warnings=warnings, flown_at=read.flown_at, first_stamp_s=first)
+    report = replace(
+        flight.report,
+        warnings=(*flight.report.warnings, *read.warnings),
+        flown_at=read.flown_at,
+        first_stamp_s=read.begins + flight.report.first_stamp_s,
+        system=read.system,
+        parameters=_parameters(read),
     )
+    return replace(flight, report=report)
+
+
+def _parameters(read: LogColumns) -> dict[str, float]:
+    """Take the parameters of the control law that flew, if it is a known one."""
+    own = (each for each in AUTOPILOTS.values() if each.firmware.wrote(read.system))
+    return next((found for each in own if (found := each.in_log(read.parameters))), {})
 
 
 @contextmanager

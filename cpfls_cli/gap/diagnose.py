@@ -120,16 +120,15 @@ def diagnose(
     prepared = Preparation(windows, model, settings, audited)
     flights = _Flights(prepared.repaired(training), prepared.logged(held), prepared.repaired(held))
     named = _named(flights, settings, rng, progress)
-    gusts, quiet, told = None, named.judge.floor, 0
+    gusts, quiet, told = None, named.judge.floor, -1
     if named.judge.remainder(named.judgement.found).unexplained:
         given = known_motion(training)
         gusts = _gusts(named, given, settings, rng)
         # Beside what is named then, more channels may turn out to be nothing but gusts.
-        while gusts is not None and gusts.told.sum() > told:
+        while gusts is not None and gusts.split.any() and gusts.told.sum() > told:
             told, quiet = int(gusts.told.sum()), np.minimum(quiet, gusts.noise(windows))
             flights = flights.in_air(gusts)
-            named = _by_instruments(_named(flights, settings, rng, progress), given, settings)
-            gusts = _gusts(named, given, settings, rng)
+            named, gusts = _beside_gusts(_named(flights, settings, rng, progress), given, told, settings, rng)
     weak, (effects, steps, judge, judgement, refusals, differ, alike) = flights.training, named
     hypothesis, _, estimates = judgement.found
     progress(0.75, "rivals")
@@ -188,8 +187,7 @@ class _Flights(NamedTuple):
 
     def in_air(self, gusts: Air) -> _Flights:
         """Give all of them the floor of their air."""
-        floor = gusts.floor(self.training[0].windows)
-        return _Flights(*(in_air(flights, floor) for flights in self))
+        return _Flights(*(in_air(flights, gusts.floor(self.training, flights)) for flights in self))
 
 
 class _Named(NamedTuple):
@@ -223,15 +221,47 @@ def _gusts(named: _Named, given: Instruments, settings: GapSettings, rng: np.ran
     return air(hypothesis, estimates.linear, block, given, settings, rng)
 
 
-def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) -> _Named:
-    """Judge what was named with the numbers that instruments tell, without what is 0 by them or may be the loop."""
+def _beside_gusts(
+    named: _Named, given: Instruments, told: int, settings: GapSettings, rng: np.random.Generator
+) -> tuple[_Named, Air | None]:
+    """Judge what was named beside gusts by what instruments tell, and find the gusts beside it.
+
+    A loop that answers gusts looks as late. Where instruments do not tell which it is, a name of what is late stands
+    only if without it what is left is no longer the air.
+
+    Parameters
+    ----------
+    told : int
+        How many channels had nothing but gusts before.
+    """
+    without = _by_instruments(named, given, settings, late=False)
+    gusts = _gusts(without, given, settings, rng)
+    if gusts is None or gusts.told.sum() >= told or _names(without) == _names(named):
+        return without, gusts
+    late = _by_instruments(named, given, settings, late=True)
+    beside = _gusts(late, given, settings, rng)
+    return (late, beside) if beside is not None and beside.told.sum() >= told else (without, gusts)
+
+
+def _names(named: _Named) -> list[str]:
+    return [each.effect.name for each in named.judgement.found.hypothesis.chosen]
+
+
+def _by_instruments(named: _Named, given: Instruments, settings: GapSettings, *, late: bool) -> _Named:
+    """Judge what was named with the numbers that instruments tell, without what is 0 by them.
+
+    Parameters
+    ----------
+    late : bool
+        Keep what is late though instruments do not tell it from the loop.
+    """
     judge, refusals, fit = named.judge, list(named.refusals), named.judgement.found
     while True:
         found = by_instruments(fit, given, judge.floor, settings)
         out = [Refusal(name, "judged by what instruments tell, it may be 0") for name in nothing_by_size(found)]
         out += [
             Refusal(name, "a loop that answers gusts looks as late, and instruments do not tell which it is")
-            for name in untold_actuation(fit, found)
+            for name in ([] if late else untold_actuation(fit, found))
         ]
         if not out:
             break
@@ -239,6 +269,8 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
         names = {refused.name for refused in out}
         kept = [each for each in found.hypothesis.chosen if each.effect.name not in names]
         fit = fitted(judge.training, kept, judge.floor, settings)
+    if late:
+        return named._replace(judgement=judge.judge(found), refusals=refusals)
     found, alike = told_apart(found, named.effects, given, judge.floor, settings)
     return named._replace(judgement=judge.judge(found), refusals=refusals, alike=alike)
 

@@ -76,6 +76,8 @@ class LogColumns:
         The section `import` as it suits the log: of columns that stand in for each other, those that the log has.
     begins : float
         Stamp on the log's own clock at 0 of the column that is the clock, s.
+    parameters, system
+        As in `LogContents`.
     """
 
     columns: dict[str, "Array"]
@@ -83,6 +85,8 @@ class LogColumns:
     warnings: tuple[str, ...] = ()
     flown_at: float = nan
     begins: float = 0.0
+    parameters: dict[str, float | str] = field(default_factory=dict)
+    system: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -205,7 +209,8 @@ def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     begins = contents.begins.get(str(chosen.time_column), contents.begins.get("", 0.0))
-    return LogColumns(columns, chosen, (*contents.warnings, *warnings), contents.flown_at, begins)
+    warnings = (*contents.warnings, *warnings)
+    return LogColumns(columns, chosen, warnings, contents.flown_at, begins, contents.parameters, contents.system)
 
 
 def _format_of(path: Path) -> LogFormat | None:

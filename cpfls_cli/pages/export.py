@@ -160,11 +160,11 @@ _SHOWN = 8
 """Rows of a table that the first screen has room for."""
 
 
-def spread_answer(samples: Samples, output: Path, size: int, dry_run: bool) -> Iterator[Block]:
+def spread_answer(samples: Samples, output: Path, size: int) -> Iterator[Block]:
     """Say what was drawn and written, what its numbers lie between, and what speaks against them."""
     spread, sheet = samples.spread, samples.sheet
     count, out = len(spread.models), spread.tried - len(spread.models)
-    yield Text(f"{output}: {'would be written' if dry_run else 'written'} ({size} bytes)")
+    yield Text(f"{output}: written ({size} bytes)")
     verdict = f"Verdict on the model: {trust_words(sheet.verdict).short}." if sheet.verdict else "It has no verdict."
     yield Text(f"{count} vehicles drawn from {sheet.file} with seed {samples.seed}. {verdict}")
     if out:

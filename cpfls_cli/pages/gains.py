@@ -39,11 +39,11 @@ def gains_box(record: GainsRecord) -> Box:
     own, short = record.set_of.index(PROPOSED), record.falls_short(PROPOSED)
     fast = joined(f"{name} {number(float(record.bandwidth[own, axis]), 2)} Hz" for axis, name in enumerate(record.axis))
     title = f"{record.title}: the angle follows to {fast}"
-    asked = f"{number(record.required, 3)}°, gain off too"
+    asked = f"disk {number(record.required, 3)}°"
     if short:
-        told = f"{joined(short)}: less than the asked margin ({asked}) with some of {record.plants} possible vehicles"
+        told = f"{joined(short)}: less than the asked margin ({asked}) with some of {record.possible}"
     else:
-        told = f"all axes keep the asked margin ({asked}) with {record.plants} possible vehicles"
+        told = f"all axes keep the asked margin ({asked}) with {record.possible}"
     return Box("GAINS", sentence(title), [sentence(told), sentence(_beside(record))], "warning" if short else "good")
 
 
@@ -77,12 +77,12 @@ def _margins(record: GainsRecord, index: int) -> Table:
                 ]
             )
     header = ("Gains", "Axis", "dB", "Phase, °", "Disk, °", "Angle, Hz", "Overshoot", "Rise, ms")
-    caption = f"The least margins with {record.plants} possible vehicles, and how fast the best guess is."
+    caption = f"The least margins with {record.possible}, and how fast the best guess is."
     legend = (
         "Possible vehicles: the best guess, and the corners of the intervals that flights leave. dB and phase: what "
-        "the loop, cut at the command, bears of either alone. Disk: the phase that may be off while gain is off as "
-        "well, cut at the command or at the angle, the less. Angle: where it follows at half power. Overshoot, rise: "
-        "of a step."
+        "the loop, cut at the command, bears of either alone. Disk: the phase that may be off while the gain is off "
+        "by as much, cut at the command or at the angle, the less. Angle: where it follows at half power. Overshoot, "
+        "rise: of a step."
     )
     return Table(f"gains-margins-{index}", caption, header, rows, frozenset({0, 1}), legend=legend)
 
@@ -123,7 +123,8 @@ def gains_blocks(gains: Source[GainsRecord], index: int) -> Iterator[Block]:
     yield Facts(
         [
             ("Vehicle", record.vehicle_name),
-            ("Law", record.source[0]),
+            *((("Firmware", record.firmware),) if record.firmware else ()),
+            ("Law", f"{record.source[0]}{f'; {record.rate:.6g} steps a second' if record.rate else ''}"),
             ("Left out of it", joined(record.left_out)),
             ("Hover", f"{percent(record.hover, 3)} of full thrust, motors at {percent(record.signal, 3)}"),
             (

@@ -14,10 +14,6 @@ from cpfls_cli.report.content import Block, Folded, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, number, whole_percent
 from cpfls_cli.words import joined
 
-_SETTLED = 0.975
-_EVEN = 0.5
-_RARE = 0.001
-
 
 def size_words(effect: Effect, values: Mapping[str, float]) -> str:
     """Write the numbers of an effect that are not zero."""
@@ -40,18 +36,20 @@ def notes_blocks(notes: Sequence[str]) -> Iterator[Block]:
 def question_blocks(name: str, asked: QuestionGroup) -> Iterator[Block]:
     """Say what a flight will tell and how sure, beside other flights, and what to do with it."""
     worst = float(np.nanmin(np.minimum(asked.sure, np.where(np.isnan(asked.flown), 1.0, asked.flown))))
-    told = _told(asked)
-    right = f"{_percent(worst)} of such flights"
-    if worst >= _SETTLED:
-        yield Text(f"This flight tells {told}: each outcome is right in {right} or more.", "good")
-    elif worst >= _EVEN:
-        yield Text(f"This flight probably tells {told}: right in {right} where it is hardest.", "note")
+    told, right = _told(asked), f"{whole_percent(worst)} of such flights"
+    if asked.settled:
+        yield Text(f"This flight tells {told}: it settles each in {right} or more.", "good")
     else:
         yield Text(
-            f"Within this room no flight was found that surely tells {told}: where it is hardest, {right} do. Give it "
-            "a larger --box, a longer --duration, or higher trajectory.limits.",
+            f"Within this room no flight was found that settles {told}: where it is hardest, {right} do. Give it a "
+            "larger --box, a longer --duration, or higher trajectory.limits.",
             "warning",
         )
+    for true, (own, rivals) in asked.expected(asked.likely).items():
+        after = ", ".join(
+            f"{each or 'none'} {whole_percent(likely)}" for each, likely in ({true: own} | rivals).items()
+        )
+        yield Text(f"Expected after this flight: {after}, if it is {true}.")
     yield _table(name, asked)
     yield Folded("what each outcome will mean", list(_meaning(asked)), shown=True)
 
@@ -64,11 +62,6 @@ def _meaning(asked: QuestionGroup) -> Iterator[Text]:
     )
 
 
-def _percent(share: float) -> str:
-    """Write a probability in per cent; what is nearly sure is not called sure."""
-    return f"{100 * (1 - _RARE):g} %" if share > 1 - _RARE else whole_percent(share)
-
-
 def _told(asked: QuestionGroup) -> str:
     """Say what is told from what, each pair once, and which effects are looked for."""
     pairs = [sorted(pair) for pair in zip(asked.true, asked.rival, strict=True)]
@@ -78,22 +71,21 @@ def _told(asked: QuestionGroup) -> str:
 
 
 def _table(name: str, asked: QuestionGroup) -> Table:
-    header = ("If it is", "Told from", "Log Bayes factor", "This flight", "As flown", "Random", "Same again")
+    header = ("If it is", "Told from", "This flight", "As flown", "Random", "Same again")
     shares = ("sure", "flown", "random", "again")
     rows = [
         [
             row["true"],
             row["rival"] or "nothing",
-            number(row["log_bayes"], 3),
-            *(UNKNOWN if np.isnan(row[key]) else _percent(row[key]) for key in shares),
+            *(UNKNOWN if np.isnan(row[key]) else whole_percent(row[key]) for key in shares),
         ]
         for row in rows_of(asked)
     ]
     caption = "How this flight, with those that are there, tells what is true."
     legend = (
-        "Expected logarithm of the Bayes factor, and the probability that the diagnosis names it. Beside it the same "
-        "along the path that the autopilot of simulation.closed_loop flies, of the median of random flights in the "
-        "same room, and of the known flights flown once more."
+        "The probability that the flight settles it: that the other one is then less than a hundredth as likely. "
+        "Beside it the same along the path that the autopilot of simulation.closed_loop flies, of a middling one of "
+        "random flights in the same room, and of the known flights flown once more."
     )
     return Table(name, caption, header, rows, frozenset({0, 1}), legend=legend)
 
@@ -103,19 +95,17 @@ def _outcomes(asked: QuestionGroup) -> Iterator[str]:
     rows = rows_of(asked)
     for row in rows:
         true, rival, least = row["true"], row["rival"], str(row["smallest"])
-        if not least and row["size"]:
+        if not least and row["size"] and not np.isnan(row["least"]):
             least = f"{number(row['least'], 2)} of that"
         taken = f"Assumed size: {row['size']}. " if row["size"] else ""
         if not rival:
             absent = f"smaller than {least}" if least else "not there"
             yield f"If the diagnosis then names {true}, it is there; if not, it is {absent}. {taken}".rstrip()
             continue
-        chance = max(other["wrong"] for other in rows if {other["true"], other["rival"]} == {true, rival})
-        surely = f"Surely told apart from {least} on. " if least else ""
-        error = f"less than {100 * _RARE:g} %" if chance < _RARE else f"{100 * chance:.2g} %"
+        surely = f"Settled from {least} on. " if least else ""
         yield (
-            f"If the diagnosis then names {true} alone, it is {true} and not {rival} (by chance the wrong one of the "
-            f"two is named in {error} of flights). {taken}{surely}To fly it by hand: {row['advice']}."
+            f"If the diagnosis then names {true} alone, it is {true} and not {rival}. {taken}{surely}To fly it by "
+            f"hand: {row['advice']}."
         )
     if any(asked.rival):
         yield (

@@ -21,7 +21,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, half_width, jackknife_error, mean_error
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.gusts import Gusts
+from cpfls_cli.playback.gusts import RANGES, GustRanges, Gusts
 from cpfls_cli.playback.instruments import Instruments, Told
 from cpfls_cli.playback.loop import wrench_during
 from cpfls_cli.playback.model import VehicleModel
@@ -53,7 +53,7 @@ _FAR, _NOISE, _AT_END = 12.0, 3.0, 1e-3
 
 
 @dataclass(frozen=True)
-class FoundGusts:
+class FoundGusts(GustRanges):
     """Sizes and memories of gusts by body axis, torque then force, with 95 % intervals.
 
     Other fields are described at `DisturbanceGroup`.
@@ -69,12 +69,6 @@ class FoundGusts:
         Share of all that is left which instruments foretell, and its standard error; NaN without instruments.
     """
 
-    size: Array
-    low: Array
-    high: Array
-    memory: Array
-    memory_low: Array
-    memory_high: Array
     told_by: Told
     noise: Array
     foretold: Array
@@ -84,10 +78,6 @@ class FoundGusts:
     def gusts(self) -> Gusts | None:
         """The gusts that are known, none on other axes; None where no size is."""
         return Gusts.known(self.size, self.memory) if np.isfinite(self.size).any() else None
-
-
-ENDS = ("size", "low", "high", "memory", "memory_low", "memory_high")
-"""Sizes and memories among the fields of `FoundGusts`."""
 
 
 class _Powers(NamedTuple):
@@ -195,7 +185,7 @@ def find_gusts(
         return None
     bodies = [f"inertia.{name}" for name in INERTIA_PARAMETERS[:3]] + ["thrust_factor"] * 3
     open_ = [not determined.get(name, True) for name in bodies[:rows]]
-    for name in ENDS:
+    for name in RANGES:
         getattr(found, name)[open_] = np.nan
     return found
 
@@ -233,9 +223,9 @@ def gusts_in(sides: Sequence[Array], given: Instruments, told_by: Told) -> Found
     columns = np.array([axis.bound() if told_by == "none" else axis.found(shared) for axis in axes])
     foretold, error = _share_foretold(powers)
     none = np.full(len(axes), np.nan) if told_by == "none" else 1.0
-    ends = dict(zip(ENDS, columns.T[: len(ENDS)], strict=True))
+    ends = dict(zip(RANGES, columns.T[: len(RANGES)], strict=True))
     shares = {"foretold": none * foretold, "foretold_error": none * shared * error}
-    return FoundGusts(**ends, told_by=told_by, noise=columns[:, len(ENDS) :], **shares)
+    return FoundGusts(**ends, told_by=told_by, noise=columns[:, len(RANGES) :], **shares)
 
 
 def _share_foretold(powers: _Powers) -> tuple[Array, Array]:

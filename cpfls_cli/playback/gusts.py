@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, fields
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -56,3 +57,38 @@ class Gusts(NamedTuple):
         white[1:] *= np.sqrt(1.0 - keep**2)
         columns = [recursion([-each], column) for each, column in zip(keep, white.T, strict=True)]
         return np.asarray(self.size * np.stack(columns, axis=1))
+
+
+@dataclass(frozen=True)
+class GustRanges:
+    """Gusts by body axis, torque then force, with their 95 % intervals.
+
+    Attributes
+    ----------
+    size, low, high : array, shape (axis,), N m and N
+        Standard deviation.
+    memory, memory_low, memory_high : array, shape (axis,), s
+        Time in which a gust falls to 37 %.
+    """
+
+    size: Array
+    low: Array
+    high: Array
+    memory: Array
+    memory_low: Array
+    memory_high: Array
+
+    @classmethod
+    def of_known(cls, *known: Array) -> GustRanges | None:
+        """Extend what is known of gusts, in the order of `RANGES`, to all axes: none where no size is."""
+        there = np.isfinite(known[0])
+        if not there.any():
+            return None
+        columns = [np.full(len(GUST_AXES), none) for none in (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)]
+        for values, own in zip(columns, known, strict=True):
+            values[: len(there)][there] = own[there]
+        return GustRanges(*columns)
+
+
+RANGES = tuple(each.name for each in fields(GustRanges))
+"""Names of the fields of `GustRanges`."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from cpfls_cli.inertia import (
     six_parameters,
     symmetric,
 )
-from cpfls_cli.playback.gusts import GUST_AXES, Gusts
+from cpfls_cli.playback.gusts import GustRanges, Gusts
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.parameters import LEARNED, PRODUCT_NAMES
 from cpfls_cli.playback.table import Remainder
@@ -79,28 +78,6 @@ class Estimates:
     gusts: GustRanges | None
 
 
-class GustRanges(NamedTuple):
-    """Gusts with their 95 % intervals, shapes (6,), N m and N, and s; 0 where there are none."""
-
-    size: Array
-    low: Array
-    high: Array
-    memory: Array
-    memory_low: Array
-    memory_high: Array
-
-    @classmethod
-    def of_known(cls, *known: Array) -> GustRanges | None:
-        """Extend what is known of gusts, in the order of the fields, to all axes: none where no size is."""
-        there = np.isfinite(known[0])
-        if not there.any():
-            return None
-        found = cls(*(np.full(len(GUST_AXES), none) for none in (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)))
-        for values, own in zip(found, known, strict=True):
-            values[: len(there)][there] = own[there]
-        return found
-
-
 @dataclass(frozen=True)
 class Spread:
     """Vehicles that were drawn.
@@ -152,8 +129,7 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
     Gelman et al., Bayesian Data Analysis, chapter 3 (t of a normal with unknown scale); Wallis 2014, the two-piece
     normal distribution.
     """
-    if known.blocks < _FEWEST_BLOCKS:
-        raise InputError("its flights are too short to tell how sure its numbers are; find it in longer ones")
+    require_sure(known)
     places = [place for place, each in enumerate(known.numbers) if each.value and _OF_A_GROUP not in each.name]
     model, numbers = _of_a_body(model, [known.numbers[place] for place in places])
     root = _root(known.correlation[np.ix_(places, places)])
@@ -182,6 +158,12 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
         tried,
         dict(rejected.most_common()),
     )
+
+
+def require_sure(known: Estimates) -> None:
+    """Refuse numbers that one block tells."""
+    if known.blocks < _FEWEST_BLOCKS:
+        raise InputError("its flights are too short to tell how sure its numbers are; find it in longer ones")
 
 
 def _of_a_body(model: VehicleModel, numbers: Sequence[FoundNumber]) -> tuple[VehicleModel, list[FoundNumber]]:

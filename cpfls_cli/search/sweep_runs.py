@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -29,6 +29,7 @@ from cpfls_cli.identification.data import TorqueSource, gathered
 from cpfls_cli.identification.identify import TRAINING, Identification, identify
 from cpfls_cli.identification.search import NothingFoundError, SearchStep, StopReason, is_end, require_flights
 from cpfls_cli.inertia import six_parameters
+from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.reduction.survey import survey
 from cpfls_cli.reduction.training_set import check_streamed, reduce_streamed
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
@@ -54,6 +55,7 @@ class SweepSamples:
         self._job, self._flights, self._inputs = job, flights, inputs
         self._splits: dict[Any, SplitFlights] = {}
         self._data: dict[Any, tuple[TrainingData, float]] = {}
+        self._selections: dict[Any, Selection] = {}
 
     def of(self, variant: Variant) -> tuple[TrainingData, float]:
         """Choose the samples of a setting, as `cpfls reduce` would, and give their condition number."""
@@ -62,21 +64,19 @@ class SweepSamples:
         if cut not in self._splits:
             self._splits[cut] = split_training(self._flights, study, self._inputs)
         split = self._splits[cut]
-        key = (
-            *cut,
-            study.reduction if variant.reduced else None,
-            *(getattr(study.identification, f.name) for f in fields(StructureSettings)),
-        )
+        regressor = (*cut, *(getattr(study.identification, f.name) for f in fields(StructureSettings)))
+        key = (*regressor, study.reduction if variant.reduced else None)
         if key not in self._data:
-            self._data[key] = self._chosen(split, study, variant)
+            self._data[key] = self._chosen(split, variant, regressor)
         return self._data[key]
 
     def _shown(self, name: str) -> Callable[[int, int], None]:
         """Show how many samples are chosen; the bar is for the searches."""
         return lambda done, most: self._job.progress(0, 1, f"choosing samples: {name}, {done} of {most}")
 
-    def _chosen(self, split: SplitFlights, study: Study, variant: Variant) -> tuple[TrainingData, float]:
-        training, settings, rng = split.training, study.reduction, generator(study, "reduce")
+    def _chosen(self, split: SplitFlights, variant: Variant, regressor: tuple[Any, ...]) -> tuple[TrainingData, float]:
+        study, training = variant.study, split.training
+        settings, rng = study.reduction, generator(study, "reduce")
         everything = TrainingData(training, training, split.rests, split.training_indices, split.parts)
         with settings_of("reduction", study):
             surveyed = survey(uniform_regressor(training, study), settings.rank_tolerance)
@@ -85,7 +85,13 @@ class SweepSamples:
             if self._job.dry_run:
                 check_streamed(surveyed, settings, rng)
                 return everything, surveyed.condition_number
-            selection = reduce_streamed(surveyed, settings, rng, self._shown(variant.name))
+            # A smaller size is the beginning of a larger one: Table 5 takes three of one rule.
+            rule = (*regressor, replace(settings, size=settings.pool))
+            known = self._selections.get(rule)
+            selection = known.beginning(settings.size) if known and settings.size else None
+            if selection is None:
+                selection = reduce_streamed(surveyed, settings, rng, self._shown(variant.name))
+                self._selections[rule] = selection
         chosen, condition = np.sort(selection.indices), selection.condition_number
         data = TrainingData(
             training, gathered(training, chosen), split.rests, split.training_indices[chosen], split.parts

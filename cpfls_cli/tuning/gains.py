@@ -20,6 +20,8 @@ _BELOW_CROSSOVER = 5.0
 """The integral takes over so much below what the rate follows: it costs about 11 degrees of phase there."""
 _ANGLE_BELOW = 3.0
 """While the rate is tuned the angle is as much slower; then it gets what is left."""
+_ANGLE_INTEGRAL_BELOW = 10.0
+"""The integral of the angle takes over so much below what the angle follows at least: else each step is passed."""
 _LEADS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 """Derivative over proportional gain that is tried, in lags and delays of the loop."""
 _WORTH = 1.03
@@ -310,9 +312,9 @@ class _Search:
         return _largest(lambda gain: self._held(self._angled(rate, gain)), self.disk, 0.05, 50.0)
 
     def _angled(self, rate: AxisLaw, gain: float) -> AxisLaw:
-        """Give the angle a gain, with its integral in the same proportion as before."""
+        """Give the angle a gain, with its integral in the same proportion as before unless the angle is slow."""
         ratio = self._own.angle_integral / self._own.angle if self._own.angle else 0.0
-        return replace(rate, angle=gain, angle_integral=ratio * gain)
+        return replace(rate, angle=gain, angle_integral=min(ratio, gain / _ANGLE_INTEGRAL_BELOW) * gain)
 
     def _held(self, own: AxisLaw) -> float:
         """Give the least disk margin of all loops with all plants, as far as asked; less at overshoot and jitter."""

@@ -215,6 +215,8 @@ class Evaluation:
 
     Attributes
     ----------
+    rate_hz : float
+        Steps of the law in a second.
     command, angle : list of Margins
         Of the plant that was found, cut at the command and at the angle.
     command_worst, angle_worst : list of Margins
@@ -228,6 +230,7 @@ class Evaluation:
         Of the plants that were found, then of the softest and the sharpest ones.
     """
 
+    rate_hz: float
     command: list[Margins]
     angle: list[Margins]
     command_worst: list[Margins]
@@ -250,6 +253,7 @@ def evaluate(law: Law, hover: HoverPlant) -> Evaluation:
     every = [hover.corners(axis) for axis in range(3)]
     ends = [hover.axes, tuple(own[min(1, len(own) - 1)] for own in every), tuple(own[-1] for own in every)]
     return Evaluation(
+        rate_hz=law.rate_hz,
         command=[own[0] for own in commands],
         angle=[own[0] for own in angles],
         command_worst=[_worst(own) for own in commands],

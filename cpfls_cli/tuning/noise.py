@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.autopilots.law import Law
+from cpfls_cli.autopilots.law import Law, chain
 
 _WINDOW_S = 1.0
 LEAST = 256
@@ -17,6 +17,8 @@ _FLOOR_SHARE = 0.25
 """Floor at a frequency: the median over so much of it on either side."""
 _LINE_DB, _LOWEST_LINE_HZ, _FROM_THE_END = 10.0, 25.0, 0.95
 _MOST_LINES = 2
+_LEFT = 1e-3
+"""Part of the power that a filter leaves, below which what was in front of it is not told by what is behind."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,12 @@ class Noise:
         gains = np.stack([np.abs(law.response(axis, frequency).feedback) for axis in range(3)], axis=1)
         spacing = float(self.frequency[1] - self.frequency[0])
         return np.asarray(np.sqrt((gains**2 * self.density[shown]).sum(axis=0) * spacing))
+
+    def before_filters(self, law: Law) -> Noise:
+        """Give the noise in front of the law's filters of the gyroscope, from what was logged behind them."""
+        back = np.exp(-2j * np.pi * self.frequency * law.period)
+        left = np.stack([np.abs(chain(axis.measured, back, law.period)) ** 2 for axis in law.axes], axis=1)
+        return replace(self, density=self.density / np.maximum(left, _LEFT))
 
     def lines(self) -> list[Line]:
         """List what stands out by 10 dB and more, the strongest first."""

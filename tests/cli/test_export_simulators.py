@@ -35,6 +35,8 @@ def read(form, output):
     """Take a file as its target does."""
     if TARGETS[form].ending == ".py":
         compile(output.read_text(), str(output), "exec")
+    elif TARGETS[form].ending == ".json":
+        return json.loads("\n".join(line for line in output.read_text().splitlines() if not line.startswith("#")))
     elif TARGETS[form].ending == ".toml":
         return tomllib.loads(output.read_text())
     else:
@@ -148,6 +150,36 @@ def test_urdf_is_read_by_a_parser_of_others(cpfls, vehicle, tmp_path):
     properties = read("urdf", output).find("properties").attrib
     turns = [-truth().vehicle.rotors[int(rotor) - 1].spin for rotor in properties["rotors"].split()]
     assert turns == [-1, 1, -1, 1]
+
+
+def test_a_frame_of_ardupilot_has_its_keys_in_its_order(cpfls, vehicle, tmp_path):
+    output = tmp_path / "uav.json"
+    assert cpfls("export", vehicle, "--format", "ardupilot", "-o", output).exit_code == 0
+    keys, known = read("ardupilot", output), truth().vehicle
+    assert (keys["mass"], keys["num_motors"], keys["propExpo"]) == (0.8, 4, 1.0)
+    assert keys["moment_inertia"] == pytest.approx(known.inertia_kg_m2[:3])
+    most = 4 * known.rotors[0].thrust_factor_n_s2 * 1500.0**2
+    assert keys["hoverThrOut"] == pytest.approx(0.8 * 9.80665 / most)
+    rotor, hover = known.rotors[0], np.sqrt(keys["hoverThrOut"]) * 1500.0
+    lift = 3 * rotor.thrust_factor_n_s2 * hover**2 / 1500.0
+    slope = 0.05 * keys["diagonal_size"] * keys["motor1_yaw"] * lift
+    # Yaw torque by its cube grows in hover as the vehicle's by its square.
+    assert slope == pytest.approx(2 * rotor.drag_factor_n_m_s2 * hover)
+    # Front right and rear left turn counter-clockwise, the axes are forward, right, down.
+    for motor, (forward, right, turn) in enumerate(((1, 1, 1), (-1, -1, 1), (1, -1, -1), (-1, 1, -1)), 1):
+        assert np.sign(keys[f"motor{motor}_position"][:2]).tolist() == [forward, right]
+        assert np.sign(keys[f"motor{motor}_yaw"]) == turn
+    assert sorted(keys["rotors"]) == [1, 2, 3, 4]
+    assert "sim_vehicle.py -v ArduCopter --model x:uav.json" in output.read_text()
+
+
+def test_an_airframe_says_where_a_range_holds_the_hover_thrust(cpfls, tmp_path):
+    light = replace(truth(), vehicle=replace(truth().vehicle, rotor_speed_max_rad_s=6000.0))
+    write_record(tmp_path / "light.h5", record_of(light))
+    assert cpfls("export", tmp_path / "light.h5", "--format", "px4", "-o", tmp_path / "uav.sdf").exit_code == 0
+    text = " ".join((tmp_path / "uav.airframe").read_text().replace("#", " ").split())
+    assert "param set-default MPC_THR_HOVER 0.1 " in text + " "
+    assert "outside PX4's range of 0.1 to 0.8" in text
 
 
 def test_an_identified_model_is_exported_as_a_vehicle(cpfls, pipeline, tmp_path):

@@ -96,9 +96,16 @@ def test_guesses_are_held_and_named(cpfls, tmp_path):
     assert not [name for name in document["samples"] if name.startswith("gust")]
 
 
-def test_nothing_is_written_on_a_dry_run(cpfls, vehicle):
+def test_nothing_is_drawn_or_written_on_a_dry_run(cpfls, vehicle, monkeypatch):
+    def never(*_):
+        raise AssertionError("nothing is computed")
+
+    monkeypatch.setattr("cpfls_cli.commands.spread.drawn", never)
     result = cpfls("spread", vehicle, "-o", vehicle.with_name("s.json"), "-n", "5", "--dry-run")
-    assert "would be written" in result.stdout
+    assert result.exit_code == 0
+    assert "s.json: would be written; 5 vehicles would be drawn from" in " ".join(
+        (result.stdout + result.stderr).split()
+    )
     assert not vehicle.with_name("s.json").exists()
 
 

@@ -208,3 +208,33 @@ def test_a_log_that_is_too_short_for_noise_is_told(cpfls, folder, tmp_path):
     assert result.exit_code == 0, result.stderr
     record = read_record(tmp_path / "gains.h5", GainsRecord)
     assert any("no log holds 256 samples" in words for words in record.warning)
+
+
+def test_an_imported_flight_keeps_the_parameters_of_its_log(cpfls, tmp_path):
+    (tmp_path / "study.yaml").write_text(STUDY + LOGGED)
+    write_record(tmp_path / "vehicle.h5", found_vehicle(config=STUDY + LOGGED))
+    rates = 0.02 * np.random.default_rng(1).standard_normal((1600, 3))
+    rows = [("IMU", (1_000_000 + 2500 * step, *rate)) for step, rate in enumerate(rates)]
+    today = {"ATC_RAT_RLL_P": 0.2, "ATC_RAT_PIT_P": 0.1, "INS_HNTCH_ENABLE": 0.0}
+    (tmp_path / "log.bin").write_bytes(dataflash({"IMU": ("Qfff", "TimeUS,GyrX,GyrY,GyrZ")}, rows, today))
+    result = cpfls("import", tmp_path / "study.yaml", tmp_path / "log.bin", "-o", tmp_path / "flight.h5")
+    assert result.exit_code == 0, result.stderr
+    result = cpfls(
+        *("tune", tmp_path / "study.yaml", tmp_path / "vehicle.h5", "--autopilot", "ardupilot"),
+        *("--flight", tmp_path / "flight.h5", "-o", tmp_path / "gains.h5"),
+    )
+    assert result.exit_code == 0, result.stderr
+    record = read_record(tmp_path / "gains.h5", GainsRecord)
+    assert (record.beside, record.noise) == ("today", None)
+    assert {row.name: row.today for row in record.rows}["ATC_RAT_RLL_P"] == pytest.approx(0.2)
+    assert any("imported flights are low-passed" in words for words in record.warning)
+    assert any("not in the log" in words for words in record.warning)
+
+
+def test_the_file_of_ardupilot_is_read_by_a_parser_of_others(gains, folder):
+    mavparm = pytest.importorskip("pymavlink.mavparm", reason="needs the package pymavlink, which reads such files")
+    assert gains["ardupilot"].exit_code == 0
+    read = mavparm.MAVParmDict()
+    assert read.load(str(folder / "ardupilot.param"))
+    assert dict(read) == pytest.approx(written(folder, "ardupilot"))
+    assert (folder / "betaflight.txt").read_text().startswith("# For Betaflight 2025.12.\n")

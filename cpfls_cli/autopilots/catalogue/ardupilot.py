@@ -3,7 +3,7 @@
 from math import pi
 
 from cpfls_cli.autopilots.motors import MixerRule
-from cpfls_cli.autopilots.parameters import Autopilot, Parameter
+from cpfls_cli.autopilots.parameters import Autopilot, Firmware, Parameter
 
 _DEGREE = pi / 180
 
@@ -27,35 +27,23 @@ def _axis(axis: str, letters: str, limit: str, gains: tuple[float, ...], filters
         ),
         Parameter(f"{rate}_FF", f"{axis}.ff", 0.0, 0.0, 0.5, f"{loop}, feedforward", "s"),
         Parameter(f"{rate}_IMAX", f"{axis}.integral_limit", 0.5, 0.0, 1.0, f"{loop}, most of the integral", step=0.01),
-        Parameter(
-            f"{rate}_FLTT",
-            f"{axis}.target.first",
-            target,
-            1.0 if yaw else 5.0,
-            50.0 if yaw else 100.0,
-            f"{loop}, low-pass of the target",
-            "Hz",
-            step=0.1,
-        ),
-        Parameter(
-            f"{rate}_FLTE",
-            f"{axis}.error.first",
-            error,
-            0.0,
-            20.0 if yaw else 100.0,
-            f"{loop}, low-pass of the error",
-            "Hz",
-            step=0.1,
-        ),
-        Parameter(
-            f"{rate}_FLTD",
-            f"{axis}.slope.first",
-            slope,
-            5.0,
-            50.0 if yaw else 100.0,
-            f"{loop}, low-pass of the derivative",
-            "Hz",
-            step=0.1,
+        *(
+            # Until 3.6 logs have one of them only.
+            Parameter(
+                f"{rate}_{name}",
+                f"{axis}.{role}.first",
+                own,
+                *ends,
+                f"{loop}, low-pass of the {what}",
+                "Hz",
+                step=0.1,
+                absent=0.0,
+            )
+            for name, role, own, ends, what in (
+                ("FLTT", "target", target, (1.0, 50.0) if yaw else (5.0, 100.0), "target"),
+                ("FLTE", "error", error, (0.0, 20.0 if yaw else 100.0), "error"),
+                ("FLTD", "slope", slope, (5.0, 50.0 if yaw else 100.0), "derivative"),
+            )
         ),
         Parameter(
             limit,
@@ -74,6 +62,12 @@ def _axis(axis: str, letters: str, limit: str, gains: tuple[float, ...], filters
 ARDUPILOT = Autopilot(
     name="ardupilot",
     title="ArduPilot Copter",
+    firmware=Firmware(
+        "ArduPilot Copter 4.6",
+        ("ArduCopter",),
+        oldest=(3, 4),
+        older="gains of Copter before 3.4 have other names and scales (RATE_RLL_P, STB_RLL_P)",
+    ),
     rate_hz=400.0,
     mixer=MixerRule("peak", 0.5, 0.5),
     parameters=(
@@ -88,6 +82,20 @@ ARDUPILOT = Autopilot(
         ),
         Parameter("INS_HNTCH_FREQ", "all.measured.notch", 80.0, 10.0, 495.0, "its centre", "Hz", step=1.0),
         Parameter("INS_HNTCH_BW", "all.measured.notch_width", 40.0, 5.0, 250.0, "its width", "Hz", step=1.0),
+        Parameter(
+            "INS_HNTCH_HMNCS",
+            "all.measured.notch_harmonics",
+            3.0,
+            0.0,
+            65535.0,
+            "1 for a notch at its centre alone",
+            step=1.0,
+        ),
+        Parameter("INS_HNTCH_MODE", "all.measured.notch_mode", 1.0, 0.0, 5.0, "0 for a notch that stays", step=1.0),
+        Parameter("INS_HNTCH_REF", "all.measured.notch_follows", 0.0, 0.0, 1.0, "0 for a notch that stays", step=0.01),
+        Parameter(
+            "SCHED_LOOP_RATE", "loop.rate", 400.0, 50.0, 400.0, "steps of the rate control in a second", "Hz", step=1.0
+        ),
         Parameter("MOT_THST_EXPO", "motors.expo", 0.65, -1.0, 1.0, "thrust curve of the motors", step=0.01),
         Parameter("MOT_SPIN_MIN", "motors.low", 0.15, 0.0, 0.3, "signal at which thrust begins", step=0.01),
         Parameter("MOT_SPIN_MAX", "motors.high", 0.95, 0.9, 1.0, "signal of full thrust", step=0.01),
@@ -103,5 +111,8 @@ ARDUPILOT = Autopilot(
         "the limit on slew (SMAX)",
         "scaling by battery voltage and air density",
     ),
+    # Until 3.6 one low-pass, of the error.
+    logged_as={f"ATC_RAT_{axis}_FILT": (f"ATC_RAT_{axis}_FLTE",) for axis in ("RLL", "PIT", "YAW")},
+    filtered=("IMU.Gyr", "IMU[", "RATE.", "ATT."),
     slope_of_error=True,
 )

@@ -2,8 +2,9 @@
 
 from math import pi
 
+from cpfls_cli.autopilots.law import AXES
 from cpfls_cli.autopilots.motors import MixerRule
-from cpfls_cli.autopilots.parameters import Autopilot, Parameter
+from cpfls_cli.autopilots.parameters import Autopilot, Firmware, Parameter
 
 _DEGREES = 180 / pi
 _FULL = 1000.0
@@ -36,6 +37,20 @@ def _axis(axis: str, gains: tuple[float, ...]) -> list[Parameter]:
 BETAFLIGHT = Autopilot(
     name="betaflight",
     title="Betaflight",
+    firmware=Firmware(
+        "Betaflight 2025.12",
+        ("Betaflight",),
+        oldest=(4, 3),
+        older="Betaflight before 4.3 has other names of filters and another thrust_linear",
+        renamed=(
+            # D of the PID is that of fast moves there.
+            (
+                (2025, 12),
+                {f"{new}_{axis}": f"{old}_{axis}" for axis in AXES for new, old in (("d", "d_min"), ("d_max", "d"))},
+            ),
+            ((4, 5), {"angle_p_gain": "angle_level_strength"}),
+        ),
+    ),
     rate_hz=4000.0,
     mixer=MixerRule("peak", 1.0, 1.0),
     parameters=(
@@ -44,7 +59,14 @@ BETAFLIGHT = Autopilot(
         *_axis("yaw", (45.0, 80.0, 0.0, 0.0)),
         Parameter("angle_p_gain", "tilt.angle", 50.0, 0.0, 200.0, "angle to rate in angle mode", "0.1/s", 0.1, 1.0),
         Parameter(
-            "iterm_limit", "all.integral_limit", 400.0, 0.0, 500.0, "most of the integral", scale=1 / _FULL, step=1.0
+            "iterm_limit",
+            "all.integral_limit",
+            400.0,
+            0.0,
+            500.0,
+            "most of the integral; since 2025.12 a share of the command's",
+            scale=1 / _FULL,
+            step=1.0,
         ),
         Parameter(
             "pidsum_limit",
@@ -94,6 +116,26 @@ BETAFLIGHT = Autopilot(
             "Hz",
             step=1.0,
         ),
+        Parameter(
+            "pid_process_denom",
+            "loop.every",
+            2.0,
+            1.0,
+            16.0,
+            "samples of the gyroscope for a step of the law",
+            step=1.0,
+        ),
+        Parameter(
+            "looptime",
+            "loop.period",
+            125.0,
+            31.0,
+            1000.0,
+            "from sample to sample of the gyroscope, as logs tell it",
+            "us",
+            1e-6,
+            1.0,
+        ),
         Parameter("thrust_linear", "motors.expo", 0.0, 0.0, 150.0, "thrust curve of the motors", "%", 0.01, 1.0),
     ),
     # A pilot holds the heading; here its error asks for a rate.
@@ -114,6 +156,7 @@ BETAFLIGHT = Autopilot(
         "gyro_notch_hz": ("gyro_notch1_hz",),
         "gyro_notch_cutoff": ("gyro_notch1_cutoff",),
     },
+    filtered=("gyroADC",),
     cross=((-1, -1, -1), (1, -1, 1), (-1, 1, 1), (1, 1, -1)),
     source=(
         "Betaflight, PID Tuning Guide, https://betaflight.com/docs/wiki/guides/current/PID-Tuning-Guide",

@@ -3,7 +3,7 @@
 from math import inf, pi
 
 from cpfls_cli.autopilots.motors import MixerRule
-from cpfls_cli.autopilots.parameters import Autopilot, Parameter
+from cpfls_cli.autopilots.parameters import Autopilot, Firmware, Parameter
 
 _DEGREES = 180 / pi
 _FULL = 65535.0
@@ -41,6 +41,7 @@ def _axis(axis: str, rate: tuple[float, ...], angle: tuple[float, ...]) -> list[
 CRAZYFLIE = Autopilot(
     name="crazyflie",
     title="Crazyflie",
+    firmware=Firmware("crazyflie-firmware 2025.02", ("Crazyflie",)),
     rate_hz=500.0,
     # Roll and pitch are halved, yaw is not.
     mixer=MixerRule("peak", 0.5, 1.0),
@@ -72,6 +73,7 @@ CRAZYFLIE = Autopilot(
         "Crazyflie firmware, Parameters, https://www.bitcraze.io/documentation/repository/crazyflie-firmware/master/"
         "api/params/ (gives no ranges)",
     ),
+    filtered=("gyro.", "stateEstimate", "stabilizer"),
     left_out=("angles of roll, pitch and yaw one by one, in place of a rotation",),
     holds_integral=False,
 )

@@ -3,7 +3,7 @@
 from math import inf, pi
 
 from cpfls_cli.autopilots.motors import MixerRule
-from cpfls_cli.autopilots.parameters import Autopilot, Parameter
+from cpfls_cli.autopilots.parameters import Autopilot, Firmware, Parameter
 
 _DEGREE = pi / 180
 
@@ -22,7 +22,7 @@ def _axis(axis: str, word: str, limit: str, most: tuple[float, float], gains: tu
             "1/s",
             step=0.01,
         ),
-        Parameter(f"{rate}_K", f"{axis}.k", 1.0, 0.01, 5.0, f"{loop}, factor on P, I and D"),
+        Parameter(f"{rate}_K", f"{axis}.k", 1.0, 0.01, 5.0, f"{loop}, factor on P, I and D", absent=1.0),
         Parameter(f"{rate}_P", f"{axis}.p", p, 0.0 if axis == "yaw" else 0.01, most[0], f"{loop}, proportional", "s"),
         Parameter(f"{rate}_I", f"{axis}.i", i, 0.0, inf, f"{loop}, integral"),
         Parameter(f"{rate}_D", f"{axis}.d", d, 0.0, most[1], f"{loop}, derivative of the gyroscope", "s^2", step=1e-5),
@@ -45,6 +45,7 @@ def _axis(axis: str, word: str, limit: str, most: tuple[float, float], gains: tu
 PX4 = Autopilot(
     name="px4",
     title="PX4",
+    firmware=Firmware("PX4 1.16", ("PX4",)),
     rate_hz=400.0,
     mixer=MixerRule("power", 1.0, 1.0),
     parameters=(
@@ -74,6 +75,16 @@ PX4 = Autopilot(
             "IMU_GYRO_NF1_FRQ", "all.measured.notch2", 0.0, 0.0, 1000.0, "second notch of the gyroscope", "Hz", step=1.0
         ),
         Parameter("IMU_GYRO_NF1_BW", "all.measured.notch2_width", 20.0, 0.0, 100.0, "its width", "Hz", step=1.0),
+        Parameter(
+            "IMU_GYRO_RATEMAX",
+            "loop.rate",
+            400.0,
+            100.0,
+            2000.0,
+            "steps of the rate control in a second",
+            "Hz",
+            step=1.0,
+        ),
         Parameter("THR_MDL_FAC", "motors.expo", 0.0, 0.0, 1.0, "thrust curve of the motors", step=0.01),
         Parameter("MPC_THR_HOVER", "motors.hover", 0.5, 0.1, 0.8, "thrust that hovers", step=0.01),
     ),
@@ -86,5 +97,12 @@ PX4 = Autopilot(
         "less weight of yaw at large errors (MC_YAW_WEIGHT)",
         "the integral's weakening at errors above 100 deg/s",
     ),
+    logged_as={
+        # Names of 1.9 to 1.12.
+        "MC_DTERM_CUTOFF": ("IMU_DGYRO_CUTOFF",),
+        "IMU_GYRO_NF_FREQ": ("IMU_GYRO_NF0_FRQ",),
+        "IMU_GYRO_NF_BW": ("IMU_GYRO_NF0_BW",),
+    },
+    filtered=("vehicle_angular_velocity", "vehicle_rates", "vehicle_attitude."),
     integrates_first=False,
 )

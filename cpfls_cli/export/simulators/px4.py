@@ -54,7 +54,9 @@ def _airframe(sheet: Sheet, held: Held, told: Sequence[str]) -> str:
     vehicle, hubs, turns = sheet.model.vehicle, places(sheet.model, alike=False), spins(sheet.model.vehicle)
     most = vehicle.rotor_speed_max_rad_s
     thrust = np.array([held.numbers[f"thrust_{rotor + 1}"] for rotor in range(len(hubs))])
-    hover = float(np.clip(held.body.mass * held.body.gravity / (thrust.sum() * most**2), *_HOVER))
+    hovers = float(held.body.mass * held.body.gravity / (thrust.sum() * most**2))
+    hover = float(np.clip(hovers, *_HOVER))
+    cut = f"MPC_THR_HOVER: the vehicle hovers at {hovers:.3g}, outside PX4's range of {_HOVER[0]} to {_HOVER[1]}."
     parameters: dict[str, str] = {"SIM_GZ_EN": "1", "CA_AIRFRAME": "0", "CA_ROTOR_COUNT": str(len(hubs))}
     for rotor, (x, y, z) in enumerate(hubs.tolist()):
         lever = held.numbers[f"yaw_{rotor + 1}"] / thrust[rotor]
@@ -71,6 +73,7 @@ def _airframe(sheet: Sheet, held: Held, told: Sequence[str]) -> str:
         "",
         *told,
         "",
+        *((cut, "") if hover != hovers else ()),
         "Commands of 0 to 1 are rotor speeds of 0 to the largest, so thrust goes with their square: THR_MDL_FAC 1. No "
         "gain is set here: those of rc.mc_defaults were not made for this vehicle.",
     ]

@@ -193,7 +193,7 @@ def fly_sdf(text: str, course: Course) -> State:
     )
     lag = float(column("timeConstantUp")[0])
 
-    def wrench(speed: Array, air: Array, rate: Array) -> tuple[Array, Array]:
+    def wrench(speed: Array, air: Array, rate: Array, _rotation: Array) -> tuple[Array, Array]:
         across = (air[:, None] + np.cross(rate[:, None], hubs)) * [1.0, 1.0, 0.0] * np.abs(speed)[..., None]
         up = [0.0, 0.0, 1.0]
         force = -drag[:, None] * across + (thrust * speed**2)[..., None] * up

@@ -2,8 +2,8 @@
 
 URDF itself has mass, inertia and places. In gym-pybullet-drones rotor i pushes kf n^2 at prop_i_link with n in rpm, the
 body turns by km (-n_0^2 + n_1^2 - n_2^2 + n_3^2), and drag is (drag_coeff_xy, drag_coeff_xy, drag_coeff_z) times the
-velocity times the sum of the rotor speeds in rad/s: there along the axes of the world, here along those of the body,
-which are alike where level. `fly_urdf` is these equations, not PyBullet.
+velocity times the sum of the rotor speeds in rad/s, along the axes of the world; those of the body, along which a
+vehicle has its drag, are alike where it is level. `fly_urdf` is these equations, not PyBullet.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.vehicle.settings import VehicleSettings
 
+OTHERWISE = "drag along the axes of the world, where the vehicle has it along those of its body"
 _ROTORS, _RPM, _GRAVITY = 4, 30 / np.pi, 9.8
 """Of gym-pybullet-drones, which has its gravity in its code."""
 _TURNS = np.array([-1.0, 1.0, -1.0, 1.0])
@@ -137,6 +138,15 @@ def _fixed(root: ElementTree.Element, name: str, place: Array) -> None:
 
 def fly_urdf(text: str, course: Course) -> State:
     """Fly an exported vehicle by the published equations of gym-pybullet-drones; see `Target.fly`."""
+    return _fly(text, course, in_world=True)
+
+
+def fly_urdf_as_held(text: str, course: Course) -> State:
+    """Fly it with drag along the axes of the body; see `Target.fly_as_held`."""
+    return _fly(text, course, in_world=False)
+
+
+def _fly(text: str, course: Course, *, in_world: bool) -> State:
     root = ElementTree.fromstring(text)
     attributes = next(root.iter("properties")).attrib
     order = np.array([int(word) - 1 for word in attributes["rotors"].split()])
@@ -148,11 +158,15 @@ def fly_urdf(text: str, course: Course) -> State:
     hubs = np.array([[float(word) for word in origin.split()] for origin in origins])
     drag = np.array([across, across, along])
 
-    def push(speed: Array, air: Array, _rate: Array) -> tuple[Array, Array]:
+    def push(speed: Array, air: Array, _rate: Array, rotation: Array) -> tuple[Array, Array]:
         squares = (_RPM * speed[:, order]) ** 2
         force = (kf * squares)[..., None] * [0.0, 0.0, 1.0]
         torque = np.cross(hubs, force).sum(axis=1)
         torque[:, 2] += km * (squares @ _TURNS)
-        return torque, force.sum(axis=1) - drag * speed.sum(axis=1, keepdims=True) * air
+        if in_world:
+            turned = np.einsum("nji,nj->ni", rotation, drag * np.einsum("nij,nj->ni", rotation, air))
+        else:
+            turned = drag * air
+        return torque, force.sum(axis=1) - speed.sum(axis=1, keepdims=True) * turned
 
     return fly_body(course, mass, inertia, push, 0.0)

@@ -89,9 +89,13 @@ def by_instruments(found: NamedFit, given: Instruments, floor: Array, settings: 
 
 
 def untold_actuation(before: NamedFit, after: NamedFit) -> list[str]:
-    """Name effects on the actuation whose numbers instruments hardly tell, and left as they were."""
+    """Name effects on the actuation whose numbers instruments hardly tell, and left as they were.
+
+    A supply that sinks is none: no loop moves the voltage.
+    """
     numbers = zip(after.hypothesis.chosen, before.estimates.effects, after.estimates.effects, strict=True)
-    return [each.effect.name for each, was, now in numbers if each.effect.kind == "actuator" and was is now]
+    left = [each.effect for each, was, now in numbers if each.effect.kind == "actuator" and was is now]
+    return [effect.name for effect in left if "voltage" not in effect.needs]
 
 
 def told_apart(

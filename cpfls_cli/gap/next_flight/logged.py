@@ -16,7 +16,7 @@ from cpfls_cli.gap.balance.balance_system import floors, system
 from cpfls_cli.gap.balance.weak_flight import WeakFlight, weak_flight
 from cpfls_cli.gap.next_flight.rivals import physical_values
 from cpfls_cli.gap.next_flight.room import Room
-from cpfls_cli.gap.next_flight.separation import SizedEffect
+from cpfls_cli.gap.next_flight.separation import Evidence, Question, SizedEffect, gathered
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.simulation.measured import measure, noisy
@@ -62,6 +62,8 @@ class Logging:
         Whether commands are logged in place of rotor speeds.
     floor : array, shape (6,), N m and N
         What noise leaves of a window.
+    off : float
+        What formulas are off by, see `formulas_off`.
     base : InertiaModel or None
         Of the model that misses something; None for the rigid body of the vehicle.
     """
@@ -71,6 +73,11 @@ class Logging:
     floor: Array
     settings: GapSettings
     base: InertiaModel | None = None
+    off: float = 0.0
+
+    def gathered(self, question: Question, flights: Sequence[WeakFlight]) -> Evidence:
+        """Gather what flights would say on a question."""
+        return gathered(question, flights, self.floor, self.settings, self.off)
 
     def weak(self, signals: Signals) -> WeakFlight:
         """Arrange a flight for the balance."""

@@ -17,7 +17,8 @@ from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.leftover import usual_size
 from cpfls_cli.gap.naming.results import Alternative, NamedEffect
 from cpfls_cli.gap.naming.scoring import candidates_of, information
-from cpfls_cli.gap.next_flight.separation import SURE, Question, SizedEffect, gathered, judged, shared_noise
+from cpfls_cli.gap.next_flight.separation import Question, SizedEffect, answered, gathered, shared_noise
+from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rounding import smallest
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -86,6 +87,7 @@ def questions_left(
     unseen: Sequence[Effect],
     flights: Sequence[WeakFlight],
     floor: Array,
+    settings: GapSettings,
 ) -> tuple[Question, ...]:
     """Ask what a diagnosis left open: which of two rivals it is, and what its flights could not show.
 
@@ -110,7 +112,7 @@ def questions_left(
         pair = (one, other.candidate.effect), (other, one.candidate.effect)
         questions += [Question(true, effect, besides) for true, effect in pair]
         beside += [Question(true, each, besides) for true, known in pair for each in _beside(true, known, flights)]
-    questions += [each for each in beside if not _is_told(each, flights, floor)]
+    questions += [each for each in beside if not _is_told(each, flights, floor, settings)]
     once = {(each.true.candidate.effect.name, each.rival and each.rival.name): each for each in questions}
     asked = tuple(question for question in once.values() if _is_open(question))
     return (*asked, *(Question(usual(effect, flights[0].signals.vehicle), None) for effect in unseen))
@@ -123,12 +125,12 @@ def _beside(true: SizedEffect, rival: Effect, flights: Sequence[WeakFlight]) -> 
     return [each for each in known if not all(each.missing(flight.signals) for flight in flights)]
 
 
-def _is_told(question: Question, flights: Sequence[WeakFlight], floor: Array) -> bool:
+def _is_told(question: Question, flights: Sequence[WeakFlight], floor: Array, settings: GapSettings) -> bool:
     """Tell whether the flights that are there answer a question."""
     if all(question.true.candidate.effect.missing(flight.signals) for flight in flights):
         return False
-    answer = judged(*gathered(question, flights, floor), shared_noise(flights[0].windows))
-    return answer.sure >= SURE
+    (answer,) = answered([gathered(question, flights, floor, settings)], shared_noise(flights[0].windows))
+    return answer.settled
 
 
 def fitted_effects(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> tuple[SizedEffect, ...]:

@@ -16,7 +16,6 @@ from cpfls_cli.trajectory.planning import Trajectory, sample_times
 from cpfls_cli.trajectory.settings import TrajectorySettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_DERIVATIVES = 7
 _AT_REST = 4
 """Derivatives that vanish at both ends: with the snap the angular acceleration does."""
 
@@ -62,7 +61,7 @@ class HarmonicPath:
         # Each derivative turns by a quarter of a period: cos -> -sin -> -cos -> sin.
         turns = ((cosine, sine), (-sine, cosine), (-cosine, -sine), (sine, -cosine))
         values = []
-        for derivative in range(_DERIVATIVES):
+        for derivative in range(len(_NAMES)):
             of_cosine, of_sine = turns[derivative % len(turns)]
             scale = frequency**derivative
             values.append((of_cosine * (self.cosine * scale) + of_sine * (self.sine * scale)).sum(axis=2))
@@ -145,16 +144,10 @@ def harmonic_trajectory(path: HarmonicPath, sample_time: float, gravity: float) 
 TILT_MAX = np.radians(35.0)
 """Largest tilt where the settings leave it open."""
 
-# Half of a turn to either side shows every heading.
-_MOST_YAW = np.pi
-# Of the fastest wave: between them a load is at most 1 % larger.
-_SAMPLES_PER_PERIOD = 20
 # Waves of an axis, as many as a person could still fly.
 _HARMONICS = 10
-# Of a bisection: to 1 % for a path, to 12 % for one that is only drawn.
-_HALVINGS, _ROUGH = 7, 3
-# Of what an axis can do alone, at which it is as good as still.
-_LEAST_SHARE = 0.05
+# Of a bisection, to a thousandth.
+_HALVINGS = 10
 
 
 @dataclass(frozen=True)
@@ -188,9 +181,9 @@ class Room:
         settings = self.settings
         assert settings.duration_s is not None, "settings of this path have a duration"
         path = random_path(settings.duration_s, settings.next_flight.frequency_max_hz, _HARMONICS, rng)
-        share = 10 ** rng.uniform(np.log10(_LEAST_SHARE), 0.0, 4)
+        share = rng.random(4)
         for axis in range(4):
-            alone = self.fitted(path.scaled(np.arange(4) == axis), _ROUGH)
+            alone = self.fitted(path.scaled(np.arange(4) == axis))
             path = replace(
                 path,
                 cosine=np.where(np.arange(4)[:, None] == axis, alone.cosine, path.cosine),
@@ -198,21 +191,22 @@ class Room:
             )
         return self.fitted(path.scaled(share))
 
-    def fitted(self, path: HarmonicPath, halvings: int = _HALVINGS) -> HarmonicPath:
+    def fitted(self, path: HarmonicPath) -> HarmonicPath:
         """Scale a path until it reaches a limit, and put its middle into that of the room; it starts at yaw 0."""
         at = path.sample(np.arange(0.0, path.duration, self.period))[0]
         low, high = at.min(axis=0), at.max(axis=0)
         reach = np.maximum(0.5 * (high - low), 1e-12)
         centred = replace(path, centre=path.centre - np.array([*0.5 * (high + low)[:3], at[0, 3]]))
-        largest = centred.scaled(float((np.array([*self.half, _MOST_YAW]) / reach).min()))
-        return largest.scaled(self._share(largest, halvings))
+        # Half of a turn to either side shows every heading.
+        largest = centred.scaled(float((np.array([*self.half, np.pi]) / reach).min()))
+        return largest.scaled(self._share(largest))
 
-    def _share(self, path: HarmonicPath, halvings: int) -> float:
+    def _share(self, path: HarmonicPath) -> float:
         """Find the largest share of a path that keeps the limits on motion and rotors, by bisection."""
         if at_most(self.load(path), 1.0):
             return 1.0
         low, high = 0.0, 1.0
-        for _ in range(halvings):
+        for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if self.load(path.scaled(middle)) <= 1 else (low, middle)
         return low
@@ -220,7 +214,7 @@ class Room:
     def load(self, path: HarmonicPath) -> float:
         """Compute the largest share of any limit on motion, tilt and rotors that a path takes."""
         try:
-            planned = self.planned(path, 1 / (_SAMPLES_PER_PERIOD * self.settings.next_flight.frequency_max_hz))
+            planned = self.planned(path)
         except ComputationError:
             return np.inf
         signals = vars(planned)

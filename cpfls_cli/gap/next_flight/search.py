@@ -9,26 +9,14 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
+from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.next_flight.logged import Logging, planned_signals
 from cpfls_cli.gap.next_flight.room import HarmonicPath, Room
-from cpfls_cli.gap.next_flight.separation import Answer, Evidence, Question, gathered, judged, shared_noise
+from cpfls_cli.gap.next_flight.separation import DRAWS, FEW_DRAWS, Answer, Evidence, Question, answered, shared_noise
 from cpfls_cli.rounding import ascending, less
 from cpfls_cli.weak_form.windows import windows
-
-# Shares of a path by which it is changed: first by what makes another one of it, then by what still shows.
-_FIRST_STEP, _SMALLEST_STEP = 0.3, 0.02
-_LONGER, _SHORTER = 1.5, 0.9
-"""Of the step after a success and a failure: in balance where one trial in five succeeds."""
-
-_ONE_AXIS, _ANEW = 0.5, 0.2
-"""Shares of the trials that change one axis only, and of those the ones that draw it anew."""
-
-_HOPELESS = 0.01
-"""Share of enough below which a question hardly counts any more: no path may be able to tell."""
-
-# Size in m and rad, and duration in s, of a flight that nobody flies.
-_A_LITTLE, _A_WHILE = 0.01, 2.0
 
 
 @dataclass(frozen=True)
@@ -38,7 +26,7 @@ class Goal:
     Attributes
     ----------
     known : tuple of Evidence
-        What the flights already flown say on each question; no rows without such flights.
+        What the flights already flown say on each question; no blocks without such flights.
     noise : float
         See `shared_noise`.
     """
@@ -49,35 +37,41 @@ class Goal:
     logging: Logging
     noise: float
 
-    def answers(self, signals: Signals | None, again: int = 1) -> tuple[Answer, ...]:
-        """Judge what the known flights, each taken `again` times, say together with one along given signals."""
-        flights = [] if signals is None else [self.logging.weak(signals)]
-        answers = []
-        for question, known in zip(self.questions, self.known, strict=True):
-            fresh, columns = gathered(question, flights or [self._empty()], self.logging.floor)
-            both = known.taken(again)
-            answers.append(judged(both + fresh if flights else both, columns, self.noise))
-        return tuple(answers)
+    def answers(self, signals: Signals | None, draws: int = DRAWS) -> tuple[Answer, ...]:
+        """Judge what the known flights say together with one along given signals; None: with themselves once more."""
+        if signals is None:
+            evidence = [known.beside(known) for known in self.known]
+        else:
+            there = [self.logging.weak(signals)]
+            fresh = [self.logging.gathered(each, there) for each in self.questions]
+            evidence = [one.beside(known) for one, known in zip(fresh, self.known, strict=True)]
+        of_effect: dict[str, list[int]] = {}
+        for index, question in enumerate(self.questions):
+            of_effect.setdefault(question.true.candidate.effect.name, []).append(index)
+        answers = {
+            index: answer
+            for asked in of_effect.values()
+            for index, answer in zip(
+                asked, answered([evidence[each] for each in asked], self.noise, draws), strict=True
+            )
+        }
+        return tuple(answers[index] for index in range(len(self.questions)))
 
     def score(self, path: HarmonicPath) -> float:
-        """Score a path: harmonic mean over the questions of what it tells, 1 for just enough; the worst counts most."""
-        answers = self.answers(planned_signals(self.room.planned(path), self.room, self.logging))
-        return 1 / float(np.mean([1 / (answer.apart / answer.enough + _HOPELESS) for answer in answers]))
-
-    def _empty(self) -> WeakFlight:
-        """Give any flight that moves a little, for the places of the columns."""
-        shaken = np.full((4, 1), _A_LITTLE)
-        path = HarmonicPath(np.zeros(4), np.ones((4, 1), dtype=int), shaken, shaken, _A_WHILE)
-        return self.logging.weak(planned_signals(self.room.planned(path), self.room, self.logging))
+        """Score a path: logarithm of one over how likely a wrong set is after it, on average over the true ones."""
+        answers = self.answers(planned_signals(self.room.planned(path), self.room, self.logging), FEW_DRAWS)
+        effects = {question.true.candidate.effect.name for question in self.questions}
+        return float(np.log(len(effects) / sum(answer.likely for answer in answers)))
 
     def known_from(self, question: Question, flights: Sequence[WeakFlight]) -> Evidence:
         """Gather what the flights already flown say; nothing where they lack a signal of an effect in question."""
+        if not flights:
+            return Evidence.none(0)
         rival = [] if question.rival is None else [question.rival]
         effects = [question.true.candidate.effect, *rival, *(each.candidate.effect for each in question.besides)]
-        seen = all(any(not effect.missing(flight.signals) for flight in flights) for effect in effects)
-        if flights and seen:
-            return gathered(question, flights, self.logging.floor)[0]
-        return gathered(question, [self._empty()], self.logging.floor)[0].taken(0)
+        if all(any(not effect.missing(flight.signals) for flight in flights) for effect in effects):
+            return self.logging.gathered(question, flights)
+        return Evidence.none(1 + int(block_index(system(flights), self.logging.settings).max()))
 
 
 def goal(questions: Sequence[Question], flights: Sequence[WeakFlight], room: Room, logging: Logging) -> Goal:
@@ -117,8 +111,7 @@ def next_flight(
 ) -> NextFlight:
     """Search for the path that tells most.
 
-    The best of some random paths is changed at random as long as that helps, with a step that grows with success and
-    shrinks with failure.
+    The best of some random paths is changed at random as long as that helps, by steps that shrink to nothing.
 
     Parameters
     ----------
@@ -128,7 +121,7 @@ def next_flight(
     References
     ----------
     Atkinson and Fedorov 1975, The design of experiments for discriminating between two rival models, Biometrika 62
-    (T-optimality). Rechenberg 1973 (the one-fifth rule).
+    (T-optimality).
     """
     settings, room = asked.room.settings.next_flight, asked.room
     total = settings.starts + settings.iterations
@@ -139,23 +132,21 @@ def next_flight(
         progress(number + 1, total, f"best random path {max(score for score, _ in scored):.3f}")
     scored = ascending(scored, lambda pair: pair[0])
     best, path = scored[-1]
-    history, step = [], _FIRST_STEP
+    history = []
     for number in range(settings.iterations):
-        trial = room.fitted(_changed(path, step, room, rng))
+        trial = room.fitted(_changed(path, 1 - number / settings.iterations, room, rng))
         score = asked.score(trial)
-        better = less(best, score)
-        step = min(max(step * (_LONGER if better else _SHORTER), _SMALLEST_STEP), 1.0)
-        best, path = (score, trial) if better else (best, path)
+        best, path = (score, trial) if less(best, score) else (best, path)
         history.append(best)
         progress(settings.starts + number + 1, total, f"best path {best:.3f}")
     return NextFlight(path, tuple(path for _, path in scored), np.array(history))
 
 
 def _changed(path: HarmonicPath, step: float, room: Room, rng: np.random.Generator) -> HarmonicPath:
-    """Change amplitudes in proportion to the velocities of their axes, of one axis or of all; or draw an axis anew."""
-    axes = np.arange(4)[:, None]
-    chosen = axes == rng.integers(4) if rng.random() < _ONE_AXIS else axes >= 0
-    if not chosen.all() and rng.random() < _ANEW:
+    """Change all axes, or one, in proportion to their velocities, or draw one anew: each as often."""
+    axes, kind = np.arange(4)[:, None], rng.integers(3)
+    chosen = axes == rng.integers(4) if kind else axes >= 0
+    if kind > 1:
         other = room.drawn(rng)
         pairs = ((getattr(other, name), getattr(path, name)) for name in ("order", "cosine", "sine"))
         order, cosine, sine = (np.where(chosen, anew, old) for anew, old in pairs)

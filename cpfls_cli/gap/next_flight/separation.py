@@ -1,24 +1,28 @@
-"""How well flights tell rivals apart: what of an effect its rival cannot imitate, in squared noise floors."""
+"""How well flights tell rivals apart: how likely each is after them, by what it leaves of the one that is true."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+from scipy.optimize import brentq
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.gap.balance.balance_system import is_free, system
+from cpfls_cli.gap.balance.balance_system import System, is_free, system
+from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, nuisance
-from cpfls_cli.gap.naming.ranking import least_gain, off_by
+from cpfls_cli.gap.naming.ranking import block_index, likely, rows
 from cpfls_cli.gap.naming.scoring import candidates_of
-from cpfls_cli.gap.settings import ERRORS
+from cpfls_cli.gap.settings import NOISE, OFF, RARE, GapSettings
+from cpfls_cli.rounding import ROUNDING
 from cpfls_cli.weak_form.windows import Windows
 
-SURE = 0.975
-"""Probability from which a flight is said to settle a question."""
+_NOWHERE = np.zeros(0, dtype=int)
+DRAWS, FEW_DRAWS = 200, 8
+"""Draws of the noise for a probability to some per cent, and for comparing flights by the same draws."""
 
 
 @dataclass(frozen=True)
@@ -54,46 +58,106 @@ class Question:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Products of all columns that a question takes, over the windows of flights; those of more flights add up.
+    """What flights would say on a question, by the products of all columns that it takes over each block.
 
     Attributes
     ----------
-    gram : array, shape (column, column)
+    gram : array, shape (block, column, column)
         In squared floors: the true effect, then base columns, then the rival at each point of its grid.
-    rows : int
-        Windows times known channels.
+    base : array of int
+        Places of the columns that are free whichever is true.
+    rivals : tuple of array of int
+        Places of the rival's, one for each point of its grid; one empty array where there is no rival.
+    unit : bool
+        Whether the rival has the coefficient 1.
+    off : float
+        What formulas are off by, see `formulas_off`.
+    known : int
+        Blocks, the first ones, that are flown already: their noise is what it is, and not drawn.
     """
 
     gram: Array
-    windows: int
-    rows: int
-
-    def __add__(self, other: Evidence) -> Evidence:
-        return Evidence(self.gram + other.gram, self.windows + other.windows, self.rows + other.rows)
-
-    def taken(self, times: int) -> Evidence:
-        """Take the same flights several times."""
-        return Evidence(times * self.gram, times * self.windows, times * self.rows)
-
-
-@dataclass(frozen=True)
-class QuestionColumns:
-    """Where the columns of a question stand.
-
-    Attributes
-    ----------
-    rivals : tuple of array of int
-        One for each point of the rival's grid; one empty array where there is no rival.
-    unit : bool
-        Whether the rival has the coefficient 1.
-    """
-
     base: IntArray
     rivals: tuple[IntArray, ...]
     unit: bool
+    off: float
+    known: int = 0
+
+    @classmethod
+    def none(cls, blocks: int) -> Evidence:
+        """Make blocks that say nothing."""
+        return cls(np.zeros((blocks, 1, 1)), _NOWHERE, (_NOWHERE,), unit=False, off=0.0)
+
+    def beside(self, known: Evidence) -> Evidence:
+        """Put blocks of other flights before these."""
+        shape = (len(known.gram), *self.gram.shape[1:])
+        gram = np.concatenate([np.broadcast_to(known.gram, shape), self.gram])
+        return replace(self, gram=gram, known=len(known.gram))
+
+    @cached_property
+    def left(self) -> Array:
+        """What the rival leaves of the true effect at its best, shape (block,), squared floors."""
+        return min((self._left(rival) for rival in self.rivals), key=lambda left: float(left.sum()))
+
+    @cached_property
+    def variance(self) -> float:
+        """Mean square of a floor with its error, and of what formulas are off by, in squared floors."""
+        return float(NOISE + self.off * self._left(_NOWHERE).sum())
+
+    def _left(self, rival: IntArray) -> Array:
+        total, weight = self.gram.sum(axis=0), np.zeros(self.gram.shape[1])
+        weight[0] = 1.0
+        free = self.base
+        if self.unit and len(rival):
+            weight[rival] = -1.0
+        else:
+            free = np.concatenate([free, rival])
+        scale = np.sqrt(np.diag(total)[free])
+        scale = np.where(scale > 0, scale, 1.0)
+        values, vectors = np.linalg.eigh(total[np.ix_(free, free)] / np.outer(scale, scale))
+        kept = values > 1e-10 * max(values.max(initial=0.0), 1e-300)
+        along = (vectors.T @ ((total[free] @ weight) / scale))[kept] / values[kept]
+        weight[free] -= vectors[:, kept] @ along / scale
+        return np.asarray(np.maximum(np.einsum("i,bij,j->b", weight, self.gram, weight), 0.0))
+
+    def odds(self, noise: float, draw: Array, size: float = 1.0) -> Array:
+        """Compute the logarithm of the rival's predictive density less that of the true effect, shape (block,).
+
+        Parameters
+        ----------
+        noise : float
+            See `shared_noise`.
+        draw : array, shape (block,)
+            Of the noise in what the two differ by, in standard deviations.
+        size : float
+            Of the true effect, as a share of its own.
+        """
+        error = np.where(np.arange(len(self.left)) < self.known, 0.0, 2 * size * np.sqrt(noise * self.left))
+        more = size**2 * self.left + error * draw
+        variance = NOISE + size**2 * (self.variance - NOISE)
+        return np.asarray(np.clip(-0.5 * more / variance, np.log(RARE), -np.log(RARE)))
 
 
-def gathered(question: Question, flights: Sequence[WeakFlight], floor: Array) -> tuple[Evidence, QuestionColumns]:
+def formulas_off(hypothesis: System, floor: Array) -> float:
+    """Estimate what formulas are off by, by what effects leave above the floor of the flights that they were named in.
+
+    Parameters
+    ----------
+    floor : array, shape (6,), N m and N
+
+    Returns
+    -------
+    float
+        Mean square, as a share of that of what the effects explain.
+    """
+    plain = system(hypothesis.flights)
+    before, left = (float(((each.left(fit(each, floor)) / floor) ** 2).sum()) for each in (plain, hypothesis))
+    return float(np.clip((left - rows(hypothesis)) / max(before - left, ROUNDING), 0.0, OFF**2))
+
+
+def gathered(
+    question: Question, flights: Sequence[WeakFlight], floor: Array, settings: GapSettings, off: float = 0.0
+) -> Evidence:
     """Gather what flights along known motions would say on a question.
 
     Parameters
@@ -101,6 +165,8 @@ def gathered(question: Question, flights: Sequence[WeakFlight], floor: Array) ->
     flights : sequence of WeakFlight
         Their residuals are not used.
     floor : array, shape (6,), N m and N
+    off : float
+        See `formulas_off`.
     """
     balance = system(flights)
     free = [nuisance(), *(each.candidate for each in question.besides if is_free(each.candidate))]
@@ -108,46 +174,17 @@ def gathered(question: Question, flights: Sequence[WeakFlight], floor: Array) ->
     true = (balance.columns(question.true.candidate) @ question.true.linear)[..., None]
     parts = [true, *(balance.columns(each) for each in (*free, *tried))]
     ends = np.cumsum([part.shape[2] for part in parts])
-    indices = [np.arange(end - part.shape[2], end) for part, end in zip(parts, ends, strict=True)]
-    matrix = (np.concatenate(parts, axis=2) / floor[:, None]).reshape(-1, int(ends[-1]))
-    rows = sum(len(flight) * int(flight.known.sum()) for flight in flights)
-    rivals = tuple(indices[1 + len(free) :]) or (np.zeros(0, dtype=int),)
-    unit = bool(tried) and tried[0].effect.unit_coefficient
-    evidence = Evidence(matrix.T @ matrix, sum(len(flight) for flight in flights), rows)
-    return evidence, QuestionColumns(np.concatenate(indices[1 : 1 + len(free)]), rivals, unit)
-
-
-def apart(evidence: Evidence, columns: QuestionColumns) -> float:
-    """Compute the part of the true effect that the rival leaves over, at its best.
-
-    Returns
-    -------
-    float
-        Sum of squares, in squared floors.
-    """
-    return min(_left(evidence.gram, columns, rival) for rival in columns.rivals)
-
-
-def beyond_numbers(evidence: Evidence, columns: QuestionColumns) -> float:
-    """Compute the part of the true effect that the free columns beside the rival leave over, in squared floors."""
-    return _left(evidence.gram, columns, np.zeros(0, dtype=int))
-
-
-def _left(gram: Array, columns: QuestionColumns, rival: IntArray) -> float:
-    weight = np.zeros(len(gram))
-    weight[0] = 1.0
-    free = columns.base
-    if columns.unit and len(rival):
-        weight[rival] = -1.0
-    else:
-        free = np.concatenate([free, rival])
-    scale = np.sqrt(np.diag(gram)[free])
-    scale = np.where(scale > 0, scale, 1.0)
-    right = (gram[free] @ weight) / scale
-    values, vectors = np.linalg.eigh(gram[np.ix_(free, free)] / np.outer(scale, scale))
-    kept = values > 1e-10 * max(values.max(initial=0.0), 1e-300)
-    imitated = ((vectors.T @ right)[kept] ** 2 / values[kept]).sum()
-    return float(max(weight @ gram @ weight - imitated, 0.0))
+    places = [np.arange(end - part.shape[2], end) for part, end in zip(parts, ends, strict=True)]
+    matrix = np.concatenate(parts, axis=2) / floor[:, None]
+    block = block_index(balance, settings)
+    parts = [matrix[block == number].reshape(-1, int(ends[-1])) for number in range(block.max() + 1)]
+    return Evidence(
+        np.array([part.T @ part for part in parts]),
+        np.concatenate(places[1 : 1 + len(free)]),
+        tuple(places[1 + len(free) :]) or (_NOWHERE,),
+        bool(tried) and tried[0].effect.unit_coefficient,
+        off,
+    )
 
 
 @dataclass(frozen=True)
@@ -156,64 +193,60 @@ class Answer:
 
     Attributes
     ----------
-    apart : float
-        See `apart`.
-    least : float
-        What the diagnosis needs of it.
-    noise : float
-        Standard deviation of one squared floor for each unit of `apart`: neighbouring windows share noise.
+    own, likely : float
+        How likely the true effect and the rival are expected to be after them, among all rivals of the true one.
+    sure : float
+        Probability that the rival is then so rare beside the true effect that it is no rival.
     """
 
-    apart: float
-    least: float
+    evidence: Evidence
+    own: float
+    likely: float
+    sure: float
     noise: float
 
     @property
-    def log_bayes(self) -> float:
-        """Expected logarithm of the Bayes factor for the true effect."""
-        return 0.5 * self.apart / self.noise
-
-    @property
-    def sure(self) -> float:
-        """Probability that the diagnosis then names the true effect and not its rival."""
-        return float(ndtr((self.apart - self._margin) / self._error))
-
-    @property
-    def wrong(self) -> float:
-        """Probability that the diagnosis then names the rival."""
-        return float(ndtr((-self.apart - self._margin) / self._error))
-
-    @property
-    def _error(self) -> float:
-        """Standard deviation of the difference between what the two leave, in squared floors."""
-        return 2 * float(np.sqrt(max(self.apart * self.noise, 1e-12)))
-
-    @property
-    def _margin(self) -> float:
-        """Difference from which on the diagnosis decides."""
-        return max(self.least, ERRORS * self._error)
-
-    @property
-    def enough(self) -> float:
-        """What `apart` has to be for an answer of probability `SURE`."""
-        by_noise = 4 * self.noise * (ERRORS + ndtri(SURE)) ** 2
-        # The root of apart - least = quantile * error, for errors of 2 sqrt(apart noise).
-        root = ndtri(SURE) * np.sqrt(self.noise)
-        return float(max(by_noise, (root + np.sqrt(root**2 + self.least)) ** 2))
+    def settled(self) -> bool:
+        """Whether the rival is expected to be no rival."""
+        return self.likely < RARE * self.own
 
     @property
     def least_size(self) -> float:
-        """Share of the effect's size from which on the answer is sure, for effects that are linear in it."""
-        return float(np.sqrt(self.enough / max(self.apart, 1e-12)))
+        """Share of the effect's size from which on it is settled, if linear in it; nan where no size is."""
+
+        def beaten(size: float) -> float:
+            own, other = _tables([self.evidence], self.noise, FEW_DRAWS, size).mean(axis=0)
+            return float(np.log(RARE) - np.log(other / own))
+
+        largest = 1 / np.sqrt(ROUNDING)
+        return float(brentq(beaten, 0.0, largest)) if beaten(largest) > 0 else np.nan
 
 
-def judged(evidence: Evidence, columns: QuestionColumns, noise: float) -> Answer:
-    """Judge what flights would say on a question."""
-    seen = beyond_numbers(evidence, columns)
-    # An effect without a rival has to be worth a name.
-    alone = not len(columns.rivals[0])
-    least = least_gain(seen, evidence.windows) if alone else off_by(seen, evidence.rows)
-    return Answer(apart(evidence, columns), least, noise)
+def answered(evidence: Sequence[Evidence], noise: float, draws: int = DRAWS) -> list[Answer]:
+    """Foretell the table of how likely each set of effects is where one effect is true, over draws of the noise.
+
+    Parameters
+    ----------
+    evidence : sequence of Evidence
+        On each of its rivals, of the same flights.
+    noise : float
+        See `shared_noise`.
+    """
+    tables = _tables(evidence, noise, draws)
+    own, *others = tables.mean(axis=0).tolist()
+    # What all draws say is not certain.
+    sure = (0.5 + (tables[:, 1:] < RARE * tables[:, :1]).sum(axis=0)) / (1 + draws)
+    return [
+        Answer(*each)
+        for each in zip(evidence, [own] * len(others), others, sure.tolist(), [noise] * len(others), strict=True)
+    ]
+
+
+def _tables(evidence: Sequence[Evidence], noise: float, draws: int, size: float = 1.0) -> Array:
+    """Draw how likely the true effect and each rival will be, shape (draw, 1 + rival); the same draws for all paths."""
+    rng, blocks = np.random.default_rng(0), len(evidence[0].gram)
+    drawn = rng.standard_normal((draws, len(evidence), blocks))
+    return np.array([likely([e.odds(noise, d, size) for e, d in zip(evidence, one, strict=True)]) for one in drawn])
 
 
 def shared_noise(windows: Windows) -> float:

@@ -13,8 +13,9 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.residual.dependence import rank_dependence, state_signals, without_actuation
 from cpfls_cli.gap.residual.repeated import without_copies
 from cpfls_cli.gap.settings import CHANCE, COUNTS, ERRORS, GapSettings
-from cpfls_cli.playback.disturbance import ENDS, FoundGusts, gusts_in
+from cpfls_cli.playback.disturbance import FoundGusts, gusts_in
 from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.gusts import RANGES
 from cpfls_cli.playback.instruments import Instruments, Repeats, foretold, instruments, late, late_by
 from cpfls_cli.rounding import levelled
 from cpfls_cli.weak_form.resampling import about_flight_mean
@@ -35,30 +36,44 @@ class Air:
         Of all channels; a bound where nothing tells gusts from what the model lacks.
     told : array of bool, shape (6,)
         Channels of which instruments tell that all that is left is gusts and noise.
+    split : array of bool, shape (6,)
+        Channels of which instruments tell how much is; what comes again beside them is a gap above them.
     """
 
     found: FoundGusts
     told: BoolArray
+    split: BoolArray
 
-    def floor(self, windows: Windows) -> Array:
-        """Compute what gusts and noise do to averages over windows: standard deviation, 0 where they are not told.
+    def floor(self, learned: Sequence[WeakFlight], flights: Sequence[WeakFlight]) -> Array:
+        """Compute what gusts and noise do to averages over windows: standard deviation, 0 where none are split off.
+
+        Gusts are as large as they were in the flights that they were found in. In others they are drawn anew: there
+        the floor is what they exceed in one of forty, as of so long flights and of so long a memory.
+
+        Parameters
+        ----------
+        learned, flights : sequence of WeakFlight
+            Those that gusts were found in, and those that the floor is of.
 
         Returns
         -------
         array, shape (6,), N m and N
         """
+        windows = learned[0].windows
         weight, noise = windows.weight, self.noise(windows)
         apart = windows.period * np.abs(np.subtract.outer(np.arange(len(weight)), np.arange(len(weight))))
+        seldom = 0.0 if flights is learned else 1 / _seconds(learned) + 1 / _seconds(flights)
         total = np.zeros(6)
-        for channel in np.flatnonzero(self.told):
-            gusts = self.found.size[channel] ** 2 * (weight @ np.exp(-apart / self.found.memory[channel]) @ weight)
-            total[channel] = gusts + noise[channel] ** 2
+        for channel in np.flatnonzero(self.split):
+            memory = self.found.memory[channel]
+            gusts = self.found.size[channel] ** 2 * (weight @ np.exp(-apart / memory) @ weight)
+            total[channel] = gusts * (1 + ERRORS * np.sqrt(2 * memory * seldom)) + noise[channel] ** 2
         return np.sqrt(total)
 
     def noise(self, windows: Windows) -> Array:
-        """Compute what the noise beside them alone does, shape (6,); infinite where they are not told."""
+        """Compute what the noise beside them alone does, shape (6,); infinite where none are split off."""
         alone = self.found.noise @ [(windows.weight**2).sum(), (windows.slope**2).sum()]
-        return np.where(self.told, np.sqrt(alone), np.inf)
+        return np.where(self.split, np.sqrt(alone), np.inf)
 
 
 def known_motion(recordings: Sequence[Recording]) -> Instruments:
@@ -115,9 +130,13 @@ def air(
         told &= _like_air(hypothesis, linear, block, given, settings, rng, told)
     # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
     sized = told | (given.kind == "repeats")
-    parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in ENDS}
+    parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in RANGES}
     parts = {name: np.where(known, values, np.nan) for name, values in parts.items()}
-    return Air(replace(found, **parts), told)
+    return Air(replace(found, **parts), told, known & np.isfinite(found.size) & sized)
+
+
+def _seconds(flights: Sequence[WeakFlight]) -> float:
+    return float(sum(len(flight.signals.time) * flight.signals.period for flight in flights))
 
 
 def in_air(flights: Sequence[WeakFlight], floor: Array) -> list[WeakFlight]:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.autopilots.law import Controller, attitude_error
-from cpfls_cli.autopilots.motors import Motors, ThrustCurve, mixing
+from cpfls_cli.autopilots.motors import Motors, ThrustCurve, mixing, straightening
+from cpfls_cli.autopilots.parameters import version_of
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import InputError
 from cpfls_cli.rotations import rotation_matrix
@@ -115,6 +116,54 @@ def test_a_header_of_betaflight_tells_what_is_off():
     assert found["angle_p_gain"] == 55
     assert AUTOPILOTS["betaflight"].in_log({"rollPID": "45,80,40"}) == {"p_roll": 45, "i_roll": 80, "d_roll": 40}
     assert AUTOPILOTS["px4"].in_log(named) == {}
+
+
+def test_which_logs_count_and_how_their_versions_name_things():
+    found = {text: version_of(text) for text in ("PX4 1.15.0", "ArduCopter V4.6.0 (3fc7011a)", "PX4", "")}
+    assert list(found.values()) == [(1, 15), (4, 6), None, None]
+    copter, betaflight = (AUTOPILOTS[name].firmware for name in ("ardupilot", "betaflight"))
+    assert copter.wrote("ArduCopter 4.6")
+    assert copter.wrote("")
+    assert not copter.wrote("ArduPlane 3.8.2")
+    assert copter.too_old("ArduCopter 3.3")
+    assert not copter.too_old("ArduCopter")
+    assert betaflight.too_old("Betaflight 4.2.11 (abc) X")
+    older, newer = betaflight.names("Betaflight 4.3.1"), betaflight.names("Betaflight 4.5.2")
+    assert (older["d_roll"], older["d_max_roll"], older["angle_p_gain"]) == (
+        "d_min_roll",
+        "d_roll",
+        "angle_level_strength",
+    )
+    assert "angle_p_gain" not in newer
+    assert betaflight.names("Betaflight 2025.12.5") == betaflight.names("") == {}
+
+
+def test_the_rate_of_a_law_is_that_of_its_log():
+    betaflight, px4 = AUTOPILOTS["betaflight"], AUTOPILOTS["px4"]
+    header = {"rollPID": "45,80,40", "looptime": 312.0, "pid_process_denom": 1.0}
+    assert betaflight.law(betaflight.of_log(betaflight.in_log(header))).rate_hz == pytest.approx(1e6 / 312)
+    assert betaflight.law().rate_hz == pytest.approx(4000.0)
+    assert px4.law({"IMU_GYRO_RATEMAX": 1000.0}).rate_hz == 1000.0
+    assert px4.law({"IMU_GYRO_RATEMAX": 0.0}).rate_hz == 400.0
+
+
+def test_parameters_without_a_gain_of_a_rate_are_of_another_vehicle():
+    assert AUTOPILOTS["ardupilot"].in_log({"INS_GYRO_FILTER": 20.0}) == {}
+    found = AUTOPILOTS["ardupilot"].in_log({"ATC_RAT_RLL_P": 0.1, "ATC_RAT_RLL_FILT": 15.0})
+    assert AUTOPILOTS["ardupilot"].of_log(found)["ATC_RAT_RLL_FLTE"] == 15.0
+    # Until 3.6 that was all.
+    assert AUTOPILOTS["ardupilot"].of_log(found)["ATC_RAT_RLL_FLTT"] == 0.0
+
+
+@pytest.mark.parametrize("linear", [0.0, 0.4])
+def test_the_straightest_curve_is_the_inverse_where_an_autopilot_has_that(linear):
+    for curve in (ThrustCurve(), ThrustCurve(0.0, 0.15, 0.95)):
+        span = curve.high - curve.low
+        exact = span / (span + 2 * curve.low + linear)
+        assert straightening(curve, linear, 1.0) == pytest.approx(exact, abs=2e-3)
+    series = ThrustCurve(0.0, 0.055, 1.0, series=True)
+    # Betaflight's straightens less, so it needs more.
+    assert straightening(series, linear, 1.5) > 1.0
 
 
 def test_the_error_of_an_attitude_is_the_rotation_to_the_asked_one():

@@ -11,6 +11,7 @@ from cpfls_cli.export.holding import FUZZY, Missing, Off, of_a_body, probe_fligh
 from cpfls_cli.export.registry import TARGETS, exported, require_package
 from cpfls_cli.export.verify import AGREES, verified
 from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import player_of
 from cpfls_cli.playback.rotors import RotorResponse
 from tests.builders.exported_models import CASES, model_of
@@ -194,3 +195,20 @@ def test_jax_differentiates_and_batches():
     thrust = 4 * 600.0**2 * model.vehicle.rotors[0].thrust_factor_n_s2
     by_mass = np.array(slopes[:, names["PARAMETER_NAMES"].index("mass")])
     np.testing.assert_allclose(by_mass, [-0.01 * thrust / model.vehicle.mass_kg**2] * 3, rtol=1e-9)
+
+
+def test_drag_along_the_axes_of_the_world_counts_as_not_held():
+    model = replace(whole(response=RotorResponse()), remainder=None)
+    made, found = fly("urdf", model)
+    (turned,) = [each for each in made.missing if each.title.startswith("drag along the axes of the world")]
+    assert turned.off.velocity > 1e-4
+    # The equations are compared along the axes of the body, and the flight is along those of the world.
+    assert found.equations.max() < AGREES
+
+
+def test_what_ardupilot_does_otherwise_counts_as_not_held():
+    made, found = fly("ardupilot", VehicleModel(vehicle=QUAD))
+    (otherwise,) = [each for each in made.missing if "cube of the speed" in each.title]
+    assert otherwise.off.rate > 1e-3
+    assert found.missing[3] > 1e-4
+    assert found.equations.max() < AGREES

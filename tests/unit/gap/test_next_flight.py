@@ -7,6 +7,8 @@ import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ComputationError, InputError, SettingError
+from cpfls_cli.gap.balance.balance_system import system
+from cpfls_cli.gap.naming.ranking import likely
 from cpfls_cli.gap.naming.results import Alternative, NamedEffect
 from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, flown_signals, planned_signals
 from cpfls_cli.gap.next_flight.rivals import (
@@ -19,15 +21,15 @@ from cpfls_cli.gap.next_flight.rivals import (
 from cpfls_cli.gap.next_flight.room import HarmonicPath, room_of
 from cpfls_cli.gap.next_flight.search import goal, next_flight
 from cpfls_cli.gap.next_flight.separation import (
-    Answer,
+    Evidence,
     Question,
     SizedEffect,
-    apart,
+    answered,
+    formulas_off,
     gathered,
-    judged,
     shared_noise,
 )
-from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.settings import NOISE, RARE, GapSettings
 from cpfls_cli.simulation.room_left import squared_speeds
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.limits import LimitSettings
@@ -62,7 +64,7 @@ def question(true, linear, rival):
 
 
 def told(asked, *paths):
-    return apart(*gathered(asked, [LOGGING.weak(along(path)) for path in paths], FLOOR))
+    return LOGGING.gathered(asked, [LOGGING.weak(along(path)) for path in paths]).left.sum()
 
 
 def thrusts(path):
@@ -102,8 +104,8 @@ def test_flights_are_taken_together():
 def test_evidence_of_flights_adds_up_to_that_of_all():
     paths = path_of(2, 0.15), path_of(0, 1.0, 3)
     offset = question("com_offset", [LEVER, LEVER], "rotor_mismatch")
-    one, two = (gathered(offset, [LOGGING.weak(along(path))], FLOOR) for path in paths)
-    assert apart(one[0] + two[0], one[1]) == pytest.approx(told(offset, *paths), rel=1e-9)
+    one, two = (LOGGING.gathered(offset, [LOGGING.weak(along(path))]) for path in paths)
+    assert two.beside(one).left.sum() == pytest.approx(told(offset, *paths), rel=1e-9)
 
 
 def test_effects_that_are_there_besides_are_free_too():
@@ -125,41 +127,58 @@ def test_without_a_rival_the_vehicles_own_numbers_are_all_that_imitates():
     assert told(question("torque_bias", [0.0, BIAS, 0.0], "parameter_error"), hover) == pytest.approx(seen)
 
 
-def test_an_effect_without_a_rival_has_to_be_worth_a_name():
-    """Three tenths of a floor in every window, or a twentieth of the gap."""
-    count = windows(0.02, 0.4, 0.5).count(601)
-    for size, least in ((0.1, 0.09 * count), (10.0, 0.05 * 100.0 * count)):
-        bias = question("torque_bias", [0.0, size * FLOOR[1], 0.0], None)
-        evidence, columns = gathered(bias, [LOGGING.weak(along(path_of(2, 0.0)))], FLOOR)
-        assert judged(evidence, columns, 1.0).least == pytest.approx(least, rel=1e-6)
+def evidence(*left, off=0.0):
+    """Blocks in which a rival without columns leaves that much of the true effect, in squared floors."""
+    return Evidence(np.array(left)[:, None, None], np.zeros(0, dtype=int), (np.zeros(0, dtype=int),), False, off)
 
 
-@pytest.mark.parametrize("least", [0.0, 25.0, 400.0])
-def test_enough_is_what_makes_the_answer_sure(least):
-    enough = Answer(1.0, least, 1.1).enough
-    assert Answer(enough, least, 1.1).sure == pytest.approx(0.975)
-    assert Answer(0.5 * enough, least, 1.1).sure < 0.9
-    assert Answer(4 * enough, least, 1.1).least_size == pytest.approx(0.5)
+def test_where_nothing_tells_all_sets_stay_as_likely_as_before():
+    answers = answered([evidence(0.0, 0.0, 0.0)] * 2, 1.1)
+    assert [answer.likely for answer in answers] == pytest.approx([1 / 3] * 2)
+    assert [answer.sure for answer in answers] == pytest.approx([0.0] * 2, abs=0.01)
+    assert not any(answer.settled for answer in answers)
 
 
-@pytest.mark.parametrize("strength", [0.35, 0.5, 0.8])
+def test_what_is_settled_is_so_from_a_smaller_size_on():
+    (answer,) = answered([evidence(*[30.0] * 6)], 1.1)
+    assert answer.settled
+    assert answer.sure > 0.95
+    (smaller,) = answered([evidence(*[30.0 * answer.least_size**2] * 6)], 1.1)
+    assert answer.likely < smaller.likely == pytest.approx(0.01, abs=0.01)
+    assert np.isnan(answered([evidence(*[0.0] * 6)], 1.1)[0].least_size)
+
+
+def test_formulas_that_are_off_leave_more_doubt():
+    exact, off = (answered([evidence(*[20.0] * 6, off=share)], 1.1)[0] for share in (0.0, 0.1))
+    assert off.evidence.variance == pytest.approx(exact.evidence.variance + 0.1 * 120.0)
+    assert off.likely > exact.likely
+    assert off.sure < exact.sure
+
+
+def test_flights_tell_how_much_formulas_are_off_by():
+    """A bias beside the named offset is taken for what the offset's formula is off by, a tenth of it at most."""
+    named, size = candidate("com_offset"), np.array([0.004, 0.0])
+    floor = np.full(6, 0.01)
+    alone, beside = (
+        system([weak(fly(1, [(named, size), *others]))], [named])
+        for others in ((), [(candidate("torque_bias"), np.array([0.0, 0.0, 0.02]))])
+    )
+    assert formulas_off(alone, floor) == 0.0
+    assert 0.0 < formulas_off(beside, floor) <= 0.01
+
+
+@pytest.mark.parametrize("strength", [0.5, 0.65, 0.8])
 def test_the_share_of_right_answers_is_that_of_draws(strength):
-    """Least squares with and without the true effect on rows with white noise, decided as the diagnosis decides."""
+    """Blocks with white noise in what the rival leaves, decided as a diagnosis decides."""
     rng = np.random.default_rng(3)
-    base = rng.standard_normal((200, 3))
-    true, rival = rng.standard_normal((2, 200, 1))
-    both = np.hstack([base, rival])
-    rest = strength * (true - both @ np.linalg.lstsq(both, true, rcond=None)[0])
-    expected = Answer(float((rest**2).sum()), 0.0, 1.0)
-    rows = strength * true + rng.standard_normal((200, 4000))
-    left = [
-        ((rows - own @ np.linalg.lstsq(own, rows, rcond=None)[0]) ** 2).sum(axis=0)
-        for own in (both, np.hstack([base, true]))
-    ]
-    margin = left[0] - left[1]
-    error = 2 * np.sqrt(expected.apart)
-    assert np.mean(margin > 2 * error) == pytest.approx(expected.sure, abs=0.05)
-    assert expected.sure > 0.02
+    true = strength * rng.standard_normal((8, 10))
+    expected = answered([evidence(*(true**2).sum(axis=1))], 1.0)[0]
+    rows = true + rng.standard_normal((1000, 8, 10))
+    more = (rows**2 - (rows - true) ** 2).sum(axis=2)
+    weights = [likely([np.clip(-0.5 * each / NOISE, np.log(RARE), -np.log(RARE))]) for each in more]
+    settled = [rival < RARE * own for own, rival in weights]
+    assert np.mean(settled) == pytest.approx(expected.sure, abs=0.1)
+    assert np.mean([rival for _, rival in weights]) == pytest.approx(expected.likely, abs=0.02)
 
 
 def test_neighbouring_windows_share_noise_as_draws_do():
@@ -244,18 +263,18 @@ def test_flights_that_are_there_count(asked):
     gentle = LOGGING.weak(along(path_of(2, 0.05)))
     known = goal(asked.questions, [gentle], room(), LOGGING)
     alone = known.answers(None)
-    assert alone[0].apart == pytest.approx(apart(*gathered(asked.questions[0], [gentle], FLOOR)))
-    assert known.answers(None, again=2)[0].apart == pytest.approx(2 * alone[0].apart)
+    once = LOGGING.gathered(asked.questions[0], [gentle]).left.sum()
+    assert alone[0].evidence.left.sum() == pytest.approx(2 * once)
     more = along(path_of(2, 0.15))
-    assert known.answers(more)[0].apart > asked.answers(more)[0].apart
+    assert known.answers(more)[0].evidence.left.sum() > asked.answers(more)[0].evidence.left.sum()
 
 
 def test_flights_without_the_signal_of_a_rival_say_nothing():
     effects = [CATALOGUE[name] for name in ("torque_bias", "rotor_drag")]
     silent = weak(replace(fly(1), velocity=None, specific_force=None))
     known = goal(questions_between(effects, VEHICLE), [silent], room(), LOGGING)
-    assert [answer.apart for answer in known.answers(None)] == [0.0, 0.0]
-    assert known.answers(along(path_of(0, 1.0, 3)))[1].apart > 0
+    assert [answer.evidence.left.sum() for answer in known.answers(None)] == [0.0, 0.0]
+    assert known.answers(along(path_of(0, 1.0, 3)))[1].evidence.left.sum() > 0
 
 
 def test_a_special_case_is_not_told_from_what_holds_it():
@@ -278,16 +297,12 @@ def test_an_effect_of_the_propellers_asks_for_their_size():
 
 
 def test_the_plan_counts_on_nothing_that_is_not_logged():
-    drag = Question(usual(CATALOGUE["linear_damping"], VEHICLE), None)
     path = room().drawn(np.random.default_rng(2))
     poor = replace(LOGGING, signals=frozenset())
     signals = planned_signals(room().planned(path), room(), poor)
     assert signals.attitude is signals.velocity is signals.acceleration is signals.specific_force is None
-    (evidence, _), (more, _) = (
-        gathered(drag, [logging.weak(planned_signals(room().planned(path), room(), logging))], FLOOR)
-        for logging in (poor, LOGGING)
-    )
-    assert (evidence.rows, more.rows) == (3 * evidence.windows, 6 * more.windows)
+    flights = [logging.weak(planned_signals(room().planned(path), room(), logging)) for logging in (poor, LOGGING)]
+    assert [flight.known.tolist() for flight in flights] == [[True] * 3 + [False] * 3, [True] * 6]
 
 
 def test_a_rival_that_could_not_be_tried_is_asked_for_at_a_usual_size():
@@ -295,10 +310,10 @@ def test_a_rival_that_could_not_be_tried_is_asked_for_at_a_usual_size():
     silent = weak(replace(fly(1, [(named, size)]), velocity=None, specific_force=None))
     effect = NamedEffect("linear_damping", named, size, (), 0.0, 1.0, 1.0, "")
     rivals = [Alternative("rotor_drag", "linear_damping", np.nan, "log velocity")]
-    first, second, *_ = questions_left([effect], rivals, [], [silent], FLOOR)
+    first, second, *_ = questions_left([effect], rivals, [], [silent], FLOOR, GapSettings())
     assert second.true.linear.tolist() == usual(CATALOGUE["rotor_drag"], VEHICLE).linear.tolist()
     known = goal([first, second], [silent], room(), LOGGING)
-    assert min(answer.apart for answer in known.answers(along(path_of(0, 1.0, 3)))) > 0
+    assert min(answer.evidence.left.sum() for answer in known.answers(along(path_of(0, 1.0, 3)))) > 0
 
 
 def test_a_rival_takes_the_size_that_imitates_the_named_effect():
@@ -307,7 +322,7 @@ def test_a_rival_takes_the_size_that_imitates_the_named_effect():
     flights = [weak(fly(seed, [(named, size)], speed=0.5, tilt=0.05)) for seed in (1, 2)]
     effect = NamedEffect("com_offset", named, size, (), 0.0, 1.0, 1.0, "")
     rivals = [Alternative("torque_bias", "com_offset", 1.0, "")]
-    first, second, *others = questions_left([effect], rivals, [], flights, FLOOR)
+    first, second, *others = questions_left([effect], rivals, [], flights, FLOOR, GapSettings())
     # What else looks like either by the catalogue must not take the place of the rival.
     asked = [(each.true.candidate.effect.name, each.rival.name) for each in others]
     assert ("com_offset", "rotor_mismatch") in asked
@@ -344,12 +359,12 @@ def test_in_closed_loop_the_flight_tells_about_as_much(asked):
     planned = room().planned(path, 0.01)
     true = asked.questions[0].true
     flown = flown_signals(planned, [true], VEHICLE, LOGGING, ClosedLoopSettings(integration_rate_hz=200.0))
-    expected = asked.answers(planned_signals(planned, room(), LOGGING))[0].apart
-    assert asked.answers(flown)[0].apart == pytest.approx(expected, rel=0.4)
+    expected = asked.answers(planned_signals(planned, room(), LOGGING))[0].evidence.left.sum()
+    assert asked.answers(flown)[0].evidence.left.sum() == pytest.approx(expected, rel=0.4)
 
 
 def test_judged_on_hover_is_not_sure():
     offset = question("com_offset", [LEVER, LEVER], "torque_bias")
-    evidence, columns = gathered(offset, [LOGGING.weak(along(path_of(2, 0.0)))], FLOOR)
-    assert judged(evidence, columns, 1.0).sure < 1e-6
+    (answer,) = answered([gathered(offset, [LOGGING.weak(along(path_of(2, 0.0)))], FLOOR, GapSettings())], 1.0)
+    assert answer.sure < 0.01
     assert usual(CATALOGUE["motor_lag"], VEHICLE).linear.tolist() == [1.0]

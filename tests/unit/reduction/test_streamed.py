@@ -1,5 +1,7 @@
 """A regressor read in chunks is reduced as one held in memory, or from a pool that stands for it."""
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,29 @@ def test_what_fits_in_the_pool_is_reduced_as_in_memory(criterion):
     assert streamed.indices.tolist() == held.indices.tolist()
     assert np.array_equal(streamed.condition_number_trace, held.condition_number_trace)
     assert streamed.stop_reason == held.stop_reason == "size"
+
+
+@pytest.mark.parametrize("criterion", ["sigma_min", "A", "D", "paper-literal"])
+@pytest.mark.parametrize("pool", [200, 3000])
+def test_a_smaller_size_is_the_beginning_of_a_larger_one(criterion, pool):
+    surveyed, settings = (
+        survey(chunked(regressor(), 700), 1e-10),
+        ReductionSettings(criterion=criterion, size=30, pool=pool),
+    )
+    larger = reduce_streamed(surveyed, settings, generator())
+    smaller, beginning = reduce_streamed(surveyed, replace(settings, size=12), generator()), larger.beginning(12)
+    assert beginning is not None
+    for field in fields(smaller):
+        assert np.array_equal(getattr(beginning, field.name), getattr(smaller, field.name)), field.name
+    assert larger.beginning(31) is None
+    assert larger.beginning(2) is None
+
+
+@pytest.mark.parametrize("criterion", ["KD-exchange", "K-exchange", "even"])
+def test_what_knows_its_size_from_the_start_has_no_beginning(criterion):
+    settings = ReductionSettings(criterion=criterion, size=30)
+    selection = reduce_streamed(survey(chunked(regressor(), 700), 1e-10), settings, generator())
+    assert selection.beginning(12) is None
 
 
 @pytest.mark.parametrize("size", [100, 999, 3000])
