@@ -137,6 +137,11 @@ class AutopilotGroup:
             return None
         return cls(system=system, name=tuple(parameters), value=np.array(list(parameters.values()), dtype=float))
 
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Values by name."""
+        return dict(zip(self.name, self.value.tolist(), strict=True))
+
 
 @record
 class NoiseGroup:

@@ -131,7 +131,7 @@ def _read(flight: Path, study: Study) -> _Log:
         kept = read_record(flight, FlightRecord).autopilot
         if kept is None:
             return _Log(flight.name, "", {}, *nothing)
-        return _Log(flight.name, kept.system, dict(zip(kept.name, kept.value.tolist(), strict=True)), *nothing)
+        return _Log(flight.name, kept.system, kept.parameters, *nothing)
     contents = log_contents(flight, ())
     rates = _rates(flight, study) if _maps_rates(study) else nothing
     return _Log(flight.name, contents.system, contents.parameters, *rates)

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.replay import VEHICLE, contradictions_of
-from cpfls_cli.artifacts.store import read_header
+from cpfls_cli.artifacts.store import read_header, read_record
 from cpfls_cli.artifacts.twin import GainsGroup, TwinRecord, WindowsGroup
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.commands.compare import to_gap
@@ -167,7 +168,7 @@ def with_autopilot(study: Study, path: Path) -> tuple[ClosedLoopSettings, GainsG
     autopilot = AUTOPILOTS[name]
     values, source = autopilot.defaults() | dict(settings.autopilot_parameters), "stated"
     if not settings.autopilot_parameters:
-        logged = autopilot.in_log(log_contents(path, ()).parameters) if is_log(path) else {}
+        logged = autopilot.in_log(_parameters(path))
         if logged:
             values, source = autopilot.of_log(logged), "log"
         elif by_simulation and made is not None and made.autopilot == name:
@@ -177,6 +178,14 @@ def with_autopilot(study: Study, path: Path) -> tuple[ClosedLoopSettings, GainsG
     gains = GainsGroup(source=source, name=tuple(values), value=np.array(list(values.values()), dtype=float))
     with settings_of("simulation", study):
         return replace(settings, autopilot=name, autopilot_parameters=values), gains
+
+
+def _parameters(path: Path) -> Mapping[str, float | str]:
+    """Read what a log, or a flight that was imported from one, knows of its autopilot."""
+    if is_log(path):
+        return log_contents(path, ()).parameters
+    kept = read_record(path, FlightRecord).autopilot
+    return {} if kept is None else kept.parameters
 
 
 def _thrust_is_share(path: Path, study: Study) -> bool:

@@ -241,6 +241,11 @@ class Effect:
         """Whether the columns are right only with the coefficient 1: everything is in the shape."""
         return not self.coefficients
 
+    @property
+    def late(self) -> bool:
+        """Whether it delays the rotors, as a control loop seems to; the voltage of a supply follows no command."""
+        return self.actuation is not None and self.actuation.supply is None
+
     def form(self, coefficients: int, shapes: Collection[str]) -> Effect:
         """Tell by the numbers that were fitted whether it is this effect or what took its place."""
         other = self.exact or self

@@ -269,8 +269,6 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings, *,
         names = {refused.name for refused in out}
         kept = [each for each in found.hypothesis.chosen if each.effect.name not in names]
         fit = fitted(judge.training, kept, judge.floor, settings)
-    if late:
-        return named._replace(judgement=judge.judge(found), refusals=refusals)
     found, alike = told_apart(found, named.effects, given, judge.floor, settings)
     return named._replace(judgement=judge.judge(found), refusals=refusals, alike=alike)
 
@@ -411,8 +409,8 @@ def _concluded(
 
 
 def _late(judged: Sequence[JudgedEffect]) -> bool:
-    """Tell whether anything lies between command and rotors: in gusts its fits see the loop, and do not compare."""
-    return any(CATALOGUE[each.effect.name].actuation is not None for each in judged)
+    """Tell whether anything makes the rotors late: in gusts its fits see the loop, and do not compare."""
+    return any(CATALOGUE[each.effect.name].late for each in judged)
 
 
 def _pull(hypothesis: System, floor: Array) -> Array:

@@ -97,14 +97,16 @@ def test_other_gains_part_and_the_answer_says_where(cpfls, logged):
     assert result.stdout.splitlines()[0] in again.stdout
 
 
-def test_a_flight_without_the_log_has_the_usual_gains(cpfls, logged):
+def test_an_imported_flight_is_flown_with_the_gains_of_its_log_and_by_another_law_with_usual_ones(cpfls, logged):
     flight = logged / "flight.h5"
     assert cpfls("import", logged / "study.yaml", logged / "log.ulg", "-o", flight).exit_code == 0
-    words = ("simulate", logged / "study.yaml", flight, "-o", logged / "usual.h5", "--json")
-    result = cpfls(*words, "--autopilot", "px4")
-    said = json.loads(result.stdout)
+    words = ("simulate", logged / "study.yaml", flight, "--json", "--force", "-o", logged / "usual.h5")
+    said = json.loads(cpfls(*words, "--autopilot", "px4").stdout)
+    assert said["gains"]["source"] == "log"
+    assert said["gains"]["MC_ROLLRATE_P"] == pytest.approx(0.15)
+    said = json.loads(cpfls(*words, "--autopilot", "ardupilot").stdout)
     assert said["gains"]["source"] == "defaults"
-    assert any("defaults of PX4" in warning for warning in said["warnings"])
+    assert any("defaults of ArduPilot" in warning for warning in said["warnings"])
 
 
 def test_what_cannot_be_flown_is_refused(refuse, logged, tmp_path):

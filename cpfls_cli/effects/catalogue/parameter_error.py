@@ -17,7 +17,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 # Places among the coefficients.
-_COUPLING, _THRUST_SCALE = slice(3, 6), 6
+_THRUST_SCALE = 6
 # A tenth and four times of what is stated: farther off the number was not measured but mistyped.
 _BOUNDS = (-0.9, 3.0)
 _COUPLED = (
@@ -49,22 +49,6 @@ def inertia_correction(values: Array, vehicle: VehicleSettings) -> Array:
     array, shape (3, 3), kg m^2
     """
     return np.diag(values[:3] * np.array(vehicle.inertia_kg_m2[:3]))
-
-
-def coupling(values: Array) -> Array:
-    """Keep the coupling of the rates, which no inertia holds, and set the other coefficients to 0.
-
-    Parameters
-    ----------
-    values : array, shape (10,)
-
-    Returns
-    -------
-    array, shape (10,)
-    """
-    kept = np.zeros_like(values)
-    kept[_COUPLING] = values[_COUPLING]
-    return kept
 
 
 def shown(turns: BoolArray) -> Array:

@@ -89,13 +89,10 @@ def by_instruments(found: NamedFit, given: Instruments, floor: Array, settings: 
 
 
 def untold_actuation(before: NamedFit, after: NamedFit) -> list[str]:
-    """Name effects on the actuation whose numbers instruments hardly tell, and left as they were.
-
-    A supply that sinks is none: no loop moves the voltage.
-    """
+    """Name effects on the actuation whose numbers instruments hardly tell, and left as they were."""
     numbers = zip(after.hypothesis.chosen, before.estimates.effects, after.estimates.effects, strict=True)
     left = [each.effect for each, was, now in numbers if each.effect.kind == "actuator" and was is now]
-    return [effect.name for effect in left if "voltage" not in effect.needs]
+    return [effect.name for effect in left if effect.actuation is None or effect.late]
 
 
 def told_apart(
@@ -121,13 +118,13 @@ def told_apart(
         Those that leave as little.
     """
     chosen, flights = found.hypothesis.chosen, found.hypothesis.flights
-    between = [each for each in chosen if each.effect.actuation is not None]
+    between = [each for each in chosen if each.effect.late]
     if len(between) != 1:
         return found, ()
     own, others = between[0].effect, [each for each in chosen if each is not between[0]]
     fits = {own.order: found}
     for effect in effects:
-        if effect.actuation is not None and effect is not own and len(effect.shapes) <= len(own.shapes):
+        if effect.late and effect is not own and len(effect.shapes) <= len(own.shapes):
             for scored in rank_effects(flights, others, [effect], settings, None, floor=floor).ranking:
                 start = refined(flights, scored.chosen, floor).chosen
                 fits[effect.order] = by_instruments(fitted(flights, start, floor, settings), given, floor, settings)
@@ -141,7 +138,7 @@ def told_apart(
 
 def _between(found: NamedFit) -> Effect:
     """Give the effect between command and rotors."""
-    return next(each.effect for each in found.hypothesis.chosen if each.effect.actuation is not None)
+    return next(each.effect for each in found.hypothesis.chosen if each.effect.late)
 
 
 def _reproduced(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> Array:

@@ -21,7 +21,7 @@ from cpfls_cli.gap.naming.scoring import (
     score,
     scoring_matrix,
 )
-from cpfls_cli.gap.settings import COUNTS, ERRORS, NOISE, OFF, VISIBLE, GapSettings
+from cpfls_cli.gap.settings import COUNTS, ERRORS, NOISE, OFF, RARE, VISIBLE, GapSettings
 from cpfls_cli.rounding import tied
 from cpfls_cli.weak_form.resampling import blocks_of, mirror_shifted
 
@@ -207,6 +207,22 @@ def off_by(explained: float, left: float, above: float = 0.0) -> float:
 @cache
 def _weights(blocks: int) -> Array:
     return np.asarray(blocks * np.random.default_rng(0).dirichlet(np.ones(blocks), _DRAWS))
+
+
+def log_odds(more: Array, off: float) -> Array:
+    """Compute the logarithm of the predictive density of blocks under another set, less that under the first one.
+
+    Parameters
+    ----------
+    more : array, shape (block,)
+        By how much more the other one leaves, in squared floors.
+    off : float
+        What formulas are off by, in squared floors.
+    """
+    # A floor that is wrong scales what is left; only what is left above it is an error of formulas, one for all blocks.
+    density = -0.5 * more / (NOISE + off)
+    # In a rare block something else happens, which neither set knows: none says more than that.
+    return np.asarray(np.clip(density, np.log(RARE), -np.log(RARE)))
 
 
 def likely(odds: Sequence[Array]) -> Array:

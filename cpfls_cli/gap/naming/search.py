@@ -19,6 +19,7 @@ from cpfls_cli.gap.naming.ranking import (
     chance_of_ranks,
     least_gain,
     likely,
+    log_odds,
     more_left,
     off_by,
     rank_effects,
@@ -26,7 +27,7 @@ from cpfls_cli.gap.naming.ranking import (
 )
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import REFUSED, Scored, normal_equations, scoring_matrix
-from cpfls_cli.gap.settings import COUNTS, NOISE, OFF, RARE, GapSettings
+from cpfls_cli.gap.settings import COUNTS, OFF, RARE, GapSettings
 from cpfls_cli.rounding import ascending, less
 
 _BEAM = 3
@@ -284,11 +285,8 @@ def odds(own: Scored, other: Scored, above_floor: float) -> Array:
     array, shape (block,)
         Logarithm of the predictive density under the other one less that under the first.
     """
-    # A floor that is wrong scales what is left; only what is left above it is an error of formulas, one for all blocks.
-    variance = NOISE + min(OFF**2 * above_floor, max(above_floor - own.gain, 0.0))
-    density = -0.5 * more_left(other.block_error, own.block_error) / variance
-    # In a rare block something else happens, which neither set knows: none says more than that.
-    return np.asarray(np.clip(density, np.log(RARE), -np.log(RARE)))
+    off = min(OFF**2 * above_floor, max(above_floor - own.gain, 0.0))
+    return log_odds(more_left(other.block_error, own.block_error), off)
 
 
 def _off(scored: Scored, above_floor: float) -> float:

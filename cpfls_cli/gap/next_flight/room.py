@@ -56,17 +56,19 @@ class HarmonicPath:
         array, shape (7, time, 4), m, rad and s
         """
         frequency = 2 * np.pi / self.duration * self.order
-        phase = np.multiply.outer(time, frequency)
-        cosine, sine = np.cos(phase), np.sin(phase)
+        phase = np.multiply.outer(time, frequency).transpose(1, 0, 2)
         # Each derivative turns by a quarter of a period: cos -> -sin -> -cos -> sin.
-        turns = ((cosine, sine), (-sine, cosine), (-cosine, -sine), (sine, -cosine))
-        values = []
-        for derivative in range(len(_NAMES)):
-            of_cosine, of_sine = turns[derivative % len(turns)]
-            scale = frequency**derivative
-            values.append((of_cosine * (self.cosine * scale) + of_sine * (self.sine * scale)).sum(axis=2))
-        values[0] = values[0] + self.centre
-        return np.stack(values)
+        turns = (
+            (self.cosine, self.sine),
+            (self.sine, -self.cosine),
+            (-self.cosine, -self.sine),
+            (-self.sine, self.cosine),
+        )
+        sizes = [np.array(turns[power % len(turns)]) * frequency**power for power in range(len(_NAMES))]
+        of_cosine, of_sine = np.stack(sizes, axis=-1)
+        values = (np.cos(phase) @ of_cosine + np.sin(phase) @ of_sine).transpose(2, 1, 0)
+        values[0] += self.centre
+        return np.ascontiguousarray(values)
 
     def scaled(self, factor: float | Array) -> HarmonicPath:
         """Scale the path about the origin.

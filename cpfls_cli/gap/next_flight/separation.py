@@ -14,9 +14,9 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, nuisance
-from cpfls_cli.gap.naming.ranking import block_index, likely, rows
+from cpfls_cli.gap.naming.ranking import block_index, likely, log_odds, rows
 from cpfls_cli.gap.naming.scoring import candidates_of
-from cpfls_cli.gap.settings import NOISE, OFF, RARE, GapSettings
+from cpfls_cli.gap.settings import OFF, RARE, GapSettings
 from cpfls_cli.rounding import ROUNDING
 from cpfls_cli.weak_form.windows import Windows
 
@@ -100,9 +100,9 @@ class Evidence:
         return min((self._left(rival) for rival in self.rivals), key=lambda left: float(left.sum()))
 
     @cached_property
-    def variance(self) -> float:
-        """Mean square of a floor with its error, and of what formulas are off by, in squared floors."""
-        return float(NOISE + self.off * self._left(_NOWHERE).sum())
+    def off_by(self) -> float:
+        """What formulas are off by, in squared floors."""
+        return float(self.off * self._left(_NOWHERE).sum())
 
     def _left(self, rival: IntArray) -> Array:
         total, weight = self.gram.sum(axis=0), np.zeros(self.gram.shape[1])
@@ -134,8 +134,7 @@ class Evidence:
         """
         error = np.where(np.arange(len(self.left)) < self.known, 0.0, 2 * size * np.sqrt(noise * self.left))
         more = size**2 * self.left + error * draw
-        variance = NOISE + size**2 * (self.variance - NOISE)
-        return np.asarray(np.clip(-0.5 * more / variance, np.log(RARE), -np.log(RARE)))
+        return log_odds(more, size**2 * self.off_by)
 
 
 def formulas_off(hypothesis: System, floor: Array) -> float:

@@ -47,8 +47,9 @@ class Air:
     def floor(self, learned: Sequence[WeakFlight], flights: Sequence[WeakFlight]) -> Array:
         """Compute what gusts and noise do to averages over windows: standard deviation, 0 where none are split off.
 
-        Gusts are as large as they were in the flights that they were found in. In others they are drawn anew: there
-        the floor is what they exceed in one of forty, as of so long flights and of so long a memory.
+        Gusts are as large as they were in the flights that they were found in. In others they are drawn anew, and the
+        mean square of a Gauss-Markov process of memory m over a time T scatters by ``sqrt(2 m / T)`` of itself: there
+        the floor is two such deviations larger, of both, which they exceed in about one flight of twenty.
 
         Parameters
         ----------

@@ -98,6 +98,15 @@ def test_gusts_about_axes_are_told_of_flights_without_velocity(flown, kind, setp
     assert np.isnan(found.found.size[3:]).all()
 
 
+def test_what_does_not_come_again_is_noise_beside_what_does(flown):
+    # Half of the inertia is missed about x, which comes again; nothing is about the other axes.
+    vehicle = replace(TRUE.vehicle, inertia_kg_m2=(2 * INERTIA[0], *INERTIA[1:]))
+    found = in_what_is_left(recorded(flown["again"], vehicle, setpoints=False))
+    assert found.told[:3].tolist() == [False, True, True]
+    assert found.split[:3].all()
+    assert 0.5 < found.found.size[0] / INERTIA[0] / GUSTS[0] < 2.0
+
+
 def test_a_copy_of_a_flight_repeats_none(flown):
     first, second, *_ = recorded(flown["asked"], TRUE.vehicle, setpoints=True)
     assert known_motion([first, replace(first, name="copy"), second]).kind == "setpoints"

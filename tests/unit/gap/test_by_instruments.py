@@ -21,7 +21,7 @@ def found_with(*chosen):
     return SimpleNamespace(hypothesis=hypothesis, estimates=SimpleNamespace(effects=[object() for _ in chosen]))
 
 
-def apart(monkeypatch, own, **left):
+def apart(monkeypatch, own, beside=None, **left):
     """Judge effects that leave so much, block by block, of what instruments know."""
     tried = []
 
@@ -39,7 +39,9 @@ def apart(monkeypatch, own, **left):
     monkeypatch.setattr(
         by_instruments, "_reproduced", lambda found, *_: left[next(iter(names(found) & set(LATE)))] * np.ones(BLOCKS)
     )
-    start = found_with(candidate("com_offset"), candidate(own, **{s.name: s.grid[0] for s in CATALOGUE[own].shapes}))
+    start = found_with(
+        beside or candidate("com_offset"), candidate(own, **{s.name: s.grid[0] for s in CATALOGUE[own].shapes})
+    )
     effects = [CATALOGUE[name] for name in (*LATE, "com_offset")]
     found, rivals = told_apart(start, effects, None, np.ones(6), GapSettings())
     return names(found) - {"com_offset"}, {(each.name, each.instead_of) for each in rivals}, tried
@@ -67,3 +69,11 @@ def test_an_effect_on_the_actuation_that_instruments_do_not_tell_is_what_a_loop_
     assert untold_actuation(before, before) == ["channel_delay"]
     told = found_with(*before.hypothesis.chosen)
     assert untold_actuation(before, told) == []
+
+
+def test_a_supply_that_sinks_is_no_loop_and_what_is_late_is_told_beside_it(monkeypatch):
+    before = found_with(candidate("battery_sag", exponent=2.0), candidate("motor_lag", time_constant_s=0.03))
+    assert untold_actuation(before, before) == ["motor_lag"]
+    late = {"own": "command_delay", "motor_lag": LITTLE, "command_delay": 9.0}
+    found, _, _ = apart(monkeypatch, **late, beside=candidate("battery_sag", exponent=2.0))
+    assert found == {"battery_sag", "motor_lag"}

@@ -150,7 +150,7 @@ def test_what_is_settled_is_so_from_a_smaller_size_on():
 
 def test_formulas_that_are_off_leave_more_doubt():
     exact, off = (answered([evidence(*[20.0] * 6, off=share)], 1.1)[0] for share in (0.0, 0.1))
-    assert off.evidence.variance == pytest.approx(exact.evidence.variance + 0.1 * 120.0)
+    assert off.evidence.off_by == pytest.approx(exact.evidence.off_by + 0.1 * 120.0)
     assert off.likely > exact.likely
     assert off.sure < exact.sure
 

@@ -1,4 +1,4 @@
-"""Accelerations and steps of a vehicle model are those of the compiled loops, and rotor speeds come back."""
+"""Accelerations and steps of a vehicle model are those of the compiled loops."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from cpfls_cli.effects import scales
 from cpfls_cli.playback.kernels import MeasuredMotion, errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.motion import State, accelerations, rotor_speeds, step
+from cpfls_cli.playback.motion import State, accelerations, step
 from cpfls_cli.rotations import rotation_matrix
 from cpfls_cli.vehicle.rotors import rotor_demand
 from tests.builders.vehicle_models import HEXA, QUAD, whole
@@ -60,50 +60,3 @@ def test_a_vehicle_at_hover_stays(model):
     moved = step(plain, still, plain.response.terms_by_step(speed, PERIOD, "previous"), PERIOD)
     for now, before in zip(moved, still, strict=True):
         np.testing.assert_allclose(now, before, rtol=0, atol=1e-12)
-
-
-def steady(speed, slow=None):
-    """Terms of rotors that keep their speed."""
-    late = np.zeros_like(speed) if slow is None else slow - speed**2
-    return np.hstack([np.ones((len(speed), 1)), speed, speed**2, np.zeros_like(speed), late])
-
-
-@pytest.mark.parametrize("behind", [False, True], ids=["settled", "slow actuation"])
-def test_rotor_speeds_of_a_wrench_give_that_wrench(model, behind):
-    count = 400
-    speed, state = speeds(model, count), states(count)
-    slow = speeds(model, count, 5) ** 2 if behind else None
-    wanted = model.table.wrench(state.velocity, state.rate, steady(speed, slow))
-    found = rotor_speeds(model, state.velocity, state.rate, wanted[:, 5], wanted[:, :3], slow)
-    assert np.isfinite(found).all()
-    given = model.table.wrench(state.velocity, state.rate, steady(found, slow))[:, [0, 1, 2, 5]]
-    size = np.abs(wanted[:, [0, 1, 2, 5]]).max(axis=0)
-    assert np.max(np.abs(given - wanted[:, [0, 1, 2, 5]]) / size) < 1e-8
-    if model.rotors == 4:
-        np.testing.assert_allclose(found, speed, rtol=1e-7)
-
-
-def test_rotors_alone_need_the_speeds_of_their_allocation():
-    model = VehicleModel(vehicle=HEXA)
-    rng, still = np.random.default_rng(2), np.zeros((50, 3))
-    thrust, torque = rng.uniform(10, 30, 50), rng.uniform(-0.02, 0.02, (50, 3))
-    demand = rotor_demand(HEXA, thrust, torque)
-    found = rotor_speeds(model, still, still, thrust, torque)
-    np.testing.assert_allclose(found, demand.speed, rtol=1e-10)
-
-
-def test_where_no_speeds_exist_there_are_none():
-    model, still = whole(), np.zeros((5, 3))
-    weight = QUAD.mass_kg * QUAD.gravity_m_s2
-    thrust = np.array([weight, -weight, 1e3 * weight, np.nan, weight])
-    torque = np.zeros((5, 3))
-    torque[4, 0] = 10.0
-    found = rotor_speeds(model, still, still, thrust, torque)
-    assert np.isfinite(found[0]).all()
-    assert np.isnan(found[1:]).all()
-
-
-def test_a_vehicle_that_stands_still_needs_no_speed():
-    model = VehicleModel(vehicle=QUAD)
-    found = rotor_speeds(model, np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1), np.zeros((1, 3)))
-    assert found.tolist() == [[0.0] * 4]

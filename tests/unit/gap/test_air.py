@@ -1,0 +1,51 @@
+"""The floor that gusts are: what averages over windows show of them, and of those of other flights."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from cpfls_cli.gap.residual.air import Air
+from cpfls_cli.weak_form.windows import windows
+
+PERIOD, SIZE, MEMORY = 0.02, 2.0, 1.2
+WINDOWS = windows(PERIOD, 0.4, 0.5)
+
+
+def flights(*seconds):
+    signals = [SimpleNamespace(time=np.arange(round(each / PERIOD)), period=PERIOD) for each in seconds]
+    return [SimpleNamespace(signals=each, windows=WINDOWS) for each in signals]
+
+
+def averages(seconds, draws):
+    """Draw Gauss-Markov gusts and average them over windows, shape (draw, window)."""
+    keep = np.exp(-PERIOD / MEMORY)
+    white = SIZE * np.random.default_rng(3).standard_normal((draws, round(seconds / PERIOD)))
+    white[:, 1:] *= np.sqrt(1 - keep**2)
+    blown = lfilter([1.0], [1.0, -keep], white, axis=1)
+    return np.array([WINDOWS.average(run[:, None])[:, 0] for run in blown])
+
+
+@pytest.fixture
+def air():
+    found = SimpleNamespace(size=np.full(6, SIZE), memory=np.full(6, MEMORY), noise=np.zeros((6, 2)))
+    split = np.arange(6) < 3
+    return Air(found, told=np.zeros(6, dtype=bool), split=split)
+
+
+def test_the_floor_of_the_flights_that_gusts_were_found_in_is_their_size(air):
+    learned = flights(30.0, 30.0)
+    floor = air.floor(learned, learned)
+    np.testing.assert_allclose(floor[:3], averages(30.0, 400).std(), rtol=0.05)
+    # Nothing is split off along the other axes, whose floor is that of the sensors.
+    np.testing.assert_array_equal(floor[3:], 0.0)
+    assert np.isinf(air.noise(WINDOWS)[3:]).all()
+
+
+def test_gusts_of_another_flight_seldom_exceed_its_floor(air):
+    floor = air.floor(flights(1e6), flights(30.0))[0]
+    above = (averages(30.0, 400) ** 2).mean(axis=1) > floor**2
+    assert 0.01 < above.mean() < 0.08
+    # The shorter the flights, the more one differs from the next.
+    assert air.floor(flights(1e6), flights(5.0))[0] > floor > air.floor(flights(1e6), flights(300.0))[0]
