@@ -263,30 +263,18 @@ class _Space:
         losses : slice
             Directions whose sizes are nearly always above 0.
         """
-        left, sizes, _ = np.linalg.svd(directions, full_matrices=False)
-        along, square = (left.T @ rows) ** 2, (rows**2).sum(axis=0)
-        parts = []
-        for scale in self.scales:
-            grown = scale + sizes**2
-            inside = (along * (1 / scale - 1 / grown)[:, None]).sum(axis=0)
-            weight = len(rows) * np.log(scale) + np.log(grown / scale).sum()
-            parts.append(-0.5 * (square / scale - inside + weight) + self._losing(rows, directions, scale, losses))
+        left, sizes, turned = np.linalg.svd(directions, full_matrices=False)
+        shown, square, scale = left.T @ rows, (rows**2).sum(axis=0), self.scales[:, None]
+        grown = scale + sizes**2
+        inside = (1 / scale - 1 / grown) @ shown**2
+        weight = len(rows) * np.log(scale) + np.log(grown / scale).sum(axis=1, keepdims=True)
+        parts = -0.5 * (square / scale - inside + weight)
+        if losses != _NONE:
+            along = turned.T[losses]
+            mean = (along * (sizes / grown)[:, None]) @ shown
+            parts += _losing(mean, 1 - ((1 - scale / grown)[:, None] * along**2).sum(axis=2))
         most = np.max(parts, axis=0)
-        return np.asarray(most + np.log(np.mean(np.exp(np.array(parts) - most), axis=0)))
-
-    def _losing(self, rows: Array, directions: Array, scale: float, losses: slice) -> Array:
-        """Compute the logarithm of what the sign of losses adds to a density, shape (row,).
-
-        Of two losses as if neither told of the other.
-        """
-        if losses == _NONE:
-            return np.zeros(rows.shape[1])
-        from scipy.special import ndtr
-
-        inverse = np.linalg.inv(directions.T @ directions / scale + np.eye(directions.shape[1]))[losses]
-        mean, error = inverse @ (directions.T @ rows) / scale, np.sqrt(np.diag(inverse[:, losses]))
-        above = ndtr(mean / error[:, None])
-        return np.asarray(np.log(2 * (_LOSES * above + (1 - _LOSES) * (1 - above))).sum(axis=0))
+        return np.asarray(most + np.log(np.mean(np.exp(parts - most), axis=0)))
 
     def sizes(self, row: Array, chosen: Sequence[int], of: int) -> tuple[Size, ...]:
         """Estimate the sizes of one of several changes that are there, in its unit.
@@ -324,6 +312,23 @@ class _Space:
 
         first = bisect_left(_SIZES, x=True, key=is_enough)
         return cause.size(_SIZES[first] * cause.usual) if first < len(_SIZES) else float("inf")
+
+
+def _losing(mean: Array, variance: Array) -> Array:
+    """Compute the logarithm of what the sign of losses adds to a density, shape (scale, row).
+
+    Of two losses as if neither told of the other.
+
+    Parameters
+    ----------
+    mean : array, shape (scale, loss, row)
+    variance : array, shape (scale, loss)
+        Of the size of each.
+    """
+    from scipy.special import ndtr
+
+    above = ndtr(mean / np.sqrt(variance)[:, :, None])
+    return np.asarray(np.log(2 * (_LOSES * above + (1 - _LOSES) * (1 - above))).sum(axis=1))
 
 
 def _found(space: _Space, row: Array, chance: Array) -> tuple[Found, ...]:

@@ -358,12 +358,20 @@ def _followed(own: Windows, inside: BoolArray, turned: Array, drives: Array, per
     """Fit what follows, averaged over windows, to what drives it, of all and without each block; see `_fit`."""
     driven = np.array([own.average(delayed(drives, each / period))[inside] for each in _DELAYS])
     there = turned[inside]
+    # Squares and products of each block, about means of all.
+    both = np.concatenate([driven, np.broadcast_to(there, (len(driven), *there.shape))], axis=2)
+    both -= both.mean(axis=1, keepdims=True)
     block = contiguous(len(there), _BLOCKS)
-    kept = [block >= 0, *(block != number for number in range(_BLOCKS))]
-    return np.array([_fit(there[rows], driven[:, rows]) for rows in kept])
+    parts = [both[:, block == number] for number in range(_BLOCKS)]
+    sums = np.array([part.sum(axis=1) for part in parts])
+    products = np.array([part.transpose(0, 2, 1) @ part for part in parts])
+    count = np.bincount(block, minlength=_BLOCKS)
+    left_out = zip(count.sum() - count, sums.sum(axis=0) - sums, products.sum(axis=0) - products, strict=True)
+    kept = [(count.sum(), sums.sum(axis=0), products.sum(axis=0)), *left_out]
+    return np.array([_fit(*each, there.shape[1]) for each in kept])
 
 
-def _fit(turned: Array, driven: Array) -> Array:
+def _fit(count: int, sums: Array, products: Array, columns: int) -> Array:
     """Fit what follows to what drives it at each delay: gain, best delay in steps, what is left, shape (3, column).
 
     A delay at the end of what is tried is not known.
@@ -373,15 +381,20 @@ def _fit(turned: Array, driven: Array) -> Array:
 
     Parameters
     ----------
-    turned : array, shape (window, column)
-    driven : array, shape (delay, window, column or more)
+    count : int
+        Of windows.
+    sums : array, shape (delay, drive and column)
+    products : array, shape (delay, drive and column, drive and column)
+        Over them of what drives and of what follows, the last of them.
     """
-    y, x = turned - turned.mean(axis=0), driven - driven.mean(axis=1, keepdims=True)
-    size = np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-300)
-    x = x / size
-    cross = np.einsum("dwk,wa->dka", x, y)
-    found = np.linalg.solve(np.einsum("dwk,dwl->dkl", x, x) + _COLLINEAR * np.eye(x.shape[2]), cross)
-    left = np.maximum((y**2).sum(axis=0) - (cross * found).sum(axis=1), 0.0)
+    products = products - sums[:, :, None] * sums[:, None, :] / count
+    drives = products.shape[1] - columns
+    squares = np.diagonal(products, axis1=1, axis2=2)
+    size = np.maximum(np.sqrt(squares[:, None, :drives]), 1e-300)
+    among = products[:, :drives, :drives] / (size * size.transpose(0, 2, 1))
+    cross = products[:, :drives, drives:] / size.transpose(0, 2, 1)
+    found = np.linalg.solve(among + _COLLINEAR * np.eye(drives), cross)
+    left = np.maximum(squares[:, drives:] - (cross * found).sum(axis=1), 0.0)
     best = np.argmin(left, axis=0)
     axis = np.arange(left.shape[1])
     inner = np.clip(best, 1, len(left) - 2)
@@ -390,7 +403,7 @@ def _fit(turned: Array, driven: Array) -> Array:
     step = np.where((bend > 0) & (inner == best), 0.5 * (before - after) / np.where(bend > 0, bend, 1.0), 0.0)
     gain = found[best, axis, axis] / size[best, 0, axis]
     late = np.where(best < len(left) - 1, best + step, np.nan)
-    return np.array([np.where(gain > 0, gain, np.nan), late, np.sqrt(left[best, axis] / len(turned))])
+    return np.array([np.where(gain > 0, gain, np.nan), late, np.sqrt(left[best, axis] / count)])
 
 
 def _of_attitude(signals: Signals) -> Array:
