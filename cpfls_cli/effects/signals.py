@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.vehicle.rotors import BodyWrench, body_wrench
+from cpfls_cli.vehicle.rotors import BodyWrench, allocation_matrix, body_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _T = TypeVar("_T")
@@ -21,9 +21,13 @@ _SHORTEST = 8
 
 _OF_MOTION = (
     *("rotation", "ground_velocity", "air_velocity"),
-    *("hubs", "spins", "radii", "hub_velocity", "hub_height"),
+    *("hubs", "spins", "radii", "allocation", "hub_velocity", "hub_height"),
 )
 """Cached properties that no rotor speed changes."""
+_OF_VEHICLE = ("hubs", "spins", "radii", "allocation")
+"""Cached properties that no motion changes."""
+_OF_FORCE = ("force", "available", "of_motion", "made")
+"""What is kept of a flight and may hang on the force that is felt."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -153,7 +157,7 @@ class Signals:
 
     @cached_property
     def _of_rotors(self) -> BodyWrench:
-        return body_wrench(self.vehicle, self.speed)
+        return body_wrench(self.vehicle, self.speed, self.allocation)
 
     @cached_property
     def wrench(self) -> Array:
@@ -213,6 +217,11 @@ class Signals:
         return np.array([rotor.position_m for rotor in self.vehicle.rotors])
 
     @cached_property
+    def allocation(self) -> Array:
+        """Thrust and body torque of squared rotor speeds, shape (4, rotor)."""
+        return allocation_matrix(self.vehicle)
+
+    @cached_property
     def spins(self) -> Array:
         """Spin directions, shape (rotor,), +1 counter-clockwise from above."""
         return np.array([float(rotor.spin) for rotor in self.vehicle.rotors])
@@ -266,6 +275,26 @@ class Signals:
         changed.__dict__.update({name: getattr(self, name) for name in _OF_MOTION if name in self.__dict__})
         changed.__dict__["of_motion"] = self.of_motion
         return changed
+
+    def at(self, **channels: Array) -> Signals:
+        """Exchange channels of one instant; what follows from the vehicle alone is kept.
+
+        A simulation does so at each of its steps, where `replace` takes as long as all that is computed.
+        """
+        changed = object.__new__(Signals)
+        changed.__dict__.update({name: getattr(self, name) for name in (*_FIELDS, *_OF_VEHICLE)}, **channels)
+        return changed
+
+    def feeling(self, specific_force: Array) -> Signals:
+        """Exchange the specific force, shape (time, 3), m/s^2, and keep all that does not follow from it."""
+        changed = object.__new__(Signals)
+        changed.__dict__.update(self.__dict__, specific_force=specific_force)
+        for name in _OF_FORCE:
+            changed.__dict__.pop(name, None)
+        return changed
+
+
+_FIELDS = tuple(each.name for each in fields(Signals))
 
 
 def stretch_of(signals: Signals, part: slice) -> Signals:
