@@ -239,14 +239,16 @@ def _refuse_links(file: h5py.File) -> None:
 
 
 def _dataset(file: h5py.File, path: str) -> h5py.Dataset | None:
-    found = file.get(path)
-    if not isinstance(found, h5py.Dataset):
+    # By the library below: a dataset looked up and asked by its object takes three times as long.
+    found = h5py.h5o.open(file.id, path.encode())
+    if not isinstance(found, h5py.h5d.DatasetID):
         return None
-    if found.external or found.is_virtual:
+    made = found.get_create_plist()
+    if made.get_layout() == h5py.h5d.VIRTUAL or made.get_external_count():
         raise ValueError(f"{path} lies in another file; an artifact must hold all that it refers to")
-    if found.shape is None:
+    if found.get_space().get_simple_extent_type() == h5py.h5s.NULL:
         raise ValueError(f"{path} holds nothing, not even a shape")
-    return found
+    return h5py.Dataset(found, readonly=True)
 
 
 def _identify(path: Path, file: h5py.File) -> Format:

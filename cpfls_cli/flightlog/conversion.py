@@ -6,7 +6,6 @@ from difflib import get_close_matches
 from typing import Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
@@ -312,6 +311,8 @@ def attitude_to_enu_flu(attitude: Array, body: BodyFrame, world: WorldFrame) -> 
 
 def attitude_from_quaternion(quaternion: Array, order: Literal["wxyz", "xyzw"]) -> Array:
     """Convert quaternions from body to world, shape (time, 4), of any length, to `euler_angles`."""
+    from scipy.spatial.transform import Rotation
+
     scalar_last = np.roll(quaternion, -1, axis=1) if order == "wxyz" else quaternion
     return euler_angles(Rotation.from_quat(scalar_last).as_matrix())
 
