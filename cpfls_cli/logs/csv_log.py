@@ -17,7 +17,8 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import most_held
-from cpfls_cli.logs.formats import MOST_LISTED, LogContents, some
+from cpfls_cli.logs.formats import MOST_LISTED, LogContents
+from cpfls_cli.words import some
 
 _LONGEST_LINE = 1 << 20
 """Characters of a line, which may hold thousands of columns; compressed, a longer one may fill the memory."""

@@ -13,7 +13,8 @@ from pyarrow import parquet
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import most_held
-from cpfls_cli.logs.formats import MOST_LISTED, LogContents, some
+from cpfls_cli.logs.formats import MOST_LISTED, LogContents
+from cpfls_cli.words import some
 
 _PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 
