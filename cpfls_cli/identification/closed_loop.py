@@ -283,8 +283,8 @@ def _known(given: Instruments, values: Sequence[Array], period: float, *, fast: 
     told, every = sum(int(there.sum()) for there in known.values()), sum(len(values[number]) for number in known)
     if told <= FOLDS * width or every * width > _MOST:
         return {}
-    given = {number: each[there] for each, (number, there) in zip(asked, known.items(), strict=True)}
-    predicted = foretold_by_run(given, {number: values[number][there] for number, there in known.items()})
+    there_asked = {number: each[there] for each, (number, there) in zip(asked, known.items(), strict=True)}
+    predicted = foretold_by_run(there_asked, {number: values[number][there] for number, there in known.items()})
     found = {number: np.full_like(values[number], np.nan) for number in known}
     for number, there in known.items():
         found[number][there] = predicted[number]
