@@ -13,12 +13,11 @@ from cpfls_cli.artifacts.spec import BODY, columns_of, dataset, group, record, r
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS, effect
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
 from cpfls_cli.gap.naming.results import Estimate, NamedEffect
-from cpfls_cli.gap.settings import CLEAR, VISIBLE
+from cpfls_cli.gap.settings import CLEAR, OFF
 from cpfls_cli.playback.replay import AFTER, BEFORE, MODEL, NOTHING_MOVES, STATED
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.naming.results import GapSize
-    from cpfls_cli.gap.residual.views import GapStretch
     from cpfls_cli.playback.replay import Played, Replay
 
 _GROWN = 1.05
@@ -34,8 +33,8 @@ def above_noise(floors: Array) -> BoolArray:
 
 
 def worse_axes(before: Array, after: Array) -> list[int]:
-    """List the axes about which a clear gap grows; both gaps have shape (6,) and are in floors."""
-    return [int(c) for c in np.flatnonzero((before[:3] > CLEAR) & (after[:3] ** 2 - before[:3] ** 2 > VISIBLE**2))]
+    """List the axes about which a clear gap grows by more than formulas are off by; both, shape (6,), are in floors."""
+    return [int(c) for c in np.flatnonzero((before[:3] > CLEAR) & (after[:3] > (1 + OFF) * before[:3]))]
 
 
 def gap_summary(value: Array, floors: Array) -> dict[str, Any]:
@@ -354,11 +353,6 @@ class StretchGroup:
     end_s: Array = dataset("on the clock of the flight", "stretch", path="end", units="s")
     channel: tuple[str, ...] = dataset("channel of the gap", "stretch")
     rms_floors: Array = dataset("root mean square of the gap there, in floors", "stretch", path="floors")
-
-    @classmethod
-    def of(cls, stretches: Sequence[GapStretch]) -> Self:
-        """Arrange stretches of time."""
-        return columns_of(cls, stretches)
 
     def first(self, most: int) -> list[tuple[int, float, float, str, float]]:
         """List the largest: flight, start and end in s, channel, floors."""

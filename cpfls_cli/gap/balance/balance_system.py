@@ -18,6 +18,8 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 NEGLIGIBLE = 0.003
 """Share of the torque or force below which nobody could use a correction; sampling alone leaves about as much."""
+_QUIET_AXIS = 0.3
+"""Torque of the most active axis that counts on every axis: what is negligible about one is so about the others."""
 
 
 @dataclass(frozen=True)
@@ -213,9 +215,11 @@ def left_over(hypothesis: System, number: int, coefficients: Array) -> Columns:
 
 
 def _activity(hypothesis: System) -> Array:
-    """Compute the root mean square of inertial torque and force: what is negligible about one axis is so about all."""
+    """Compute the root mean square of the inertial torque and force of each channel about its mean."""
     rows = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
-    return np.repeat([np.sqrt(np.mean(rows[:, kind] ** 2)) for kind in (slice(0, 3), slice(3, 6))], 3)
+    torque = np.sqrt(np.mean(rows[:, :3] ** 2, axis=0))
+    weight = np.sqrt(np.mean(rows[:, 3:] ** 2))
+    return np.array([*np.maximum(torque, _QUIET_AXIS * torque.max()), *[weight] * 3])
 
 
 def scatter_variance(hypothesis: System) -> Array:

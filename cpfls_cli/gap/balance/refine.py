@@ -15,6 +15,7 @@ from cpfls_cli.effects.catalogue.parameter_error import Change, physical, too_li
 from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.gap.balance.balance_system import System, has_force, is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.gap.settings import VISIBLE
 from cpfls_cli.rounding import ROUNDING, at_most, levelled, smallest
 
 _MOST_NOISE = 0.5
@@ -183,9 +184,10 @@ def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = F
     least = np.zeros(3, dtype=bool)
     change = _change(hypothesis, length > 0, least if of_vehicle else None)
     at = np.linalg.lstsq(change.matrix, linear - change.offset, rcond=None)[0]
-    out = np.zeros(len(linear), dtype=bool)
-    if ((at >= change.low) & (at <= change.high)).all() and _without_lever(hypothesis, linear, rows.errors) is None:
-        return linear, out
+    out = _unseen(hypothesis, change, length)
+    within = ((at >= change.low) & (at <= change.high)).all()
+    if within and not out.any() and _without_lever(hypothesis, linear, rows.errors) is None:
+        return linear, np.zeros(len(linear), dtype=bool)
     columns, right = rows.root
     while True:
         at, linear = _bounded(columns, right, change, out)
@@ -196,6 +198,14 @@ def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = F
         out |= leverless if leverless is not None else False
         least = least | light
         change = _change(hypothesis, length > 0, least if of_vehicle else None)
+
+
+def _unseen(hypothesis: System, change: Change, length: Array) -> BoolArray:
+    """Mark coefficients of effects that even on a bound would move all windows together by nothing that shows."""
+    most = np.maximum(np.abs(change.low), np.abs(change.high))
+    unseen = np.where(np.isfinite(most), most, 1.0) * length < VISIBLE
+    unseen[hypothesis.places[0][1]] = False
+    return np.asarray(unseen & np.isfinite(most) & (length > 0))
 
 
 def _bounded(root: Array, right: Array, change: Change, out: BoolArray) -> tuple[Array, Array]:
@@ -243,8 +253,9 @@ def _without_lever(hypothesis: System, linear: Array, errors: Array) -> BoolArra
         return None
     for candidate, place in hypothesis.places:
         if candidate.effect.lever is not None:
-            own = linear[place]
-            out[place] = ~candidate.effect.lever(own, errors[place], hypothesis.vehicle) & (own != 0)
+            own, of_force = linear[place], hypothesis.columns(candidate)[:, 3:].any(axis=(0, 1))
+            error = np.where(of_force, 0.0, errors[place])
+            out[place] = ~candidate.effect.lever(own, error, hypothesis.vehicle) & (own != 0)
     return out if out.any() else None
 
 

@@ -25,6 +25,9 @@ from cpfls_cli.gap.settings import COUNTS, ERRORS, RARE, GapSettings
 from cpfls_cli.rounding import ascending, at_most
 from cpfls_cli.vehicle.settings import VehicleSettings
 
+_MATTERS = 0.02
+"""Relative error of a moment of inertia or of the thrust from which on it is told."""
+
 
 @dataclass(frozen=True)
 class JudgedEffect:
@@ -183,7 +186,7 @@ def impossible_ratios(numbers: Sequence[Estimate]) -> dict[str, float]:
 
 
 def _is_wrong(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
-    """Tell whether a number is surely wrong, by more than named effects account for."""
+    """Tell whether a number is surely wrong, by as much as matters and more than named effects account for."""
     if number.name not in NUMBERS:
         return False
     accounted = 0.0
@@ -192,7 +195,7 @@ def _is_wrong(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
         if accounts is not None:
             accounted += accounts(number.name, {c.name: c.value for c in effect.coefficients})
     # At the rate of errors of names, over all numbers that are asked.
-    return len(NUMBERS) * _chance(number) <= RARE and abs(number.value) > accounted
+    return len(NUMBERS) * _chance(number) <= RARE and abs(number.value) > max(_MATTERS, accounted)
 
 
 def _chance(number: Estimate) -> float:

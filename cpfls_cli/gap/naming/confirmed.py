@@ -144,7 +144,7 @@ class Without(NamedTuple):
     def worsened(self, after: Array) -> Array:
         """Compute how much worse the effect makes channels that it leaves `after` floors in, as ratios; 0 if unsure."""
         surely = -self.raised > ERRORS * self.error
-        worse = (after > CLEAR) & (-self.raised > VISIBLE**2) & surely
+        worse = (after > CLEAR) & (after > (1 + OFF) * self.left) & surely
         return np.where(worse, after / np.maximum(self.left, 1e-9), 0.0)
 
 

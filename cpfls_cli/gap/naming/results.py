@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.settings import CLEAR, COUNTS, GapSettings
+from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, OFF, GapSettings
 
 
 class GapVerdict(StrEnum):
@@ -239,7 +239,8 @@ def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> 
     filled = effects > 1 and bool((after > CLEAR).any())
     largest = np.repeat([np.nanmax(before[kind], initial=0.0) for kind in (slice(0, 3), slice(3, 6))], 3)
     clear = (before > CLEAR) & (before**2 > COUNTS * largest**2)
-    return filled or bool((clear & _is_left(after, before, named_share)).any())
+    large = (after > ERRORS * CLEAR) & (after > OFF * before)
+    return filled or bool((clear & (_is_left(after, before, named_share) | large)).any())
 
 
 def _is_left(after: Array, before: Array, named_share: float) -> BoolArray:

@@ -63,7 +63,7 @@ def forward_selection(
         progress(len(steps))
         if len(chosen) >= settings.effects_max:
             return chosen, steps
-        grown = [scored for scored in step.ranking if scored.gain > 0] if acceptable(step, settings) else []
+        grown = _moved(flights, step, settings) if acceptable(step, settings) else []
         grown += grown_elsewhere(flights, beam[1:], step, effects, settings)
         if not grown:
             return chosen, steps
@@ -84,6 +84,21 @@ def acceptable(step: RankedStep, settings: GapSettings) -> bool:
     """Tell whether the best candidate explains more than chance and a relevant part of the residual."""
     best = max((scored.gain for scored in step.ranking), default=-np.inf)
     return best >= step.worth_a_name() and step.p_value(best) <= settings.significance
+
+
+def _moved(flights: Sequence[WeakFlight], step: RankedStep, settings: GapSettings) -> list[Scored]:
+    """List the candidates that explain something; those between command and rotors, if the best is, with shapes moved.
+
+    Between the points of a grid an effect with more shapes comes closer to what one with fewer is.
+    """
+    best = step.ranking[0]
+    near = [scored for scored in step.ranking if scored.gain > 0]
+    alike = [scored for scored in near if _late(scored)]
+    beside_late = any(each.effect.actuation is not None for each in best.others)
+    if best not in alike or not (beside_late or len(alike) > 1):
+        return near
+    moved = [rescored(refined(flights, scored.chosen, step.floor), step, settings) for scored in alike]
+    return ascending(moved, lambda scored: -scored.gain)
 
 
 def grown_elsewhere(

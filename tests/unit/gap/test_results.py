@@ -15,7 +15,7 @@ from cpfls_cli.gap.naming.results import (
 from cpfls_cli.gap.settings import GapSettings
 
 RIVAL = Alternative("torque_bias", "com_offset", 0.99, "change the thrust")
-LEFT = Unexplained("torque y", 4.0, "yaw rate", 0.8, None, "neither")
+LEFT = Unexplained("torque y", 5.2, "yaw rate", 0.8, None, "neither")
 
 
 def effect(name="com_offset", share=0.9):
@@ -74,12 +74,12 @@ GAP = np.array([3.0, 20.0, np.nan, np.nan, np.nan, np.nan])
     [
         (LEFT, True),
         (Unexplained("torque y", 3.0, "yaw rate", 0.8, None, "neither"), False),
-        (Unexplained("torque y", 4.0, None, 0.0, None, "neither"), False),
-        (Unexplained("torque y", 4.0, None, 0.8, 0.9, "feeds"), True),
-        (Unexplained("torque y", 4.0, "yaw rate", 0.5, None, "neither"), False),
+        (Unexplained("torque y", 5.2, None, 0.0, None, "neither"), False),
+        (Unexplained("torque y", 5.2, None, 0.8, 0.9, "feeds"), True),
+        (Unexplained("torque y", 5.2, "yaw rate", 0.5, None, "neither"), False),
         (Unexplained("torque y", 7.0, None, 0.0, None, "neither"), True),
     ],
-    ids=["3.2 % of the gap", "1.8 % of the gap", "follows nothing", "narrow band", "half of it follows", "12 % of it"],
+    ids=["5.4 % of the gap", "1.8 % of the gap", "follows nothing", "narrow band", "half of it follows", "12 % of it"],
 )
 def test_what_is_left_matters_where_it_follows_something_and_is_not_small(left, expected):
     assert matters(left, GAP, 0.9) is expected
