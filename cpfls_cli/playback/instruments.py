@@ -40,6 +40,8 @@ FOLDS = 5
 """Parts of the flights that are kept aside in turn."""
 _ANSWERED_S = 0.5
 """What was asked for is answered within this time."""
+_HELD_M = 1.0
+"""How far a vehicle that holds its place may be blown; where the setpoint is left over from before, it flies on."""
 _RIDGE = 1e-6
 """Of predictions, so that setpoints that hardly differ from each other do no harm."""
 
@@ -143,6 +145,17 @@ def instruments(flights: Sequence[PlaybackFlight]) -> Instruments:
         for flight, names in zip(flown, outside, strict=True)
     ]
     return Instruments(runs, flown, repeating, tuple(columns), max(outside, key=len, default=()))
+
+
+def held(flight: PlaybackFlight) -> bool:
+    """Tell whether a flight was asked to stay at one place all the time, and was never far from it."""
+    asked, position = flight.setpoints.get("position"), flight.motion.position
+    return (
+        asked is not None
+        and flight.has_position
+        and not np.ptp(asked, axis=0).any()
+        and bool(np.abs(position - np.median(position, axis=0)).max() < _HELD_M)
+    )
 
 
 def late_by(period: float, apart: int) -> range:

@@ -15,9 +15,9 @@ from cpfls_cli.gap.residual.dependence import rank_dependence, state_signals, wi
 from cpfls_cli.gap.residual.repeated import without_copies
 from cpfls_cli.gap.settings import COUNTS, ERRORS, RARE, GapSettings
 from cpfls_cli.playback.disturbance import FoundGusts, gusts_in
-from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
+from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.gusts import RANGES
-from cpfls_cli.playback.instruments import Instruments, Repeats, foretold, instruments, late, late_by
+from cpfls_cli.playback.instruments import Instruments, Repeats, foretold, held, instruments, late, late_by
 from cpfls_cli.rounding import levelled
 from cpfls_cli.weak_form.resampling import about_flight_mean
 from cpfls_cli.weak_form.windows import Recording, Windows
@@ -25,9 +25,6 @@ from cpfls_cli.weak_form.windows import Recording, Windows
 _FORETOLD = {"repeats": 1 / 2, "setpoints": 1 / 3, "none": 0.0}
 """Share of what is left that instruments may foretell, at 95 %, where it is called the air: the smaller part of it.
 Other runs show all that the vehicle does again, and a linear answer to setpoints about two thirds of it."""
-
-_HELD_M = 1.0
-"""How far a vehicle that holds its position may be blown; where the setpoint is left over from before, it flies on."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +85,7 @@ def known_motion(recordings: Sequence[Recording]) -> Instruments:
     """
     flights = [LoggedFlight.of(each.name, each.signals).playback for each in recordings]
     given = instruments(flights)
-    if given.kind == "none" and all(_held(flight) for flight in flights):
+    if given.kind == "none" and all(held(flight) for flight in flights):
         given = replace(given, setpoints=tuple(np.ones((len(run), 1)) for run in given.flown), names=("position",))
     different = set(without_copies(recordings))
     copies = {number for number, run in enumerate(given.runs) if run.flight not in different}
@@ -98,17 +95,6 @@ def known_motion(recordings: Sequence[Recording]) -> Instruments:
     )
     likeness = {pair: alike for pair, alike in given.repeats.likeness.items() if copies.isdisjoint(pair)}
     return replace(given, repeats=Repeats(beside, likeness))
-
-
-def _held(flight: PlaybackFlight) -> bool:
-    """Tell whether a flight was asked to stay at one place all the time, and was never far from it."""
-    asked, position = flight.setpoints.get("position"), flight.motion.position
-    return (
-        asked is not None
-        and flight.has_position
-        and not np.ptp(asked, axis=0).any()
-        and bool(np.abs(position - np.median(position, axis=0)).max() < _HELD_M)
-    )
 
 
 def air(

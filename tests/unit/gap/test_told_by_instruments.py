@@ -8,7 +8,8 @@ from scipy.stats import ttest_1samp
 
 from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.gap.naming.by_instruments import _chance
-from cpfls_cli.gap.residual.air import _growing, _gusty, _held
+from cpfls_cli.gap.residual.air import _growing, _gusty
+from cpfls_cli.playback.instruments import held as stays
 
 BLOCKS, WINDOWS = 20, 12
 OWN, OTHER = np.array([True, False]), np.array([False, True])
@@ -78,4 +79,4 @@ def test_who_is_asked_to_stay_and_does_is_asked_for_nothing(asked, reach, held):
     flown = reach * np.sin(np.linspace(0, 20, 200))[:, None] * [1.0, 0.5, 0.2] + [0.0, 0.0, 2.0]
     setpoints = {} if asked is None else {"position": np.tile(asked, (200, 1))}
     flight = SimpleNamespace(setpoints=setpoints, has_position=True, motion=SimpleNamespace(position=flown))
-    assert _held(flight) is held
+    assert stays(flight) is held
