@@ -141,9 +141,10 @@ def air(
     moved = np.mean(about_flight_mean(residual, hypothesis.flight_index) ** 2, axis=0) / sensors**2
     told = known & np.isfinite(found.size) & _gusty(found, np.where(known, moved, 0.0), _FORETOLD[given.kind])
     if given.kind == "setpoints" and told.any():
-        sized, moves = np.isfinite(found.size), residual.any(axis=0)
-        blows = (sized | ~moves)[:3].all() and (sized[3:].any() or not moves[3:].any())
-        told &= blows & _like_air(hypothesis, residual, block, given, settings, rng, doubt)
+        turned, pushed = np.split(residual.any(axis=0), 2)
+        turning, pushing = np.split(np.isfinite(found.size), 2)
+        blows = turning[turned].all() and (pushing.any() or not pushed.any())
+        told &= bool(blows) & _like_air(hypothesis, residual, block, given, settings, rng, doubt)
     # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
     sized = told | (given.kind == "repeats")
     parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in RANGES}
