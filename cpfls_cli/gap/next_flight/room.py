@@ -145,8 +145,8 @@ def harmonic_trajectory(path: HarmonicPath, sample_time: float, gravity: float) 
 TILT_MAX = np.radians(35.0)
 """Largest tilt where the settings leave it open."""
 
-# Waves of an axis, as many as a person could still fly.
 _HARMONICS = 10
+"""Waves of an axis, as many as a person could still fly."""
 
 
 @dataclass(frozen=True)
