@@ -203,7 +203,7 @@ def find_gusts(
     for name in (*RANGES, "white"):
         getattr(found, name)[open_] = np.nan
     if found.lack is not None:
-        for columns in (found.lack.share, found.lack.size, found.lack.memory):
+        for columns in (found.lack.share, found.lack.rest, found.lack.memory):
             columns[open_] = np.nan
     return found
 
@@ -424,7 +424,9 @@ class _Axis:
     def lack(self, power: Array, parts: _Complex) -> AxisLack:
         """Find what the model lacks, in power of what is left by piece and its parts as they are foretold."""
         known = self._expected(self._fit.numbers)[0]
-        return lack_of(power, parts, known, Rest(self._alike, self._lags, _MEMORY_S))
+        both = np.where(np.arange(parts.shape[2]) > 0, 2.0, 1.0)
+        squares = np.abs(parts) ** 2 @ both / (len(self._lags) * self._noise[0, 0])
+        return lack_of(power, squares, known, Rest(self._alike, self._lags, _MEMORY_S))
 
     @cached_property
     def _fit(self) -> _Fit:
