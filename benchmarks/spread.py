@@ -441,7 +441,6 @@ def judged(name: str, told: Found, given: Instruments, aside: Sequence[PlaybackF
 
 def kinds_of(told: Found, count: int) -> dict[str, Fleet]:
     """Draw the spread, and leave out of it what it has more than others."""
-
     models = drawn(told.model, told.known, count, np.random.default_rng(1)).models
     return {
         "spread": fleet(told.model, models, told.known.lack),
