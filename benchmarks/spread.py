@@ -213,8 +213,10 @@ class Air(NamedTuple):
         """Draw them a step later."""
         return self.keep * now + self.size * jnp.sqrt(1 - self.keep**2) * jax.random.normal(key, now.shape)
 
-    def push(self, now: Any, key: Any, state: Any, rotor: Any) -> Any:
+    def push(self, now: Any, key: Any, state: Any, speed: Any) -> Any:
         """Add them up in a state, with the white part, shape (vehicle, 6)."""
+        mean = jnp.sqrt((speed**2).mean(axis=1, keepdims=True))
+        rotor = jax.vmap(self.flying.module["steady"])(jnp.tile(mean, (1, speed.shape[1])))
         velocity = jnp.einsum("nji,nj->ni", state[:, 6:15].reshape(-1, 3, 3), state[:, 3:6])
         given = self.parts(velocity, state[:, 15:], rotor, self.flying.parts)
         share = jnp.moveaxis(jnp.asarray(self.flying.share), 1, 0)
@@ -331,7 +333,7 @@ def closed_loop(truth: Truth, flying: Fleet, asked: Flight) -> Array:
         measured = state[:, 15:] + truth.gyro_noise * jax.random.normal(felt, (count, 3))
         after = speed + STEP_S / truth.lag_s * (autopilot(state, wanted_at, measured) - speed)
         rotor = terms(speed, after)
-        shoved = pushed(flying, state, air.push(gust, blown, state, rotor), STEP_S)
+        shoved = pushed(flying, state, air.push(gust, blown, state, after), STEP_S)
         return (move(shoved, rotor, flying.parameters), after, air.after(gust, new)), measured
 
     begun = jnp.concatenate([path[0, :6], jnp.eye(3).ravel(), jnp.zeros(3)])
@@ -548,7 +550,7 @@ def twins(model: VehicleModel, flying: Fleet, law: Law, period: float) -> Callab
         after = law.keep * answer + jnp.concatenate([turned, state[:, 15:] - rate, along_body], axis=1) @ law.gain.T
         blown, new = jax.random.split(key)
         rotor = terms(jnp.sqrt(squared))
-        shoved = pushed(flying, state, air.push(gust, blown, state, rotor), period)
+        shoved = pushed(flying, state, air.push(gust, blown, state, jnp.sqrt(squared)), period)
         moved_on = move(shoved, rotor, flying.parameters)
         return (moved_on, after, air.after(gust, new)), moved_on[:, 15:]
 

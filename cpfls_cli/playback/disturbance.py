@@ -209,10 +209,15 @@ def find_gusts(
 
 
 def _wrench_of_part(model: VehicleModel, weights: Array, flight: PlaybackFlight) -> Array:
-    """Evaluate torque and force of a part of a model along a flight, shape (time, 6); 0 between its stretches."""
+    """Evaluate torque and force of a part of a model along a flight whose rotors all turn alike, shape (time, 6).
+
+    What rotors do by turning unlike answers the motion, and what is in proportion to it would excite itself; the
+    flights tell it as a number.
+    """
     part, found = replace(model.table, weights=weights), np.zeros((len(flight), 6))
+    alike = np.sqrt((flight.speed**2).mean(axis=1, keepdims=True)) * np.ones(flight.speed.shape[1])
     for stretch in flight.stretches:
-        found[stretch] = wrench_during(model, flight, stretch, part)
+        found[stretch] = wrench_during(model, replace(flight, speed=alike), stretch, part)
     return found
 
 

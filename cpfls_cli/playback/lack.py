@@ -2,8 +2,9 @@
 
 A formula that is wrong is wrong in proportion to what it gives: little where little flows, much in a fast climb. So
 what a model lacks about or along an axis is a Gauss-Markov process whose size at an instant is the root of the sum of
-squares of a rest and of shares of what each part of the model gives there: its rotors, and each effect. Other runs of a
-path, or what was asked for, tell the parts, so that no gust that the rotors answer is mistaken for them.
+squares of a rest and of shares of what each part of the model gives there while all rotors turn alike: what they do by
+turning unlike is what an autopilot commands, and a size in proportion to that would excite itself. Other runs of a
+path, or what was asked for, tell the parts, so that no gust is mistaken for them.
 """
 
 from __future__ import annotations
