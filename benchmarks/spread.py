@@ -218,7 +218,7 @@ class Air(NamedTuple):
         mean = jnp.sqrt((speed**2).mean(axis=1, keepdims=True))
         rotor = jax.vmap(self.flying.module["steady"])(jnp.tile(mean, (1, speed.shape[1])))
         velocity = jnp.einsum("nji,nj->ni", state[:, 6:15].reshape(-1, 3, 3), state[:, 3:6])
-        given = self.parts(velocity, state[:, 15:], rotor, self.flying.parts)
+        given = self.parts(velocity, jnp.zeros_like(velocity), rotor, self.flying.parts)
         share = jnp.moveaxis(jnp.asarray(self.flying.share), 1, 0)
         size = jnp.sqrt(self.flying.rest**2 + ((share * given) ** 2).sum(axis=0))
         return now[0] + size * now[1] + self.white * jax.random.normal(key, self.white.shape)

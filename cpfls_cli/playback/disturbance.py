@@ -209,15 +209,16 @@ def find_gusts(
 
 
 def _wrench_of_part(model: VehicleModel, weights: Array, flight: PlaybackFlight) -> Array:
-    """Evaluate torque and force of a part of a model along a flight whose rotors all turn alike, shape (time, 6).
+    """Evaluate torque and force of a part of a model in the flow of a flight, shape (time, 6).
 
-    What rotors do by turning unlike answers the motion, and what is in proportion to it would excite itself; the
-    flights tell it as a number.
+    The body does not turn and all rotors turn alike: what is in proportion to rates and commands, which answer what is
+    played, would excite itself, and the flights tell it as numbers.
     """
     part, found = replace(model.table, weights=weights), np.zeros((len(flight), 6))
     alike = np.sqrt((flight.speed**2).mean(axis=1, keepdims=True)) * np.ones(flight.speed.shape[1])
+    flow = replace(flight, speed=alike, motion=flight.motion._replace(rate=np.zeros_like(flight.motion.rate)))
     for stretch in flight.stretches:
-        found[stretch] = wrench_during(model, replace(flight, speed=alike), stretch, part)
+        found[stretch] = wrench_during(model, flow, stretch, part)
     return found
 
 

@@ -2,8 +2,8 @@
 
 A formula that is wrong is wrong in proportion to what it gives: little where little flows, much in a fast climb. So
 what a model lacks about or along an axis is a Gauss-Markov process whose size at an instant is the root of the sum of
-squares of a rest and of shares of what each part of the model gives there while all rotors turn alike: what they do by
-turning unlike is what an autopilot commands, and a size in proportion to that would excite itself. Other runs of a
+squares of a rest and of shares of what the flow does there to each part of the model, while the body does not turn and
+all rotors turn alike: a size in proportion to rates and commands, which answer it, would excite itself. Other runs of a
 path, or what was asked for, tell the parts, so that no gust is mistaken for them.
 """
 
