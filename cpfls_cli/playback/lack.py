@@ -21,7 +21,9 @@ _BEGIN_S = (0.15, 0.6)
 """Where the memory begins."""
 _FAR, _MORE = 14.0, 4.0
 """Logarithms of factors by which powers may be off where they begin, down and up."""
-_STEPS = 500
+
+_STEPS, _NOTHING = 500, 1e-12
+"""Of the search; and the mean square of a part, over that of what is left, below which it is rounding."""
 
 
 class Rest(NamedTuple):
@@ -113,10 +115,10 @@ def lack_of(power: Array, squares: Array, known: Array, rest: Rest) -> AxisLack:
     """
     from scipy.optimize import minimize
 
-    active = np.flatnonzero(squares.any(axis=0))
+    largest = np.log(power.mean(axis=0).max() / rest.alike.sum(axis=1).max())
+    active = np.flatnonzero(squares.mean(axis=0) > _NOTHING * np.exp(largest))
     unit = squares[:, active].mean(axis=0)
     columns = np.column_stack([np.ones(len(squares)), squares[:, active] / unit])
-    largest = np.log(power.mean(axis=0).max() / rest.alike.sum(axis=1).max())
 
     def unlikely(numbers: Array) -> tuple[float, Array]:
         sizes, (shape, longer) = np.exp(numbers[:-1]), rest.power(float(np.exp(numbers[-1])))
