@@ -391,7 +391,7 @@ class _Axis:
         self._mean = power.sum(axis=0) / count.sum()
         # Power of white noise, as acceleration and through a derivative.
         self._noise = np.array([(np.abs(kernel) ** 2).sum(axis=0) for kernel in (band.weight, band.slope)])
-        self._lags = period * np.arange(len(weight))
+        self._lags = np.asarray(period * np.arange(len(weight)), dtype=float)
         alike = np.correlate(weight, weight, "full")[len(weight) - 1 :]
         self._alike = np.cos(np.outer(band.turns, self._lags)) * alike * np.where(self._lags == 0, 1.0, 2.0)
 
