@@ -55,12 +55,13 @@ except ImportError:
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.export.registry import exported
-from cpfls_cli.export.source import executed, jax_parameters
+from cpfls_cli.export.source import executed, jax_parameters, jax_parts
 from cpfls_cli.playback.constants import find_constants
 from cpfls_cli.playback.disturbance import find_gusts
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.gusts import RANGES, GustRanges, Gusts
 from cpfls_cli.playback.instruments import Instruments, instruments
+from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import rotation_vectors
 from cpfls_cli.playback.settings import PlaybackSettings
@@ -130,58 +131,97 @@ def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
 
 
 class Fleet(NamedTuple):
-    """Vehicles side by side: parameters of the functions in JAX, gusts, and what comes like them."""
+    """Vehicles side by side: parameters of the functions in JAX, gusts, and what the model lacks.
+
+    Attributes
+    ----------
+    module : mapping of str
+        What the export names.
+    parts : array, shape (part, parameter)
+        Parameters of the model's parts alone.
+    parameters : array, shape (vehicle, parameter)
+    gusts : array, shape (vehicle, 3, 6)
+    share : array, shape (vehicle, part, 6)
+    rest, memory : array, shape (vehicle, 6)
+    inertia : array, shape (vehicle, 3, 3)
+    mass : array, shape (vehicle,)
+    """
 
     module: Mapping[str, Any]
+    parts: Array
     parameters: Array
     gusts: Array
-    lack: Array
+    share: Array
+    rest: Array
+    memory: Array
     inertia: Array
     mass: Array
 
+    def beside(self, *others: Fleet) -> Fleet:
+        """Put vehicles of the same export beside these."""
+        columns = zip(*(own[2:] for own in (self, *others)), strict=True)
+        return Fleet(self.module, self.parts, *map(np.concatenate, columns))
 
-def fleet(nominal: VehicleModel, models: Sequence[VehicleModel], *, still: bool = False) -> Fleet:
+
+def fleet(
+    nominal: VehicleModel, models: Sequence[VehicleModel], lack: Lack | None = None, *, still: bool = False
+) -> Fleet:
     """Export a vehicle once, and take the samples as they are."""
     sheet = sheet_of_vehicle(replace(nominal, gusts=None))
     module = executed(exported(sheet, "jax", "v.py").text)
-    none = Gusts(np.zeros(6), np.ones(6))
-    blowing = [(none, none) if still else (each.gusts or none, each.lack or none) for each in models]
-    gusts, lack = (np.array(own) for own in zip(*blowing, strict=True))
+    none, parts, count = Gusts(np.zeros(6), np.ones(6)), tuple(nominal.parts), len(models)
+    gusts = np.array([none if still or each.gusts is None else each.gusts for each in models])
+    share, rest, memory = np.zeros((len(parts), 6)), np.zeros(6), np.ones(6)
+    if lack is not None:
+        assert lack.part == parts
+        share, rest = np.nan_to_num(lack.share).T, np.nan_to_num(lack.rest)
+        memory = np.where(np.isfinite(lack.memory), lack.memory, 1.0)
     return Fleet(
         module,
+        jax_parts(sheet, parts),
         jax_parameters(sheet, models),
         gusts,
-        lack,
+        *(np.tile(each, (count, *[1] * each.ndim)) for each in (share, rest, memory)),
         np.array([each.body.inertia for each in models]),
         np.array([each.body.mass for each in models]),
     )
 
 
 class Air(NamedTuple):
-    """Torque and force that act on vehicles beside those of their models: gusts and what comes like them."""
+    """Torque and force that act on vehicles beside those of their models: gusts and what the model lacks."""
 
+    flying: Fleet
     keep: Any
-    fresh: Any
+    size: Any
     white: Any
+    parts: Any
 
     @classmethod
     def of(cls, flying: Fleet, step: float) -> Air:
         """Play them as docs/spread.md says."""
-        size, memory = (np.stack([flying.gusts[:, row], flying.lack[:, row]]) for row in (0, 1))
-        keep = jnp.exp(-step / memory)
-        return cls(keep, size * jnp.sqrt(1 - keep**2), flying.gusts[:, 2] / np.sqrt(step))
+        keep = jnp.exp(-step / jnp.stack([flying.gusts[:, 1], flying.memory]))
+        size = jnp.stack([flying.gusts[:, 0], jnp.ones_like(flying.memory)])
+        wrench = jax.vmap(flying.module["wrench"], (0, 0, 0, None))
+        parts = jax.vmap(wrench, (None, None, None, 0))
+        return cls(flying, keep, size, flying.gusts[:, 2] / np.sqrt(step), parts)
 
     def first(self, key: Any) -> Any:
         """Draw both processes, shape (2, vehicle, 6)."""
-        return jax.random.normal(key, self.keep.shape) * self.fresh / jnp.sqrt(1 - self.keep**2)
+        return self.size * jax.random.normal(key, self.keep.shape)
 
     def after(self, now: Any, key: Any) -> Any:
         """Draw them a step later."""
-        return self.keep * now + self.fresh * jax.random.normal(key, now.shape)
+        return self.keep * now + self.size * jnp.sqrt(1 - self.keep**2) * jax.random.normal(key, now.shape)
 
-    def push(self, now: Any, key: Any) -> Any:
-        """Add the white part, shape (vehicle, 6)."""
-        return now.sum(axis=0) + self.white * jax.random.normal(key, self.white.shape)
+    def push(self, now: Any, key: Any, state: Any, speed: Any) -> Any:
+        """Add them up in a state, with the white part, shape (vehicle, 6)."""
+        mean = jnp.sqrt((speed**2).mean(axis=1, keepdims=True))
+        rotor = jax.vmap(self.flying.module["steady"])(jnp.tile(mean, (1, speed.shape[1])))
+        velocity = jnp.einsum("nji,nj->ni", state[:, 6:15].reshape(-1, 3, 3), state[:, 3:6])
+        given = self.parts(velocity, jnp.zeros_like(velocity), rotor, self.flying.parts)
+        share = jnp.moveaxis(jnp.asarray(self.flying.share), 1, 0)
+        size = jnp.sqrt(self.flying.rest**2 + ((share * given) ** 2).sum(axis=0))
+        return now[0] + size * now[1] + self.white * jax.random.normal(key, self.white.shape)
 
 
 def pushed(fleet: Fleet, state: Any, gust: Any, step: float) -> Any:
@@ -249,7 +289,7 @@ def fleets(told: Found, truth: Truth, count: int) -> dict[str, Fleet]:
     by_itself = drawn(told.model, alone, count, np.random.default_rng(1))
     true = VehicleModel(vehicle=truth.vehicle, gusts=true_gusts(truth))
     return kinds_of(told, count) | {
-        "each number by itself": fleet(told.model, by_itself.models),
+        "each number by itself": fleet(told.model, by_itself.models, told.known.lack),
         "the true vehicle, true gusts": fleet(true, [true] * count),
     }
 
@@ -292,8 +332,9 @@ def closed_loop(truth: Truth, flying: Fleet, asked: Flight) -> Array:
         felt, blown, new = jax.random.split(key, 3)
         measured = state[:, 15:] + truth.gyro_noise * jax.random.normal(felt, (count, 3))
         after = speed + STEP_S / truth.lag_s * (autopilot(state, wanted_at, measured) - speed)
-        shoved = pushed(flying, state, air.push(gust, blown), STEP_S)
-        return (move(shoved, terms(speed, after), flying.parameters), after, air.after(gust, new)), measured
+        rotor = terms(speed, after)
+        shoved = pushed(flying, state, air.push(gust, blown, state, after), STEP_S)
+        return (move(shoved, rotor, flying.parameters), after, air.after(gust, new)), measured
 
     begun = jnp.concatenate([path[0, :6], jnp.eye(3).ravel(), jnp.zeros(3)])
     start = jnp.tile(begun, (count, 1)), jnp.full((count, 4), jnp.sqrt(hover)), air.first(jax.random.key(1))
@@ -312,6 +353,8 @@ def closed_loop(truth: Truth, flying: Fleet, asked: Flight) -> Array:
 
 KINDS, KINDS_ASIDE = ("B2", "B3", "B6", "B7"), ("B5", "B8", "B9")
 """Of NanoBench: circle, figure of eight, ramp and oval; helix, star and trefoil are kept aside."""
+PART = 500
+"""Samples that are flown at a time."""
 AXES = ("roll", "pitch")
 ANSWERS = {"thrust": (8, 11), "roll": (0, 3, 7, 10), "pitch": (1, 4, 6, 9)}
 """What each answers of a difference of states: rotation, rate, velocity and position along the body axes."""
@@ -377,10 +420,12 @@ def judged(name: str, told: Found, given: Instruments, aside: Sequence[PlaybackF
     print(f"  law: {law}", file=sys.stderr)
     kinds = kinds_of(told, count)
     # Side by side, so that they are compiled once.
-    whole = Fleet(kinds["spread"].module, *map(np.concatenate, zip(*(own[1:] for own in kinds.values()), strict=True)))
+    first, *others = kinds.values()
+    whole = first.beside(*others)
+    fly = twins(told.model, whole, law, given.flown[0].motion.period)
     rows: dict[str, list[tuple[Array, ...]]] = {kind: [] for kind in kinds}
     for flight in aside:
-        turned, measured = np.split(twins(told.model, whole, law, flight), len(kinds)), flight.motion.rate[1:]
+        turned, measured = np.split(fly(flight), len(kinds)), flight.motion.rate[1:]
         for kind, own in zip(kinds, turned, strict=True):
             low, middle, high = np.percentile(own[~tumbled(own)], (ENDS[0], 50.0, ENDS[1]), axis=0)
             off = np.sqrt(((middle - measured) ** 2).mean(axis=0))
@@ -398,16 +443,12 @@ def judged(name: str, told: Found, given: Instruments, aside: Sequence[PlaybackF
 
 def kinds_of(told: Found, count: int) -> dict[str, Fleet]:
     """Draw the spread, and leave out of it what it has more than others."""
-
-    def made(known: Estimates, *, still: bool = False) -> Fleet:
-        return fleet(told.model, drawn(told.model, known, count, np.random.default_rng(1)).models, still=still)
-
-    without = replace(told.known, lack=None)
+    models = drawn(told.model, told.known, count, np.random.default_rng(1)).models
     return {
-        "spread": made(told.known),
-        "spread without what the model lacks": made(without),
+        "spread": fleet(told.model, models, told.known.lack),
+        "spread without what the model lacks": fleet(told.model, models),
         "the estimate, in gusts": fleet(told.model, [told.model] * count),
-        "spread in still air, nothing lacking": made(without, still=True),
+        "spread in still air, nothing lacking": fleet(told.model, models, still=True),
     }
 
 
@@ -480,15 +521,19 @@ def about_z(angle: Any) -> Any:
     return jnp.moveaxis(jnp.array(rows), 2, 0)
 
 
-def twins(model: VehicleModel, flying: Fleet, law: Law, flight: PlaybackFlight) -> Array:
-    """Fly all vehicles from the first logged state, asked what the flight was asked; rates, shape (flight, time, 3).
+def twins(model: VehicleModel, flying: Fleet, law: Law, period: float) -> Callable[[PlaybackFlight], Array]:
+    """Make what flies all vehicles from the first logged state of a flight, asked what the flight was asked.
 
     About yaw they keep what was logged: these flights tell neither the moment of inertia nor the gusts there.
+
+    Returns
+    -------
+    callable
+        From a flight to rates, shape (vehicle, time, 3); it is compiled once.
     """
-    motion, module, count = flight.motion, flying.module, len(flying.parameters)
-    period, unmix = motion.period, np.linalg.pinv(allocation_matrix(model.vehicle)) * sizes(model)
+    module, count = flying.module, len(flying.parameters)
+    unmix = np.linalg.pinv(allocation_matrix(model.vehicle)) * sizes(model)
     air = Air.of(flying, period)
-    logged = tuple(map(jnp.asarray, (*motion[:4], flight.speed)))
     terms = jax.vmap(module["steady"])
     move = jax.vmap(lambda state, rotor, own: module["step"](state, rotor, period, own))
 
@@ -504,15 +549,27 @@ def twins(model: VehicleModel, flying: Fleet, law: Law, flight: PlaybackFlight) 
         squared = jnp.maximum(speed**2 + answer @ unmix.T, 0.0)
         after = law.keep * answer + jnp.concatenate([turned, state[:, 15:] - rate, along_body], axis=1) @ law.gain.T
         blown, new = jax.random.split(key)
-        shoved = pushed(flying, state, air.push(gust, blown), period)
-        moved_on = move(shoved, terms(jnp.sqrt(squared)), flying.parameters)
+        rotor = terms(jnp.sqrt(squared))
+        shoved = pushed(flying, state, air.push(gust, blown, state, jnp.sqrt(squared)), period)
+        moved_on = move(shoved, rotor, flying.parameters)
         return (moved_on, after, air.after(gust, new)), moved_on[:, 15:]
 
-    begun = jnp.concatenate([part[0].ravel() for part in logged[:4]])
-    start = jnp.tile(begun, (count, 1)), jnp.zeros((count, 4)), air.first(jax.random.key(1))
-    keys = jax.random.split(jax.random.key(2), len(flight) - 1)
-    rows = tuple(each[:-1] for each in logged)
-    return np.asarray(jax.jit(lambda: jax.lax.scan(along, start, (rows, keys))[1])()).swapaxes(0, 1)
+    part = jax.jit(lambda carried, rows: jax.lax.scan(along, carried, rows))
+
+    def fly(flight: PlaybackFlight) -> Array:
+        logged = (*flight.motion[:4], flight.speed)
+        begun = jnp.concatenate([jnp.asarray(each[0]).ravel() for each in logged[:4]])
+        carried = jnp.tile(begun, (count, 1)), jnp.zeros((count, 4)), air.first(jax.random.key(1))
+        # The last part is filled up with its last row, so that all are as long.
+        places = np.minimum(np.arange(-(-len(flight) // PART) * PART), len(flight) - 2)
+        keys, found = jax.random.split(jax.random.key(2), len(places)), []
+        for first in range(0, len(places), PART):
+            own = slice(first, first + PART)
+            carried, rates = part(carried, (tuple(jnp.asarray(each[places[own]]) for each in logged), keys[own]))
+            found.append(np.asarray(rates))
+        return np.concatenate(found)[: len(flight) - 1].swapaxes(0, 1)
+
+    return fly
 
 
 PARTS: dict[str, Callable[..., None]] = {"simulated": simulated, "real": real, "nanobench": nanobench}

@@ -40,18 +40,12 @@ class GustAxis(NamedTuple):
 
 @record
 class LackGroup:
-    """What comes again and a model lacks: its parts are off by shares of themselves, and a rest is like no part."""
+    """What comes again and a model lacks: a process as large as shares of what the model's parts give at an instant."""
 
     part: tuple[str, ...] = dataset("parts of the model", "formula")
-    share: Array = dataset(
-        "covariance of the shares by which torque or force of the parts are off",
-        "gust",
-        "formula",
-        "formula",
-        gaps=True,
-    )
-    size: Array = dataset("standard deviation of the rest, N m or N", "gust", units="SI", gaps=True)
-    memory: Array = dataset("time in which the rest falls to 37 %", "gust", units="s", gaps=True)
+    share: Array = dataset("share of each part that its size has", "gust", "formula", gaps=True)
+    rest: Array = dataset("size where no part gives anything, N m or N", "gust", units="SI", gaps=True)
+    memory: Array = dataset("time in which it falls to 37 %", "gust", units="s", gaps=True)
 
 
 @record

@@ -12,8 +12,8 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.sheet import EXPORTER, GUST_RECIPE, Sheet
-from cpfls_cli.export.source import jax_parameters
+from cpfls_cli.export.sheet import EXPORTER, GUST_RECIPE, LACK_RECIPE, Sheet
+from cpfls_cli.export.source import jax_parameters, jax_parts
 from cpfls_cli.export.text import strict_json, yaml_text
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.gusts import GUST_AXES
@@ -28,8 +28,7 @@ _CONVENTIONS = (
     "k, and all entries k belong together: numbers that the flights tell only by their ratio differ together. Rotor i "
     "pushes thrust_factor w^2 along z and turns the body by -spin drag_factor w^2 about z; with thrust_linear a, w^2 "
     "becomes w^2 + a w_h w, w_h the speed that hovers under the square alone. Commands act after delay_s through a "
-    "first-order lag of motor_lag_s. Torque and force of a part of the model are to be multiplied, axis by axis, with "
-    "1 + off.PART: by so much its formula is off. Gusts and what is lacking act beside it, by the recipe of gusts."
+    "first-order lag of motor_lag_s."
 )
 _ENDS = (2.5, 97.5)
 
@@ -91,7 +90,7 @@ class Samples:
         centre = self.spread.centre.tolist()
         for name, value, (low, high) in zip(self.spread.names, centre, ends, strict=True):
             found[name] = Range(self.numbers[name].unit, value, low, high, name not in self.untold)
-        return found | dict(_gust_ranges(self.sheet.model, self.spread)) | dict(_off_ranges(self.spread))
+        return found | dict(_gust_ranges(self.sheet.model, self.spread))
 
     @property
     def moved(self) -> dict[str, float]:
@@ -107,6 +106,7 @@ class Samples:
         return {
             **self.facts,
             "ranges": {name: each._asdict() for name, each in self.ranges.items()},
+            "lack": self.lack,
             "fixed": {
                 "gravity_m_s2": vehicle.gravity_m_s2,
                 "rotor_position_m": [list(rotor.position_m) for rotor in vehicle.rotors],
@@ -115,6 +115,22 @@ class Samples:
             },
             "units": {name: column.unit for name, column in self.columns.items()},
             "samples": {name: column.values.tolist() for name, column in self.columns.items()},
+        }
+
+    @property
+    def lack(self) -> dict[str, Any] | None:
+        """What the model lacks, and how to play it; 0 on axes of which nothing is known."""
+        found = self.spread.lack
+        if found is None:
+            return None
+        share, rest = np.nan_to_num(found.share), np.nan_to_num(found.rest)
+        memory = np.where(np.isfinite(found.memory), found.memory, 1.0)
+        return {
+            "how_to_play": LACK_RECIPE,
+            "units": "rows of torque x y z, force x y z: share 1, rest N m and N, memory s",
+            "share": dict(zip(found.part, share.T.tolist(), strict=True)),
+            "rest": rest.tolist(),
+            "memory_s": memory.tolist(),
         }
 
     @property
@@ -152,6 +168,7 @@ class Samples:
             **{name: column.values for name, column in self.columns.items()},
             **{name: np.array(values) for name, values in document["fixed"].items()},
             "parameters": jax_parameters(self.sheet, self.spread.models),
+            **self._lack_arrays(),
             "range_names": np.array(list(ranges)),
             "range_units": np.array([each.unit for each in ranges.values()]),
             "ranges": np.array([[each.low, each.value, each.high] for each in ranges.values()]).reshape(-1, 3),
@@ -160,6 +177,18 @@ class Samples:
         file = io.BytesIO()
         np.savez_compressed(file, allow_pickle=False, **made)
         return file.getvalue()
+
+    def _lack_arrays(self) -> dict[str, Array]:
+        lack = self.lack
+        if lack is None:
+            return {}
+        return {
+            "lack_part": np.array(list(lack["share"])),
+            "lack_parameters": jax_parts(self.sheet, list(lack["share"])),
+            "lack_share": np.array(list(lack["share"].values())),
+            "lack_rest": np.array(lack["rest"]),
+            "lack_memory_s": np.array(lack["memory_s"]),
+        }
 
 
 def _columns(nominal: VehicleModel, models: tuple[VehicleModel, ...]) -> Iterator[tuple[str, str, Array]]:
@@ -191,29 +220,15 @@ def _columns(nominal: VehicleModel, models: tuple[VehicleModel, ...]) -> Iterato
         yield "remainder", "SI, learned, without a name: row, column, power", np.array(learned)
     if nominal.gusts is not None:
         gusts = np.array([each.gusts for each in models])
-        yield from _random(gusts, "gust", "gust")
+        halves = (("torque_n_m", "torque_memory_s", "N m", _TURNS), ("force_n", "force_memory_s", "N", _PUSHES))
+        for size, memory, unit, axes in halves:
+            yield f"gust_{size}", f"{unit}, standard deviation, x y z", gusts[:, 0, axes]
+            yield f"gust_{memory}", "s, in which a gust falls to 37 %, x y z", gusts[:, 1, axes]
         for size, unit, axes in (("torque_white_n_m_sqrt_s", "N m", _TURNS), ("force_white_n_sqrt_s", "N", _PUSHES)):
             yield f"gust_{size}", f"{unit} s^0.5, white noise beside it, x y z", gusts[:, 2, axes]
-    lacking = [each.lack for each in models if each.lack is not None]
-    if lacking:
-        yield from _random(np.array(lacking), "lack", "rest")
-    for name in models[0].deviations:
-        values = np.array([each.deviations[name] for each in models])
-        if values.any():
-            yield f"off.{name}", "share of torque about and force along x y z by which this part is off", values
 
 
 _TURNS, _PUSHES = slice(0, 3), slice(3, 6)
-
-
-def _random(values: Array, name: str, what: str) -> Iterator[tuple[str, str, Array]]:
-    """Give sizes and memories of random torque and force, shape of values (vehicle, 2 or more, 6)."""
-    for size, memory, unit, axes in (
-        ("torque_n_m", "torque_memory_s", "N m", _TURNS),
-        ("force_n", "force_memory_s", "N", _PUSHES),
-    ):
-        yield f"{name}_{size}", f"{unit}, standard deviation, x y z", values[:, 0, axes]
-        yield f"{name}_{memory}", f"s, in which a {what} falls to 37 %, x y z", values[:, 1, axes]
 
 
 def _gust_ranges(nominal: VehicleModel, spread: Spread) -> Iterator[tuple[str, Range]]:
@@ -226,16 +241,6 @@ def _gust_ranges(nominal: VehicleModel, spread: Spread) -> Iterator[tuple[str, R
             low, high = np.percentile(drawn[:, part, axis], _ENDS).tolist()
             value = float(nominal.gusts[part][axis])
             yield f"gust.{GUST_AXES[axis]}_{word}", Range(unit, value, low, high, True)
-
-
-def _off_ranges(spread: Spread) -> Iterator[tuple[str, Range]]:
-    """Give the range of each share by which a part is off."""
-    first = spread.models[0].deviations
-    for name, axis in ((name, axis) for name in first for axis in range(len(GUST_AXES))):
-        values = np.array([each.deviations[name][axis] for each in spread.models])
-        if values.any():
-            low, high = np.percentile(values, _ENDS).tolist()
-            yield f"off.{name}_{GUST_AXES[axis]}", Range("1", 0.0, low, high, True)
 
 
 def require_ending(name: str, suffix: str) -> str:

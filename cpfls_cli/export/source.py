@@ -176,6 +176,12 @@ def jax_parameters(sheet: Sheet, models: Sequence[VehicleModel]) -> Array:
     )
 
 
+def jax_parts(sheet: Sheet, parts: Sequence[str]) -> Array:
+    """Give the parameters with which the functions in JAX give parts of a model alone, shape (part, parameter)."""
+    places = sheet.weights[:3]
+    return np.array([_parameters(sheet, sheet.model.parts[name][places], delayed=True) for name in parts])
+
+
 def _python_rules(model: InertiaFunctions) -> dict[str, Any]:
     structure = model.structure
     named = {

@@ -197,9 +197,9 @@ def spread_answer(samples: Samples, output: Path, size: int) -> Iterator[Block]:
             always=True,
         )
     if sheet.verdict == Trust.LACKING:
-        drawn = ": it is drawn as shares by which the parts of the model are off, as far as the flights show it."
+        drawn = ": the file holds how large that is, to be played beside the gusts."
         narrow = ", so the spread is too narrow by as much as that."
-        said = drawn if spread.models[0].deviations else narrow
+        said = drawn if spread.lack else narrow
         yield Text(f"The vehicle answers with something that the model lacks{said}", "warning", always=True)
     calm = _without_gusts(sheet.model.gusts)
     if calm:
@@ -213,9 +213,6 @@ def spread_answer(samples: Samples, output: Path, size: int) -> Iterator[Block]:
 
 def _name(name: str) -> str:
     kind, _, axis = name.partition(".")
-    if kind == "off":
-        part, _, about = axis.rpartition("_")
-        return f"{part.replace('_', ' ')} off, {about}"
     return f"gusts, {axis.replace('_', ' ')}" if kind == "gust" else name_of(name)
 
 

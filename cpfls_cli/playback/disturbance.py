@@ -210,16 +210,22 @@ def find_gusts(
     for name in (*RANGES, "white"):
         getattr(found, name)[open_] = np.nan
     if found.lack is not None:
-        for columns in (found.lack.share, found.lack.size, found.lack.memory):
+        for columns in (found.lack.share, found.lack.rest, found.lack.memory):
             columns[open_] = np.nan
     return found
 
 
 def _wrench_of_part(model: VehicleModel, weights: Array, flight: PlaybackFlight) -> Array:
-    """Evaluate torque and force of a part of a model along a flight, shape (time, 6); 0 between its stretches."""
+    """Evaluate torque and force of a part of a model in the flow of a flight, shape (time, 6).
+
+    The body does not turn and all rotors turn alike: what is in proportion to rates and commands, which answer what is
+    played, would excite itself, and the flights tell it as numbers.
+    """
     part, found = replace(model.table, weights=weights), np.zeros((len(flight), 6))
+    alike = np.sqrt((flight.speed**2).mean(axis=1, keepdims=True)) * np.ones(flight.speed.shape[1])
+    flow = replace(flight, speed=alike, motion=flight.motion._replace(rate=np.zeros_like(flight.motion.rate)))
     for stretch in flight.stretches:
-        found[stretch] = wrench_during(model, flight, stretch, part)
+        found[stretch] = wrench_during(model, flow, stretch, part)
     return found
 
 
@@ -392,7 +398,7 @@ class _Axis:
         self._mean = power.sum(axis=0) / count.sum()
         # Power of white noise, as acceleration and through a derivative.
         self._noise = np.array([(np.abs(kernel) ** 2).sum(axis=0) for kernel in (band.weight, band.slope)])
-        self._lags = period * np.arange(len(weight))
+        self._lags = np.asarray(period * np.arange(len(weight)), dtype=float)
         alike = np.correlate(weight, weight, "full")[len(weight) - 1 :]
         self._alike = np.cos(np.outer(band.turns, self._lags)) * alike * np.where(self._lags == 0, 1.0, 2.0)
 
@@ -431,7 +437,9 @@ class _Axis:
     def lack(self, power: Array, parts: _Complex) -> AxisLack:
         """Find what the model lacks, in power of what is left by piece and its parts as they are foretold."""
         known = self._expected(self._fit.numbers)[0]
-        return lack_of(power, parts, known, Rest(self._alike, self._lags, _MEMORY_S))
+        both = np.where(np.arange(parts.shape[2]) > 0, 2.0, 1.0)
+        squares = np.abs(parts) ** 2 @ both / (len(self._lags) * self._noise[0, 0])
+        return lack_of(power, squares, known, Rest(self._alike, self._lags, _MEMORY_S))
 
     @cached_property
     def _fit(self) -> _Fit:

@@ -1,10 +1,10 @@
-"""What a model lacks, as it comes again: each of its formulas off by a share of itself, and a rest with a memory.
+"""What a model lacks, as it comes again: a torque and a force with a memory, as large as shares of the model's parts.
 
 A formula that is wrong is wrong in proportion to what it gives: little where little flows, much in a fast climb. So
-torque and force of each part of a model are taken to be off by a share, another one on each piece of flight, and the
-shares of the parts go together: rotors that hold a body against the flow are off as much as the flow is. What no part
-is like comes as a Gauss-Markov process. Other runs of a path, or what was asked for, tell the parts, so that no gust
-that the rotors answer is mistaken for them.
+what a model lacks about or along an axis is a Gauss-Markov process whose size at an instant is the root of the sum of
+squares of a rest and of shares of what the flow does there to each part of the model, while the body does not turn and
+all rotors turn alike: a size in proportion to rates and commands, which answer it, would excite itself. Other runs of a
+path, or what was asked for, tell the parts, so that no gust is mistaken for them.
 """
 
 from __future__ import annotations
@@ -14,20 +14,16 @@ from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
-import numpy.typing as npt
 
 from cpfls_cli.arrays import Array
 
-_Complex = npt.NDArray[np.complex128]
+_BEGIN_S = (0.15, 0.6)
+"""Where the memory begins."""
+_FAR, _MORE = 14.0, 4.0
+"""Logarithms of factors by which powers may be off where they begin, down and up."""
 
-ROTORS = "rotors"
-"""The part of a model that is its rotors alone."""
-
-_BEGIN, _BEGIN_S = 0.3, (0.15, 0.6)
-"""Where shares and the memory of the rest begin."""
-_FAR, _MORE = 14.0, 3.0
-"""Logarithms of factors by which the power of the rest may be off where it begins, down and up."""
-_STEPS = 500
+_STEPS, _NOTHING = 500, 1e-12
+"""Of the search; and the mean square of a part, over that of what is left, below which it is rounding."""
 
 
 class Rest(NamedTuple):
@@ -58,14 +54,16 @@ class AxisLack(NamedTuple):
 
     Attributes
     ----------
-    share : array, shape (part, part)
-        Covariance of the shares by which parts are off.
-    size, memory : float
-        Standard deviation of the rest, N m or N, and the time in which it falls to 37 %, s.
+    share : array, shape (part,)
+        Of each part of the model, that the size has.
+    rest : float, N m or N
+        Size where no part gives anything.
+    memory : float, s
+        Time in which it falls to 37 %.
     """
 
     share: Array
-    size: float
+    rest: float
     memory: float
 
 
@@ -77,102 +75,73 @@ class Lack:
     ----------
     part : tuple of str
         Parts of the model, see `VehicleModel.parts`.
-    share : array, shape (axis, part, part)
-        Covariance of the shares by which the parts are off; NaN where nothing is known.
-    size : array, shape (axis,), N m and N
-        Standard deviation of what no part is like; NaN where nothing is known.
+    share : array, shape (axis, part)
+        See `AxisLack`; NaN where nothing is known, as for all others.
+    rest : array, shape (axis,), N m and N
     memory : array, shape (axis,), s
-        Time in which that falls to 37 %.
     """
 
     part: tuple[str, ...]
     share: Array
-    size: Array
+    rest: Array
     memory: Array
 
     @classmethod
     def of(cls, part: Sequence[str], axes: Sequence[AxisLack]) -> Self:
         """Arrange axes."""
-        share, size, memory = zip(*axes, strict=True)
-        return cls(tuple(part), np.array(share), np.array(size), np.array(memory))
+        share, rest, memory = zip(*axes, strict=True)
+        return cls(tuple(part), np.array(share), np.array(rest), np.array(memory))
 
 
-def lack_of(power: Array, parts: _Complex, known: Array, rest: Rest) -> AxisLack:
-    """Find by which shares the parts of a model are off, by Whittle's likelihood of what is left.
+def lack_of(power: Array, squares: Array, known: Array, rest: Rest) -> AxisLack:
+    """Find how large what a model lacks is, by Whittle's likelihood of what is left.
 
-    The power of what is left on a piece is ``known(w) + sum_ij S_ij P_i(w)* P_j(w) + s^2 G(w; m)``: gusts and noise,
-    parts that are off by shares of covariance S, and a Gauss-Markov process of size s and memory m.
+    The power of what is left on a piece is ``known(w) + (r^2 + sum_k s_k^2 q_k) G(w; m)``: gusts and noise, and a
+    Gauss-Markov process of memory m with shares s_k of the parts, whose mean squares on the piece are q_k, and a rest.
 
     Parameters
     ----------
     power : array, shape (piece, frequency)
         Of what is left.
-    parts : complex array, shape (piece, part, frequency)
-        Each part as instruments foretell it.
+    squares : array, shape (piece, part)
+        Mean square of each part as instruments foretell it.
     known : array, shape (frequency,)
         Power of gusts and noise, which do not come again.
     rest : Rest
 
     References
     ----------
-    Whittle 1953; Kennedy and O'Hagan 2001 (discrepancy of a model); Laird and Ware 1982 (random coefficients).
+    Whittle 1953; Kennedy and O'Hagan 2001 (discrepancy of a model).
     """
     from scipy.optimize import minimize
 
-    sizes = np.sqrt((np.abs(parts) ** 2).mean(axis=(0, 2)))
-    active = np.flatnonzero(sizes > 0)
-    unit = np.sqrt(power.mean()) / sizes[active]
-    likelihood = _Likelihood(power, parts[:, active] * unit[:, None], known, rest)
+    largest = np.log(power.mean(axis=0).max() / rest.alike.sum(axis=1).max())
+    active = np.flatnonzero(squares.mean(axis=0) > _NOTHING * np.exp(largest))
+    unit = squares[:, active].mean(axis=0)
+    columns = np.column_stack([np.ones(len(squares)), squares[:, active] / unit])
+
+    def unlikely(numbers: Array) -> tuple[float, Array]:
+        sizes, (shape, longer) = np.exp(numbers[:-1]), rest.power(float(np.exp(numbers[-1])))
+        size = columns @ sizes
+        expected = known + size[:, None] * shape
+        ratio = power / expected
+        slope = (1.0 - ratio) / expected
+        slopes = np.append(sizes * (columns.T @ (slope @ shape)), size @ (slope @ longer))
+        return float((ratio + np.log(expected)).sum()) / len(power), slopes / len(power)
+
+    count = columns.shape[1]
     found = [
-        minimize(likelihood, begin, jac=True, method="L-BFGS-B", bounds=likelihood.bounds, options={"maxiter": _STEPS})
-        for begin in likelihood.begins
+        minimize(
+            unlikely,
+            np.array([*[largest - 1.0 - np.log(count)] * count, np.log(memory)]),
+            jac=True,
+            method="L-BFGS-B",
+            bounds=[*[(largest - _FAR, largest + _MORE)] * count, tuple(np.log(rest.memory))],
+            options={"maxiter": _STEPS},
+        )
+        for memory in _BEGIN_S
     ]
     best = min(found, key=lambda each: float(each.fun)).x
-    root = likelihood.root(best) * unit[:, None]
-    share = np.zeros((parts.shape[1], parts.shape[1]))
-    share[np.ix_(active, active)] = root @ root.T
-    return AxisLack(share, float(np.exp(0.5 * best[-2])), float(np.exp(best[-1])))
-
-
-class _Likelihood:
-    """How unlikely what is left is, by a root of the covariance and logarithms of squared size and memory."""
-
-    def __init__(self, power: Array, parts: _Complex, known: Array, rest: Rest) -> None:
-        self._power, self._known, self._rest = power, known, rest
-        self._parts = np.ascontiguousarray(parts.swapaxes(1, 2)).reshape(-1, parts.shape[1])
-        self._places = np.tril_indices(parts.shape[1])
-
-    @property
-    def begins(self) -> list[Array]:
-        """Where searches begin."""
-        diagonal = np.where(self._places[0] == self._places[1], _BEGIN, 0.0)
-        return [np.array([*diagonal, self._largest - 1.0, np.log(memory)]) for memory in _BEGIN_S]
-
-    @property
-    def bounds(self) -> list[tuple[float | None, float | None]]:
-        """Ends of what is sought."""
-        largest, (low, high) = self._largest, np.log(self._rest.memory)
-        return [*[(None, None)] * len(self._places[0]), (largest - _FAR, largest + _MORE), (low, high)]
-
-    @property
-    def _largest(self) -> float:
-        return float(np.log(self._power.mean(axis=0).max() / self._rest.alike.sum(axis=1).max()))
-
-    def root(self, numbers: Array) -> Array:
-        """Give the root of the covariance, shape (part, part)."""
-        count = self._parts.shape[1]
-        root = np.zeros((count, count))
-        root[self._places] = numbers[:-2]
-        return root
-
-    def __call__(self, numbers: Array) -> tuple[float, Array]:
-        size, memory = np.exp(numbers[-2:])
-        root = self.root(numbers)
-        off = self._parts @ root
-        rest, longer = (size * each for each in self._rest.power(memory))
-        expected = self._known + (np.abs(off) ** 2).sum(axis=1).reshape(self._power.shape) + rest
-        ratio = self._power / expected
-        slope = (1.0 - ratio) / expected
-        moved = 2.0 * (np.conj(self._parts).T @ (slope.reshape(-1, 1) * off)).real
-        slopes = np.array([*moved[self._places], (slope * rest).sum(), (slope * longer).sum()])
-        return float((ratio + np.log(expected)).sum()) / len(ratio), slopes / len(ratio)
+    share = np.zeros(squares.shape[1])
+    share[active] = np.sqrt(np.exp(best[1:-1]) / unit)
+    return AxisLack(share, float(np.exp(0.5 * best[0])), float(np.exp(best[-1])))

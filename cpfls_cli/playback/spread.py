@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from cpfls_cli.inertia import (
     symmetric,
 )
 from cpfls_cli.playback.gusts import GUST_AXES, GustRanges, Gusts
-from cpfls_cli.playback.lack import ROTORS, Lack
+from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.parameters import LEARNED, PRODUCT_NAMES
 from cpfls_cli.playback.table import Remainder
@@ -72,7 +71,7 @@ class Estimates:
         has widened the intervals; 1 for none.
     gusts : GustRanges or None
     lack : Lack or None
-        By which shares parts of the model are off, and what no part is like.
+        What the model lacks.
     """
 
     numbers: Sequence[FoundNumber]
@@ -100,6 +99,8 @@ class Spread:
         Draws, possible or not.
     rejected : mapping of str to int
         How many of them are of no possible vehicle, by the reason that was met first.
+    lack : Lack or None
+        What the model lacks, whichever of its numbers it has: the same for all of them.
     """
 
     names: tuple[str, ...]
@@ -108,6 +109,7 @@ class Spread:
     models: tuple[VehicleModel, ...]
     tried: int
     rejected: Mapping[str, int]
+    lack: Lack | None = None
 
 
 def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Generator) -> Spread:
@@ -157,14 +159,14 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
     made = [each for _, each in kept]
     heavier = _heavier(model, made)
     gusts = _gusts_drawn(known.gusts, model, heavier, rng)
-    lacking = _lack_drawn(known.lack, heavier, rng)
     return Spread(
         tuple(number.name for number in numbers),
         np.array([number.value for number in numbers]),
         np.array([row for row, _ in kept]).reshape(count, len(numbers)),
-        tuple(replace(each, gusts=own, **off) for each, own, off in zip(made, gusts, lacking, strict=True)),
+        tuple(replace(each, gusts=own) for each, own in zip(made, gusts, strict=True)),
         tried,
         dict(rejected.most_common()),
+        known.lack,
     )
 
 
@@ -191,7 +193,7 @@ def _of_a_body(model: VehicleModel, numbers: Sequence[FoundNumber]) -> tuple[Veh
 
 
 def _root(correlation: Array) -> Array:
-    """Take a root of a correlation or covariance, which rounding or few blocks may leave without full rank."""
+    """Take a root of a correlation that rounding, or fewer blocks than numbers, leave without full rank."""
     sizes, axes = np.linalg.eigh(correlation)
     return np.asarray(axes * np.sqrt(np.maximum(sizes, 0.0)))
 
@@ -341,28 +343,6 @@ def _gusts_drawn(
     white = np.zeros(len(GUST_AXES)) if model.gusts is None else model.gusts.white
     for own, own_size, own_memory in zip(heavier, size, memory, strict=True):
         yield Gusts(own_size * own, own_memory, white * own)
-
-
-def _lack_drawn(known: Lack | None, heavier: Array, rng: np.random.Generator) -> Iterator[dict[str, Any]]:
-    """Draw by which shares the parts of each vehicle are off, and give what no part is like."""
-    if known is None:
-        yield from [{}] * len(heavier)
-        return
-    rotors = known.part.index(ROTORS)
-    shares = np.zeros((len(heavier), len(GUST_AXES), len(known.part)))
-    for axis, covariance in enumerate(np.nan_to_num(known.share)):
-        own, root = shares[:, axis], _root(covariance)
-        again = np.arange(len(heavier))
-        # Rotors that turn a vehicle the wrong way are those of none.
-        while len(again):
-            own[again] = rng.standard_normal((len(again), len(root))) @ root.T
-            again = again[own[again, rotors] <= -1.0]
-    rest = Gusts.known(known.size, known.memory)
-    for own, share in zip(heavier, shares, strict=True):
-        yield {
-            "deviations": dict(zip(known.part, share.T, strict=True)),
-            "lack": rest._replace(size=rest.size * own),
-        }
 
 
 _NORMAL = 1.959964

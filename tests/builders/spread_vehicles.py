@@ -36,7 +36,7 @@ def numbers_of(model):
 def found_record(model=None, *, together=0.9, loop=None, gusts=True, lack=None, relative=RELATIVE, **changed):
     """An artifact; Izz and the drag factor go together, and so do the moments about roll and pitch a little.
 
-    `lack` is the covariance by which rotors and damping are off about each axis of torque.
+    `lack` are the shares of rotors and damping about each axis of torque.
     """
     model = model or truth()
     known = numbers_of(model)
@@ -92,11 +92,10 @@ def found_record(model=None, *, together=0.9, loop=None, gusts=True, lack=None, 
 
 def lack_group(share, size):
     """What a model lacks, the same about all axes of torque; of forces nothing is known."""
-    nothing = np.full((3, 2, 2), np.nan)
     return LackGroup(
         part=("rotors", "linear_damping"),
-        share=np.concatenate([np.tile(share, (3, 1, 1)), nothing]),
-        size=np.append(size[:3], [np.nan] * 3),
+        share=np.concatenate([np.tile(share, (3, 1)), np.full((3, 2), np.nan)]),
+        rest=np.append(size[:3], [np.nan] * 3),
         memory=np.array([0.5, 2.0, 8.0, *[np.nan] * 3]),
     )
 

@@ -82,25 +82,25 @@ def test_a_model_that_lacks_an_effect_is_said_to_spread_too_little(cpfls, vehicl
     assert json.loads(output.read_text())["verdict"] == Trust.LACKING
 
 
-def test_what_the_model_lacks_is_drawn_and_in_the_parameters(cpfls, vehicle, monkeypatch):
+def test_what_the_model_lacks_is_in_the_file_with_the_parameters_of_its_parts(cpfls, vehicle, monkeypatch):
     monkeypatch.setattr(VehicleRecord, "verdict", Trust.LACKING)
-    write_record(vehicle, found_record(lack=[[0.04, 0.02], [0.02, 0.09]]))
+    write_record(vehicle, found_record(lack=[0.3, 0.2]))
     result, output = written(cpfls, vehicle, "npz")
-    assert "it is drawn as shares by which the parts of the model are off" in result.stderr
+    assert "the model lacks: the file holds how large that is" in result.stderr
     with np.load(output, allow_pickle=False) as arrays:
-        off, parameters = arrays["off.rotors"], arrays["parameters"]
-        assert off.shape == (COUNT, 6)
-        assert 0.1 < off[:, :3].std() < 0.3
-        assert not off[:, 3:].any()
-        assert arrays["lack_torque_n_m"].shape == (COUNT, 3)
+        assert arrays["lack_part"].tolist() == ["rotors", "linear_damping"]
+        assert arrays["lack_share"].tolist() == [[0.3] * 3 + [0.0] * 3, [0.2] * 3 + [0.0] * 3]
         assert arrays["gust_torque_white_n_m_sqrt_s"].min() > 0
-        # A weight of the first rotor about roll is its lever times its thrust factor, off by the share.
-        factor = 0.5 * arrays["thrust_factor_n_s2"][:, 0] * (1 + off[:, 0])
-        alike = [np.corrcoef(column, factor)[0, 1] for column in np.abs(parameters[:, 9:]).T if np.ptp(column)]
-        assert max(alike) > 0.999
-        names = arrays["range_names"].tolist()
-        assert "off.linear_damping_roll" in names
-        assert json.loads(str(arrays["facts"]))["units"]["off.rotors"].startswith("share of torque about")
+        # Each weight is that of one part: side by side they are the estimate.
+        rotors, damping = arrays["lack_parameters"]
+        apart = rotors != damping
+        assert apart.sum() > 12
+        assert not (rotors * damping)[apart].any()
+        facts = {name: arrays[f"lack_{name}"].tolist() for name in ("rest", "memory_s")}
+    document = json.loads(written(cpfls, vehicle, "json")[1].read_text())["lack"]
+    assert document["share"] == {"rotors": [0.3] * 3 + [0.0] * 3, "linear_damping": [0.2] * 3 + [0.0] * 3}
+    assert {name: document[name] for name in facts} == facts
+    assert "root of rest^2" in document["how_to_play"]
 
 
 def test_guesses_are_held_and_named(cpfls, tmp_path):

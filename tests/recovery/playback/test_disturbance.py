@@ -108,6 +108,8 @@ def test_without_instruments_there_is_a_bound_alone(flights):
     np.testing.assert_array_equal(find_gusts(model, known, told=False).high, found.high)
     assert found.told_by == "none"
     assert found.gusts is None
+    assert found.lack is None
+    assert told.lack is not None
     assert (found.high > told.size).all()
 
 
@@ -118,6 +120,8 @@ def test_beside_a_body_that_is_not_known_nothing_is(flights):
     assert np.isfinite(found.size).tolist() == [True, True, False, True, True, True]
     assert np.isnan(found.high[2])
     assert found.gusts.size[2] == 0
+    assert found.gusts.white[2] == 0
+    assert np.isfinite(found.lack.rest).tolist() == [True, True, False, True, True, True]
 
 
 def test_flights_that_are_short_or_of_several_rates_tell_nothing(flights):
