@@ -163,7 +163,7 @@ def _told(kind: Kind, vehicle: VehicleSettings, body: Body, seed: list[int], pac
 def _fleet(kind: Kind, trim: Trim, series: int) -> Fleet:
     numbers = range(series * VEHICLES, (series + 1) * VEHICLES)
     vehicles = [vehicle_of(kind, np.random.default_rng([kind.rotors, index])) for index in numbers]
-    days = []
+    days: list[list[list[Told]]] = []
     for index, (vehicle, body) in zip(numbers, vehicles, strict=True):
         days.append([])
         for day in range(DAYS):
@@ -175,7 +175,7 @@ def _fleet(kind: Kind, trim: Trim, series: int) -> Fleet:
 
 def _faster(kind: Kind, trim: Trim, fleet: Fleet, series: int) -> list[list[Told]]:
     """Fly once more on each day, legs in half of the time: by vehicle and day."""
-    made = []
+    made: list[list[Told]] = []
     for index, (vehicle, body) in enumerate(fleet.vehicles, series * VEHICLES):
         made.append([])
         for day in range(DAYS):
@@ -297,7 +297,8 @@ def _part_of(rights: Iterable[str]) -> set[str]:
 
 def _changes(fleet: Fleet, cases: Sequence[Case], instrument: str) -> tuple[list[list[object]], list[list[object]]]:
     """Give a row a change and size, and one a change: the smallest that is found, and what the tool says would show."""
-    rows, smallest = [], []
+    rows: list[list[object]] = []
+    smallest: list[list[object]] = []
     for name in dict.fromkeys(case.name for case in cases):
         sizes = SIZES[name]
         shares, shows, held = [], [], []

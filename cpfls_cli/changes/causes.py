@@ -78,6 +78,9 @@ _SHAKES = 0.5
 _OF_AXIS = 0.5
 """Of that, by how much each axis differs from the others."""
 
+_DAMAGE_SHAKES = 0.8
+"""Probability that a rotor which pulls less shakes otherwise too."""
+
 _HEAVIER = 0.1
 _ON_ARMS = (1 / 3, 2 / 3)
 """Of the way from the middle to a rotor: places of a mass, beside those half way between two rotors."""
@@ -192,15 +195,14 @@ def _hung(numbers: _Numbers, vehicle: VehicleSettings, place: Array) -> Array:
 
 
 def _shaken_or_not(cause: Cause, numbers: _Numbers) -> Iterator[Cause]:
-    """Give a change with and without another vibration, each as likely as the other.
+    """Give a change with and without another vibration.
 
-    Rotors that turn otherwise shake otherwise, at whatever the log's rate makes of that.
+    Rotors that turn otherwise shake otherwise, at whatever the log's rate makes of that, and damaged ones do mostly.
     """
-    if cause.rotors:
-        yield replace(cause, directions=np.column_stack([cause.directions, *numbers.shakes]))
-        return
-    yield replace(cause, prior=0.5 * cause.prior)
-    yield replace(cause, prior=0.5 * cause.prior, directions=np.column_stack([cause.directions, *numbers.shakes]))
+    shakes = _DAMAGE_SHAKES if cause.rotors else 0.5
+    yield replace(cause, prior=(1 - shakes) * cause.prior)
+    directions = np.column_stack([cause.directions, *numbers.shakes])
+    yield replace(cause, prior=shakes * cause.prior, directions=directions)
 
 
 def _of_kind(numbers: _Numbers, kind: str) -> Iterator[Cause]:

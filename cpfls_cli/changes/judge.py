@@ -19,7 +19,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 FALSE_ALARM = 0.01
 """Probability at which flights of an unchanged vehicle are said to have changed."""
 
-NAMED = 0.9
+NAMED = 0.95
 """Share of the belief from which on a change is named; below, it is one of several that look alike."""
 
 LISTED = 0.03

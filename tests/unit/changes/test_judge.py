@@ -138,6 +138,34 @@ def test_two_rotors_at_once_are_no_third_change():
     assert [each.cause.name for each in found.found] in (["rotors M1 and M2"], ["mass"])
 
 
+def test_a_mass_at_a_place_by_a_hover_that_is_solved():
+    """It adds to the weight, moves the centre of mass, and is turned about it, by the same number."""
+    size, place = 1e-5, ARM * np.array([-1.0, 1.0])
+    names = [*LOADS, "follow roll", "follow pitch"]
+    (weight,) = [cause for cause in causes(names, QUAD) if cause.name == "weight near M3"]
+    moved = np.append(size * place, 0.0)
+    rotors = [replace(rotor, position_m=tuple(rotor.position_m - moved)) for rotor in QUAD.rotors]
+    before, after = hover(QUAD, 1.2 * 9.81), hover(replace(QUAD, rotors=tuple(rotors)), 1.2 * 9.81 * (1 + size))
+    shown = weight.directions[:, 0] / weight.usual
+    assert np.log(after / before) / size == pytest.approx(shown[:4], abs=1e-3)
+    assert shown[4:] == pytest.approx(-1.2 * place**2 / np.array([0.01, 0.012]), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("more", "what"), [([0.3, 0.3, 0.0, 0.0], "rotors M1 and M2"), ([0.3, 0.15, 0.0, 0.15], "mass")]
+)
+def test_a_mass_and_weak_rotors_look_alike(more, what):
+    """Of a mass between two rotors, or on the way to one, loads say hardly anything else than of weak rotors."""
+    rng = np.random.default_rng(14)
+    before = flights(6, rng)
+    mean = {name: float(np.mean([flight.values[name] for flight in before])) for name in NAMES}
+    today = [replace(before[0], values={**mean, **{name: mean[name] + x for name, x in zip(LOADS, more, strict=True)}})]
+    found = changed(today, before, QUAD, rng)
+    (first,) = found.found
+    assert {what, "mass"} <= {first.cause.name, *(name for name, _ in first.alike)}
+    assert first.belief < 0.9 or first.cause.name == "mass"
+
+
 def test_what_shows_does():
     """A rotor that lost as much as is said to show is found in most of many draws."""
     rng = np.random.default_rng(7)
