@@ -17,8 +17,13 @@ class Signal(StrEnum):
     LOGARITHMIC = "sweep-logarithmic"
 
 
-MissionFormat = StrEnum("MissionFormat", "csv px4 ardupilot")
-"""What a path is written as for an autopilot."""
+class MissionFormat(StrEnum):
+    """What a path is written as for an autopilot."""
+
+    CSV = "csv"
+    PX4 = "px4"
+    ARDUPILOT = "ardupilot"
+
 
 WaypointsOption = Annotated[
     Path | None,

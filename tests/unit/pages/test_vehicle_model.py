@@ -275,7 +275,7 @@ def test_a_response_that_is_off_is_none_of_the_vehicle_and_one_that_is_not_seen_
     assert unseen.verdict == Trust.NOT_JUDGED
     assert "do not show the frequency responses of roll and pitch clearly enough" in " ".join(grounds(unseen))
     assert off.summary["responses"]["roll"] == {"word": "not-acceptable", "cost": 101.0, "band_hz": [0.4, 9.0]}
-    assert off.summary["response"]["lag_s"] == off.vehicle.response.lag
+    assert off.summary["response"]["lag_s"] == off.vehicle.response.lag_s
 
 
 @pytest.mark.parametrize(
