@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from cpfls_cli.dynamics.equations_of_motion import TurningLaw, identified_turnin
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.hooks import CarriedBody, Carrier
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.signals import Signals, at_another_instant, feeling
 from cpfls_cli.simulation.actuators import Rotors
 from cpfls_cli.simulation.model import SimulatedEffect, SimulatedEffects
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -56,7 +56,7 @@ class EffectWrench:
         for one, acting in self._in_turn:
             felt = signals
             if one.effect.of_all_forces:
-                felt = signals.feeling((signals.wrench[:, 3:] + total[3:]) / signals.vehicle.mass_kg)
+                felt = feeling(signals, (signals.wrench[:, 3:] + total[3:]) / signals.vehicle.mass_kg)
             total += _columns(one, felt).direct[0] @ acting
         return total
 
@@ -136,7 +136,7 @@ class Plant:
             Of gusts.
         """
         body_rate = state[BODY_RATE]
-        signals = self._any_instant.at(**_channels(state, rotors.speed))
+        signals = at_another_instant(self._any_instant, _channels(state, rotors.speed))
         by_rotors = signals.wrench[0]
         if self.whole is not None:
             squared = rotors.speed**2
@@ -198,7 +198,7 @@ def instant(vehicle: VehicleSettings, state: Array, rotor_speed: Array) -> Signa
     return Signals(time=np.zeros(1), vehicle=vehicle, **_channels(state, rotor_speed))
 
 
-def _channels(state: Array, rotor_speed: Array) -> dict[str, Array]:
+def _channels(state: Array, rotor_speed: Array) -> dict[str, Any]:
     row = state[None]
     return {
         "position": row[:, POSITION],
