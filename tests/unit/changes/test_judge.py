@@ -83,7 +83,7 @@ def test_evidence_by_quadrature(losses):
         return np.exp(-0.5 * apart @ precision @ apart) * norm.pdf(size) * sign
 
     expected = np.log(quad(density, -9, 9, points=[0.0])[0]) + 0.5 * row @ precision @ row
-    assert own.evidence(own.whitened(row[:, None]))[0, 0] == pytest.approx(expected, abs=1e-6)
+    assert own.evidence(own.whitened(row[:, None]), [0])[0, 0] == pytest.approx(expected, abs=1e-6)
 
 
 def flights(count, rng, change=None, names=NAMES, voltage=np.nan):
