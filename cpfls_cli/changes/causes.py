@@ -28,7 +28,9 @@ class Cause:
         The first size, in its unit, where it happens: standard deviation of a normal prior.
     unit : str
     prior : float
-        Beside the others.
+        Beside the others, of the belief in it.
+    searched : float
+        The same where it is searched for; 0 where another way in which it shows stands for it.
     losses : int
         Of the first so many sizes: nearly always above 0. What is damaged pulls less, and no load is lighter than none.
     told : int
@@ -42,6 +44,7 @@ class Cause:
     usual: float
     unit: str
     prior: float = 1.0
+    searched: float = 1.0
     losses: int = 0
     told: int = 1
     ratio: int = 0
@@ -163,22 +166,25 @@ def _of_loads(numbers: _Numbers, vehicle: VehicleSettings) -> Iterator[Cause]:
         yield Cause(f"rotor M{index + 1}", np.stack([single[-1], *beside], axis=1), _LOSS, "1", losses=1, ratio=-1)
     for one, other in combinations(range(len(single)), 2):
         columns = np.stack([single[one], single[other], *beside], axis=1)
-        yield Cause(f"rotors M{one + 1} and M{other + 1}", columns, _LOSS, "1", _RARER, losses=2, told=2, ratio=-1)
+        yield Cause(
+            f"rotors M{one + 1} and M{other + 1}", columns, _LOSS, "1", _RARER, _RARER, losses=2, told=2, ratio=-1
+        )
     moved, heavier = [_OFF_CENTRE * arm * loads(each) for each in own.offset], _HEAVIER * loads(own.mass)
     yield Cause("mass", np.stack([heavier, *moved], axis=1), _HEAVIER, "1", 0.5, ratio=1)
     places = [*(share * place for place in arms for share in _ON_ARMS), *map(sum, combinations(0.5 * arms, 2))]
     for place in places:
         columns = _HEAVIER * _hung(numbers, vehicle, place)[:, None]
-        yield Cause("mass", columns, _HEAVIER, "1", 0.5 / len(places), ratio=1)
+        yield Cause("mass", columns, _HEAVIER, "1", 0.5 / len(places), 0.0, ratio=1)
     if numbers.of_kind("swing"):
         hangs = heavier + _HEAVIER * numbers.direction({"swing": 1.0})
         yield Cause("load on a cable", np.stack([hangs, *moved], axis=1), _HEAVIER, "1", losses=1)
     yield Cause("centre of mass", np.stack(moved, axis=1), _OFF_CENTRE * arm, "m", told=2)
     yield Cause("hover", heavier[:, None], _HEAVIER, "1", ratio=1)
+    share = 1 / len(arms)
     for index, place in enumerate(arms):
         # In hover hardly another thing than a rotor that pulls less.
         columns = _HEAVIER * _hung(numbers, vehicle, place)[:, None]
-        yield Cause(f"weight near M{index + 1}", columns, _HEAVIER, "1", 1 / len(arms), losses=1)
+        yield Cause(f"weight near M{index + 1}", columns, _HEAVIER, "1", share, share, losses=1)
     yield Cause("torque about z", _OF_YAW * loads(own.yaw)[:, None], _OF_YAW, "1")
 
 
@@ -199,10 +205,12 @@ def _shaken_or_not(cause: Cause, numbers: _Numbers) -> Iterator[Cause]:
 
     Rotors that turn otherwise shake otherwise, at whatever the log's rate makes of that, and damaged ones do mostly.
     """
-    shakes = _DAMAGE_SHAKES if cause.rotors else 0.5
-    yield replace(cause, prior=(1 - shakes) * cause.prior)
+    damaged = bool(cause.rotors)
+    shakes = _DAMAGE_SHAKES if damaged else 0.5
+    yield replace(cause, prior=(1 - shakes) * cause.prior, searched=0.0 if damaged else cause.searched)
     directions = np.column_stack([cause.directions, *numbers.shakes])
-    yield replace(cause, prior=shakes * cause.prior, directions=directions)
+    searched = cause.searched if damaged else 0.0
+    yield replace(cause, prior=shakes * cause.prior, searched=searched, directions=directions)
 
 
 def _of_kind(numbers: _Numbers, kind: str) -> Iterator[Cause]:

@@ -178,8 +178,8 @@ def judged(
         at = list(starts).index(since)
         found = _found(spaces[at], means[at], chance) or found
     threshold, first = float(np.quantile(chance, 1 - FALSE_ALARM)), dict[str, int]()
-    for index, cause in enumerate(listed):
-        first.setdefault(cause.name, index)
+    for index in spaces[0].searched:
+        first.setdefault(listed[index].name, index)
     return Change(
         names,
         reference,
@@ -228,7 +228,9 @@ class _Space:
         self.root = np.linalg.cholesky(covariance)
         self.scales = freedom / chdtri(freedom, 1 - _QUANTILES)
         self.white = [self.whitened(cause.directions) for cause in listed]
+        self.searched = [index for index, cause in enumerate(listed) if cause.searched]
         self.prior = np.log([cause.prior for cause in listed])
+        self.searched_prior = np.log([listed[index].searched for index in self.searched])
 
     def whitened(self, apart: Array) -> Array:
         """Turn numbers into such that do not go together, of variance 1, along the first axis."""
@@ -240,10 +242,10 @@ class _Space:
 
     def strongest(self, rows: Array) -> Array:
         """Compute the logarithm of the largest evidence of a change, shape (row,)."""
-        return np.asarray(self.evidence(rows).max(axis=0))
+        return np.asarray((self.evidence(rows, self.searched) + self.searched_prior[:, None]).max(axis=0))
 
-    def evidence(self, rows: Array, beside: Array | None = None) -> Array:
-        """Compute the logarithm of the evidence of each change, shape (cause, row).
+    def evidence(self, rows: Array, of: Sequence[int], beside: Array | None = None) -> Array:
+        """Compute the logarithm of the evidence of changes, without what was believed before, shape (cause, row).
 
         Parameters
         ----------
@@ -257,9 +259,9 @@ class _Space:
         known = base.shape[1]
         each = [
             self._density(rows, np.hstack([base, own]), slice(known, known + cause.losses))
-            for own, cause in zip(self.white, self.listed, strict=True)
+            for own, cause in ((self.white[index], self.listed[index]) for index in of)
         ]
-        return np.array(each) - without + self.prior[:, None]
+        return np.array(each) - without
 
     def _density(self, rows: Array, directions: Array, losses: slice = _NONE) -> Array:
         """Compute the logarithm of the density of whitened rows, but for what all have in common, shape (row,).
@@ -314,7 +316,7 @@ class _Space:
         def is_enough(size: float) -> bool:
             rows = drawn + size * own[:, :1]
             evidence = self._density(rows, own, slice(0, cause.losses)) - self._density(rows, own[:, :0])
-            return bool(np.mean(evidence + self.prior[index] >= threshold) >= _POWER)
+            return bool(np.mean(evidence + np.log(cause.searched) >= threshold) >= _POWER)
 
         first = bisect_left(_SIZES, x=True, key=is_enough)
         return cause.size(_SIZES[first] * cause.usual) if first < len(_SIZES) else float("inf")
@@ -341,14 +343,14 @@ def _found(space: _Space, row: Array, chance: Array) -> tuple[Found, ...]:
     """Name one change after another while each explains more than chance beside the others."""
     chosen: list[int] = []
     while len(chosen) < _MOST:
-        evidence = _beside(space, row, chosen)
+        evidence = _beside(space, row, space.searched, chosen) + space.searched_prior
         best = int(np.argmax(evidence))
         if beyond_chance(chance, float(evidence[best])) > FALSE_ALARM:
             break
-        chosen.append(best)
+        chosen.append(space.searched[best])
         # What came first was chosen for what the others do too.
-        for index in [*chosen] * 2:
-            others = [other for other in chosen if other != index]
+        for _ in range(2 * len(chosen)):
+            others = chosen[1:]
             beliefs = _beliefs(space, row, others)
             of_name = _by_name(space, beliefs)
             most = max(of_name, key=lambda name: of_name[name])
@@ -377,7 +379,7 @@ def _by_name(space: _Space, beliefs: Array) -> dict[str, float]:
 
 def _beliefs(space: _Space, row: Array, there: Sequence[int]) -> Array:
     """Compute the belief in each change beside those that are there, shape (cause,)."""
-    evidence = _beside(space, row, there)
+    evidence = _beside(space, row, range(len(space.listed)), there) + space.prior
     share = np.exp(evidence - evidence.max())
     return np.asarray(share / share.sum())
 
@@ -397,13 +399,11 @@ def _since(space: _Space, apart: Array, found: Sequence[Found], starts: Sequence
     return min(starts, key=apart_from)
 
 
-def _beside(space: _Space, row: Array, there: Sequence[int]) -> Array:
-    """Compute the logarithm of the evidence of each change beside those that are there, shape (cause,)."""
+def _beside(space: _Space, row: Array, of: Sequence[int], there: Sequence[int]) -> Array:
+    """Compute the logarithm of the evidence of changes beside those that are there, shape (cause,)."""
     beside = np.hstack([space.white[index] for index in there]) if there else None
-    evidence = space.evidence(row[:, None], beside)[:, 0]
     names = {space.listed[index].name for index in there}
     rotors = frozenset[str]().union(*(space.listed[index].rotors for index in there))
-    for index, cause in enumerate(space.listed):
-        if cause.name in names or cause.rotors & rotors:
-            evidence[index] = -np.inf
-    return evidence
+    causes_of = [space.listed[index] for index in of]
+    known = [cause.name in names or bool(cause.rotors & rotors) for cause in causes_of]
+    return np.where(known, -np.inf, space.evidence(row[:, None], of, beside)[:, 0])
