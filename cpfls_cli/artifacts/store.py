@@ -53,6 +53,8 @@ _PLAIN = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
 """Neither the time of writing nor an order of attributes is kept."""
 _PLAIN.set_obj_track_times(False)
 _PLAIN.set_attr_creation_order(0)
+_PLAIN_KINDS = "Siuf"
+"""Kinds of numbers and text that artifacts hold."""
 _KEPT_BYTES = 1_000_000
 """Size up to which an artifact that was read is kept."""
 
@@ -144,11 +146,24 @@ def read_artifact(path: Path, *wanted: Format) -> Artifact:
 
 def _read_whole(path: Path, *wanted: Format) -> Artifact:
     with opened(path, *wanted) as stored, patient(path):
-        require_all(path, stored)
-        refuse(path, check_structure(stored))
-        artifact = Artifact(stored.spec, stored.header, {name: _read(own) for name, own in stored.data.items()})
-        refuse(path, check_values(artifact))
-        return artifact
+        # What is large is not read before its structure is known to be good.
+        if _size_of(stored) > _KEPT_BYTES:
+            require_all(path, stored)
+            refuse(path, check_structure(stored))
+        return _all_of(path, stored)
+
+
+def _all_of(path: Path, stored: Stored) -> Artifact:
+    require_all(path, stored)
+    artifact = Artifact(stored.spec, stored.header, {name: _read(own) for name, own in stored.data.items()})
+    refuse(path, check_structure(artifact) or check_values(artifact))
+    return artifact
+
+
+def _size_of(stored: Stored) -> int:
+    """Count the bytes of all datasets as they are in memory: compressed, a small file may hold much."""
+    parts = (own.id for own in stored.data.values())
+    return sum(part.get_space().get_simple_extent_npoints() * part.get_type().get_size() for part in parts)
 
 
 def _known(path: Path, look: Callable[[FileState], T | None]) -> T | None:
@@ -163,10 +178,8 @@ def _known(path: Path, look: Callable[[FileState], T | None]) -> T | None:
 def _small(state: FileState) -> Artifact | None:
     if state.size > _KEPT_BYTES:
         return None
-    with opened(state.path) as stored:
-        # Compressed, a small file may hold much.
-        small = sum(own.nbytes for own in stored.data.values()) <= _KEPT_BYTES
-    return _read_whole(state.path) if small else None
+    with opened(state.path) as stored, patient(state.path):
+        return _all_of(state.path, stored) if _size_of(stored) <= _KEPT_BYTES else None
 
 
 class _Origin(NamedTuple):
@@ -239,6 +252,12 @@ def format_name(path: Path) -> str | None:
     return None if known is None else known.spec.name
 
 
+def kind_name(path: Path) -> str | None:
+    """Tell the kind that a file is of its format without reading it whole; None where it is no artifact."""
+    known = _known(path, _origin_of)
+    return None if known is None else known.spec.kind
+
+
 def holds(path: Path, wanted: type[Record]) -> bool:
     """Tell whether a file is an artifact of one format, and of its kind, without reading it whole."""
     known = _known(path, _origin_of)
@@ -255,10 +274,14 @@ def read_header(path: Path) -> Header:
 
 
 def _read(dataset: h5py.Dataset) -> Any:
-    value = dataset[()]
-    if dataset.dtype.kind == "S":
-        return np.char.decode(np.asarray(value), "utf-8")
-    return value
+    kind = dataset.dtype
+    if kind.kind not in _PLAIN_KINDS:
+        return dataset[()]
+    # As `dataset[()]`, which takes three times as long for what is small.
+    value = np.empty(dataset.shape, kind)
+    if value.size:
+        dataset.id.read(h5py.h5s.ALL, h5py.h5s.ALL, value)
+    return np.char.decode(value, "utf-8") if kind.kind == "S" else value[()]
 
 
 def write_artifact(path: Path, artifact: Artifact) -> None:

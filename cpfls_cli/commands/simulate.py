@@ -7,29 +7,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import MOTION, FlightRecord
-from cpfls_cli.artifacts.job import Job, begin, finish, go_on
+from cpfls_cli.artifacts.job import Job, begin, finish, go_on, require_numbers
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import holds, read_record
+from cpfls_cli.artifacts.store import holds, kind_name, read_record
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
-from cpfls_cli.commands import tracking
-from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.flights.models import read_model
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.pages.disturbance import still_air_text
 from cpfls_cli.pages.flight import answer, autopilot_text
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trajectory import violation_sentence
-from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.simulation.inverse import SimulatedFlight, simulate
@@ -37,6 +32,11 @@ from cpfls_cli.simulation.measured import MeasuredFlight, measure
 from cpfls_cli.simulation.model import played_gusts, simulated_effects, with_effects
 from cpfls_cli.simulation.settings import Mode
 
+if TYPE_CHECKING:
+    from cpfls_cli.playback.model import VehicleModel
+
+_WHOLE = "vehicle"
+"""Kind of a model of a whole vehicle."""
 _MOVED = ("position", "velocity", "acceleration")
 _EFFECT_FORM = "write NAME=VALUE[,VALUE...] or NAME.coefficient=VALUE, see `cpfls effects NAME`"
 
@@ -48,13 +48,13 @@ def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None 
             raise InputError(f"{trajectory}: --mode {mode}: along a flight all is flown in closed loop; leave it out")
         return import_module("cpfls_cli.commands.twin").run(job, trajectory, model)  # type: ignore[no-any-return]
     if model is not None and mode is None:
-        whole = holds(model, VehicleRecord)
+        whole = kind_name(model) == _WHOLE
         job = replace(job, study=_with_mode(job.study, "closed-loop" if whole else "computed-torque"))
-    job = with_numbers(job, "simulate", model)
+    job = _with_numbers(job, model)
     if job.study.simulation.mode == "computed-torque":
         if model is None:
             raise InputError("simulation.mode = computed-torque: controls the attitude with a model; add --model MODEL")
-        return tracking.run(job, trajectory, model)
+        return import_module("cpfls_cli.commands.tracking").run(job, trajectory, model)  # type: ignore[no-any-return]
     closed = job.study.simulation.mode == "closed-loop"
     if model is not None and not closed:
         raise InputError(
@@ -63,7 +63,7 @@ def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None 
         )
     inputs = begin(job, {"trajectory": trajectory} | ({} if model is None else {"model": model}))
     time, planned = _plan(trajectory, closed)
-    flown = None if model is None else read_model(model, job.study)
+    flown = None if model is None else import_module("cpfls_cli.flights.models").read_model(model, job.study)
     with settings_of("simulation", job.study):
         with_effects(flown, simulated_effects(job.study.simulation.closed_loop.effects, job.study.vehicle))
         played_gusts(flown, job.study.simulation.closed_loop.gusts)
@@ -72,6 +72,14 @@ def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None 
     if closed:
         return _closed_loop(job, inputs, time, planned, flown)
     return _inverse(job, inputs, time, planned, trajectory)
+
+
+def _with_numbers(job: Job, model: Path | None) -> Job:
+    """Take what the config leaves open from a model; without one nothing is loaded that reads models."""
+    if model is None:
+        require_numbers(job, "simulate", whole=False)
+        return job
+    return import_module("cpfls_cli.commands.numbers").with_numbers(job, "simulate", model)  # type: ignore[no-any-return]
 
 
 def _with_mode(study: Study, usual: Mode) -> Study:

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish, go_on
+from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish, go_on, require_numbers
 from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.trajectory import ExcitedGroup, TrajectoryRecord
 from cpfls_cli.commands.mission import Mission, mission_paths, mission_texts, write_mission
-from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError, SettingError
 from cpfls_cli.excitation.optimise import Excitation, optimised_rotation
@@ -81,7 +80,7 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False, mission: Mi
     mission = mission or Mission()
     inputs = begin(job, {"waypoints": waypoints} if waypoints else {})
     settings = _settings(job.study, waypoints)
-    job = with_numbers(job, "trajectory", None, whole=not settings.held)
+    require_numbers(job, "trajectory", whole=not settings.held)
     figures = figure_paths(job, figure_names(held=settings.held) if plot else ())
     check_outputs(job, *figures, *mission_paths(job, mission))
     # To optimise takes long; what else can go wrong shows only when it is planned.

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.linalg import polar
-from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import jackknife_error
@@ -99,6 +98,7 @@ class Kinematics:
 def kinematics(signals: Signals, windows: Windows) -> Kinematics | None:
     """Cut a flight with attitude into windows, clear of its ends by the longest delay; None for too short a one."""
     from scipy.interpolate import CubicSpline
+    from scipy.spatial.transform import Rotation
 
     margin = int(np.ceil(LONGEST_DELAY_S / windows.period))
     inside = slice(margin, len(signals) - margin)
@@ -288,6 +288,8 @@ def _padded(solutions: Array, columns: IntArray) -> Array:
 
 def _faults(solution: Array, base: float) -> Array:
     """Invert ``M, c`` to faults; the left polar form separates scale and cross-axis from rotation exactly."""
+    from scipy.spatial.transform import Rotation
+
     inverse = np.linalg.inv(np.eye(3) + solution[:9].reshape(3, 3))
     turned, stretched = polar(inverse, side="left")
     misalignment = -Rotation.from_matrix(turned).as_rotvec()

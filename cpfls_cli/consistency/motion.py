@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import jackknife_error
@@ -188,6 +187,8 @@ def checked(flights: Sequence[Signals], windows: Windows, channel: str | None = 
 
 def beside_lean(part: Signals) -> Iterator[Finding]:
     """Say which of position and velocity no lean makes of gravity in their unit, where the lean explains them."""
+    from scipy.spatial.transform import Rotation
+
     if part.attitude is None or len(part) * part.period < _LEAST_OF_LEAN_S:
         return
     rotation, rate_hz = Rotation.from_matrix(part.rotation), 1 / part.period

@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.vehicle.rotors import BodyWrench, body_wrench
+from cpfls_cli.vehicle.rotors import BodyWrench, allocation_matrix, body_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _T = TypeVar("_T")
@@ -21,9 +21,23 @@ _SHORTEST = 8
 
 _OF_MOTION = (
     *("rotation", "ground_velocity", "air_velocity"),
-    *("hubs", "spins", "radii", "hub_velocity", "hub_height"),
+    *("hubs", "spins", "radii", "allocation", "hub_velocity", "hub_height"),
 )
 """Cached properties that no rotor speed changes."""
+_OF_VEHICLE = ("hubs", "spins", "radii", "allocation")
+"""Cached properties that no motion changes."""
+_OF_FORCE = ("force", "available", "of_motion", "made")
+"""What is kept of a flight and may hang on the force that is felt."""
+
+
+class _kept(cached_property[_T]):  # noqa: N801
+    """A cached property without the lock that Python 3.11 takes at each first look, of which a flight has thousands."""
+
+    def __get__(self, signals: Any, owner: type[Any] | None = None) -> Any:
+        if signals is None:
+            return self
+        value = signals.__dict__[self.attrname] = self.func(signals)
+        return value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,7 +108,7 @@ class Signals:
         """Sampling period, s."""
         return float(self.time[1] - self.time[0])
 
-    @cached_property
+    @_kept
     def available(self) -> frozenset[str]:
         """Names of the signals that effects can need and the flight has."""
         radius = all(rotor.radius_m is not None for rotor in self.vehicle.rotors)
@@ -137,25 +151,25 @@ class Signals:
         )
         return known and self.thrust is not None
 
-    @cached_property
+    @_kept
     def torque(self) -> Array | None:
         """Body torque of the rotors, shape (time, 3), N m."""
         if self.rotor_speed is None:
             return self.stated_torque
         return self._of_rotors.body_torque
 
-    @cached_property
+    @_kept
     def thrust(self) -> Array | None:
         """Thrust along body z, shape (time,), N."""
         if self.rotor_speed is None:
             return self.stated_thrust
         return self._of_rotors.thrust
 
-    @cached_property
+    @_kept
     def _of_rotors(self) -> BodyWrench:
-        return body_wrench(self.vehicle, self.speed)
+        return body_wrench(self.vehicle, self.speed, self.allocation)
 
-    @cached_property
+    @_kept
     def wrench(self) -> Array:
         """Torque and force of the rotors, and of what is known beside them, shape (time, 6); unknown parts are 0."""
         wrench = np.zeros((len(self), 6)) if self.beside is None else self.beside.copy()
@@ -165,7 +179,7 @@ class Signals:
             wrench[:, 5] += self.thrust
         return wrench
 
-    @cached_property
+    @_kept
     def force(self) -> Array:
         """Force on the vehicle without weight, shape (time, 3), N, body frame.
 
@@ -179,55 +193,60 @@ class Signals:
             return np.asarray(mass * (felt + gravity * self.rotation[:, 2]))
         return self.wrench[:, 3:]
 
-    @cached_property
+    @_kept
     def speed(self) -> Array:
         """Rotor speeds, shape (time, rotor), rad/s."""
         assert self.rotor_speed is not None, "an effect that needs rotor speeds declares so"
         return self.rotor_speed
 
-    @cached_property
+    @_kept
     def rotation(self) -> Array:
         """Body to world, shape (time, 3, 3)."""
         assert self.attitude is not None, "an effect that needs the attitude declares so"
         return rotations.rotation_matrix(self.attitude)
 
-    @cached_property
+    @_kept
     def ground_velocity(self) -> Array:
         """Velocity of the centre of mass over the ground, shape (time, 3), m/s, body frame."""
         assert self.velocity is not None, "an effect that needs velocity declares so"
         return np.asarray(np.einsum("tji,tj->ti", self.rotation, self.velocity))
 
-    @cached_property
+    @_kept
     def air_velocity(self) -> Array:
         """Velocity of the centre of mass through the air, shape (time, 3), m/s, body frame."""
         return self.ground_velocity if self.wind is None else self.ground_velocity - self.wind @ self.rotation
 
-    @cached_property
+    @_kept
     def of_motion(self) -> dict[Hashable, Array]:
-        """What effects derive from the motion alone, kept for the same flight with other rotor speeds."""
+        """Keep what effects derive from the motion alone, for the same flight with other rotor speeds."""
         return {}
 
-    @cached_property
+    @_kept
     def hubs(self) -> Array:
         """Hub positions relative to the centre of mass, shape (rotor, 3), m, body frame."""
         return np.array([rotor.position_m for rotor in self.vehicle.rotors])
 
-    @cached_property
+    @_kept
+    def allocation(self) -> Array:
+        """Thrust and body torque of squared rotor speeds, shape (4, rotor)."""
+        return allocation_matrix(self.vehicle)
+
+    @_kept
     def spins(self) -> Array:
         """Spin directions, shape (rotor,), +1 counter-clockwise from above."""
         return np.array([float(rotor.spin) for rotor in self.vehicle.rotors])
 
-    @cached_property
+    @_kept
     def rotor_thrust(self) -> Array:
         """Thrust of each rotor, shape (time, rotor), N."""
         return np.asarray(self.speed**2 * [rotor.thrust_factor_n_s2 for rotor in self.vehicle.rotors])
 
-    @cached_property
+    @_kept
     def hub_velocity(self) -> Array:
         """Velocity of each hub through the air, ``v + omega x r_i``, shape (time, rotor, 3), m/s, body frame."""
         return np.asarray(self.air_velocity[:, None] + rotations.cross(self.body_rate[:, None], self.hubs[None]))
 
-    @cached_property
+    @_kept
     def hub_height(self) -> Array:
         """Height of each hub above the ground, shape (time, rotor), m."""
         assert self.position is not None, "an effect that needs the height declares so"
@@ -236,7 +255,7 @@ class Signals:
         height = fused(self.position[:, 2], climb, self.period) if len(self) > _SHORTEST else self.position[:, 2]
         return np.asarray(height[:, None] - self.ground_height_m + above)
 
-    @cached_property
+    @_kept
     def radii(self) -> Array:
         """Radius of each propeller, shape (rotor,), m."""
         return np.array([rotor.radius_m for rotor in self.vehicle.rotors], dtype=float)
@@ -266,6 +285,26 @@ class Signals:
         changed.__dict__.update({name: getattr(self, name) for name in _OF_MOTION if name in self.__dict__})
         changed.__dict__["of_motion"] = self.of_motion
         return changed
+
+    def at(self, **channels: Array) -> Signals:
+        """Exchange channels of one instant; what follows from the vehicle alone is kept.
+
+        A simulation does so at each of its steps, where `replace` takes as long as all that is computed.
+        """
+        changed = object.__new__(Signals)
+        changed.__dict__.update({name: getattr(self, name) for name in (*_FIELDS, *_OF_VEHICLE)}, **channels)
+        return changed
+
+    def feeling(self, specific_force: Array) -> Signals:
+        """Exchange the specific force, shape (time, 3), m/s^2, and keep all that does not follow from it."""
+        changed = object.__new__(Signals)
+        changed.__dict__.update(self.__dict__, specific_force=specific_force)
+        for name in _OF_FORCE:
+            changed.__dict__.pop(name, None)
+        return changed
+
+
+_FIELDS = tuple(each.name for each in fields(Signals))
 
 
 def stretch_of(signals: Signals, part: slice) -> Signals:

@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations, product
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.repair import align_quaternion_signs
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 _FILTER_ORDER = 2
 _EDGE_S = 0.5
@@ -156,6 +158,8 @@ def slow(values: Array, rate_hz: float, cutoff_hz: float = SLOW_HZ) -> Array:
 
 def rotations_of(quaternion: Array, order: str, inverse: bool = False) -> Rotation:
     """Make rotations of quaternions, of body to world; `inverse` where the log has them from world to body."""
+    from scipy.spatial.transform import Rotation
+
     scalar_last = np.roll(quaternion, -1, axis=1) if order == "wxyz" else quaternion
     rotation = Rotation.from_quat(scalar_last)
     return rotation.inv() if inverse else rotation
@@ -163,6 +167,8 @@ def rotations_of(quaternion: Array, order: str, inverse: bool = False) -> Rotati
 
 def on_clock(rotation: Rotation, time: Array, clock: Array) -> Rotation:
     """Interpolate rotations to a clock, near enough for the comparison of slow motion."""
+    from scipy.spatial.transform import Rotation
+
     quaternion = align_quaternion_signs(np.asarray(rotation.as_quat()))
     columns = np.column_stack([np.interp(clock, time, column) for column in quaternion.T])
     return Rotation.from_quat(columns)

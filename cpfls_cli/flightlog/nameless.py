@@ -1,10 +1,11 @@
 """Columns of a matrix that bear numbers and no names, recognised by how they move together."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.agreement import (
@@ -21,6 +22,9 @@ from cpfls_cli.flightlog.names import ColumnGroup, Named
 from cpfls_cli.flightlog.settings import SignalName
 from cpfls_cli.rounding import less
 from cpfls_cli.units import STANDARD_GRAVITY
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 _FEWEST_COLUMNS = 12
 """Attitude, rates, accelerometer and rotors are as many and more; what is narrower is another matrix."""

@@ -7,14 +7,15 @@ than it is named. A column that disagrees with all others is then the odd one, a
 takes less than twice as much, the log does not tell.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import permutations, product
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.agreement import (
@@ -32,6 +33,9 @@ from cpfls_cli.flightlog.agreement import (
     slow,
     turning_of,
 )
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 CLEAR: Final = 0.3
 """Share of a signal that another has to explain to say something about it."""
@@ -148,7 +152,7 @@ class Reading:
         rates = AS_NAMED if self.rates is None else (self.rates.order, self.rates.sign)
         return {"attitude": (own.order, own.sign), "body_rate": rates, "position": (self.place_order, self.place_sign)}
 
-    def differs(self, other: "Reading") -> bool:
+    def differs(self, other: Reading) -> bool:
         """Tell whether another reading makes something else of the log."""
         return (self.maps, self.body, self.attitude.scalar_last) != (other.maps, other.body, other.attitude.scalar_last)
 
@@ -205,6 +209,8 @@ def euler_readings(angles: Array, time: Array, grid: Array) -> Iterator[Attitude
     ----------
     angles : array, shape (sample, 3), rad
     """
+    from scipy.spatial.transform import Rotation
+
     # A pitch that is positive with the nose up, a heading like that of a compass, or both, are conventions.
     usual = ((1.0, 1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, -1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, 1.0))
     signs = (*usual, *(own for own in product((1.0, -1.0), repeat=3) if own not in usual))

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cpfls_cli.artifacts.disturbance import DisturbanceGroup, GustAxis
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.report.content import Block, Table, Text
 from cpfls_cli.report.numbers import number
 from cpfls_cli.words import joined
+
+if TYPE_CHECKING:
+    from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
 
 def gust_blocks(record: VehicleRecord, index: int) -> Iterator[Block]:

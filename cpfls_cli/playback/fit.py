@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, jackknife_covariance
@@ -115,6 +114,8 @@ def rate_stays(flight: PlaybackFlight, starts: IntArray, horizon: int) -> Array:
     -------
     array, shape (horizon, 4), m, m/s, rad, rad/s
     """
+    from scipy.spatial.transform import Rotation
+
     motion, errors = flight.motion, np.zeros((horizon, 4))
     turned = Rotation.from_matrix(motion.rotation[starts])
     for step in range(1, horizon + 1):

@@ -95,7 +95,7 @@ class Battery:
 
     def voltage(self, time: float, rotor_speed: Array) -> float:
         """Compute the voltage some time after take-off, s, at rotor speeds, shape (rotor,), rad/s."""
-        power = float(np.sum(rotor_speed**3)) / self.hover_cubed
+        power = float((rotor_speed**3).sum()) / self.hover_cubed
         return max(1 - self.use * time / self.duration - self.load * (power - 1), _LOWEST_VOLTAGE)
 
 

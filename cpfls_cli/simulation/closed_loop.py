@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, cos, pi
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulation.actuators import Actuators, Mixer, Rotors, actuators, mixer
 from cpfls_cli.simulation.law_pilot import Asked, GyroscopeNoise, integration_rate, law_pilot
@@ -31,6 +30,9 @@ from cpfls_cli.simulation.plant import (
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.trajectory.planning import sample_interval
 from cpfls_cli.vehicle.settings import VehicleSettings
+
+if TYPE_CHECKING:
+    from cpfls_cli.playback.model import VehicleModel
 
 _ROUNDING = 1e-6
 _STEPS_BETWEEN_REPORTS = 100

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,10 +13,12 @@ from cpfls_cli.effects.effect import Coefficient, Effect, Shape
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import SettingError
-from cpfls_cli.playback.gusts import Gusts
-from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.vehicle.settings import VehicleSettings
+
+if TYPE_CHECKING:
+    from cpfls_cli.playback.gusts import Gusts
+    from cpfls_cli.playback.model import VehicleModel
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +15,12 @@ from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.hooks import CarriedBody, Carrier
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.simulation.actuators import Rotors
 from cpfls_cli.simulation.model import SimulatedEffect, SimulatedEffects
 from cpfls_cli.vehicle.settings import VehicleSettings
+
+if TYPE_CHECKING:
+    from cpfls_cli.playback.model import VehicleModel
 
 POSITION, VELOCITY, ATTITUDE, BODY_RATE = (slice(3 * n, 3 * n + 3) for n in range(4))
 VEHICLE_STATES = 12
@@ -49,13 +53,17 @@ class EffectWrench:
         for one in self.effects:
             if one.effect.kind == "wrench" and one.effect.apply is not None:
                 signals = one.effect.apply(signals, one.shape)
-        # What has a lever for all forces comes last.
-        for one in sorted(self.effects, key=lambda each: each.effect.of_all_forces):
+        for one, acting in self._in_turn:
             felt = signals
             if one.effect.of_all_forces:
-                felt = replace(signals, specific_force=(signals.wrench[:, 3:] + total[3:]) / signals.vehicle.mass_kg)
-            total += _columns(one, felt).direct[0] @ one.acting
+                felt = signals.feeling((signals.wrench[:, 3:] + total[3:]) / signals.vehicle.mass_kg)
+            total += _columns(one, felt).direct[0] @ acting
         return total
+
+    @cached_property
+    def _in_turn(self) -> list[tuple[SimulatedEffect, Array]]:
+        """Effects with their coefficients; what has a lever for all forces comes last."""
+        return [(one, one.acting) for one in sorted(self.effects, key=lambda each: each.effect.of_all_forces)]
 
 
 def effect_wrench(chosen: SimulatedEffects, hover: Signals) -> EffectWrench:
@@ -128,7 +136,7 @@ class Plant:
             Of gusts.
         """
         body_rate = state[BODY_RATE]
-        signals = instant(self.vehicle, state, rotors.speed)
+        signals = self._any_instant.at(**_channels(state, rotors.speed))
         by_rotors = signals.wrench[0]
         if self.whole is not None:
             squared = rotors.speed**2
@@ -153,6 +161,11 @@ class Plant:
         change[ATTITUDE] = rotations.attitude_rate(state[None, ATTITUDE], body_rate[None])[0]
         change[BODY_RATE] = turning
         return change
+
+    @cached_property
+    def _any_instant(self) -> Signals:
+        """An instant that knows what follows from the vehicle alone."""
+        return instant(self.vehicle, np.zeros(VEHICLE_STATES), np.zeros(len(self.vehicle.rotors)))
 
 
 def plant_of(
@@ -182,13 +195,15 @@ def instant(vehicle: VehicleSettings, state: Array, rotor_speed: Array) -> Signa
     state : array, shape (state,)
     rotor_speed : array, shape (rotor,), rad/s
     """
+    return Signals(time=np.zeros(1), vehicle=vehicle, **_channels(state, rotor_speed))
+
+
+def _channels(state: Array, rotor_speed: Array) -> dict[str, Array]:
     row = state[None]
-    return Signals(
-        time=np.zeros(1),
-        vehicle=vehicle,
-        position=row[:, POSITION],
-        velocity=row[:, VELOCITY],
-        attitude=row[:, ATTITUDE],
-        body_rate=row[:, BODY_RATE],
-        rotor_speed=rotor_speed[None],
-    )
+    return {
+        "position": row[:, POSITION],
+        "velocity": row[:, VELOCITY],
+        "attitude": row[:, ATTITUDE],
+        "body_rate": row[:, BODY_RATE],
+        "rotor_speed": rotor_speed[None],
+    }

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray
@@ -244,6 +243,8 @@ class _SquaredErrors:
 
 
 def _errors(measured: MeasuredWindows, sample: int, state: RotationState) -> tuple[Array, Array]:
+    from scipy.spatial.transform import Rotation
+
     away = measured.rotation[:, sample].swapaxes(1, 2) @ state.rotation
     return Rotation.from_matrix(away).as_rotvec(), state.body_rate - measured.body_rate[:, sample]
 

@@ -116,15 +116,17 @@ def figures_of_vehicle(vehicle: VehicleSettings) -> Figures:
     return figures_of(**known)
 
 
-def body_wrench(vehicle: VehicleSettings, rotor_speed: Array) -> BodyWrench:
+def body_wrench(vehicle: VehicleSettings, rotor_speed: Array, allocation: Array | None = None) -> BodyWrench:
     """Compute thrust and body torque from rotor speeds.
 
     Parameters
     ----------
     rotor_speed : array, shape (time, rotor), rad/s
+    allocation : array, shape (4, rotor), or None
+        `allocation_matrix` of the vehicle, where it was computed before.
     """
     require_columns("rotor_speed", rotor_speed, len(vehicle.rotors))
-    wrench = rotor_speed**2 @ allocation_matrix(vehicle).T
+    wrench = rotor_speed**2 @ (allocation_matrix(vehicle) if allocation is None else allocation).T
     return BodyWrench(thrust=wrench[:, 0], body_torque=wrench[:, 1:])
 
 

@@ -11,10 +11,12 @@ from cpfls_cli.effects.effect import Coefficient, Columns, Effect, a_few_percent
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.rotations import cross
 
+_AXES = np.eye(3)[None]
+
 
 def _levers(signals: Signals, axes: int) -> Columns:
     direct = np.zeros((len(signals), 6, axes))
-    direct[:, :3] = -cross(np.eye(3)[None, :axes], signals.force[:, None]).swapaxes(1, 2)
+    direct[:, :3] = -cross(_AXES[:, :axes], signals.force[:, None]).swapaxes(1, 2)
     return Columns(direct)
 
 
