@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
@@ -33,11 +33,13 @@ _OF_FORCE = ("force", "available", "of_motion", "made")
 class _kept(cached_property[_T]):  # noqa: N801
     """A cached property without the lock that Python 3.11 takes at each first look, of which a flight has thousands."""
 
-    def __get__(self, signals: Any, owner: type[Any] | None = None) -> Any:
-        if signals is None:
-            return self
-        value = signals.__dict__[self.attrname] = self.func(signals)
-        return value
+    if not TYPE_CHECKING:
+
+        def __get__(self, signals: Signals | None, owner: type[Signals] | None = None) -> Any:
+            if signals is None:
+                return self
+            value = signals.__dict__[self.attrname] = self.func(signals)
+            return value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

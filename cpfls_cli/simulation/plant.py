@@ -195,7 +195,8 @@ def instant(vehicle: VehicleSettings, state: Array, rotor_speed: Array) -> Signa
     state : array, shape (state,)
     rotor_speed : array, shape (rotor,), rad/s
     """
-    return Signals(time=np.zeros(1), vehicle=vehicle, **_channels(state, rotor_speed))
+    still = Signals(time=np.zeros(1), vehicle=vehicle, body_rate=np.zeros((1, 3)))
+    return still.at(**_channels(state, rotor_speed))
 
 
 def _channels(state: Array, rotor_speed: Array) -> dict[str, Array]:
