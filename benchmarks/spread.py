@@ -1,7 +1,8 @@
 """How often 1000 closed-loop flights of vehicles that were drawn hold the rates of a flight that was held out.
 
     python benchmarks/spread.py simulated
-    python benchmarks/spread.py real DATA
+    python benchmarks/spread.py real DATA [COUNT]
+    python benchmarks/spread.py nanobench DATA [COUNT]
 
 simulated: two vehicles of 45 g and 1.5 kg in gusts, whose truth is known. A path with sines of up to 5 Hz is flown four
 times, 20 s each; the constants, how they go together, and the gusts are found in these flights as `cpfls vehicle` does
@@ -10,14 +11,18 @@ motors that flew, each in gusts of its own and with the noise of the gyroscope: 
 export, which takes the samples as they are. Counted is how often the rates of flights that were held out, in gusts of
 their own, lie between the 2.5th and the 97.5th percentile of the 1000 at that instant.
 
-Beside it: all vehicles the estimate, in gusts; vehicles drawn, in still air; numbers drawn from their ranges each by
-itself; and the truth in its true gusts, which is what can be had.
+Beside it: vehicles drawn without what the model lacks; all vehicles the estimate, in gusts; vehicles drawn, in still
+air, with nothing lacking; numbers drawn from their ranges each by itself; and the truth in its true gusts, which is
+what can be had.
 
 real: the nano-drone benchmark (see nanodrone.py for DATA). Constants and gusts are found in its training flights, each
 path of which was flown three or four times. The law of its autopilot is not known: how torque and thrust answer is
 found in how runs of one path differ. Vehicles drawn fly the test flights in closed loop, asked what the flight was
 asked: their rotors turn as logged, and answer the difference to the logged state by that law. About yaw these flights
 tell neither the moment of inertia nor gusts, so all keep the logged heading, and roll and pitch are counted.
+
+nanobench: the same with another vehicle (DATA: the folder datasets/dataset of syediu/nanobench-iros2026), whose log
+holds commands in place of rotor speeds, and whose moments of inertia are the published ones.
 
 Needs jax (extra `simulators`); real needs pyarrow (extra `parquet`) too.
 """
@@ -33,6 +38,8 @@ from typing import Any, NamedTuple
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.shared.measure import pin_threads, table
+from benchmarks.shared.nanobench_files import VEHICLE as NANOBENCH
+from benchmarks.shared.nanobench_files import commanded_flights, playback_of
 from benchmarks.shared.nanodrone_files import TEST, TRAINING, VEHICLE, flights
 
 pin_threads()
@@ -117,16 +124,18 @@ def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
             blocks=spread.blocks,
             loop=np.ones((2, 3)),
             gusts=None if held is None else GustRanges.of_known(*(getattr(gusts, name) for name in RANGES)),
+            lack=None if gusts is None else gusts.lack,
         ),
     )
 
 
 class Fleet(NamedTuple):
-    """Vehicles side by side: parameters of the functions in JAX, and gusts."""
+    """Vehicles side by side: parameters of the functions in JAX, gusts, and what comes like them."""
 
     module: Mapping[str, Any]
     parameters: Array
     gusts: Array
+    lack: Array
     inertia: Array
     mass: Array
 
@@ -136,14 +145,43 @@ def fleet(nominal: VehicleModel, models: Sequence[VehicleModel], *, still: bool 
     sheet = sheet_of_vehicle(replace(nominal, gusts=None))
     module = executed(exported(sheet, "jax", "v.py").text)
     none = Gusts(np.zeros(6), np.ones(6))
-    gusts = np.array([none if still or each.gusts is None else each.gusts for each in models])
+    blowing = [(none, none) if still else (each.gusts or none, each.lack or none) for each in models]
+    gusts, lack = (np.array(own) for own in zip(*blowing, strict=True))
     return Fleet(
         module,
         jax_parameters(sheet, models),
         gusts,
+        lack,
         np.array([each.body.inertia for each in models]),
         np.array([each.body.mass for each in models]),
     )
+
+
+class Air(NamedTuple):
+    """Torque and force that act on vehicles beside those of their models: gusts and what comes like them."""
+
+    keep: Any
+    fresh: Any
+    white: Any
+
+    @classmethod
+    def of(cls, flying: Fleet, step: float) -> Air:
+        """Play them as docs/spread.md says."""
+        size, memory = (np.stack([flying.gusts[:, row], flying.lack[:, row]]) for row in (0, 1))
+        keep = jnp.exp(-step / memory)
+        return cls(keep, size * jnp.sqrt(1 - keep**2), flying.gusts[:, 2] / np.sqrt(step))
+
+    def first(self, key: Any) -> Any:
+        """Draw both processes, shape (2, vehicle, 6)."""
+        return jax.random.normal(key, self.keep.shape) * self.fresh / jnp.sqrt(1 - self.keep**2)
+
+    def after(self, now: Any, key: Any) -> Any:
+        """Draw them a step later."""
+        return self.keep * now + self.fresh * jax.random.normal(key, now.shape)
+
+    def push(self, now: Any, key: Any) -> Any:
+        """Add the white part, shape (vehicle, 6)."""
+        return now.sum(axis=0) + self.white * jax.random.normal(key, self.white.shape)
 
 
 def pushed(fleet: Fleet, state: Any, gust: Any, step: float) -> Any:
@@ -168,7 +206,7 @@ def share_inside(flown: Array, measured: Array) -> Array:
 # Simulated flights
 
 
-def simulated() -> None:
+def simulated(count: str = str(COUNT)) -> None:
     rows = []
     for name, truth in VEHICLES.items():
         training = gusty_flights(
@@ -177,16 +215,18 @@ def simulated() -> None:
         told = found(unknown(truth), [replace(flight, setpoints={}) for flight in training])
         aside = [Flight(truth, GUSTS, 7, 100 + run, reach=REACH_HZ, swing=SWING) for run in range(HELD_OUT)]
         measured = np.stack([flight.motion.rate for flight in gusty_flights(aside, SECONDS)])
-        for kind, own in fleets(told, truth).items():
+        for kind, own in fleets(told, truth, int(count)).items():
             flown = closed_loop(truth, own, aside[0])
-            rows.append(row(name, kind, share_inside(flown, measured)))
+            low, high = np.percentile(flown[~tumbled(flown)], ENDS, axis=0)
+            wide = ", ".join(f"{value:.2g}" for value in (high - low).mean(axis=0))
+            rows.append((*row(name, kind, share_inside(flown, measured)), wide))
             print(rows[-1], file=sys.stderr, flush=True)
-    header = ("vehicle", "flown", "roll", "pitch", "yaw", "all", "one flight, least to most")
+    header = ("vehicle", "flown", "roll", "pitch", "yaw", "all", "one flight, least to most", "width, rad/s")
     table("spread_simulated", header, rows)
 
 
 def row(name: str, kind: str, shares: Array) -> tuple[str, ...]:
-    """Write shares of flights, shape (flight, 3), in per cent."""
+    """Write shares of flights, shape (flight, axis), in per cent."""
     each = 100 * shares.mean(axis=1)
     mean = [f"{value:.1f}" for value in 100 * shares.mean(axis=0)]
     return name, kind, *mean, f"{each.mean():.1f}", f"{each.min():.1f} to {each.max():.1f}"
@@ -199,23 +239,18 @@ def unknown(truth: Truth) -> VehicleSettings:
     return replace(vehicle, inertia_kg_m2=moments)
 
 
-def fleets(told: Found, truth: Truth) -> dict[str, Fleet]:
+def fleets(told: Found, truth: Truth, count: int) -> dict[str, Fleet]:
     """Make what is flown: the spread, and what it has to be better than."""
-    rng = np.random.default_rng(1)
-    together = drawn(told.model, told.known, COUNT, rng)
-    alone = replace(told.known, correlation=np.eye(len(told.known.numbers)))
-    by_itself = drawn(told.model, alone, COUNT, rng)
     for number in told.known.numbers:
         print(
             f"  {number.name} {number.value:.3g} ({number.low:.3g} to {number.high:.3g}) {number.unit}", file=sys.stderr
         )
+    alone = replace(told.known, correlation=np.eye(len(told.known.numbers)))
+    by_itself = drawn(told.model, alone, count, np.random.default_rng(1))
     true = VehicleModel(vehicle=truth.vehicle, gusts=true_gusts(truth))
-    return {
-        "spread": fleet(told.model, together.models),
-        "the estimate, in gusts": fleet(told.model, [told.model] * COUNT),
-        "spread, still air": fleet(told.model, together.models, still=True),
+    return kinds_of(told, count) | {
         "each number by itself": fleet(told.model, by_itself.models),
-        "the true vehicle, true gusts": fleet(true, [true] * COUNT),
+        "the true vehicle, true gusts": fleet(true, [true] * count),
     }
 
 
@@ -231,8 +266,7 @@ def closed_loop(truth: Truth, flying: Fleet, asked: Flight) -> Array:
     count, module = len(flying.parameters), flying.module
     hover, unmix = truth.mass * GRAVITY / 4 / truth.thrust_factor, np.linalg.inv(truth.mixer)
     outer, loop = min(2.0, asked.bandwidth / 6), asked.bandwidth * np.array([1.0, 1.0, 0.4])
-    keep = jnp.exp(-STEP_S / flying.gusts[:, 1])
-    fresh = flying.gusts[:, 0] * jnp.sqrt(1 - keep**2)
+    air = Air.of(flying, STEP_S)
     terms = jax.vmap(lambda now, then: module["steady"](jnp.sqrt(0.5 * (now**2 + then**2))))
     move = jax.vmap(lambda state, rotor, own: module["step"](state, rotor, STEP_S, own))
 
@@ -255,15 +289,14 @@ def closed_loop(truth: Truth, flying: Fleet, asked: Flight) -> Array:
     def along(carried: Any, given: Any) -> Any:
         state, speed, gust = carried
         wanted_at, key = given
-        noise, new = jnp.split(jax.random.normal(key, (count, 9)), [3], axis=1)
-        measured = state[:, 15:] + truth.gyro_noise * noise
+        felt, blown, new = jax.random.split(key, 3)
+        measured = state[:, 15:] + truth.gyro_noise * jax.random.normal(felt, (count, 3))
         after = speed + STEP_S / truth.lag_s * (autopilot(state, wanted_at, measured) - speed)
-        moved = move(pushed(flying, state, gust, STEP_S), terms(speed, after), flying.parameters)
-        return (moved, after, keep * gust + fresh * new), measured
+        shoved = pushed(flying, state, air.push(gust, blown), STEP_S)
+        return (move(shoved, terms(speed, after), flying.parameters), after, air.after(gust, new)), measured
 
     begun = jnp.concatenate([path[0, :6], jnp.eye(3).ravel(), jnp.zeros(3)])
-    first = jax.random.normal(jax.random.key(1), (count, 6)) * flying.gusts[:, 0]
-    start = jnp.tile(begun, (count, 1)), jnp.full((count, 4), jnp.sqrt(hover)), first
+    start = jnp.tile(begun, (count, 1)), jnp.full((count, 4), jnp.sqrt(hover)), air.first(jax.random.key(1))
     keys = jax.random.split(jax.random.key(2), len(path))
 
     def ten(carried: Any, given: Any) -> Any:
@@ -277,6 +310,8 @@ def closed_loop(truth: Truth, flying: Fleet, asked: Flight) -> Array:
 # Real flights
 
 
+KINDS, KINDS_ASIDE = ("B2", "B3", "B6", "B7"), ("B5", "B8", "B9")
+"""Of NanoBench: circle, figure of eight, ramp and oval; helix, star and trefoil are kept aside."""
 AXES = ("roll", "pitch")
 ANSWERS = {"thrust": (8, 11), "roll": (0, 3, 7, 10), "pitch": (1, 4, 6, 9)}
 """What each answers of a difference of states: rotation, rate, velocity and position along the body axes."""
@@ -296,36 +331,84 @@ class Law(NamedTuple):
     gain: Array
 
 
-def real(folder: str) -> None:
+def real(folder: str, count: str = str(COUNT)) -> None:
+    """Find the nano-drone in its training flights, judge on a path that is not among them."""
     training = flights(Path(folder), TRAINING)
     told = found(VEHICLE, training)
+    judged("nano-drone", told, instruments(training), flights(Path(folder), TEST), int(count))
+
+
+def nanobench(folder: str, count: str = str(COUNT)) -> None:
+    """Find drag, flapping and what the model lacks of another vehicle in half of its paths, judge on the others.
+
+    These flights tell no moment of inertia, so the published one stands, and is not drawn.
+    """
+    flown = list(commanded_flights(Path(folder)))
+    kinds = {flight.name: flight.path.split("_")[0] for flight in flown}
+    training = [playback_of(flight) for flight in flown if kinds[flight.name] in KINDS]
+    given = instruments(training)
+    constants = find_constants(NANOBENCH, training, given, PlaybackSettings().leave_out)
+    assert constants is not None
+    solved, spread = constants.fitted, constants.spread
+    numbers = [each for each in found_numbers(solved, spread) if not each.name.startswith("inertia.")]
+    model = replace(solved.model, vehicle=NANOBENCH)
+    gusts = find_gusts(model, given)
+    assert gusts is not None
+    known = Estimates(
+        numbers=numbers,
+        correlation=np.eye(len(numbers)),
+        blocks=spread.blocks,
+        loop=np.ones((2, 3)),
+        gusts=GustRanges.of_known(*(getattr(gusts, name) for name in RANGES)),
+        lack=gusts.lack,
+    )
+    model = replace(model, gusts=gusts.gusts)
+    aside = {flight.path: playback_of(flight) for flight in reversed(flown) if kinds[flight.name] in KINDS_ASIDE}
+    judged("NanoBench", Found(model, known), given, [aside[path] for path in sorted(aside)], int(count))
+
+
+def judged(name: str, told: Found, given: Instruments, aside: Sequence[PlaybackFlight], count: int) -> None:
+    """Fly the spread, and what it has to be better than, along flights kept aside; print how often they hold them."""
     for number in told.known.numbers:
         print(
             f"  {number.name} {number.value:.3g} ({number.low:.3g} to {number.high:.3g}) {number.unit}", file=sys.stderr
         )
-    law = law_of(told.model, instruments(training))
+    law = law_of(told.model, given)
     print(f"  law: {law}", file=sys.stderr)
-    together = drawn(told.model, told.known, COUNT, np.random.default_rng(1))
-    flown = {
-        "spread": fleet(told.model, together.models),
-        "the estimate, in gusts": fleet(told.model, [told.model] * COUNT),
-        "spread, still air": fleet(told.model, together.models, still=True),
-    }
-    rows = []
-    for kind, own in flown.items():
-        shares, off, wide, lost = [], [], [], 0
-        for flight in flights(Path(folder), TEST):
-            turned, measured = twins(told.model, own, law, flight), flight.motion.rate[1:]
-            shares.append(share_inside(turned, measured)[:2])
-            low, middle, high = np.percentile(turned[~tumbled(turned)], (ENDS[0], 50.0, ENDS[1]), axis=0)
-            off.append(np.sqrt(((middle - measured) ** 2).mean(axis=0))[:2])
-            wide.append((high - low).mean(axis=0)[:2])
-            lost += int(tumbled(turned).sum())
-        sizes_ = (", ".join(f"{value:.2g}" for value in np.mean(each, axis=0)) for each in (off, wide))
-        rows.append((*row("nano-drone", kind, np.array(shares)), *sizes_, f"{lost} of {len(shares) * COUNT}"))
-        print(rows[-1], file=sys.stderr, flush=True)
+    kinds = kinds_of(told, count)
+    # Side by side, so that they are compiled once.
+    whole = Fleet(kinds["spread"].module, *map(np.concatenate, zip(*(own[1:] for own in kinds.values()), strict=True)))
+    rows: dict[str, list[tuple[Array, ...]]] = {kind: [] for kind in kinds}
+    for flight in aside:
+        turned, measured = np.split(twins(told.model, whole, law, flight), len(kinds)), flight.motion.rate[1:]
+        for kind, own in zip(kinds, turned, strict=True):
+            low, middle, high = np.percentile(own[~tumbled(own)], (ENDS[0], 50.0, ENDS[1]), axis=0)
+            off = np.sqrt(((middle - measured) ** 2).mean(axis=0))
+            shares, lost = share_inside(own, measured), np.array([tumbled(own).sum()])
+            rows[kind].append((shares[:2], off[:2], (high - low).mean(axis=0)[:2], lost))
+            print(f"  {flight.name}, {kind}: {np.concatenate(rows[kind][-1]).round(3)}", file=sys.stderr, flush=True)
     header = ("vehicle", "flown", *AXES, "all", "one flight, least to most", "median off", "width", "tumbled")
-    table("spread_real", header, rows)
+    listed = []
+    for kind, each in rows.items():
+        shares, off, wide, lost = (np.array(part) for part in zip(*each, strict=True))
+        sizes_ = (", ".join(f"{value:.2g}" for value in part.mean(axis=0)) for part in (off, wide))
+        listed.append((*row(name, kind, shares), *sizes_, f"{lost.sum()} of {len(aside) * count}"))
+    table(f"spread_{name}", header, listed)
+
+
+def kinds_of(told: Found, count: int) -> dict[str, Fleet]:
+    """Draw the spread, and leave out of it what it has more than others."""
+
+    def made(known: Estimates, *, still: bool = False) -> Fleet:
+        return fleet(told.model, drawn(told.model, known, count, np.random.default_rng(1)).models, still=still)
+
+    without = replace(told.known, lack=None)
+    return {
+        "spread": made(told.known),
+        "spread without what the model lacks": made(without),
+        "the estimate, in gusts": fleet(told.model, [told.model] * count),
+        "spread in still air, nothing lacking": made(without, still=True),
+    }
 
 
 def answers(model: VehicleModel, speed: Array) -> Array:
@@ -404,8 +487,7 @@ def twins(model: VehicleModel, flying: Fleet, law: Law, flight: PlaybackFlight) 
     """
     motion, module, count = flight.motion, flying.module, len(flying.parameters)
     period, unmix = motion.period, np.linalg.pinv(allocation_matrix(model.vehicle)) * sizes(model)
-    keep = jnp.exp(-period / flying.gusts[:, 1])
-    fresh = flying.gusts[:, 0] * jnp.sqrt(1 - keep**2)
+    air = Air.of(flying, period)
     logged = tuple(map(jnp.asarray, (*motion[:4], flight.speed)))
     terms = jax.vmap(module["steady"])
     move = jax.vmap(lambda state, rotor, own: module["step"](state, rotor, period, own))
@@ -421,18 +503,19 @@ def twins(model: VehicleModel, flying: Fleet, law: Law, flight: PlaybackFlight) 
         along_body = jnp.einsum("nji,nkj->nki", own, moved).reshape(-1, 6)
         squared = jnp.maximum(speed**2 + answer @ unmix.T, 0.0)
         after = law.keep * answer + jnp.concatenate([turned, state[:, 15:] - rate, along_body], axis=1) @ law.gain.T
-        moved_on = move(pushed(flying, state, gust, period), terms(jnp.sqrt(squared)), flying.parameters)
-        return (moved_on, after, keep * gust + fresh * jax.random.normal(key, (count, 6))), moved_on[:, 15:]
+        blown, new = jax.random.split(key)
+        shoved = pushed(flying, state, air.push(gust, blown), period)
+        moved_on = move(shoved, terms(jnp.sqrt(squared)), flying.parameters)
+        return (moved_on, after, air.after(gust, new)), moved_on[:, 15:]
 
     begun = jnp.concatenate([part[0].ravel() for part in logged[:4]])
-    first = jax.random.normal(jax.random.key(1), (count, 6)) * flying.gusts[:, 0]
-    start = jnp.tile(begun, (count, 1)), jnp.zeros((count, 4)), first
+    start = jnp.tile(begun, (count, 1)), jnp.zeros((count, 4)), air.first(jax.random.key(1))
     keys = jax.random.split(jax.random.key(2), len(flight) - 1)
     rows = tuple(each[:-1] for each in logged)
     return np.asarray(jax.jit(lambda: jax.lax.scan(along, start, (rows, keys))[1])()).swapaxes(0, 1)
 
 
-PARTS: dict[str, Callable[..., None]] = {"simulated": simulated, "real": real}
+PARTS: dict[str, Callable[..., None]] = {"simulated": simulated, "real": real, "nanobench": nanobench}
 
 if __name__ == "__main__":
     main(*sys.argv[1:])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from textwrap import wrap
 
@@ -11,6 +11,17 @@ def joined(words: Iterable[str], last: str = "and") -> str:
     """Join words to a phrase, without repeating one."""
     *others, final = dict.fromkeys(words)
     return f"{', '.join(others)} {last} {final}" if others else final
+
+
+def some(names: Sequence[str], most: int, between: str = ", ") -> str:
+    """List names, not more than anybody reads."""
+    rest = len(names) - most
+    return between.join(names[:most]) + (f" and {rest} more" if rest > 0 else "")
+
+
+def capitalised(words: str) -> str:
+    """Begin with a capital."""
+    return words[0].upper() + words[1:]
 
 
 def did_you_mean(name: str, known: Iterable[str], otherwise: str, *, most: int = 1, cutoff: float = 0.4) -> str:

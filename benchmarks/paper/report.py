@@ -22,7 +22,6 @@ from cpfls_cli.artifacts.store import file_sha256
 from cpfls_cli.commands.report import read_sources
 from cpfls_cli.config.load import load_study
 from cpfls_cli.pages.page import Page, page_of, sections_of
-from cpfls_cli.pages.sweep import replicates_section
 from cpfls_cli.report.content import Section
 from cpfls_cli.version import __version__
 
@@ -52,7 +51,8 @@ def _without_readings(section: Section, sources: PaperSources) -> Section | None
     if section.name != "replicates":
         return section
     readings = [sweep for sweep in sources.sweeps if compares_readings(sweep.record.settings)]
-    return replicates_section(replace(sources, all=[source for source in sources.all if source not in readings]))
+    others = replace(sources, all=[source for source in sources.all if source not in readings])
+    return next((each for each in sections_of(others) if each.name == section.name), None)
 
 
 def main() -> None:

@@ -13,12 +13,16 @@ from scipy.signal import lfilter, medfilt
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import MeasuredMotion
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 PERIOD = 0.01
 MASS, ARM, INERTIA = 0.027, 0.0325, 1.66e-5
 """As the data set states it, half the distance of neighbouring motors, and about roll and pitch as published for the
 type at 28 g."""
+YAW_INERTIA, THRUST_FACTOR, LEVER = 2.93e-5, 2.88e-8, 0.006
+"""About yaw as published; rotors as usual for the type, whose commands tell nothing about them."""
 GRAVITY = 9.81
 EXPONENT, MOTOR_LAG_S = 1.4, 0.07
 """Of the thrust by the command, as the accelerometer shows it from 0.4 to 2.5 Hz, and how late it follows; 40 to 90 ms
@@ -27,6 +31,23 @@ _FULL = 65535.0
 _ALOFT_M, _AFTER, _BEFORE, _SHORTEST = 0.6, 150, 50, 800
 _SATURATED = 0.06
 """Flights whose motors stand at full command for longer are left out, share of the time."""
+
+
+HUBS = (((ARM, -ARM), -1), ((-ARM, -ARM), 1), ((-ARM, ARM), -1), ((ARM, ARM), 1))
+VEHICLE = VehicleSettings(
+    mass_kg=MASS,
+    inertia_kg_m2=(INERTIA, INERTIA, YAW_INERTIA),
+    rotor_speed_max_rad_s=3500.0,
+    rotors=tuple(
+        RotorSettings(
+            position_m=(*hub, 0.0),
+            spin=spin,
+            thrust_factor_n_s2=THRUST_FACTOR,
+            drag_factor_n_m_s2=LEVER * THRUST_FACTOR,
+        )
+        for hub, spin in HUBS
+    ),
+)
 
 
 class Commanded(NamedTuple):
@@ -61,6 +82,23 @@ def commanded_flights(folder: Path) -> Iterator[Commanded]:
         seen.add(content)
         if flight is not None:
             yield flight
+
+
+def playback_of(flight: Commanded) -> PlaybackFlight:
+    """Give the rotor speeds that thrust and torque stand for; about yaw they turn nothing."""
+    about_roll, about_pitch = (flight.torque / ARM).T
+    each = np.stack(
+        [
+            flight.thrust - about_roll - about_pitch,
+            flight.thrust - about_roll + about_pitch,
+            flight.thrust + about_roll + about_pitch,
+            flight.thrust + about_roll - about_pitch,
+        ],
+        axis=1,
+    )
+    speed = np.sqrt(np.maximum(0.25 * each, 0.0) / THRUST_FACTOR)
+    whole = (slice(0, len(speed)),)
+    return PlaybackFlight(name=flight.name, motion=flight.motion, speed=speed, hold="previous", stretches=whole)
 
 
 def _flight(name: str, logged: dict[str, Array]) -> Commanded | None:

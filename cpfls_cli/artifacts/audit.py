@@ -13,7 +13,6 @@ from cpfls_cli.consistency.findings import AuditFinding, FaultNumber
 
 if TYPE_CHECKING:
     from cpfls_cli.consistency.audit import Audit
-    from cpfls_cli.consistency.repairs import ChannelRepair
 
 
 @record
@@ -51,11 +50,6 @@ class AuditRepairGroup:
     matrix: Array = dataset("unit and axes, after the turn to world axes", "repair", "axis", "axis")
     gravity_m_s2: Array = dataset("added along the vertical, last", "repair", path="gravity", units="m/s^2")
     sentence: tuple[str, ...] = dataset("what is wrong, what shows it, and what to correct", "repair")
-
-    @classmethod
-    def of(cls, repairs: Sequence[ChannelRepair]) -> Self | None:
-        """Arrange repairs; None where there are none."""
-        return columns_of(cls, repairs) if repairs else None
 
 
 @record
@@ -95,7 +89,7 @@ class AuditGroup:
             untested=tuple(f"{name}: {reason}" for name, reason in audit.untested.items()),
             warning=audit.warnings,
             note=audit.notes,
-            repair=AuditRepairGroup.of(audit.repairs),
+            repair=columns_of(AuditRepairGroup, audit.repairs) if audit.repairs else None,
             contradiction=audit.contradictions or None,
         )
 

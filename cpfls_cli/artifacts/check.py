@@ -25,6 +25,7 @@ from cpfls_cli.artifacts.spec import (
 )
 from cpfls_cli.errors import InputError, NotAnArtifactError
 from cpfls_cli.files import is_hdf5, is_sealed, read_content, text_sha256
+from cpfls_cli.words import some
 
 # Text in memory and in a file.
 _KINDS = {"U": "text", "S": "text", "i": "numbers", "u": "numbers", "f": "numbers"}
@@ -293,18 +294,13 @@ def require_all(path: Path, stored: Stored) -> None:
     assert record is not None, "its format is known"
     missing = record.lacking(stored.data)
     if missing:
-        raise InputError(f"{path}: the {stored.spec.name} lacks {_some(missing)}; make it again")
+        raise InputError(f"{path}: the {stored.spec.name} lacks {some(missing, 5)}; make it again")
 
 
 def refuse(path: Path, findings: Sequence[str]) -> None:
     """Refuse a file in which something was found."""
     if findings:
         raise InputError("\n".join(f"{path}: {finding}" for finding in findings))
-
-
-def _some(names: list[str], most: int = 5) -> str:
-    rest = len(names) - most
-    return ", ".join(names[:most]) + (f" and {rest} more" if rest > 0 else "")
 
 
 def one_line(error: Exception) -> str:

@@ -101,32 +101,40 @@ class CheckpointRecord(Record):
     @classmethod
     def of_state(cls, state: EvolutionState) -> Self:
         """Arrange the state of a search after a generation."""
-        population = PopulationGroup(
-            genes=state.genes.astype(np.uint16), objectives=state.objectives, subpopulation=state.subpopulations
-        )
-        none, submitted, results = state.genes[:0], state.archive.submitted, state.archive.results
-        return cls(
-            generation=state.index,
-            generator=json.dumps(state.rng.bit_generator.state),
-            population=population,
-            archive=ArchiveGroup(**_stored(submitted, results.genes, results.objectives)),
-            history=group_of(HistoryGroup, state.history),
-            unfinished=UnfinishedGroup(**_stored(none, none, state.objectives[:0])),
-        )
+        archive, results = state.archive.submitted, state.archive.results
+        generator = json.dumps(state.rng.bit_generator.state)
+        population = (state.genes, state.objectives, state.subpopulations)
+        stored = _stored(archive, results.genes, results.objectives)
+        return cls._arranged(state.index, generator, population, stored, state.history)
 
     @classmethod
     def of_nothing(cls, unfinished: Unfinished) -> Self:
         """Arrange a search that has not evaluated its whole initial population, only this part of it."""
         none, objectives = unfinished.submitted[:0], unfinished.evaluation.objectives[:0]
-        empty = cls(
-            generation=_BEFORE_ALL,
-            generator=_NO_GENERATOR,
-            population=PopulationGroup(genes=none.astype(np.uint16), objectives=objectives, subpopulation=np.arange(0)),
-            archive=ArchiveGroup(**_stored(none, none, objectives)),
-            history=group_of(HistoryGroup, History.empty(objectives.shape[1])),
-            unfinished=UnfinishedGroup(**_stored(none, none, objectives)),
+        population, history = (none, objectives, np.arange(0)), History.empty(objectives.shape[1])
+        stored = _stored(none, none, objectives)
+        return cls._arranged(_BEFORE_ALL, _NO_GENERATOR, population, stored, history).with_unfinished(unfinished)
+
+    @classmethod
+    def _arranged(
+        cls,
+        generation: int,
+        generator: str,
+        population: tuple[IntArray, Array, IntArray],
+        archive: dict[str, Any],
+        history: History,
+    ) -> Self:
+        genes, objectives, subpopulation = population
+        return cls(
+            generation=generation,
+            generator=generator,
+            population=PopulationGroup(
+                genes=genes.astype(np.uint16), objectives=objectives, subpopulation=subpopulation
+            ),
+            archive=ArchiveGroup(**archive),
+            history=group_of(HistoryGroup, history),
+            unfinished=UnfinishedGroup(**_stored(genes[:0], genes[:0], objectives[:0])),
         )
-        return empty.with_unfinished(unfinished)
 
     def with_unfinished(self, unfinished: Unfinished) -> Self:
         """Replace what was evaluated of the next generation."""

@@ -62,11 +62,6 @@ class AlternativeGroup:
         default=None,
     )
 
-    @classmethod
-    def of(cls, rivals: Sequence[Alternative]) -> Self:
-        """Arrange effects that could be named instead."""
-        return columns_of(cls, rivals)
-
     def rows(self) -> list[Alternative]:
         """List effects that could be named instead."""
         return [Alternative(**row) for row in rows_of(self)]
@@ -313,19 +308,19 @@ class DiagnosisRecord(Record):
             share=diagnosis.share,
             split=split,
             effects=NamedEffectsGroup.of(effects, named, diagnosis.parameters, model.parameters),
-            alternative=AlternativeGroup.of(diagnosis.alternatives),
+            alternative=columns_of(AlternativeGroup, diagnosis.alternatives),
             unexplained=UnexplainedGroup.of(diagnosis.unexplained),
             torque_alone=TorqueAloneGroup(
                 name=tuple(name for name, _ in alone), share=np.fromiter((share for _, share in alone), float)
             ),
             gap=GapChangeGroup.of(diagnosis.before, diagnosis.after, diagnosis.floor),
             playback=PlaybackChangeGroup.of_pairs(change.played, change.playback),
-            stretch=StretchGroup.of(change.stretches),
+            stretch=columns_of(StretchGroup, change.stretches),
             residual=ResidualChangeGroup.of(diagnosed.held_out, change),
             whiteness=WhitenessGroup.of(change),
             picture=PictureGroup.of(change, held),
             run=FreeRunsGroup.of(change, held),
-            not_excited=NotExcitedGroup.of(diagnosis.not_excited),
+            not_excited=columns_of(NotExcitedGroup, diagnosis.not_excited),
             audit=AuditGroup.of(diagnosed.audit),
             note=diagnosis.notes,
             contradiction=diagnosis.contradictions,

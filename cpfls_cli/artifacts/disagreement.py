@@ -23,7 +23,6 @@ from cpfls_cli.playback.replay import STATED
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.compare import Disagreement, WorstChannel
-    from cpfls_cli.gap.residual.dependence import Dependence
     from cpfls_cli.vehicle.settings import VehicleSettings
     from cpfls_cli.weak_form.windows import Recording
 
@@ -91,11 +90,6 @@ class DependenceGroup:
     signal: tuple[str, ...] = dataset("signal that the gap is explained with, alone", "dependence")
     r2: Array = dataset("share of the variance explained on blocks that the fit did not see", "dependence")
     p_value: Array = dataset("probability that chance does as well with any signal", "dependence")
-
-    @classmethod
-    def of(cls, pairs: Sequence[Dependence]) -> Self:
-        """Arrange pairs of channel and signal."""
-        return columns_of(cls, pairs)
 
     @property
     def sure(self) -> BoolArray:
@@ -172,15 +166,15 @@ class DisagreementRecord(Record):
             state=StateGroup(
                 name=tuple(disagreement.states), value=np.column_stack(list(disagreement.states.values()))
             ),
-            stretch=StretchGroup.of(disagreement.stretches),
-            dependence=DependenceGroup.of(disagreement.dependence),
+            stretch=columns_of(StretchGroup, disagreement.stretches),
+            dependence=columns_of(DependenceGroup, disagreement.dependence),
             heat_map=None if disagreement.worst is None else HeatMapGroup.of(disagreement.worst),
             playback=PlaybackGroup.of(
                 disagreement.played,
                 disagreement.playback,
                 {name: name for name in disagreement.playback.predictions if name != STATED},
             ),
-            not_excited=NotExcitedGroup.of(disagreement.not_excited),
+            not_excited=columns_of(NotExcitedGroup, disagreement.not_excited),
             audit=AuditGroup.of(disagreement.audit),
             warning=(*disagreement.audit.filtered, *warnings),
             base=VehicleGroup.of(base),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.artifacts.spec import dataset, group_of, record
+from cpfls_cli.artifacts.spec import dataset, group, group_of, record
 from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 
 if TYPE_CHECKING:
@@ -39,6 +39,22 @@ class GustAxis(NamedTuple):
 
 
 @record
+class LackGroup:
+    """What comes again and a model lacks: its parts are off by shares of themselves, and a rest is like no part."""
+
+    part: tuple[str, ...] = dataset("parts of the model", "formula")
+    share: Array = dataset(
+        "covariance of the shares by which torque or force of the parts are off",
+        "gust",
+        "formula",
+        "formula",
+        gaps=True,
+    )
+    size: Array = dataset("standard deviation of the rest, N m or N", "gust", units="SI", gaps=True)
+    memory: Array = dataset("time in which the rest falls to 37 %", "gust", units="s", gaps=True)
+
+
+@record
 class DisturbanceGroup:
     """Gusts in the flights that a model was found in or held against, torque about body axes and force along them."""
 
@@ -54,16 +70,21 @@ class DisturbanceGroup:
         "share of all that is left which repeats or setpoints foretell", "gust", gaps=True, default=None
     )
     alone: BoolArray | None = dataset("whether all that is left of a gap is gusts and noise", "gust", default=None)
+    white: Array | None = dataset(
+        "white noise beside it, as of a step of 1 s, N m s^0.5 or N s^0.5", "gust", units="SI", gaps=True, default=None
+    )
+    lack: LackGroup | None = group(default=None)
 
     @classmethod
     def of(cls, found: FoundGusts, alone: BoolArray | None = None) -> Self:
         """Arrange what was found, and of a gap where it is all that is left."""
-        return group_of(cls, found, name=GUST_AXES[: len(found.size)], alone=alone)
+        lack = None if found.lack is None else group_of(LackGroup, found.lack)
+        return group_of(cls, found, name=GUST_AXES[: len(found.size)], alone=alone, lack=lack)
 
     @property
     def gusts(self) -> Gusts:
         """The gusts that are known; none on other axes."""
-        return Gusts.known(self.size, self.memory)
+        return Gusts.known(self.size, self.memory, self.white)
 
     def axes(self, inertia: Array, mass: float) -> Iterator[GustAxis]:
         """Give each axis as the acceleration of a body of these inertia parameters, kg m^2, and this mass, kg."""

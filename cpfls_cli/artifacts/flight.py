@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record
+from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, group_of, record
 from cpfls_cli.dynamics.rigid_body import not_positive_definite
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.regressor.motion import Motion
@@ -217,18 +217,11 @@ class TrackingGroup:
         cls, plan: Plan, controllers: Sequence[str], scores: Scores, model: InertiaFunctions, attitude: Array
     ) -> Self:
         """Arrange a comparison; the attitude, shape (time, 3), rad, is the one under the model's controller."""
-        return cls(
+        return group_of(
+            cls,
+            scores,
             controller=tuple(controllers),
             time=plan.time[:: plan.parts],
-            error=scores.error,
-            settled_from=scores.settled_from,
-            rms=scores.rms,
-            settled_rms=scores.settled_rms,
-            max_error=scores.largest,
-            settled_max=scores.settled_largest,
-            torque_rms=scores.effort,
-            clipped=scores.clipped,
-            lost_at=scores.lost,
             control_rate=1 / plan.period,
             outside=model.outside(attitude),
             not_positive_definite=int(np.sum(not_positive_definite(model.inertia(attitude).value, attitude))),

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.response import CurveGroup
-from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record, rows_of
+from cpfls_cli.artifacts.spec import Format, Record, columns_of, dataset, group, record, rows_of
 
 if TYPE_CHECKING:
     from cpfls_cli.autopilots.parameters import Autopilot
@@ -250,7 +250,9 @@ class GainsRecord(Record):
             "asked": {"gain_db": self.asked_gain, "phase_deg": self.asked_phase, "disk_deg": self.asked_disk},
             "disk_required_deg": self.required,
             "hover_thrust": self.hover,
-            "parameters": {row.pop("name"): _finite(row) for row in rows_of(self.parameter)},
+            "parameters": {
+                row.pop("name"): {name: _known(value) for name, value in row.items()} for row in rows_of(self.parameter)
+            },
             "sets": {
                 name: {axis: self._axis(own, place) for place, axis in enumerate(self.axis)}
                 for own, name in enumerate(self.set_of)
@@ -263,57 +265,32 @@ class GainsRecord(Record):
         }
 
     def _axis(self, own: int, axis: int) -> dict[str, Any]:
-        groups = {
-            "command": self.command,
-            "command_worst": self.command_worst,
-            "angle": self.angle,
-            "angle_worst": self.angle_worst,
-        }
-        return {
-            **{
-                name: _finite(
-                    {
-                        "gain_db": each.gain[own, axis],
-                        "phase_deg": each.phase[own, axis],
-                        "disk_deg": each.disk[own, axis],
-                        "crossover_hz": each.crossover[own, axis],
-                    }
-                )
-                for name, each in groups.items()
-            },
-            **_finite(
-                {
-                    "bandwidth_hz": self.bandwidth[own, axis],
-                    "overshoot": self.overshoot[own, axis],
-                    "overshoot_most": self.overshoot_most[own, axis],
-                    "rise_s": self.rise[own, axis],
-                }
-            ),
-        }
+        groups = ("command", "command_worst", "angle", "angle_worst")
+        margins = {"gain_db": "gain", "phase_deg": "phase", "disk_deg": "disk", "crossover_hz": "crossover"}
+        answers = {"bandwidth_hz": "bandwidth", "overshoot": "overshoot"}
+        answers |= {"overshoot_most": "overshoot_most", "rise_s": "rise"}
+
+        def told(group: object, names: Mapping[str, str]) -> dict[str, Any]:
+            return {name: _known(float(getattr(group, column)[own, axis])) for name, column in names.items()}
+
+        return {name: told(getattr(self, name), margins) for name in groups} | told(self, answers)
 
 
-def _finite(row: dict[str, Any]) -> dict[str, Any]:
-    """Put None in the place of numbers that are not finite."""
-    return {
-        name: None if isinstance(value, float) and not np.isfinite(value) else value
-        for name, value in (
-            (name, float(each) if isinstance(each, np.floating) else each) for name, each in row.items()
-        )
-    }
+def _known(value: Any) -> Any:
+    """Put None in the place of a number that is not finite."""
+    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def _parameters(proposals: Sequence[Proposal], today: dict[str, float], names: Mapping[str, str]) -> ParametersGroup:
     own = [each.parameter for each in proposals]
     high = np.array([each.high for each in own], dtype=float)
-    return ParametersGroup(
+    return columns_of(
+        ParametersGroup,
+        own,
         name=tuple(names.get(each.name, each.name) for each in own),
-        meaning=tuple(each.meaning for each in own),
-        unit=tuple(each.unit for each in own),
         today=np.array([today.get(each.name, np.nan) for each in own], dtype=float),
-        default=np.array([each.default for each in own], dtype=float),
         proposed=np.array([each.value for each in proposals], dtype=float),
         wanted=np.array([each.wanted for each in proposals], dtype=float),
-        low=np.array([each.low for each in own], dtype=float),
         high=np.where(np.isfinite(high), high, np.nan),
         clipped=np.array([each.clipped for each in proposals], dtype=bool),
     )

@@ -18,7 +18,6 @@ from cpfls_cli.playback.replay import AFTER, BEFORE, MODEL, NOTHING_MOVES, STATE
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.naming.results import GapSize
-    from cpfls_cli.gap.residual.views import GapStretch
     from cpfls_cli.playback.replay import Played, Replay
 
 _GROWN = 1.05
@@ -354,11 +353,6 @@ class StretchGroup:
     end_s: Array = dataset("on the clock of the flight", "stretch", path="end", units="s")
     channel: tuple[str, ...] = dataset("channel of the gap", "stretch")
     rms_floors: Array = dataset("root mean square of the gap there, in floors", "stretch", path="floors")
-
-    @classmethod
-    def of(cls, stretches: Sequence[GapStretch]) -> Self:
-        """Arrange stretches of time."""
-        return columns_of(cls, stretches)
 
     def first(self, most: int) -> list[tuple[int, float, float, str, float]]:
         """List the largest: flight, start and end in s, channel, floors."""

@@ -17,7 +17,6 @@ from cpfls_cli.weak_form.windows import Recording
 
 if TYPE_CHECKING:
     from cpfls_cli.config.study import Study
-    from cpfls_cli.gap.naming.results import NotExcited
 
 _ASKED = "setpoint_"
 """Before the name of a signal that was asked for."""
@@ -32,11 +31,6 @@ class NotExcitedGroup:
 
     name: tuple[str, ...] = dataset("effects that could be there unseen", "unseen")
     reason: tuple[str, ...] = dataset("why: signals that are lacking, or the flight that would show it", "unseen")
-
-    @classmethod
-    def of(cls, unseen: Sequence[NotExcited]) -> Self:
-        """Arrange effects that flights could not show."""
-        return columns_of(cls, unseen)
 
     @property
     def by_reason(self) -> dict[str, list[str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 import numpy as np
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     # Reading a record waits for no numerics; `artifacts/rebuilt.py` makes a model of it again.
     from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
     from cpfls_cli.playback.model import ModelEffect, VehicleModel
-    from cpfls_cli.playback.table import Remainder
     from cpfls_cli.regressor.structure import ModelStructure
 
 USUAL = "usual"
@@ -75,13 +75,13 @@ class RotorsGroup:
 class ResponseGroup:
     """How rotors follow their logged speed."""
 
-    delay: float = dataset("pure delay", units="s")
-    lag: float = dataset("time constant of the first-order lag; 0 for none", units="s")
+    delay_s: float = dataset("pure delay", path="delay", units="s")
+    lag_s: float = dataset("time constant of the first-order lag; 0 for none", path="lag", units="s")
     slow_roll_pitch: float = dataset(
         "share by which roll and pitch torque of the rotors come back after a change; below 0: fade"
     )
     slow_yaw: float = dataset("the same of the yaw torque")
-    slow: float = dataset("time constant with which they do", units="s")
+    slow_s: float = dataset("time constant with which they do", path="slow", units="s")
     commanded: bool = dataset(
         "1 where delay and lag lie behind commands, which measured speeds have already; 0 behind any speed"
     )
@@ -90,18 +90,11 @@ class ResponseGroup:
     @classmethod
     def of(cls, response: RotorResponse, *, commanded: bool, hold: str | None) -> Self:
         """Arrange a response, whether it lies behind commands, and what those are between samples."""
-        times = {"delay": response.delay_s, "lag": response.lag_s, "slow": response.slow_s}
-        return group_of(cls, response, **times, commanded=commanded, hold=hold or USUAL)
+        return group_of(cls, response, commanded=commanded, hold=hold or USUAL)
 
     def response(self) -> RotorResponse:
         """Rebuild it."""
-        return RotorResponse(
-            delay_s=self.delay,
-            lag_s=self.lag,
-            slow_roll_pitch=self.slow_roll_pitch,
-            slow_yaw=self.slow_yaw,
-            slow_s=self.slow,
-        )
+        return RotorResponse(**{own.name: getattr(self, own.name) for own in fields(RotorResponse)})
 
 
 @record
@@ -155,11 +148,6 @@ class RemainderGroup:
         units="SI",
     )
 
-    @classmethod
-    def of(cls, remainder: Remainder) -> Self:
-        """Arrange a remainder."""
-        return group_of(cls, remainder)
-
 
 @record
 class GustsGroup:
@@ -169,16 +157,35 @@ class GustsGroup:
     torque_memory: Array = dataset("time in which a gust falls to 37 %", "axis", units="s", frame=BODY)
     force: Array = dataset("standard deviation; 0 for none", "axis", units="N", frame=BODY)
     force_memory: Array = dataset("time in which a gust falls to 37 %", "axis", units="s", frame=BODY)
+    torque_white: Array | None = dataset(
+        "white noise beside it, as of a step of 1 s", "axis", units="N m s^0.5", frame=BODY, default=None
+    )
+    force_white: Array | None = dataset(
+        "white noise beside it, as of a step of 1 s", "axis", units="N s^0.5", frame=BODY, default=None
+    )
 
     @classmethod
     def of(cls, gusts: Gusts) -> Self:
         """Arrange gusts."""
-        (torque, force), (turning, pushing) = (values.reshape(2, 3) for values in gusts)
-        return cls(torque=torque, torque_memory=turning, force=force, force_memory=pushing)
+        (torque, force), (turning, pushing), (torque_white, force_white) = (values.reshape(2, 3) for values in gusts)
+        return cls(
+            torque=torque,
+            torque_memory=turning,
+            force=force,
+            force_memory=pushing,
+            torque_white=torque_white,
+            force_white=force_white,
+        )
 
     def gusts(self) -> Gusts:
         """Rebuild them."""
-        return Gusts(np.append(self.torque, self.force), np.append(self.torque_memory, self.force_memory))
+        return Gusts(np.append(self.torque, self.force), np.append(self.torque_memory, self.force_memory), self.white)
+
+    @property
+    def white(self) -> Array:
+        """White noise of torque and force, 0 in files of before, shape (6,)."""
+        torque, force = (np.zeros(3) if own is None else own for own in (self.torque_white, self.force_white))
+        return np.append(torque, force)
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -188,6 +195,8 @@ class GustsGroup:
             "torque_memory_s": self.torque_memory.tolist(),
             "force_n": self.force.tolist(),
             "force_memory_s": self.force_memory.tolist(),
+            "torque_white_n_m_sqrt_s": self.white[:3].tolist(),
+            "force_white_n_sqrt_s": self.white[3:].tolist(),
         }
 
 
@@ -268,7 +277,7 @@ class VehicleGroup:
             rotor=RotorsGroup.of(vehicle, model.thrust_linear),
             response=ResponseGroup.of(model.response, commanded=model.commanded, hold=model.hold),
             effect=EffectsGroup.of(model.effects),
-            remainder=None if model.remainder is None else RemainderGroup.of(model.remainder),
+            remainder=None if model.remainder is None else group_of(RemainderGroup, model.remainder),
             wind=np.array(model.wind) if any(model.wind) else None,
             # What is written was identified.
             inertia_functions=None if functions is None else InertiaFunctionsGroup.of(functions),
@@ -296,13 +305,7 @@ class VehicleGroup:
             "thrust_factor_n_s2": self.rotor.thrust_factor.tolist(),
             "drag_factor_n_m_s2": self.rotor.drag_factor.tolist(),
             "thrust_linear": self.rotor.thrust_linear,
-            "response": {
-                "delay_s": self.response.delay,
-                "lag_s": self.response.lag,
-                "slow_roll_pitch": self.response.slow_roll_pitch,
-                "slow_yaw": self.response.slow_yaw,
-                "slow_s": self.response.slow,
-            },
+            "response": asdict(self.response.response()),
             "effects": {name: self.effect.linear_of(name).tolist() for name in self.effect.name},
             "remainder": None if self.remainder is None else self.remainder.rows.tolist(),
             "steady_wind_m_s": [0.0, 0.0, 0.0] if self.wind is None else self.wind.tolist(),

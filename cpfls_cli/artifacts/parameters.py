@@ -204,7 +204,7 @@ def _held(record: VehicleRecord, key: str) -> float:
     of_rotors = {THRUST: vehicle.rotor.thrust_factor, DRAG: vehicle.rotor.drag_factor}
     if key in of_rotors:
         return float(np.mean(of_rotors[key]))
-    return {LAG: vehicle.response.lag, DELAY: vehicle.response.delay}.get(key, 0.0)
+    return {LAG: vehicle.response.lag_s, DELAY: vehicle.response.delay_s}.get(key, 0.0)
 
 
 def _why_not_fitted(key: str) -> str:

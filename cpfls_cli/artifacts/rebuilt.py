@@ -5,6 +5,8 @@ It stands apart from the records, because who only reads one waits for no numeri
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 
 from cpfls_cli.artifacts.audit import AuditGroup, AuditRepairGroup
@@ -21,6 +23,7 @@ from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.playback.gusts import RANGES, GustRanges
 from cpfls_cli.playback.history import Observer
+from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.spread import Estimates
 from cpfls_cli.playback.table import Remainder
@@ -80,6 +83,7 @@ def estimates(record: VehicleRecord) -> Estimates:
         blocks=record.blocks,
         loop=loop,
         gusts=None if gusts is None else GustRanges.of_known(*(getattr(gusts, name) for name in RANGES)),
+        lack=None if gusts is None or gusts.lack is None else Lack(**vars(gusts.lack)),
     )
 
 
@@ -90,17 +94,10 @@ def model_effects(group: EffectsGroup) -> tuple[ModelEffect, ...]:
 
 def inertia_functions(group: InertiaFunctionsGroup) -> InertiaFunctions:
     """Rebuild an inertia over attitude."""
+    given = {own.name: getattr(group, own.name) for own in fields(StructureSettings)}
+    functions = tuple(group.membership_functions.tolist())
     try:
-        structure = model_structure(
-            StructureSettings(
-                structure=group.structure,  # type: ignore[arg-type]  # checked there
-                input_map=group.input_map,  # type: ignore[arg-type]
-                consequents=group.consequents,  # type: ignore[arg-type]
-                harmonic_order=group.harmonic_order,
-                products=group.products,  # type: ignore[arg-type]
-                membership_functions=tuple(group.membership_functions.tolist()),
-            )
-        )
+        structure = model_structure(StructureSettings(**given | {"membership_functions": functions}))
     except SettingError as error:
         raise InputError(f"vehicle/inertia_functions/{error}") from None
     names = np.array(group.partition)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias
 
 import numpy as np
 
@@ -97,38 +97,8 @@ class SignalErrorGroup:
         }
 
 
-class ErrorsByHorizon(Protocol):
-    """What says how far a model and its rivals are off by horizon."""
-
-    @property
-    def played(self) -> str:
-        """What is played back."""
-        ...
-
-    @property
-    def flown(self) -> tuple[str, ...]:
-        """Flights along which."""
-        ...
-
-    @property
-    def windows(self) -> int:
-        """Number of windows."""
-        ...
-
-    @property
-    def prediction(self) -> tuple[str, ...]:
-        """What predicts, by the names of `playback.replay`: they say which row of `errors` is whose."""
-        ...
-
-    @property
-    def horizon_s(self) -> Array:
-        """Horizons, s."""
-        ...
-
-    @property
-    def errors(self) -> Mapping[str, SignalErrorGroup | None]:
-        """Errors by signal."""
-        ...
+ErrorsByHorizon: TypeAlias = "PlaybackGroup | ReplayRecord"
+"""What says how far a model and its rivals are off by horizon; rows of `errors` are those of `prediction`."""
 
 
 def row_of(errors: ErrorsByHorizon, *names: str) -> int:
@@ -154,7 +124,7 @@ def rival_row(errors: ErrorsByHorizon, group: SignalErrorGroup) -> int:
     return best
 
 
-def _by_signal(found: PlaybackGroup | ReplayRecord) -> dict[str, SignalErrorGroup | None]:
+def _by_signal(found: ErrorsByHorizon) -> dict[str, SignalErrorGroup | None]:
     """List errors by signal, what is asked of first first."""
     return {
         "body_rate": found.body_rate,
@@ -164,9 +134,14 @@ def _by_signal(found: PlaybackGroup | ReplayRecord) -> dict[str, SignalErrorGrou
     }
 
 
-def _summaries(errors: ErrorsByHorizon, prediction: int) -> dict[str, Any]:
-    """Describe the errors of one prediction for machines, by signal."""
-    return {name: None if found is None else found.summary(prediction) for name, found in errors.errors.items()}
+def _summaries(errors: ErrorsByHorizon) -> dict[str, Any]:
+    """Describe the errors of each prediction for machines, by signal, and how often it ran away."""
+    known = errors.errors.items()
+    return {
+        name: {signal: found and found.summary(row) for signal, found in known}
+        | {"diverged": int(errors.diverged[row])}
+        for row, name in enumerate(errors.prediction)
+    }
 
 
 @record
@@ -264,11 +239,11 @@ class HeldOutGroup(PlaybackGroup):
     @property
     def summary(self) -> dict[str, Any]:
         """The replay for machines."""
-        models = {
-            name: {**_summaries(self, index), "diverged": int(self.diverged[index])}
-            for index, name in enumerate(self.prediction)
+        return {
+            **super().summary,
+            "models": _summaries(self),
+            "better": None if self.better is None else self.better.summary,
         }
-        return {**super().summary, "models": models, "better": None if self.better is None else self.better.summary}
 
 
 def better_to(errors: ErrorsByHorizon, signal: str) -> float:
@@ -557,7 +532,7 @@ class ReplayRecord(Record):
             "fading_s": self.fading_s,
             "horizon_s": self.horizon_s.tolist(),
             "windows": self.windows,
-            "models": {name: self._prediction(index) for index, name in enumerate(self.prediction)},
+            "models": _summaries(self),
             "flights": [{_KEYS.get(key, key): value for key, value in row.items()} for row in rows_of(self.flight)],
             "worst": [
                 {
@@ -570,6 +545,3 @@ class ReplayRecord(Record):
             "contradictions": list(self.contradiction or ()),
             "warnings": list(self.warning),
         }
-
-    def _prediction(self, index: int) -> dict[str, Any]:
-        return {**_summaries(self, index), "diverged": int(self.diverged[index])}

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.changes.reference import load_directions
+from cpfls_cli.inertia import symmetric
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -20,7 +21,7 @@ class Cause:
     Attributes
     ----------
     name : str
-        What changed, as a key: ``rotor M3``.
+        What changed, as a key: ``rotor M3``. Of one name there are several where it can show in several ways.
     directions : array, shape (number, size)
         Of each size of it, the first of which is told, for as much as is usual where it happens.
     usual : float
@@ -56,8 +57,10 @@ class Cause:
         return frozenset(rest) - {"and"} if first in ("rotor", "rotors") else frozenset()
 
     def holds(self, other: Cause) -> bool:
-        """Tell whether another change is this one with something more: a rotor and a second one."""
-        return bool(self.rotors) and self.rotors < other.rotors
+        """Tell whether another change is this one, or this one with something more: a second rotor, a place."""
+        if self.name == "mass" and other.name.startswith("weight "):
+            return True
+        return self.name == other.name or (bool(self.rotors) and self.rotors < other.rotors)
 
 
 _LOSS = 0.15
@@ -76,6 +79,9 @@ _OF_AXIS = 0.5
 """Of that, by how much each axis differs from the others."""
 
 _HEAVIER = 0.1
+_ON_ARMS = (1 / 3, 2 / 3)
+"""Of the way from the middle to a rotor: places of a mass, beside those half way between two rotors."""
+
 _OFF_CENTRE = 0.1
 """Of the arm: by how much a centre of mass moves."""
 
@@ -109,6 +115,7 @@ def causes(names: Sequence[str], vehicle: VehicleSettings) -> list[Cause]:
     numbers = _Numbers(names)
     found = [*_of_loads(numbers, vehicle)] if numbers.of_kind("load") else []
     if numbers.of_kind("vibration"):
+        found = [each for cause in found for each in _shaken_or_not(cause, numbers)]
         found.append(Cause("vibration", np.stack(numbers.shakes, axis=1), _SHAKES, "1"))
     return [*found, *(cause for kind in _ALONE for cause in _of_kind(numbers, kind))]
 
@@ -144,7 +151,7 @@ def _of_loads(numbers: _Numbers, vehicle: VehicleSettings) -> Iterator[Cause]:
     arms = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
     arm = float(np.linalg.norm(arms, axis=1).mean())
     lever = arms[:, ::-1] ** 2 / np.maximum((arms**2).sum(axis=0)[::-1], 1e-12)
-    beside = [_LOSS * _OF_YAW / len(arms) * loads(own.yaw), *numbers.shakes]
+    beside = [_LOSS * _OF_YAW / len(arms) * loads(own.yaw)]
     single = []
     for index, (roll, pitch) in enumerate(lever):
         # It turns the body less too, as far as it drives roll and pitch.
@@ -155,17 +162,45 @@ def _of_loads(numbers: _Numbers, vehicle: VehicleSettings) -> Iterator[Cause]:
         columns = np.stack([single[one], single[other], *beside], axis=1)
         yield Cause(f"rotors M{one + 1} and M{other + 1}", columns, _LOSS, "1", _RARER, losses=2, told=2, ratio=-1)
     moved, heavier = [_OFF_CENTRE * arm * loads(each) for each in own.offset], _HEAVIER * loads(own.mass)
-    yield Cause("mass", np.stack([heavier, *moved], axis=1), _HEAVIER, "1", ratio=1)
+    yield Cause("mass", np.stack([heavier, *moved], axis=1), _HEAVIER, "1", 0.5, ratio=1)
+    places = [*(share * place for place in arms for share in _ON_ARMS), *map(sum, combinations(0.5 * arms, 2))]
+    for place in places:
+        columns = _HEAVIER * _hung(numbers, vehicle, place)[:, None]
+        yield Cause("mass", columns, _HEAVIER, "1", 0.5 / len(places), ratio=1)
     if numbers.of_kind("swing"):
         hangs = heavier + _HEAVIER * numbers.direction({"swing": 1.0})
         yield Cause("load on a cable", np.stack([hangs, *moved], axis=1), _HEAVIER, "1", losses=1)
     yield Cause("centre of mass", np.stack(moved, axis=1), _OFF_CENTRE * arm, "m", told=2)
     yield Cause("hover", heavier[:, None], _HEAVIER, "1", ratio=1)
-    for index, (x, y) in enumerate(arms):
+    for index, place in enumerate(arms):
         # In hover hardly another thing than a rotor that pulls less.
-        hangs = heavier + _HEAVIER * loads(x * own.offset[0] + y * own.offset[1])
-        yield Cause(f"weight near M{index + 1}", hangs[:, None], _HEAVIER, "1", 1 / len(arms), losses=1)
+        columns = _HEAVIER * _hung(numbers, vehicle, place)[:, None]
+        yield Cause(f"weight near M{index + 1}", columns, _HEAVIER, "1", 1 / len(arms), losses=1)
     yield Cause("torque about z", _OF_YAW * loads(own.yaw)[:, None], _OF_YAW, "1")
+
+
+def _hung(numbers: _Numbers, vehicle: VehicleSettings, place: Array) -> Array:
+    """Give what a mass does that is fixed at a place, shape (number,), for as much as the vehicle's.
+
+    By the same number it adds to the weight, moves the centre of mass, and is turned about it.
+    """
+    own, (x, y) = load_directions(vehicle), place
+    moments = np.diag(symmetric(vehicle.inertia_kg_m2)) / vehicle.mass_kg
+    slower = dict(zip(("roll", "pitch", "yaw"), np.array([y * y, x * x, x * x + y * y]) / moments, strict=True))
+    turned = numbers.direction({f"follow {axis}": -share for axis, share in slower.items()})
+    return numbers.loads(own.mass + x * own.offset[0] + y * own.offset[1]) + turned
+
+
+def _shaken_or_not(cause: Cause, numbers: _Numbers) -> Iterator[Cause]:
+    """Give a change with and without another vibration, each as likely as the other.
+
+    Rotors that turn otherwise shake otherwise, at whatever the log's rate makes of that.
+    """
+    if cause.rotors:
+        yield replace(cause, directions=np.column_stack([cause.directions, *numbers.shakes]))
+        return
+    yield replace(cause, prior=0.5 * cause.prior)
+    yield replace(cause, prior=0.5 * cause.prior, directions=np.column_stack([cause.directions, *numbers.shakes]))
 
 
 def _of_kind(numbers: _Numbers, kind: str) -> Iterator[Cause]:

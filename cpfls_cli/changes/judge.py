@@ -177,7 +177,9 @@ def judged(
         since = _since(spaces[best], apart, found, starts)
         at = list(starts).index(since)
         found = _found(spaces[at], means[at], chance) or found
-    threshold = float(np.quantile(chance, 1 - FALSE_ALARM))
+    threshold, first = float(np.quantile(chance, 1 - FALSE_ALARM)), dict[str, int]()
+    for index, cause in enumerate(listed):
+        first.setdefault(cause.name, index)
     return Change(
         names,
         reference,
@@ -187,7 +189,7 @@ def judged(
         np.array([beyond_chance(alone, held([flight])[2]) for flight in today]),
         since,
         found,
-        {cause.name: spaces[0].shows(index, threshold, drawn[0][:, :_SHOWN]) for index, cause in enumerate(listed)},
+        {name: spaces[0].shows(index, threshold, drawn[0][:, :_SHOWN]) for name, index in first.items()},
     )
 
 
@@ -232,6 +234,10 @@ class _Space:
         """Turn numbers into such that do not go together, of variance 1, along the first axis."""
         return np.asarray(np.linalg.solve(self.root, apart))
 
+    def ways(self, name: str) -> list[int]:
+        """List the ways in which a change shows."""
+        return [index for index, cause in enumerate(self.listed) if cause.name == name]
+
     def strongest(self, rows: Array) -> Array:
         """Compute the logarithm of the largest evidence of a change, shape (row,)."""
         return np.asarray(self.evidence(rows).max(axis=0))
@@ -263,30 +269,18 @@ class _Space:
         losses : slice
             Directions whose sizes are nearly always above 0.
         """
-        left, sizes, _ = np.linalg.svd(directions, full_matrices=False)
-        along, square = (left.T @ rows) ** 2, (rows**2).sum(axis=0)
-        parts = []
-        for scale in self.scales:
-            grown = scale + sizes**2
-            inside = (along * (1 / scale - 1 / grown)[:, None]).sum(axis=0)
-            weight = len(rows) * np.log(scale) + np.log(grown / scale).sum()
-            parts.append(-0.5 * (square / scale - inside + weight) + self._losing(rows, directions, scale, losses))
+        left, sizes, turned = np.linalg.svd(directions, full_matrices=False)
+        shown, square, scale = left.T @ rows, (rows**2).sum(axis=0), self.scales[:, None]
+        grown = scale + sizes**2
+        inside = (1 / scale - 1 / grown) @ shown**2
+        weight = len(rows) * np.log(scale) + np.log(grown / scale).sum(axis=1, keepdims=True)
+        parts = -0.5 * (square / scale - inside + weight)
+        if losses != _NONE:
+            along = turned.T[losses]
+            mean = (along * (sizes / grown)[:, None]) @ shown
+            parts += _losing(mean, 1 - ((1 - scale / grown)[:, None] * along**2).sum(axis=2))
         most = np.max(parts, axis=0)
-        return np.asarray(most + np.log(np.mean(np.exp(np.array(parts) - most), axis=0)))
-
-    def _losing(self, rows: Array, directions: Array, scale: float, losses: slice) -> Array:
-        """Compute the logarithm of what the sign of losses adds to a density, shape (row,).
-
-        Of two losses as if neither told of the other.
-        """
-        if losses == _NONE:
-            return np.zeros(rows.shape[1])
-        from scipy.special import ndtr
-
-        inverse = np.linalg.inv(directions.T @ directions / scale + np.eye(directions.shape[1]))[losses]
-        mean, error = inverse @ (directions.T @ rows) / scale, np.sqrt(np.diag(inverse[:, losses]))
-        above = ndtr(mean / error[:, None])
-        return np.asarray(np.log(2 * (_LOSES * above + (1 - _LOSES) * (1 - above))).sum(axis=0))
+        return np.asarray(most + np.log(np.mean(np.exp(parts - most), axis=0)))
 
     def sizes(self, row: Array, chosen: Sequence[int], of: int) -> tuple[Size, ...]:
         """Estimate the sizes of one of several changes that are there, in its unit.
@@ -326,6 +320,23 @@ class _Space:
         return cause.size(_SIZES[first] * cause.usual) if first < len(_SIZES) else float("inf")
 
 
+def _losing(mean: Array, variance: Array) -> Array:
+    """Compute the logarithm of what the sign of losses adds to a density, shape (scale, row).
+
+    Of two losses as if neither told of the other.
+
+    Parameters
+    ----------
+    mean : array, shape (scale, loss, row)
+    variance : array, shape (scale, loss)
+        Of the size of each.
+    """
+    from scipy.special import ndtr
+
+    above = ndtr(mean / np.sqrt(variance)[:, :, None])
+    return np.asarray(np.log(2 * (_LOSES * above + (1 - _LOSES) * (1 - above))).sum(axis=1))
+
+
 def _found(space: _Space, row: Array, chance: Array) -> tuple[Found, ...]:
     """Name one change after another while each explains more than chance beside the others."""
     chosen: list[int] = []
@@ -338,22 +349,37 @@ def _found(space: _Space, row: Array, chance: Array) -> tuple[Found, ...]:
         # What came first was chosen for what the others do too.
         for index in [*chosen] * 2:
             others = [other for other in chosen if other != index]
-            chosen = [*others, int(np.argmax(_beside(space, row, others)))]
+            beliefs = _beliefs(space, row, others)
+            of_name = _by_name(space, beliefs)
+            most = max(of_name, key=lambda name: of_name[name])
+            chosen = [*others, max(space.ways(most), key=lambda at: beliefs[at])]
     found = []
     for index in chosen:
-        evidence = _beside(space, row, [other for other in chosen if other != index])
-        share = np.exp(evidence - evidence.max())
-        share /= share.sum()
-        order = np.argsort(-share, kind="stable")
-        alike = tuple(
-            (space.listed[other].name, float(share[other]))
-            for other in order
-            if other != index and share[other] >= LISTED
-        )
-        own = space.listed[index]
-        belief = sum(share[at] for at, other in enumerate(space.listed) if at == index or own.holds(other))
-        found.append(Found(own, space.sizes(row, chosen, index), float(belief), alike))
+        beliefs = _beliefs(space, row, [other for other in chosen if other != index])
+        cause, of_name = space.listed[index], _by_name(space, beliefs)
+        order = sorted(of_name, key=lambda name: -of_name[name])
+        alike = tuple((name, of_name[name]) for name in order if name != cause.name and of_name[name] >= LISTED)
+        sure = sum(belief for other, belief in zip(space.listed, beliefs, strict=True) if cause.holds(other))
+        # The way that leaves most open.
+        widest = max(space.ways(cause.name), key=lambda at: space.white[at].shape[1])
+        sizes = space.sizes(row, [widest if other == index else other for other in chosen], widest)
+        found.append(Found(cause, sizes, float(sure), alike))
     return tuple(found)
+
+
+def _by_name(space: _Space, beliefs: Array) -> dict[str, float]:
+    """Add up the belief in each change over the ways in which it shows."""
+    of_name = {cause.name: 0.0 for cause in space.listed}
+    for cause, belief in zip(space.listed, beliefs.tolist(), strict=True):
+        of_name[cause.name] += belief
+    return of_name
+
+
+def _beliefs(space: _Space, row: Array, there: Sequence[int]) -> Array:
+    """Compute the belief in each change beside those that are there, shape (cause,)."""
+    evidence = _beside(space, row, there)
+    share = np.exp(evidence - evidence.max())
+    return np.asarray(share / share.sum())
 
 
 def _since(space: _Space, apart: Array, found: Sequence[Found], starts: Sequence[int]) -> int:
@@ -375,8 +401,9 @@ def _beside(space: _Space, row: Array, there: Sequence[int]) -> Array:
     """Compute the logarithm of the evidence of each change beside those that are there, shape (cause,)."""
     beside = np.hstack([space.white[index] for index in there]) if there else None
     evidence = space.evidence(row[:, None], beside)[:, 0]
+    names = {space.listed[index].name for index in there}
     rotors = frozenset[str]().union(*(space.listed[index].rotors for index in there))
     for index, cause in enumerate(space.listed):
-        if index in there or cause.rotors & rotors:
+        if cause.name in names or cause.rotors & rotors:
             evidence[index] = -np.inf
     return evidence

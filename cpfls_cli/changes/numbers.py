@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -92,11 +92,13 @@ _SHORTEST_S = 4.0
 _BLOCKS = 8
 """That errors are told by."""
 
-_ABOVE_HZ = 20.0
-"""Where vibration begins: above what a vehicle flies."""
+_ABOVE_HZ, _ACROSS_HZ = 20.0, 3.0
+"""Where vibration begins: above what a vehicle flies. Across its rotors the accelerometer feels the air alone, so that
+what turns with them shows at whatever the log's rate makes of its frequency."""
 
-_TURNS_S = 0.5
-"""Stretches over which what turns with a rotor adds up: rotors 2 Hz apart are told apart."""
+_TURNS_S, _ALIKE = 1.0, 0.03
+"""Stretches over which what turns with a rotor adds up: rotors 1 Hz apart are told apart. Of those that turn more alike
+each has its share, by the squared size below which a difference of theirs counts as none."""
 
 _WINDOW_S, _SWING_S = 0.12, 0.4
 """Length of windows over which rotation is averaged, and a swing. Below its bandwidth, 2 Hz or so, the loop's torque
@@ -219,8 +221,12 @@ def _told(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
         )
         yield _answer(signals, flies, rotors)
     turns, feels = bool(signals.body_rate.any()), _felt(signals)
-    for sensor, values in (("gyroscope", signals.body_rate if turns else None), ("accelerometer", feels)):
-        if values is not None and (squares := _above(values, signals.period)) is not None:
+    across = _ACROSS_HZ if signals.specific_force is not None else _ABOVE_HZ
+    for sensor, values, above in (
+        ("gyroscope", signals.body_rate if turns else None, (_ABOVE_HZ,) * 3),
+        ("accelerometer", feels, (across, across, _ABOVE_HZ)),
+    ):
+        if values is not None and (squares := _above(values, signals.period, above)) is not None:
             names = [f"vibration {sensor} {axis}" for axis in _AXES]
             yield _averaged(names, squares, flies, lambda means: 0.5 * np.log(means))
     if signals.specific_force is not None:
@@ -263,12 +269,13 @@ def _felt(signals: Signals) -> Array | None:
     return signals.acceleration if signals.specific_force is None else signals.specific_force
 
 
-def _above(values: Array, period: float) -> Array | None:
-    """Square what is above 20 Hz, shape (time, 3); None where the log is too slow to hold it."""
-    half = max(1, round(0.5 / (_ABOVE_HZ * period)))
-    if 0.5 / period < 1.5 * _ABOVE_HZ or len(values) < 4 * half + 4:
+def _above(values: Array, period: float, hertz: Sequence[float]) -> Array | None:
+    """Square what is above a frequency along each axis, shape (time, 3); None where the log is too slow to hold it."""
+    halves = [max(1, round(0.5 / (each * period))) for each in hertz]
+    if 0.5 / period < 1.5 * _ABOVE_HZ or len(values) < 4 * max(halves) + 4:
         return None
-    return np.asarray((values - parabolas(values, half, 0)) ** 2)
+    smooth = [parabolas(values[:, [axis]], half, 0) for axis, half in enumerate(halves)]
+    return np.asarray((values - np.hstack(smooth)) ** 2)
 
 
 def _unbalance(signals: Signals, feels: Array, flies: BoolArray) -> _Numbers:
@@ -284,13 +291,15 @@ def _unbalance(signals: Signals, feels: Array, flies: BoolArray) -> _Numbers:
     turned = np.exp(-1j * signals.period * (np.cumsum(speed, axis=0) - 0.5 * speed))
     # What moves slowly is seen by the edges of a stretch alone, which this window takes away.
     weight = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
-    apart = (feels[whole] - feels[flies].mean(axis=0)).reshape(count, length, 3) * (weight / weight.sum())[:, None]
-    parts = np.einsum("btr,bta->bra", turned.reshape(count, length, -1), apart)
+    weighed = turned.reshape(count, length, -1) * (weight / weight.sum())[:, None]
+    parts = np.einsum("btr,bta->bra", weighed, (feels[whole] - feels[flies].mean(axis=0)).reshape(count, length, 3))
+    # Of rotors that turn alike each feels what the others do.
+    alike = np.einsum("btr,bts->brs", weighed, turned.conj().reshape(count, length, -1))
     flown = np.asarray(flies[whole].reshape(count, length).all(axis=1))
     names = [f"unbalance M{index + 1}" for index in range(signals.speed.shape[1])]
-    if flown.sum() < 2 * _BLOCKS:
+    if flown.sum() < _BLOCKS:
         return [], np.zeros(0), np.zeros(0)
-    power = 4 * (np.abs(parts) ** 2).sum(axis=2)
+    power = 4 * (np.abs(np.linalg.solve(alike + _ALIKE * np.eye(len(names)), parts)) ** 2).sum(axis=2)
     return _averaged(names, power, flown, lambda means: 0.5 * np.log(means))
 
 
@@ -358,12 +367,20 @@ def _followed(own: Windows, inside: BoolArray, turned: Array, drives: Array, per
     """Fit what follows, averaged over windows, to what drives it, of all and without each block; see `_fit`."""
     driven = np.array([own.average(delayed(drives, each / period))[inside] for each in _DELAYS])
     there = turned[inside]
+    # Squares and products of each block, about means of all.
+    both = np.concatenate([driven, np.broadcast_to(there, (len(driven), *there.shape))], axis=2)
+    both -= both.mean(axis=1, keepdims=True)
     block = contiguous(len(there), _BLOCKS)
-    kept = [block >= 0, *(block != number for number in range(_BLOCKS))]
-    return np.array([_fit(there[rows], driven[:, rows]) for rows in kept])
+    parts = [both[:, block == number] for number in range(_BLOCKS)]
+    sums = np.array([part.sum(axis=1) for part in parts])
+    products = np.array([part.transpose(0, 2, 1) @ part for part in parts])
+    count = np.bincount(block, minlength=_BLOCKS)
+    left_out = zip(count.sum() - count, sums.sum(axis=0) - sums, products.sum(axis=0) - products, strict=True)
+    kept = [(count.sum(), sums.sum(axis=0), products.sum(axis=0)), *left_out]
+    return np.array([_fit(*each, there.shape[1]) for each in kept])
 
 
-def _fit(turned: Array, driven: Array) -> Array:
+def _fit(count: int, sums: Array, products: Array, columns: int) -> Array:
     """Fit what follows to what drives it at each delay: gain, best delay in steps, what is left, shape (3, column).
 
     A delay at the end of what is tried is not known.
@@ -373,15 +390,22 @@ def _fit(turned: Array, driven: Array) -> Array:
 
     Parameters
     ----------
-    turned : array, shape (window, column)
-    driven : array, shape (delay, window, column or more)
+    count : int
+        Of windows.
+    sums : array, shape (delay, drive and column)
+    products : array, shape (delay, drive and column, drive and column)
+        Over them of what drives and of what follows, the last of them.
     """
-    y, x = turned - turned.mean(axis=0), driven - driven.mean(axis=1, keepdims=True)
-    size = np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-300)
-    x = x / size
-    cross = np.einsum("dwk,wa->dka", x, y)
-    found = np.linalg.solve(np.einsum("dwk,dwl->dkl", x, x) + _COLLINEAR * np.eye(x.shape[2]), cross)
-    left = np.maximum((y**2).sum(axis=0) - (cross * found).sum(axis=1), 0.0)
+    products = products - sums[:, :, None] * sums[:, None, :] / count
+    drives = products.shape[1] - columns
+    squares = np.maximum(np.diagonal(products, axis1=1, axis2=2), 0.0)
+    size = np.sqrt(squares[:, None, :drives])
+    # What does not change drives nothing.
+    size = np.where(size > 0, size, 1.0)
+    among = products[:, :drives, :drives] / size / size.transpose(0, 2, 1)
+    cross = products[:, :drives, drives:] / size.transpose(0, 2, 1)
+    found = np.linalg.solve(among + _COLLINEAR * np.eye(drives), cross)
+    left = np.maximum(squares[:, drives:] - (cross * found).sum(axis=1), 0.0)
     best = np.argmin(left, axis=0)
     axis = np.arange(left.shape[1])
     inner = np.clip(best, 1, len(left) - 2)
@@ -390,7 +414,7 @@ def _fit(turned: Array, driven: Array) -> Array:
     step = np.where((bend > 0) & (inner == best), 0.5 * (before - after) / np.where(bend > 0, bend, 1.0), 0.0)
     gain = found[best, axis, axis] / size[best, 0, axis]
     late = np.where(best < len(left) - 1, best + step, np.nan)
-    return np.array([np.where(gain > 0, gain, np.nan), late, np.sqrt(left[best, axis] / len(turned))])
+    return np.array([np.where(gain > 0, gain, np.nan), late, np.sqrt(left[best, axis] / count)])
 
 
 def _of_attitude(signals: Signals) -> Array:

@@ -190,13 +190,8 @@ HistoryOption = Annotated[
 ]
 EveryOption = Annotated[int, typer.Option("--every", metavar="N", min=1, help="Begin at every N-th sample.")]
 
-
-class Between(StrEnum):
-    """What a rotor speed is between samples."""
-
-    LINEAR = "linear"
-    PREVIOUS = "previous"
-
+Between = StrEnum("Between", "linear previous")
+"""What a rotor speed is between samples."""
 
 HoldOption = Annotated[
     Between | None,
@@ -207,56 +202,16 @@ HoldOption = Annotated[
     ),
 ]
 
-
-class TimeOrder(StrEnum):
-    """What tells which flight came first."""
-
-    DATE = "date"
-    NAME = "name"
-    GIVEN = "given"
-
-
-class ExportFormat(StrEnum):
-    """What a model is exported as."""
-
-    JSON = "json"
-    C = "c"
-    PYTHON = "python"
-    SDF = "sdf"
-    PX4 = "px4"
-    CRAZYFLOW = "crazyflow"
-    URDF = "urdf"
-    ARDUPILOT = "ardupilot"
-    MJCF = "mjcf"
-    ROTORPY = "rotorpy"
-    CASADI = "casadi"
-    JAX = "jax"
-    MCAP = "mcap"
-    CSV = "csv"
-
-
-class AutopilotChoice(StrEnum):
-    """Whose control law is meant."""
-
-    PX4 = "px4"
-    ARDUPILOT = "ardupilot"
-    BETAFLIGHT = "betaflight"
-    CRAZYFLIE = "crazyflie"
-
-
-class Flown(StrEnum):
-    """What an exported vehicle is flown in."""
-
-    SDF = "sdf"
-    PX4 = "px4"
-    CRAZYFLOW = "crazyflow"
-    URDF = "urdf"
-    ARDUPILOT = "ardupilot"
-    MJCF = "mjcf"
-    ROTORPY = "rotorpy"
-    CASADI = "casadi"
-    JAX = "jax"
-
+TimeOrder = StrEnum("TimeOrder", "date name given")
+"""What tells which flight came first."""
+ExportFormat = StrEnum(
+    "ExportFormat", "json c python sdf px4 crazyflow urdf ardupilot mjcf rotorpy casadi jax mcap csv"
+)
+"""What a model is exported as."""
+AutopilotChoice = StrEnum("AutopilotChoice", "px4 ardupilot betaflight crazyflie")
+"""Whose control law is meant."""
+Flown = StrEnum("Flown", "sdf px4 crazyflow urdf ardupilot mjcf rotorpy casadi jax")
+"""What an exported vehicle is flown in."""
 
 WorkersOption = Annotated[int, typer.Option("--workers", metavar="N", min=1, help="Processes that evaluate.")]
 SchedulerOption = Annotated[

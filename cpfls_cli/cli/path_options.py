@@ -17,13 +17,8 @@ class Signal(StrEnum):
     LOGARITHMIC = "sweep-logarithmic"
 
 
-class MissionFormat(StrEnum):
-    """What a path is written as for an autopilot."""
-
-    CSV = "csv"
-    PX4 = "px4"
-    ARDUPILOT = "ardupilot"
-
+MissionFormat = StrEnum("MissionFormat", "csv px4 ardupilot")
+"""What a path is written as for an autopilot."""
 
 WaypointsOption = Annotated[
     Path | None,

@@ -11,7 +11,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.channels import channel_warnings, filter_warnings
 from cpfls_cli.consistency.check import findings_of
 from cpfls_cli.consistency.clocks import actuation_delay
-from cpfls_cli.consistency.findings import AuditFinding, capitalised, contradictions, doubts
+from cpfls_cli.consistency.findings import AuditFinding, contradictions, doubts
 from cpfls_cli.consistency.gyroscope import GyroFit
 from cpfls_cli.consistency.repairs import ChannelRepair, shifted
 from cpfls_cli.consistency.sensors import CheckedFault, findings, sensors_of
@@ -19,6 +19,7 @@ from cpfls_cli.effects.hooks import ReadingError
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.weak_form.windows import Windows
+from cpfls_cli.words import capitalised
 
 # What is only mentioned, never repaired: biases of flights that lie apart by more than a warm-up makes, rad/s, and axes
 # that are less square than those of usual sensors; beyond chance over some dozen numbers.

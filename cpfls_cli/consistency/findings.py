@@ -105,11 +105,6 @@ def doubts(findings: Iterable[Finding]) -> tuple[str, ...]:
     return tuple(finding.sentence for finding in findings if not finding.contradiction)
 
 
-def capitalised(words: str) -> str:
-    """Let words begin a sentence."""
-    return words[0].upper() + words[1:]
-
-
 def off_clock(delay_s: float) -> str:
     """Say how late or early something is."""
     return f"{'late' if delay_s > 0 else 'early'} by {abs(1000 * delay_s):.0f} ms"

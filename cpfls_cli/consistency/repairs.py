@@ -6,9 +6,10 @@ from typing import Any, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.consistency.findings import Finding, capitalised
+from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.lag import delayed
+from cpfls_cli.words import capitalised
 
 _UP = np.array([0.0, 0.0, 1.0])
 _SAME = 1e-6

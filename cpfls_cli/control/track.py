@@ -216,31 +216,17 @@ def flown_signals(plan: Plan, tracked: Tracked, controller: int, plant: Rotation
 
 @dataclass(frozen=True)
 class Scores:
-    """Tracking errors at the samples of the plan; NaN for a controller that lost its vehicle.
-
-    Other fields are described at `TrackingGroup`.
-
-    Attributes
-    ----------
-    rms, largest : array, shape (controller, 3), rad
-        Root mean square and largest size of all samples.
-    settled_rms, settled_largest : array, shape (controller, 3), rad
-        Of those after that time.
-    effort : array, shape (controller, 3), N m, body frame
-        Root mean square of the torque.
-    lost : array, shape (controller,), s
-        Time of the loss; NaN where none.
-    """
+    """Tracking errors at the samples of the plan, described at `TrackingGroup`; NaN where a vehicle was lost."""
 
     error: Array
     settled_from: float
     rms: Array
-    largest: Array
     settled_rms: Array
-    settled_largest: Array
-    effort: Array
+    max_error: Array
+    settled_max: Array
+    torque_rms: Array
     clipped: Array
-    lost: Array
+    lost_at: Array
 
 
 def scores(plan: Plan, tracked: Tracked, settling_time: float) -> Scores:
@@ -253,7 +239,7 @@ def scores(plan: Plan, tracked: Tracked, settling_time: float) -> Scores:
     """
     error = rotations.wrapped(plan.attitude - tracked.attitude)
     alive = np.all(np.isfinite(error), axis=2)
-    lost = np.where(alive.all(axis=1), np.nan, plan.time[np.argmin(alive, axis=1)])
+    lost_at = np.where(alive.all(axis=1), np.nan, plan.time[np.argmin(alive, axis=1)])
     sampled = error[:, :: plan.parts]
     since = plan.time[:: plan.parts] - plan.time[0]
     settled_from = min(settling_time, 0.5 * float(since[-1]))
@@ -262,12 +248,12 @@ def scores(plan: Plan, tracked: Tracked, settling_time: float) -> Scores:
         error=sampled,
         settled_from=settled_from,
         rms=_rms(sampled),
-        largest=np.max(np.abs(sampled), axis=1),
         settled_rms=_rms(settled),
-        settled_largest=np.max(np.abs(settled), axis=1),
-        effort=_rms(tracked.body_torque),
+        max_error=np.max(np.abs(sampled), axis=1),
+        settled_max=np.max(np.abs(settled), axis=1),
+        torque_rms=_rms(tracked.body_torque),
         clipped=np.sum(tracked.clipped, axis=1) / np.maximum(np.sum(alive, axis=1), 1),
-        lost=lost,
+        lost_at=lost_at,
     )
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque, positive_definite
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues
@@ -290,14 +290,7 @@ def _attitude(state: RotationState) -> Array:
 
 
 def _solved(matrices: Array, right_side: Array) -> Acceleration:
-    exists = _positive_definite(matrices)
+    exists = positive_definite(matrices)
     safe = np.where(exists[:, None, None], matrices, np.eye(3))
     value = np.linalg.solve(safe, np.where(exists[:, None], right_side, 0.0)[..., None])[..., 0]
     return Acceleration(value, exists)
-
-
-def _positive_definite(matrices: Array) -> BoolArray:
-    """Flag positive definite matrices by their leading minors (Sylvester), ten times as fast as by eigenvalues."""
-    first, second = matrices[:, 0, 0], matrices[:, 1, 1]
-    minor = first * second - matrices[:, 0, 1] ** 2
-    return np.asarray((first > 0) & (minor > 0) & (np.linalg.det(matrices) > 0))

@@ -157,37 +157,19 @@ class _Channel:
             for stamp, place, turn in zip(stamps, places, turned, strict=True)
         ]
         topic = "/pose" if pose.child == BODY_FRAME else f"/pose/{pose.child}"
-        posed = cls(writer, topic, _POSE_IN_FRAME, about)
-        posed.messages = iter(
-            [
-                (
-                    stamp,
-                    posed.number,
-                    {
-                        "timestamp": _timestamp(stamp),
-                        "frame_id": WORLD_FRAME,
-                        "pose": {"position": place, "orientation": turn},
-                    },
-                )
-                for stamp, place, turn in samples
-            ]
+        posed, moved = (
+            cls(writer, topic, _POSE_IN_FRAME, about),
+            cls(writer, f"/tf/{pose.child}", _FRAME_TRANSFORM, about),
         )
-        moved = cls(writer, f"/tf/{pose.child}", _FRAME_TRANSFORM, about)
-        moved.messages = iter(
-            [
-                (
-                    stamp,
-                    moved.number,
-                    {
-                        "timestamp": _timestamp(stamp),
-                        "parent_frame_id": WORLD_FRAME,
-                        "child_frame_id": pose.child,
-                        "translation": place,
-                        "rotation": turn,
-                    },
-                )
-                for stamp, place, turn in samples
-            ]
+        frames = {"parent_frame_id": WORLD_FRAME, "child_frame_id": pose.child}
+        posed.messages = (
+            (stamp, posed.number, {"timestamp": _timestamp(stamp), "frame_id": WORLD_FRAME, "pose": own})
+            for stamp, place, turn in samples
+            for own in [{"position": place, "orientation": turn}]
+        )
+        moved.messages = (
+            (stamp, moved.number, {"timestamp": _timestamp(stamp), **frames, "translation": place, "rotation": turn})
+            for stamp, place, turn in samples
         )
         return [posed, moved]
 

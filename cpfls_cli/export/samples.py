@@ -28,7 +28,8 @@ _CONVENTIONS = (
     "k, and all entries k belong together: numbers that the flights tell only by their ratio differ together. Rotor i "
     "pushes thrust_factor w^2 along z and turns the body by -spin drag_factor w^2 about z; with thrust_linear a, w^2 "
     "becomes w^2 + a w_h w, w_h the speed that hovers under the square alone. Commands act after delay_s through a "
-    "first-order lag of motor_lag_s."
+    "first-order lag of motor_lag_s. Torque and force of a part of the model are to be multiplied, axis by axis, with "
+    "1 + off.PART: by so much its formula is off. Gusts and what is lacking act beside it, by the recipe of gusts."
 )
 _ENDS = (2.5, 97.5)
 
@@ -90,7 +91,7 @@ class Samples:
         centre = self.spread.centre.tolist()
         for name, value, (low, high) in zip(self.spread.names, centre, ends, strict=True):
             found[name] = Range(self.numbers[name].unit, value, low, high, name not in self.untold)
-        return found | dict(_gust_ranges(self.sheet.model, self.spread))
+        return found | dict(_gust_ranges(self.sheet.model, self.spread)) | dict(_off_ranges(self.spread))
 
     @property
     def moved(self) -> dict[str, float]:
@@ -190,10 +191,29 @@ def _columns(nominal: VehicleModel, models: tuple[VehicleModel, ...]) -> Iterato
         yield "remainder", "SI, learned, without a name: row, column, power", np.array(learned)
     if nominal.gusts is not None:
         gusts = np.array([each.gusts for each in models])
-        halves = (("torque_n_m", "torque_memory_s", slice(0, 3)), ("force_n", "force_memory_s", slice(3, 6)))
-        for size, memory, axes in halves:
-            yield f"gust_{size}", f"{'N m' if axes.start == 0 else 'N'}, standard deviation, x y z", gusts[:, 0, axes]
-            yield f"gust_{memory}", "s, in which a gust falls to 37 %, x y z", gusts[:, 1, axes]
+        yield from _random(gusts, "gust", "gust")
+        for size, unit, axes in (("torque_white_n_m_sqrt_s", "N m", _TURNS), ("force_white_n_sqrt_s", "N", _PUSHES)):
+            yield f"gust_{size}", f"{unit} s^0.5, white noise beside it, x y z", gusts[:, 2, axes]
+    lacking = [each.lack for each in models if each.lack is not None]
+    if lacking:
+        yield from _random(np.array(lacking), "lack", "rest")
+    for name in models[0].deviations:
+        values = np.array([each.deviations[name] for each in models])
+        if values.any():
+            yield f"off.{name}", "share of torque about and force along x y z by which this part is off", values
+
+
+_TURNS, _PUSHES = slice(0, 3), slice(3, 6)
+
+
+def _random(values: Array, name: str, what: str) -> Iterator[tuple[str, str, Array]]:
+    """Give sizes and memories of random torque and force, shape of values (vehicle, 2 or more, 6)."""
+    for size, memory, unit, axes in (
+        ("torque_n_m", "torque_memory_s", "N m", _TURNS),
+        ("force_n", "force_memory_s", "N", _PUSHES),
+    ):
+        yield f"{name}_{size}", f"{unit}, standard deviation, x y z", values[:, 0, axes]
+        yield f"{name}_{memory}", f"s, in which a {what} falls to 37 %, x y z", values[:, 1, axes]
 
 
 def _gust_ranges(nominal: VehicleModel, spread: Spread) -> Iterator[tuple[str, Range]]:
@@ -206,6 +226,16 @@ def _gust_ranges(nominal: VehicleModel, spread: Spread) -> Iterator[tuple[str, R
             low, high = np.percentile(drawn[:, part, axis], _ENDS).tolist()
             value = float(nominal.gusts[part][axis])
             yield f"gust.{GUST_AXES[axis]}_{word}", Range(unit, value, low, high, True)
+
+
+def _off_ranges(spread: Spread) -> Iterator[tuple[str, Range]]:
+    """Give the range of each share by which a part is off."""
+    first = spread.models[0].deviations
+    for name, axis in ((name, axis) for name in first for axis in range(len(GUST_AXES))):
+        values = np.array([each.deviations[name][axis] for each in spread.models])
+        if values.any():
+            low, high = np.percentile(values, _ENDS).tolist()
+            yield f"off.{name}_{GUST_AXES[axis]}", Range("1", 0.0, low, high, True)
 
 
 def require_ending(name: str, suffix: str) -> str:

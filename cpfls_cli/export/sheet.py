@@ -31,7 +31,7 @@ DO_NOT_USE = "DO NOT USE: this is the verdict on the model, which was exported n
 GUST_RECIPE = (
     "Torque and force of gusts act on the body in addition to those of the model, about and along its axes. Each is x, "
     "at first size * n, and after every step h: x = k x + size sqrt(1 - k^2) n, k = exp(-h / memory), n a new normal "
-    "number."
+    "number; to x the white part adds white / sqrt(h) times another n in every step."
 )
 """How to play gusts, which no equation of an export holds."""
 
@@ -210,10 +210,10 @@ class Sheet:
             rows = ", ".join(_ROWS[row] for row in self.remainder.rows)
             yield f"Learned, without a name: {rows} over the direction of the airflow."
         if model.gusts is not None:
-            size, memory = (", ".join(f"{value:.4g}" for value in values) for values in model.gusts)
+            size, memory, white = (", ".join(f"{value:.4g}" for value in values) for values in model.gusts)
             yield (
                 f"Gusts of its flights, not played here, {', '.join(_ROWS)}: standard deviations {size} (N m, N); "
-                f"memories {memory} s. {GUST_RECIPE}"
+                f"memories {memory} s; white {white} (N m s^0.5, N s^0.5). {GUST_RECIPE}"
             )
         if self.identified is not None:
             yield _inertia_in_words(self.identified, fuzzy=self.rules is not None)

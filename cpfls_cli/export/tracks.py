@@ -136,10 +136,7 @@ def csv_text(view: View) -> str:
         rows = np.searchsorted(stamps, time).tolist()
         for what, axis, values in track.columns:
             header.append("/".join(part for part in (track.path, axis, what) if part))
-            cells = [""] * len(stamps)
-            for row, value in zip(rows, values.tolist(), strict=True):
-                cells[row] = _number(value, _VALUE_DIGITS)
-            columns.append(cells)
+            columns.append(_cells(len(stamps), rows, values))
     return _table(header, zip(*columns, strict=True))
 
 
@@ -149,14 +146,17 @@ def _curves_text(curves: Sequence[Curve]) -> str:
     for curve in curves:
         rows = np.searchsorted(over, curve.x).tolist()
         for name, values in curve.values.items():
-            if not np.isfinite(values).any():
-                continue
-            header.append(f"{curve.name}/{name}")
-            cells = [""] * len(over)
-            for row, value in zip(rows, values.tolist(), strict=True):
-                cells[row] = _number(value, _VALUE_DIGITS)
-            columns.append(cells)
+            if np.isfinite(values).any():
+                header.append(f"{curve.name}/{name}")
+                columns.append(_cells(len(over), rows, values))
     return _table(header, zip(*columns, strict=True))
+
+
+def _cells(count: int, rows: Sequence[int], values: Array) -> list[str]:
+    cells = [""] * count
+    for row, value in zip(rows, values.tolist(), strict=True):
+        cells[row] = _number(value, _VALUE_DIGITS)
+    return cells
 
 
 def _table(header: Sequence[str], rows: Iterator[tuple[str, ...]]) -> str:

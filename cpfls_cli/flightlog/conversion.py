@@ -13,6 +13,7 @@ from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.repair import unwrap_angles
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, ColumnMap, ImportSettings, SignalMap
 from cpfls_cli.units import STANDARD_GRAVITY, to_si
+from cpfls_cli.words import some
 
 _SUFFICIENT_SIGNALS = ("attitude", "quaternion", "body_rate", "rotor_speed", "rotor_command")
 _WORLD_SIGNALS = ("position", "velocity", "acceleration")
@@ -185,10 +186,8 @@ def columns_in_words(columns: Mapping[str, Array]) -> str:
     """Say once what the log holds; of a log of topics, which has hundreds of columns, its topics."""
     of_topics = all("." in column for column in columns)
     names = sorted({column.partition(".")[0] for column in columns}) if of_topics else list(columns)
-    more = f" and {len(names) - _MOST_LISTED} more" if len(names) > _MOST_LISTED else ""
     what = "topics" if of_topics else "columns"
-    shown = ", ".join(names[:_MOST_LISTED]) or "none"
-    return f"the log has the {what} {shown}{more}; `cpfls init LOG` proposes the mapping"
+    return f"the log has the {what} {some(names, _MOST_LISTED) or 'none'}; `cpfls init LOG` proposes the mapping"
 
 
 def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) -> dict[str, Array]:

@@ -31,6 +31,7 @@ from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
+from cpfls_cli.words import some
 
 _DEGREES = 180 / np.pi
 _TORQUE_HZ, _FOLLOWS = 6.0, 0.3
@@ -292,8 +293,7 @@ def _list_unused(seen: Seen) -> None:
         unused = [own.group for own in found if not used & {*own.group.columns} and own.group.pattern not in said]
         groups = [words for group in unused if (words := ", ".join(group.columns)) not in said]
         if groups:
-            more = f" and {len(groups) - _SHOWN} more" if len(groups) > _SHOWN else ""
-            seen.left_out.append(f"{'; '.join(groups[:_SHOWN])}{more}: also {name} by name; not used")
+            seen.left_out.append(f"{some(groups, _SHOWN, '; ')}: also {name} by name; not used")
 
 
 def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy | None, kind: str) -> Recognition:

@@ -14,9 +14,8 @@ from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study
-from cpfls_cli.config.unknown import KEYS
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.same_vehicle import read_of_vehicle
+from cpfls_cli.flights.same_vehicle import read_of_vehicle, with_numbers_of
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import VehicleModel
 
@@ -39,12 +38,7 @@ def with_found_numbers(study: Study, path: Path) -> Study:
     They stay among its unknown ones: a flight of the config is one of this vehicle, whatever stands for them.
     """
     found = read_of_vehicle(path, VehicleRecord, study).vehicle.vehicle()
-    vehicle = study.vehicle
-    keys = [KEYS[name] for name in vehicle.unknown if name != "inertia"]
-    pairs = zip(vehicle.rotors, found.rotors, strict=True)
-    rotors = tuple(replace(own, **{key: getattr(other, key) for key in keys}) for own, other in pairs)
-    inertia = found.inertia_kg_m2 if "inertia" in vehicle.unknown else vehicle.inertia_kg_m2
-    return study.model_copy(update={"vehicle": replace(vehicle, rotors=rotors, inertia_kg_m2=inertia)})
+    return study.model_copy(update={"vehicle": with_numbers_of(study.vehicle, found)})
 
 
 def read_observer(path: Path, past_s: float) -> Observer:

@@ -39,13 +39,18 @@ def read_of_vehicle(path: Path, wanted: type[R], study: Study) -> R:
 
 def _with_what_was_open(given: VehicleSettings, wanted: VehicleSettings) -> VehicleSettings:
     """Take from the config what the one of a model left open: the model has numbers of its own."""
-    rotors = given.rotors
-    if len(rotors) == len(wanted.rotors):
-        open_ = [KEYS[name] for name in given.unknown if name != "inertia"]
-        pairs = zip(rotors, wanted.rotors, strict=True)
-        rotors = tuple(replace(own, **{key: getattr(other, key) for key in open_}) for own, other in pairs)
-    inertia = wanted.inertia_kg_m2 if "inertia" in given.unknown else given.inertia_kg_m2
-    return replace(given, rotors=rotors, inertia_kg_m2=inertia, unknown=wanted.unknown)
+    return replace(with_numbers_of(given, wanted), unknown=wanted.unknown)
+
+
+def with_numbers_of(vehicle: VehicleSettings, other: VehicleSettings) -> VehicleSettings:
+    """Put the numbers of another vehicle in the place of those that one leaves open, as far as both have the rotors."""
+    rotors = vehicle.rotors
+    if len(rotors) == len(other.rotors):
+        keys = [KEYS[name] for name in vehicle.unknown if name != "inertia"]
+        pairs = zip(rotors, other.rotors, strict=True)
+        rotors = tuple(replace(own, **{key: getattr(found, key) for key in keys}) for own, found in pairs)
+    inertia = other.inertia_kg_m2 if "inertia" in vehicle.unknown else vehicle.inertia_kg_m2
+    return replace(vehicle, rotors=rotors, inertia_kg_m2=inertia)
 
 
 def other_vehicles(paths: Sequence[Path], study: Study) -> tuple[str, ...]:

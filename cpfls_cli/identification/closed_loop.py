@@ -22,7 +22,7 @@ from cpfls_cli.identification.data import Flights, TorqueData, TorqueSource, axi
 from cpfls_cli.inertia import KNOWN, VISIBLE
 from cpfls_cli.playback.balances import block_length
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.instruments import FOLDS, Instruments, foretold, instruments, late, late_by
+from cpfls_cli.playback.instruments import FOLDS, Instruments, foretold_by_run, instruments, late, late_by
 from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.playback.loop import BalancedTorque, LoopBounds, bounds_between
 from cpfls_cli.regressor.motion import RIGID, Motion
@@ -283,15 +283,11 @@ def _known(given: Instruments, values: Sequence[Array], period: float, *, fast: 
     told, every = sum(int(there.sum()) for there in known.values()), sum(len(values[number]) for number in known)
     if told <= FOLDS * width or every * width > _MOST:
         return {}
-    predicted = foretold(
-        np.concatenate([each[there] for each, there in zip(asked, known.values(), strict=True)]),
-        np.concatenate([values[number][there] for number, there in known.items()]),
-    )
-    ends = np.cumsum([int(there.sum()) for there in known.values()])[:-1]
-    found = {}
-    for (number, there), own in zip(known.items(), np.split(predicted, ends), strict=True):
-        found[number] = np.full_like(values[number], np.nan)
-        found[number][there] = own
+    there_asked = {number: each[there] for each, (number, there) in zip(asked, known.items(), strict=True)}
+    predicted = foretold_by_run(there_asked, {number: values[number][there] for number, there in known.items()})
+    found = {number: np.full_like(values[number], np.nan) for number in known}
+    for number, there in known.items():
+        found[number][there] = predicted[number]
     return found
 
 

@@ -17,7 +17,7 @@ from cpfls_cli.identification.solver import Fit
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.rounding import less
-from cpfls_cli.words import joined
+from cpfls_cli.words import joined, some
 
 AXES = ("roll", "pitch", "yaw")
 _BADLY_EXPLAINED_R2 = 0.5
@@ -209,9 +209,7 @@ def _silent_rules(diagnostics: FitDiagnostics) -> Iterator[str]:
     rules = diagnostics.excitation
     silent = [name for name, excited in zip(rules.name, rules.excited, strict=True) if not excited]
     if silent:
-        rest = f" and {len(silent) - _NAMED} more" if len(silent) > _NAMED else ""
-        named = ", ".join(silent[:_NAMED])
-        yield f"{len(silent)} of {len(rules.name)} rules not excited beyond the noise: {named}{rest}"
+        yield f"{len(silent)} of {len(rules.name)} rules not excited beyond the noise: {some(silent, _NAMED)}"
 
 
 def _fuzzy_part_off(diagnostics: FitDiagnostics) -> Iterator[str]:

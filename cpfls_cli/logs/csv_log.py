@@ -17,7 +17,8 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import most_held
-from cpfls_cli.logs.formats import LogContents, some
+from cpfls_cli.logs.formats import MOST_LISTED, LogContents
+from cpfls_cli.words import some
 
 _LONGEST_LINE = 1 << 20
 """Characters of a line, which may hold thousands of columns; compressed, a longer one may fill the memory."""
@@ -31,7 +32,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         first = next((row for row in rows if row), [])
     numeric = [name for name, text in zip(names, first, strict=False) if _is_number(text)]
     left_out = sorted(set(names) - set(numeric))
-    warnings = (f"columns that hold text are left out: {some(left_out)}",) if left_out else ()
+    warnings = (f"columns that hold text are left out: {some(left_out, MOST_LISTED)}",) if left_out else ()
     columns = read_csv(path, set(numeric))
     return LogContents({"": {name: columns[name] for name in numeric}}, warnings=warnings)
 

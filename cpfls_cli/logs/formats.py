@@ -6,7 +6,7 @@ loaded when the first file of its format is read.
 """
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from importlib import import_module
 from math import nan
@@ -27,7 +27,7 @@ USD_MAGIC = b"\xbc"
 GZIP_MAGIC = b"\x1f\x8b"
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 _LONGEST_LINE = 16384
-_MOST_LISTED = 20
+MOST_LISTED = 20
 
 
 @dataclass(frozen=True)
@@ -166,12 +166,6 @@ def suffixes_in_words() -> str:
 def formats_in_words() -> str:
     """List the names of the formats, each once."""
     return ", ".join(dict.fromkeys(form.name for form in LOG_FORMATS))
-
-
-def some(names: Sequence[str]) -> str:
-    """List names of columns, not more than anybody reads."""
-    rest = len(names) - _MOST_LISTED
-    return ", ".join(names[:_MOST_LISTED]) + (f" and {rest} more" if rest > 0 else "")
 
 
 def is_log(path: Path) -> bool:

@@ -13,7 +13,8 @@ from pyarrow import parquet
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import most_held
-from cpfls_cli.logs.formats import LogContents, some
+from cpfls_cli.logs.formats import MOST_LISTED, LogContents
+from cpfls_cli.words import some
 
 _PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 
@@ -47,7 +48,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     columns: dict[str, Array] = {name: np.empty(0) for name in schema.names if name not in left_out}
     for name in set(columns) & set(kept):
         columns[name] = _numbers_of_column(path, name, table.column(name))
-    warnings = (f"columns that hold no numbers are left out: {some(left_out)}",) if left_out else ()
+    warnings = (f"columns that hold no numbers are left out: {some(left_out, MOST_LISTED)}",) if left_out else ()
     units = {name: "s" for name in set(columns) & set(kept) if _states_unit(schema.field(name).type)}
     return LogContents({"": columns}, units, warnings=warnings, begins={name: _begins(table, name) for name in units})
 

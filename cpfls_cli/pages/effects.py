@@ -12,7 +12,7 @@ from cpfls_cli.pages.gap import AFTER
 from cpfls_cli.report.canvas import plot
 from cpfls_cli.report.content import Plot, Table
 from cpfls_cli.report.numbers import UNKNOWN, number, printed, probability, whole_percent, with_interval
-from cpfls_cli.words import joined
+from cpfls_cli.words import capitalised, joined
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,11 +68,6 @@ def named_sentences(effects: Sequence[NamedEffect]) -> list[str]:
 def effect_sentence(effect: NamedEffect, whole: str = "the gap") -> str:
     """Say how large a named effect is, and how sure."""
     return f"{capitalised(effect_title(effect.name))} ({effect.name}): {_size(effect, whole)}."
-
-
-def capitalised(words: str) -> str:
-    """Begin with a capital."""
-    return words[0].upper() + words[1:]
 
 
 def closest_sentence(effect: NamedEffect) -> str:

@@ -197,11 +197,10 @@ def spread_answer(samples: Samples, output: Path, size: int) -> Iterator[Block]:
             always=True,
         )
     if sheet.verdict == Trust.LACKING:
-        yield Text(
-            "The vehicle answers with something that the model lacks, so the spread is too narrow by as much as that.",
-            "warning",
-            always=True,
-        )
+        drawn = ": it is drawn as shares by which the parts of the model are off, as far as the flights show it."
+        narrow = ", so the spread is too narrow by as much as that."
+        said = drawn if spread.models[0].deviations else narrow
+        yield Text(f"The vehicle answers with something that the model lacks{said}", "warning", always=True)
     calm = _without_gusts(sheet.model.gusts)
     if calm:
         yield Text(
@@ -213,8 +212,11 @@ def spread_answer(samples: Samples, output: Path, size: int) -> Iterator[Block]:
 
 
 def _name(name: str) -> str:
-    axis = name.removeprefix("gust.")
-    return name_of(name) if axis == name else f"gusts, {axis.replace('_', ' ')}"
+    kind, _, axis = name.partition(".")
+    if kind == "off":
+        part, _, about = axis.rpartition("_")
+        return f"{part.replace('_', ' ')} off, {about}"
+    return f"gusts, {axis.replace('_', ' ')}" if kind == "gust" else name_of(name)
 
 
 def _without_gusts(gusts: Gusts | None) -> list[str]:

@@ -11,9 +11,9 @@ from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.effects import coefficients_table, intervals_figure, named_sentences, parameters_table, titles
 from cpfls_cli.pages.gap import gap_sizes_figure, gap_table
 from cpfls_cli.pages.replay import playback_figure, playback_text, playback_words
-from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import trust_words
-from cpfls_cli.report.content import Block, Facts, Folded, Heading, Section, Table, Text
+from cpfls_cli.report.content import Block, Facts, Folded, Heading, Table, Text
 from cpfls_cli.report.numbers import number, sentence
 from cpfls_cli.words import joined
 
@@ -79,17 +79,8 @@ def _by(record: ExtendedRecord) -> str:
     return joined(titles(record.effects.names()) or ["nothing"])
 
 
-def extension_section(sources: Sources) -> Section | None:
-    """Show the extended models; what stands in their diagnosis is not shown again; None where none was given."""
-    return section_of_each(
-        "extension",
-        "The extended model",
-        sources.extensions,
-        lambda extended, index: _section(extended, index, sources.by_hash(extended.made_from("diagnosis")) is None),
-    )
-
-
-def _section(extended: Source[ExtendedRecord], index: int, alone: bool) -> Iterator[Block]:
+def extension_blocks(extended: Source[ExtendedRecord], index: int, sources: Sources) -> Iterator[Block]:
+    """Show an extended model; what stands in its diagnosis is not shown again."""
     record = extended.record
     yield Heading(extended.label)
     yield Facts(
@@ -106,7 +97,7 @@ def _section(extended: Source[ExtendedRecord], index: int, alone: bool) -> Itera
     yield coefficients_table(f"extended-coefficients-{index}", record.effects)
     yield _gap_table(extended, index)
     yield from (Text(warning, "warning") for warning in warnings(record))
-    if alone:
+    if sources.by_hash(extended.made_from("diagnosis")) is None:
         yield from _figures(record, index)
 
 

@@ -17,7 +17,6 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.naming.results import Alternative, GapVerdict
 from cpfls_cli.pages.disturbance import beside_gaps, left_to_gusts
 from cpfls_cli.pages.effects import (
-    capitalised,
     closest_sentence,
     effect_title,
     named_sentences,
@@ -32,7 +31,7 @@ from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Table, Text, Tone, in_short
 from cpfls_cli.report.numbers import number, plain, sentence
 from cpfls_cli.rounding import less
-from cpfls_cli.words import joined
+from cpfls_cli.words import capitalised, joined
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.naming.results import Unexplained

@@ -11,7 +11,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trajectory import attitude_figure, rotation_figure
 from cpfls_cli.report.canvas import line, plot, stacked, style_of
 from cpfls_cli.report.content import HASH_SHOWN, Block, Facts, Folded, Heading, Plot, Section, Table, Text
@@ -141,23 +141,19 @@ def _effects(flight: Source[FlightRecord]) -> Iterator[Text]:
         yield Text(f"effects{own}: {', '.join(f'{name} = {value:g}' for name, value in effects.items()) or 'none'}")
 
 
-def flight_section(sources: Sources) -> Section | None:
-    """Show the flights, if any."""
-
-    def blocks(flight: Source[FlightRecord], index: int) -> Iterator[Block]:
-        record, label, name = flight.record, flight.label, f"figure-3-flight-{index}"
-        yield Heading(label)
-        yield from answer(flight, index)
-        if record.attitude is not None and sources.by_hash(flight.made_from("trajectory")) is None:
-            # On the circle where angles go round it: they would run off any other figure.
-            if record.turns and record.attitude_rate is not None:
-                yield rotation_figure(name, label, record.time, record.attitude, record.attitude_rate)
-            else:
-                yield attitude_figure(name, label, record.time, record.attitude)
-        if record.torque is not None:
-            yield torque_figure(f"figure-4-torque-{index}", label, record.time, record.torque)
-
-    return section_of_each("flights", "Flights", sources.flights, blocks)
+def flight_blocks(flight: Source[FlightRecord], index: int, sources: Sources) -> Iterator[Block]:
+    """Show a flight, its figures but for those of its path."""
+    record, label, name = flight.record, flight.label, f"figure-3-flight-{index}"
+    yield Heading(label)
+    yield from answer(flight, index)
+    if record.attitude is not None and sources.by_hash(flight.made_from("trajectory")) is None:
+        # On the circle where angles go round it: they would run off any other figure.
+        if record.turns and record.attitude_rate is not None:
+            yield rotation_figure(name, label, record.time, record.attitude, record.attitude_rate)
+        else:
+            yield attitude_figure(name, label, record.time, record.attitude)
+    if record.torque is not None:
+        yield torque_figure(f"figure-4-torque-{index}", label, record.time, record.torque)
 
 
 def torque_figure(name: str, label: str, time: Array, torque: Array) -> Plot:

@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.report.canvas import legend_above, plain_ticks, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Cell, Folded, Heading, Plot, Section, Table, Text
@@ -283,12 +283,8 @@ def _rows(judged: JudgedGroup, part: str, name: str) -> Iterator[list[str | Cell
         yield [MODELS.get(name, name) if axis == 0 else "", axis_name, *values]
 
 
-def search_section(sources: Sources) -> Section | None:
-    """Show how the models were found; None where no model was given."""
-    return section_of_each("search", "Search", sources.models, _search)
-
-
-def _search(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+def search_blocks(model: Source[IdentifiedRecord], index: int) -> Iterator[Block]:
+    """Show how a model was found."""
     if not model.record.searched:
         yield Text(
             f"No search: one chromosome. {model.label} has one rule per input, so there is no partition to search for.",

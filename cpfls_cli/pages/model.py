@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import partial
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -16,9 +15,9 @@ from cpfls_cli.artifacts.rebuilt import model_effects
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.effects import effect_title, unit_words
-from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import model_words, trust_facts
-from cpfls_cli.report.content import Block, Box, Facts, Heading, Section, Table, in_short
+from cpfls_cli.report.content import Block, Box, Facts, Heading, Table, in_short
 from cpfls_cli.report.numbers import number, plain, whole_percent
 from cpfls_cli.words import joined
 
@@ -96,14 +95,9 @@ def worth_in_words(record: ModelRecord) -> Iterator[str]:
     return _kind_of(record).worth(record)
 
 
-def model_section(sources: Sources) -> Section | None:
-    """Say what each model is, part by part; None where none was given."""
-    models: list[Source[Any]] = [source for source in sources.all if isinstance(source.record, ModelRecord)]
-    return section_of_each("model", "What the model is", models, partial(_section, len(models) > 1))
-
-
-def _section(several: bool, model: Source[Any], index: int) -> Iterator[Block]:
-    yield from [Heading(model.label)] if several else []
+def model_blocks(model: Source[Any], index: int, sources: Sources) -> Iterator[Block]:
+    """Say what a model is, part by part."""
+    yield from [Heading(model.label)] if len(sources.of_kind(ModelRecord)) > 1 else []
     yield Facts(facts(model.record))
     if model.record.vehicle.effect.name:
         yield _effects_table(f"model-effects-{index}", model.record.vehicle.effect)
@@ -164,12 +158,12 @@ def _range(values: Array) -> str:
 
 
 def _response(response: ResponseGroup) -> str:
-    parts = [("delay", response.delay), ("lag", response.lag)]
+    parts = [("delay", response.delay_s), ("lag", response.lag_s)]
     told = [f"{name} {number(1e3 * seconds, 3)} ms" for name, seconds in parts if seconds]
     slow = [("roll and pitch", response.slow_roll_pitch), ("yaw", response.slow_yaw)]
     told += [
         f"{whole_percent(abs(share))} of the torque of {axes} {'back' if share > 0 else 'gone'} within "
-        f"{number(response.slow, 3)} s"
+        f"{number(response.slow_s, 3)} s"
         for axes, share in slow
         if share
     ]

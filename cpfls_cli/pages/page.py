@@ -4,44 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
+from typing import Any
 
-from cpfls_cli.artifacts.changed import ChangedRecord
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
-from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
-from cpfls_cli.artifacts.gains import GainsRecord
-from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.trajectory import TrajectoryRecord
-from cpfls_cli.artifacts.trend import TrendRecord
-from cpfls_cli.artifacts.twin import TwinRecord
+from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.pages.changed import changed_blocks
 from cpfls_cli.pages.comparison import compared_vehicles_section, comparison_section
 from cpfls_cli.pages.diagnosis import diagnosis_blocks
 from cpfls_cli.pages.disagreement import disagreement_blocks
 from cpfls_cli.pages.evidence import steps_blocks, validation_blocks
-from cpfls_cli.pages.extended import extension_section
-from cpfls_cli.pages.flight import flight_section, vehicle_section
+from cpfls_cli.pages.extended import extension_blocks
+from cpfls_cli.pages.flight import flight_blocks, vehicle_section
 from cpfls_cli.pages.flight_numbers import answer as flight_numbers_blocks
 from cpfls_cli.pages.fuzzy_part import partitions_blocks, rules_blocks
 from cpfls_cli.pages.gains import gains_blocks
-from cpfls_cli.pages.identification import identification_section, search_section
-from cpfls_cli.pages.model import model_section
-from cpfls_cli.pages.prediction import prediction_section
+from cpfls_cli.pages.identification import identification_section, search_blocks
+from cpfls_cli.pages.model import model_blocks
+from cpfls_cli.pages.prediction import prediction_blocks
 from cpfls_cli.pages.provenance import missing, provenance_section
-from cpfls_cli.pages.replay import replay_section
+from cpfls_cli.pages.replay import replay_blocks
 from cpfls_cli.pages.residuals import residual_blocks
-from cpfls_cli.pages.response import response_section
+from cpfls_cli.pages.response import response_blocks
 from cpfls_cli.pages.selection import reduction_section
 from cpfls_cli.pages.sensors import sensors_section, unseen_section
-from cpfls_cli.pages.source import R, Source, Sources, section_of_each
+from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.summary import models_section, summary_section
-from cpfls_cli.pages.sweep import replicates_section
-from cpfls_cli.pages.tracking import tracking_section
+from cpfls_cli.pages.sweep import joined_sweeps, sweep_blocks
+from cpfls_cli.pages.tracking import tracking_blocks
 from cpfls_cli.pages.trajectory import path_blocks
 from cpfls_cli.pages.trend import trend_blocks
 from cpfls_cli.pages.twin import twin_blocks
 from cpfls_cli.pages.uncertainty import uncertainty_blocks
-from cpfls_cli.pages.vehicle_model import found_vehicle_section
+from cpfls_cli.pages.vehicle_model import found_vehicle_blocks
 from cpfls_cli.report.content import Block, Document, Section
 from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import html_page
@@ -52,61 +47,81 @@ from cpfls_cli.report.markdown import markdown_page
 def _of_each(
     name: str,
     title: str,
-    kind: type[R],
-    blocks: Callable[[Source[R], int], Iterable[Block]],
-    holds: Callable[[R], object] = lambda _: True,
+    given: Callable[[Sources], Sequence[Source[Any]]],
+    blocks: Callable[..., Iterable[Block]],
+    *,
+    holds: Callable[[Any], object] = lambda _: True,
+    among: bool = False,
 ) -> Callable[[Sources], Section | None]:
-    """Make a section of all artifacts of one kind, or of those that hold what it shows."""
+    """Make a section of all artifacts of one kind, or of those that hold what it shows, each numbered from 1.
+
+    Parameters
+    ----------
+    blocks : callable
+        What is shown of an artifact with its number and, if it has to know what is shown beside it, of all.
+    """
 
     def section(sources: Sources) -> Section | None:
-        shown = [source for source in sources.of_kind(kind) if holds(source.record)]
-        return section_of_each(name, title, shown, blocks)
+        shown, others = [source for source in given(sources) if holds(source.record)], [sources] if among else []
+        parts = (blocks(source, number, *others) for number, source in enumerate(shown, start=1))
+        return Section(name, title, [block for part in parts for block in part]) if shown else None
 
     return section
 
 
+_MODELS = attrgetter("models")
 _SECTIONS: Sequence[Callable[[Sources], Section | None]] = (
     summary_section,
     comparison_section,
     models_section,
-    model_section,
-    _of_each("diagnosis", "Before and after", DiagnosisRecord, diagnosis_blocks),
-    extension_section,
+    _of_each("model", "What the model is", lambda given: given.of_kind(ModelRecord), model_blocks, among=True),
+    _of_each("diagnosis", "Before and after", attrgetter("diagnoses"), diagnosis_blocks),
+    _of_each("extension", "The extended model", attrgetter("extensions"), extension_blocks, among=True),
     compared_vehicles_section,
-    found_vehicle_section,
-    _of_each("disagreement", "Where they disagree", DisagreementRecord, disagreement_blocks),
+    _of_each("found-vehicle", "The vehicle found in flights", attrgetter("vehicles"), found_vehicle_blocks),
+    _of_each("disagreement", "Where they disagree", attrgetter("disagreements"), disagreement_blocks),
     sensors_section,
     unseen_section,
     vehicle_section,
-    _of_each("path", "Training path", TrajectoryRecord, path_blocks),
-    flight_section,
+    _of_each("path", "Training path", attrgetter("trajectories"), path_blocks),
+    _of_each("flights", "Flights", attrgetter("flights"), flight_blocks, among=True),
     reduction_section,
     identification_section,
-    _of_each("validation", "How far to trust it", IdentifiedRecord, validation_blocks),
-    _of_each(
-        "residuals", "What the model leaves unexplained", IdentifiedRecord, residual_blocks, lambda one: one.residuals
-    ),
+    _of_each("validation", "How far to trust it", _MODELS, validation_blocks),
+    _of_each("residuals", "What the model leaves unexplained", _MODELS, residual_blocks, holds=attrgetter("residuals")),
     _of_each(
         "uncertainty",
         "How sure the inertia is",
-        IdentifiedRecord,
+        _MODELS,
         uncertainty_blocks,
-        lambda one: one.uncertainty or one.curves,
+        holds=lambda record: record.uncertainty or record.curves,
     ),
-    _of_each("steps", "Prediction by horizon", IdentifiedRecord, steps_blocks, lambda one: one.steps),
-    replicates_section,
-    search_section,
-    _of_each("partitions", "Partitions and parameters", IdentifiedRecord, partitions_blocks),
-    prediction_section,
-    _of_each("twin", "Does the simulator fly like the vehicle", TwinRecord, twin_blocks),
-    response_section,
-    _of_each("gains", "Gains for an autopilot", GainsRecord, gains_blocks),
-    replay_section,
-    _of_each("trend", "What changed over many flights", TrendRecord, trend_blocks),
-    _of_each("changed", "What changed", ChangedRecord, changed_blocks),
-    _of_each("flight-numbers", "What each flight tells", FlightNumbersRecord, flight_numbers_blocks),
-    tracking_section,
-    _of_each("rules", "Excitation of the rules", IdentifiedRecord, rules_blocks),
+    _of_each("steps", "Prediction by horizon", _MODELS, steps_blocks, holds=attrgetter("steps")),
+    _of_each("replicates", "Replicates of the search", lambda given: joined_sweeps(given.sweeps), sweep_blocks),
+    _of_each("search", "Search", _MODELS, search_blocks),
+    _of_each("partitions", "Partitions and parameters", _MODELS, partitions_blocks),
+    _of_each("prediction", "Torque along a flight", attrgetter("predictions"), prediction_blocks, among=True),
+    _of_each("twin", "Does the simulator fly like the vehicle", attrgetter("twins"), twin_blocks),
+    _of_each("response", "Frequency responses", attrgetter("responses"), response_blocks),
+    _of_each("gains", "Gains for an autopilot", attrgetter("gains"), gains_blocks),
+    _of_each("replay", "Played back along flights", attrgetter("replays"), replay_blocks, among=True),
+    _of_each("trend", "What changed over many flights", attrgetter("trends"), trend_blocks),
+    _of_each("changed", "What changed", attrgetter("changes"), changed_blocks),
+    _of_each(
+        "flight-numbers",
+        "What each flight tells",
+        lambda given: given.of_kind(FlightNumbersRecord),
+        flight_numbers_blocks,
+    ),
+    _of_each(
+        "tracking",
+        "Control with the model",
+        attrgetter("flights"),
+        tracking_blocks,
+        holds=attrgetter("tracking"),
+        among=True,
+    ),
+    _of_each("rules", "Excitation of the rules", _MODELS, rules_blocks),
     provenance_section,
 )
 

@@ -12,11 +12,11 @@ from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.artifacts.spec import Record
-from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import seen_words
 from cpfls_cli.pages.uncertainty import MISFIT_WORDS, OUTSIDE_WORDS
 from cpfls_cli.report.canvas import BASELINE, band, legend_above, line, plot, runs, stacked, style_of
-from cpfls_cli.report.content import Block, Heading, Plot, Section, Text
+from cpfls_cli.report.content import Block, Heading, Plot, Text
 from cpfls_cli.report.numbers import number
 
 if TYPE_CHECKING:
@@ -97,22 +97,8 @@ def _outside_words(model: Record | None) -> str:
     return "do not trust it there, the model extrapolates"
 
 
-def prediction_section(sources: Sources) -> Section | None:
-    """Show the predictions; None where no prediction was given.
-
-    References
-    ----------
-    Figure 7 of the paper.
-    """
-    return section_of_each(
-        "prediction",
-        "Torque along a flight",
-        sources.predictions,
-        lambda given, index: _prediction(given, index, sources),
-    )
-
-
-def _prediction(prediction: Source[PredictionRecord], index: int, sources: Sources) -> Iterator[Block]:
+def prediction_blocks(prediction: Source[PredictionRecord], index: int, sources: Sources) -> Iterator[Block]:
+    """Show a prediction: Figure 7 of the paper."""
     model = sources.by_hash(prediction.made_from("model"))
     yield Heading(prediction.label)
     yield Text(_seen(prediction, model, sources))

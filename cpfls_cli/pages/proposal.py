@@ -17,7 +17,7 @@ from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival
 from cpfls_cli.flightlog.settings import ColumnMap
 from cpfls_cli.report.content import Block, Cell, Folded, Table, Text
 from cpfls_cli.report.numbers import number
-from cpfls_cli.words import joined
+from cpfls_cli.words import capitalised, joined
 
 _WIDTH = 110
 _SURE: Final = {"data": "the data", "named": "its name", "guess": "a guess"}
@@ -362,7 +362,7 @@ def _import(proposal: Proposal) -> Iterator[str]:
 
 
 def _entry(reason: str, rivals: Sequence[Rival], lines: Sequence[str], indent: int) -> Iterator[str]:
-    yield from _comment(f"{reason[0].upper()}{reason[1:]}.", indent)
+    yield from _comment(f"{capitalised(reason)}.", indent)
     yield from lines
     for rival in rivals:
         yield from _comment(f"or {rival.text} ({rival.reason})", indent)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from cpfls_cli.artifacts.replay import (
 )
 from cpfls_cli.pages.gap import AXES, MEASURED, keep_in_view
 from cpfls_cli.pages.sensors import contradicted
-from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.playback.replay import (
     AFTER,
     BEFORE,
@@ -50,7 +49,7 @@ from cpfls_cli.report.canvas import (
     stacked,
     style_of,
 )
-from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Plot, Table, Text
 from cpfls_cli.report.numbers import number, sentence, whole_percent
 from cpfls_cli.rounding import less, tied
 from cpfls_cli.validation.trust import Trust
@@ -343,11 +342,6 @@ def _worst_table(record: ReplayRecord, index: int) -> Table:
     return Table(f"replay-worst-{index}", caption, header, rows, frozenset({0, 1}))
 
 
-def replay_section(sources: Sources) -> Section | None:
-    """Show how models predict the motion of flights; None where no replay was given."""
-    return section_of_each("replay", "Played back along flights", sources.replays, partial(_section, sources))
-
-
 def told_at(replay: ReplayRecord, sources: Sources) -> str | None:
     """Find the vehicle whose errors on the flights held out are those of a replay: they are told once."""
     for vehicle in sources.vehicles:
@@ -370,7 +364,8 @@ def _same_errors(first: ErrorsByHorizon, second: ErrorsByHorizon) -> bool:
     )
 
 
-def _section(sources: Sources, replay: Source[ReplayRecord], index: int) -> Iterator[Block]:
+def replay_blocks(replay: Source[ReplayRecord], index: int, sources: Sources) -> Iterator[Block]:
+    """Show how a model predicts the motion of flights."""
     record, told = replay.record, told_at(replay.record, sources)
     yield Heading(replay.label)
     yield Facts(_facts(record))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,9 +12,9 @@ from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, ResponseRecord
 from cpfls_cli.pages.gap import MEASURED
 from cpfls_cli.pages.sensors import contradicted
-from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, GREY, HELD, band, legend_above, legend_over, plain_ticks, plot, style_of
-from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text, in_short
+from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Table, Text, in_short
 from cpfls_cli.report.numbers import number, plain, sentence
 from cpfls_cli.response.mismatch import ACCEPTABLE, COHERENT, GOOD, Deviation
 from cpfls_cli.words import joined
@@ -187,12 +186,8 @@ def _median(values: Array) -> str:
     return number(float(np.median(known)), 2) if len(known) else "—"
 
 
-def response_section(sources: Sources) -> Section | None:
-    """Show frequency responses; None where none were given."""
-    return section_of_each("response", "Frequency responses", sources.responses, partial(_section))
-
-
-def _section(response: Source[ResponseRecord], index: int) -> Iterator[Block]:
+def response_blocks(response: Source[ResponseRecord], index: int) -> Iterator[Block]:
+    """Show frequency responses."""
     record = response.record
     yield Heading(response.label)
     yield Facts(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from itertools import count
@@ -18,7 +18,7 @@ from cpfls_cli.config.load import validate
 from cpfls_cli.config.study import ReportSettings, resolved
 from cpfls_cli.config.yaml_text import parse_yaml
 from cpfls_cli.errors import ConfigError
-from cpfls_cli.report.content import Block, Origin, Section, Text
+from cpfls_cli.report.content import Block, Origin, Text
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
@@ -156,16 +156,6 @@ def unique_labels(paths: Sequence[Path]) -> list[str]:
 def source_of(job: Job, record: R) -> Source[R]:
     """Name the artifact that a job has just written, so that its page can speak of it."""
     return Source(job.output.name, "", record, resolved(job.study), job.study.vehicle, 0)
-
-
-def section_of_each(
-    name: str, title: str, sources: Sequence[Source[R]], blocks: Callable[[Source[R], int], Iterable[Block]]
-) -> Section | None:
-    """Join to one section what is shown of each source, which is numbered from 1; None where there is no source."""
-    if not sources:
-        return None
-    shown = [block for number, source in enumerate(sources, start=1) for block in blocks(source, number)]
-    return Section(name, title, shown)
 
 
 def answer_again(page: str, record: Record, path: Path) -> Iterator[Block]:

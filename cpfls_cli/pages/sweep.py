@@ -11,9 +11,9 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.sweep import SettingRuns, SweepRecord, spread
 from cpfls_cli.pages.identification import SQUARED_TORQUE, TORQUE
-from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import plain_ticks, plot, style_of
-from cpfls_cli.report.content import Block, Folded, Plot, Section, Table, Text
+from cpfls_cli.report.content import Block, Folded, Plot, Table, Text
 from cpfls_cli.report.numbers import number, percent
 
 if TYPE_CHECKING:
@@ -81,11 +81,6 @@ def _finished(sweep: Source[SweepRecord]) -> str:
     return f"{len(sweep.record.run)} of {planned} runs"
 
 
-def replicates_section(sources: Sources) -> Section | None:
-    """Show the settings of sweeps beside each other, if any: Table 5 of the paper."""
-    return section_of_each("replicates", "Replicates of the search", joined_sweeps(sources.sweeps), _sweep)
-
-
 def joined_sweeps(sweeps: Sequence[Source[SweepRecord]]) -> list[Source[SweepRecord]]:
     """Take sweeps of equal settings and inputs as one, in the order of the first of each, unless they share a seed."""
     joined: list[Source[SweepRecord]] = []
@@ -105,7 +100,8 @@ def _joined(first: Source[SweepRecord], second: Source[SweepRecord]) -> Source[S
     return replace(first, label=f"{first.label} and {second.label}", record=record, config=config)
 
 
-def _sweep(sweep: Source[SweepRecord], index: int) -> Iterator[Block]:
+def sweep_blocks(sweep: Source[SweepRecord], index: int) -> Iterator[Block]:
+    """Show the settings of a sweep beside each other: Table 5 of the paper."""
     # Table 5 holds more than the one that a terminal has room for.
     yield from (block for block in answer(sweep) if not isinstance(block, Table | Folded))
     if not sweep.record.complete:

@@ -13,9 +13,9 @@ from cpfls_cli.artifacts.flight import FlightRecord, TrackingGroup
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.artifacts.spec import Record
 from cpfls_cli.pages.prediction import trust_along
-from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_above, line, plot, stacked, style_of
-from cpfls_cli.report.content import Block, Cell, Folded, Heading, Plot, Section, Table, Text, Tone
+from cpfls_cli.report.content import Block, Cell, Folded, Heading, Plot, Table, Text, Tone
 from cpfls_cli.report.numbers import number, percent, plain
 
 if TYPE_CHECKING:
@@ -95,18 +95,13 @@ def _beside(tracking: TrackingGroup, other: str, words: str, tone: Tone) -> Iter
         yield Text(text, tone if bool((ratio > _EVEN).any()) else "good")
 
 
-def tracking_section(sources: Sources) -> Section | None:
+def tracking_blocks(flight: Source[FlightRecord], index: int, sources: Sources) -> Iterator[Block]:
     """Show how closely controllers followed a plan, where a flight was controlled with a model."""
-
-    def blocks(flight: Source[FlightRecord], index: int) -> Iterator[Block]:
-        model = sources.by_hash(flight.made_from("model"))
-        yield Heading(flight.label)
-        yield Text(_setting(flight, flight.config["simulation"]["computed_torque"]))
-        yield from answer(flight, None if model is None else model.record, index)
-        yield tracking_figure(f"tracking-error-{index}", flight)
-
-    tracked = [flight for flight in sources.flights if flight.record.tracking is not None]
-    return section_of_each("tracking", "Control with the model", tracked, blocks)
+    model = sources.by_hash(flight.made_from("model"))
+    yield Heading(flight.label)
+    yield Text(_setting(flight, flight.config["simulation"]["computed_torque"]))
+    yield from answer(flight, None if model is None else model.record, index)
+    yield tracking_figure(f"tracking-error-{index}", flight)
 
 
 def _setting(flight: Source[FlightRecord], settings: dict[str, Any]) -> str:

@@ -46,11 +46,11 @@ from cpfls_cli.pages.replay import (
     lost_words,
     playback_words,
 )
-from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.source import Source
 from cpfls_cli.pages.trust import model_words
 from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, style_of
-from cpfls_cli.report.content import Block, Cell, Facts, Folded, Heading, Listing, Plot, Section, Table, Text
+from cpfls_cli.report.content import Block, Cell, Facts, Folded, Heading, Listing, Plot, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, number, percent, whole_percent
 from cpfls_cli.response.mismatch import ACCEPTABLE
 from cpfls_cli.trajectory.consistency import coarsest_excited
@@ -511,12 +511,8 @@ def _scale(record: VehicleRecord, known: dict[str, Parameter]) -> Iterator[str]:
             yield f"About yaw {joined(each.name for each in yaw)} are known only as a ratio."
 
 
-def found_vehicle_section(sources: Sources) -> Section | None:
-    """Show the vehicles found in flights; None where none was given."""
-    return section_of_each("found-vehicle", "The vehicle found in flights", sources.vehicles, _section)
-
-
-def _section(found: Source[VehicleRecord], index: int) -> Iterator[Block]:
+def found_vehicle_blocks(found: Source[VehicleRecord], index: int) -> Iterator[Block]:
+    """Show a vehicle found in flights."""
     record = found.record
     yield Heading(found.label)
     yield Facts(

@@ -15,7 +15,7 @@ from cpfls_cli.effects.polynomial import state_terms
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric_columns
 from cpfls_cli.playback.evaluation import Evaluated, VehicleAt
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.instruments import Instruments, foretold, late, late_by
+from cpfls_cli.playback.instruments import Instruments, foretold_by_run, late, late_by
 from cpfls_cli.playback.parameters import FreeNumbers
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
@@ -272,18 +272,12 @@ class Balances:
 
     def _expected(self, band: Windows, own: dict[int, Array]) -> dict[int, Array]:
         """Predict balances from what was asked for; see `foretold`."""
-        if not own:
-            return {}
         lags = late_by(band.period, round(_OF_WINDOW * band.hop / (1 - OVERLAP)))
-        asked = np.concatenate(
-            [
-                _averaged(band, self.flights[number], np.hstack([late(self.asked[number], lag) for lag in lags]))
-                for number in own
-            ]
-        )
-        expected = foretold(asked, np.concatenate(list(own.values())))
-        ends = np.cumsum([len(each) for each in own.values()])[:-1]
-        return dict(zip(own, np.split(expected, ends), strict=True))
+        asked = {
+            number: _averaged(band, self.flights[number], np.hstack([late(self.asked[number], lag) for lag in lags]))
+            for number in own
+        }
+        return foretold_by_run(asked, own)
 
 
 class _Products(NamedTuple):

@@ -368,11 +368,13 @@ def _blocks(free: JointNumbers) -> tuple[str, ...]:
 
 def _explained(problem: _Problem) -> tuple[Array, Array]:
     """Compute the share of the rotation that comes again that a model explains, and its error, shape (band, 3)."""
+    return _shares(problem.sums.crossed[:, : len(problem.bands_hz)])
 
-    def share(crossed: Array) -> Array:
-        return np.asarray(1.0 - crossed[..., 0, 0] / np.where(crossed[..., -1, -1] == 0, np.nan, crossed[..., -1, -1]))
 
-    crossed = problem.sums.crossed[:, : len(problem.bands_hz)]
+def _shares(crossed: Array) -> tuple[Array, Array]:
+    def share(sums: Array) -> Array:
+        return np.asarray(1.0 - sums[..., 0, 0] / np.where(sums[..., -1, -1] == 0, np.nan, sums[..., -1, -1]))
+
     return share(crossed.sum(axis=0)), jackknife_error(share(crossed.sum(axis=0) - crossed))
 
 
@@ -403,12 +405,7 @@ def _constants(problem: _Problem) -> Constants:
 def _explained_in_all(problem: _Problem) -> tuple[Array, Array]:
     """Compute the share of what comes again that is explained in all used bands together, and its error, (3,)."""
     bands = slice(0, len(problem.bands_hz))
-    crossed = np.einsum("ka,bkapq->bapq", problem.weights[bands], problem.sums.crossed[:, bands])
-
-    def share(sums: Array) -> Array:
-        return np.asarray(1.0 - sums[..., 0, 0] / sums[..., -1, -1])
-
-    return share(crossed.sum(axis=0)), jackknife_error(share(crossed.sum(axis=0) - crossed))
+    return _shares(np.einsum("ka,bkapq->bapq", problem.weights[bands], problem.sums.crossed[:, bands]))
 
 
 def _f_statistics(problem: _Problem) -> Array:

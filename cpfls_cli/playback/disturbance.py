@@ -9,7 +9,8 @@ grow with frequency, and that of the rotor speeds.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -23,6 +24,7 @@ from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.gusts import RANGES, GustRanges, Gusts
 from cpfls_cli.playback.instruments import Instruments, Told
+from cpfls_cli.playback.lack import AxisLack, Lack, Rest, lack_of
 from cpfls_cli.playback.loop import wrench_during
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.weak_form.windows import Windows, windows
@@ -67,17 +69,23 @@ class FoundGusts(GustRanges):
         Variance of the white noise beside it, and of that which a derivative is taken of, as of samples.
     foretold, foretold_error : array, shape (axis,)
         Share of all that is left which instruments foretell, and its standard error; NaN without instruments.
+    white : array, shape (axis,), N m s^0.5 and N s^0.5, or None
+        See `Gusts`; NaN where it is not known.
+    lack : Lack or None
+        What the model lacks; None without instruments, or where no parts were asked for.
     """
 
     told_by: Told
     noise: Array
     foretold: Array
     foretold_error: Array
+    white: Array | None = None
+    lack: Lack | None = None
 
     @property
     def gusts(self) -> Gusts | None:
         """The gusts that are known, none on other axes; None where no size is."""
-        return Gusts.known(self.size, self.memory) if np.isfinite(self.size).any() else None
+        return Gusts.known(self.size, self.memory, self.white) if np.isfinite(self.size).any() else None
 
 
 class _Powers(NamedTuple):
@@ -89,11 +97,14 @@ class _Powers(NamedTuple):
         Sums over the pieces of a block, squared units of torque and force; of that, and of all that is left.
     pieces : array, shape (block,)
         How many there are.
+    left : array, shape (piece, axis, frequency)
+        Power of all that is left, piece by piece.
     """
 
     power: Array
     whole: Array
     pieces: IntArray
+    left: Array
 
 
 class _Band(NamedTuple):
@@ -180,17 +191,37 @@ def find_gusts(
     """
     rows = 6 if all(flight.translates for flight in given.flown) else 3
     sides = [_sides(model, flight)[..., :rows] for flight in given.flown]
-    found = gusts_in(sides, given, given.kind if told else "none")
+    parts = {
+        name: [_wrench_of_part(model, weights, flight)[:, :rows] for flight in given.flown]
+        for name, weights in model.parts.items()
+    }
+    found = gusts_in(sides, given, given.kind if told else "none", parts)
     if found is None:
         return None
     bodies = [f"inertia.{name}" for name in INERTIA_PARAMETERS[:3]] + ["thrust_factor"] * 3
     open_ = [not determined.get(name, True) for name in bodies[:rows]]
-    for name in RANGES:
+    for name in (*RANGES, "white"):
         getattr(found, name)[open_] = np.nan
+    if found.lack is not None:
+        for columns in (found.lack.share, found.lack.size, found.lack.memory):
+            columns[open_] = np.nan
     return found
 
 
-def gusts_in(sides: Sequence[Array], given: Instruments, told_by: Told) -> FoundGusts | None:
+def _wrench_of_part(model: VehicleModel, weights: Array, flight: PlaybackFlight) -> Array:
+    """Evaluate torque and force of a part of a model along a flight, shape (time, 6); 0 between its stretches."""
+    part, found = replace(model.table, weights=weights), np.zeros((len(flight), 6))
+    for stretch in flight.stretches:
+        found[stretch] = wrench_during(model, flight, stretch, part)
+    return found
+
+
+def gusts_in(
+    sides: Sequence[Array],
+    given: Instruments,
+    told_by: Told,
+    parts: Mapping[str, Sequence[Array]] = MappingProxyType({}),
+) -> FoundGusts | None:
     """Find sizes and memories of gusts in what both sides of a balance differ by; see `find_gusts`.
 
     Parameters
@@ -201,6 +232,8 @@ def gusts_in(sides: Sequence[Array], given: Instruments, told_by: Told) -> Found
         Of these runs.
     told_by : str
         Which instruments to take.
+    parts : mapping of str to sequence of array, shape (time, axis), N m and N
+        For each run what parts of the model give; what is left is held against them to tell what the model lacks.
 
     Returns
     -------
@@ -221,11 +254,16 @@ def gusts_in(sides: Sequence[Array], given: Instruments, told_by: Told) -> Found
     shared = np.sqrt(2 * runs / (2 * runs - 1)) if told_by == "repeats" else 1.0
     axes = [_Axis(band, power, powers.pieces) for power in powers.power.swapaxes(0, 1)]
     columns = np.array([axis.bound() if told_by == "none" else axis.found(shared) for axis in axes])
+    white = np.array([np.nan if told_by == "none" else axis.white for axis in axes])
+    lack = None
+    if parts and told_by != "none":
+        rows = zip(axes, powers.left.swapaxes(0, 1), _foretold_parts(parts, given, band, told_by), strict=True)
+        lack = Lack.of(tuple(parts), [axis.lack(power, own) for axis, power, own in rows])
     foretold, error = _share_foretold(powers)
     none = np.full(len(axes), np.nan) if told_by == "none" else 1.0
     ends = dict(zip(RANGES, columns.T[: len(RANGES)], strict=True))
     shares = {"foretold": none * foretold, "foretold_error": none * shared * error}
-    return FoundGusts(**ends, told_by=told_by, noise=columns[:, len(RANGES) :], **shares)
+    return FoundGusts(**ends, told_by=told_by, noise=columns[:, len(RANGES) :], **shares, white=white, lack=lack)
 
 
 def _share_foretold(powers: _Powers) -> tuple[Array, Array]:
@@ -253,16 +291,33 @@ def _powers(sides: Sequence[Array], given: Instruments, band: _Band, told_by: To
     period = given.flown[0].motion.period
     seen = sum(len(own) for own in left) * band.pieces.hop * period
     block_s = min(_PIECE_S, max(seen / _BLOCKS, _LEAST_BLOCK_S))
-    power, whole, count = [], [], []
+    power, whole, count, each_left = [], [], [], []
     for flight, own, known in zip(given.flown, left, beside, strict=True):
         there = np.isfinite(known).all(axis=(1, 2))
         products, squares = (own * np.conj(own - known)).real[there], np.abs(own[there]) ** 2
         block = band.starts(flight)[there] * period // block_s
+        each_left.append(squares)
         for each in np.unique(block):
             power.append(products[block == each].sum(axis=0))
             whole.append(squares[block == each].sum(axis=0))
             count.append(int((block == each).sum()))
-    return _Powers(np.array(power), np.array(whole), np.array(count, dtype=np.int64))
+    return _Powers(np.array(power), np.array(whole), np.array(count, dtype=np.int64), np.concatenate(each_left))
+
+
+def _foretold_parts(parts: Mapping[str, Sequence[Array]], given: Instruments, band: _Band, told_by: Told) -> _Complex:
+    """Give parts of a model as instruments foretell them, shape (axis, piece, part, frequency)."""
+    values = [np.stack(own, axis=2) for own in zip(*parts.values(), strict=True)]
+    flat = [own.reshape(len(own), -1) for own in values]
+    if told_by == "repeats":
+        flat = [
+            given.repeats.others(number, flat) if given.repeats.beside[number] else np.nan * own
+            for number, own in enumerate(flat)
+        ]
+    laid = [band.laid(flight, columns, band.weight) for flight, columns in zip(given.flown, flat, strict=True)]
+    if told_by == "setpoints":
+        laid = _expected(given, laid, band)
+    known = np.concatenate([each[np.isfinite(each).all(axis=(1, 2))] for each in laid])
+    return known.reshape(len(known), values[0].shape[1], len(parts), -1).swapaxes(0, 1)
 
 
 def _sides(model: VehicleModel, flight: PlaybackFlight) -> Array:
@@ -325,6 +380,7 @@ class _Axis:
 
     def __init__(self, band: _Band, power: Array, count: IntArray) -> None:
         weight, period = band.pieces.weight, band.pieces.period
+        self._period = period
         self._power, self._count = power, count
         self._mean = power.sum(axis=0) / count.sum()
         # Power of white noise, as acceleration and through a derivative.
@@ -348,7 +404,7 @@ class _Axis:
         shared : float
             By how much errors are larger than the scatter of blocks tells.
         """
-        fit = self._fit()
+        fit = self._fit
         half = half_width(shared * self._errors(*fit) * [0.5, 1.0], len(self._count))
         size, memory = float(np.exp(0.5 * fit.numbers[0])), float(np.exp(fit.numbers[1]))
         inside = _EDGE * _MEMORY_S[0] < memory < _MEMORY_S[1] / _EDGE
@@ -360,6 +416,17 @@ class _Axis:
             [size, size * np.exp(-half[0]), size * np.exp(half[0]), memory, *ends, *np.exp(fit.numbers[2:])]
         )
 
+    @property
+    def white(self) -> float:
+        """White noise, as of a step of a second."""
+        return float(np.sqrt(np.exp(self._fit.numbers[2]) * self._period))
+
+    def lack(self, power: Array, parts: _Complex) -> AxisLack:
+        """Find what the model lacks, in power of what is left by piece and its parts as they are foretold."""
+        known = self._expected(self._fit.numbers)[0]
+        return lack_of(power, parts, known, Rest(self._alike, self._lags, _MEMORY_S))
+
+    @cached_property
     def _fit(self) -> _Fit:
         """Maximise the likelihood over logarithms of squared size, memory and the two noises."""
         from scipy.optimize import minimize

@@ -23,18 +23,23 @@ class Gusts(NamedTuple):
         0 where there are none.
     memory : array, shape (6,), s
         Time in which a gust falls to 37 %.
+    white : array, shape (6,), N m s^0.5 and N s^0.5, body frame
+        White noise beside it, which over a step of h s has the standard deviation ``white / sqrt(h)``.
     """
 
     size: Array
     memory: Array
+    white: Array = np.zeros(len(GUST_AXES))
 
     @classmethod
-    def known(cls, size: Array, memory: Array) -> Self:
-        """Take sizes and memories of the first axes as far as they are known, and none elsewhere."""
-        there = np.flatnonzero(np.isfinite(size))
-        sizes, memories = np.zeros(len(GUST_AXES)), np.ones(len(GUST_AXES))
-        sizes[there], memories[there] = size[there], memory[there]
-        return cls(sizes, memories)
+    def known(cls, size: Array, memory: Array, white: Array | None = None) -> Self:
+        """Take what is known of the first axes, and none elsewhere."""
+        columns = [np.zeros(len(GUST_AXES)), np.ones(len(GUST_AXES)), np.zeros(len(GUST_AXES))]
+        for column, given, there in zip(columns, (size, memory, white), (size, size, white), strict=True):
+            if given is not None and there is not None:
+                known = np.flatnonzero(np.isfinite(there))
+                column[known] = given[known]
+        return cls(*columns)
 
     def drawn(self, rng: np.random.Generator, step: float, count: int) -> Array:
         """Draw torque and force at instants a step apart, exactly, from the first on as large as at any.
@@ -53,10 +58,13 @@ class Gusts(NamedTuple):
         Gillespie 1996, Exact numerical simulation of the Ornstein-Uhlenbeck process.
         """
         keep = np.exp(-step / self.memory)
-        white = rng.standard_normal((count, len(keep)))
-        white[1:] *= np.sqrt(1.0 - keep**2)
-        columns = [recursion([-each], column) for each, column in zip(keep, white.T, strict=True)]
-        return np.asarray(self.size * np.stack(columns, axis=1))
+        fresh = rng.standard_normal((count, len(keep)))
+        fresh[1:] *= np.sqrt(1.0 - keep**2)
+        columns = [recursion([-each], column) for each, column in zip(keep, fresh.T, strict=True)]
+        pushed = self.size * np.stack(columns, axis=1)
+        if np.any(self.white):
+            pushed += self.white / np.sqrt(step) * rng.standard_normal(pushed.shape)
+        return np.asarray(pushed)
 
 
 @dataclass(frozen=True)

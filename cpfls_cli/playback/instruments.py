@@ -181,6 +181,14 @@ def foretold(asked: Array, values: Array) -> Array:
     return found.reshape(values.shape)
 
 
+def foretold_by_run(asked: Mapping[int, Array], values: Sequence[Array] | Mapping[int, Array]) -> dict[int, Array]:
+    """Predict values of runs by their numbers, all runs together, from what was asked for; see `foretold`."""
+    if not asked:
+        return {}
+    told = foretold(np.concatenate(list(asked.values())), np.concatenate([values[number] for number in asked]))
+    return dict(zip(asked, np.split(told, np.cumsum([len(own) for own in asked.values()])[:-1]), strict=True))
+
+
 def _runs(flight: PlaybackFlight) -> list[slice]:
     """Cut a flight where what was asked of it begins again; one that is asked its path once stays whole."""
     part, step = _longest(flight), _step(flight.motion.period)

@@ -19,6 +19,7 @@ from cpfls_cli.blocks import contiguous, half_width, jackknife_error
 from cpfls_cli.inertia import EXPLAINED
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.table import WrenchTable
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, windows
 
 _BANDS = ((0.15, 0.4), (0.3, 0.8), (0.6, 1.6))
@@ -161,9 +162,17 @@ def _sums(stretch: BalancedTorque, short_s: float, long_s: float) -> Iterator[Ar
     yield from (products[number == block].sum(axis=0) for block in range(blocks))
 
 
-def wrench_during(model: VehicleModel, flight: PlaybackFlight, stretch: slice) -> Array:
-    """Evaluate torque and force of rotors and effects at the samples of a stretch, shape (time, 6), N m and N, body."""
+def wrench_during(
+    model: VehicleModel, flight: PlaybackFlight, stretch: slice, table: WrenchTable | None = None
+) -> Array:
+    """Evaluate torque and force of rotors and effects at the samples of a stretch, shape (time, 6), N m and N, body.
+
+    Parameters
+    ----------
+    table : WrenchTable or None
+        A part of the model alone; None for all of it.
+    """
     motion = flight.motion
     air = np.einsum("tji,tj->ti", motion.rotation[stretch], motion.velocity[stretch] - np.array(model.wind))
     rotor = model.response.terms_at_samples(flight.speed[stretch], motion.period, flight.hold)
-    return model.table.wrench(air, motion.rate[stretch], rotor)
+    return (table or model.table).wrench(air, motion.rate[stretch], rotor)

@@ -126,6 +126,10 @@ class VehicleModel:
         Faults of the sensors, which are taken out of signals first.
     gusts : Gusts or None
         In its flights, as far as they are known; no part of what the model forecasts.
+    deviations : mapping of str to array, shape (6,)
+        Shares by which torque and force of a part are off in a vehicle that was drawn; see `parts`.
+    lack : Gusts or None
+        What no part is like and comes again, of a vehicle that was drawn.
     """
 
     vehicle: VehicleSettings
@@ -139,6 +143,8 @@ class VehicleModel:
     hold: Hold | None = None
     repairs: Audit | None = None
     gusts: Gusts | None = None
+    deviations: Mapping[str, Array] = field(default_factory=dict)
+    lack: Gusts | None = None
 
     @property
     def rotors(self) -> int:
@@ -170,7 +176,10 @@ class VehicleModel:
             parts["remainder"] = remainder_weights(self.remainder, self.rotors)
         levers = [known for known in self.effects if known.is_lever]
         forces = sum(parts.values()) if levers else np.zeros(6)
-        return parts | {known.name: lever_weights(known.coefficients, np.asarray(forces)) for known in levers}
+        parts |= {known.name: lever_weights(known.coefficients, np.asarray(forces)) for known in levers}
+        for name, share in self.deviations.items():
+            parts[name] = (1.0 + share)[:, None, None] * parts[name]
+        return parts
 
     @cached_property
     def _polynomials(self) -> dict[str, Array]:

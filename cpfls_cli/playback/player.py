@@ -11,6 +11,7 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, momentum_form
+from cpfls_cli.dynamics.rigid_body import positive_definite
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_flight
 from cpfls_cli.playback.history import Observer, missed_wrench, past_of
@@ -449,7 +450,7 @@ class _FuzzyRuns:
 
 def _turning(attitude: Array, inertia: tuple[InertiaValues, Array], momentum: Array) -> _Fuzzy:
     values, matrices = inertia
-    exists = _positive_definite(matrices)
+    exists = positive_definite(matrices)
     safe = np.where(exists[:, None, None], matrices, np.eye(3))
     rate: Array = np.asarray(np.linalg.solve(safe, momentum[..., None])[..., 0], dtype=float)
     _, direct = momentum_form(attitude, rate, values)
@@ -470,11 +471,3 @@ def _finite_attitude(rotation: Array) -> Array:
 
 def _kept(good: BoolArray, new: Array, old: Array) -> Array:
     return np.where(good.reshape(-1, *[1] * (new.ndim - 1)), new, old)
-
-
-def _positive_definite(matrices: Array) -> BoolArray:
-    """Flag positive definite matrices by their leading minors (Sylvester); those that are not finite are not."""
-    first, minor = matrices[:, 0, 0], matrices[:, 0, 0] * matrices[:, 1, 1] - matrices[:, 0, 1] ** 2
-    finite = np.asarray(np.isfinite(matrices).all(axis=(1, 2)), dtype=bool)
-    whole = np.linalg.det(np.where(finite[:, None, None], matrices, 0.0))
-    return np.asarray(finite & (first > 0) & (minor > 0) & (whole > 0))

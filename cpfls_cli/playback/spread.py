@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,8 @@ from cpfls_cli.inertia import (
     six_parameters,
     symmetric,
 )
-from cpfls_cli.playback.gusts import GustRanges, Gusts
+from cpfls_cli.playback.gusts import GUST_AXES, GustRanges, Gusts
+from cpfls_cli.playback.lack import ROTORS, Lack
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.parameters import LEARNED, PRODUCT_NAMES
 from cpfls_cli.playback.table import Remainder
@@ -69,6 +71,8 @@ class Estimates:
         Least and largest factor on each moment of inertia by which the autopilot's loop may have misled the fit, which
         has widened the intervals; 1 for none.
     gusts : GustRanges or None
+    lack : Lack or None
+        By which shares parts of the model are off, and what no part is like.
     """
 
     numbers: Sequence[FoundNumber]
@@ -76,6 +80,7 @@ class Estimates:
     blocks: int
     loop: Array
     gusts: GustRanges | None
+    lack: Lack | None = None
 
 
 @dataclass(frozen=True)
@@ -149,12 +154,15 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
             raise ComputationError(
                 f"of {tried} vehicles drawn only {len(kept)} are possible; of {often} no vehicle has {first}"
             )
-    gusts = _gusts_drawn(known.gusts, model, [made for _, made in kept], rng)
+    made = [each for _, each in kept]
+    heavier = _heavier(model, made)
+    gusts = _gusts_drawn(known.gusts, model, heavier, rng)
+    lacking = _lack_drawn(known.lack, heavier, rng)
     return Spread(
         tuple(number.name for number in numbers),
         np.array([number.value for number in numbers]),
         np.array([row for row, _ in kept]).reshape(count, len(numbers)),
-        tuple(replace(made, gusts=own) for (_, made), own in zip(kept, gusts, strict=True)),
+        tuple(replace(each, gusts=own, **off) for each, own, off in zip(made, gusts, lacking, strict=True)),
         tried,
         dict(rejected.most_common()),
     )
@@ -183,7 +191,7 @@ def _of_a_body(model: VehicleModel, numbers: Sequence[FoundNumber]) -> tuple[Veh
 
 
 def _root(correlation: Array) -> Array:
-    """Take a root of a correlation that rounding, or fewer blocks than numbers, leave without full rank."""
+    """Take a root of a correlation or covariance, which rounding or few blocks may leave without full rank."""
     sizes, axes = np.linalg.eigh(correlation)
     return np.asarray(axes * np.sqrt(np.maximum(sizes, 0.0)))
 
@@ -312,20 +320,49 @@ def _remainder_at(remainder: Remainder, values: Mapping[str, float]) -> Remainde
     return replace(remainder, coefficients=coefficients)
 
 
-def _gusts_drawn(
-    known: GustRanges | None, model: VehicleModel, models: Sequence[VehicleModel], rng: np.random.Generator
-) -> Iterator[Gusts | None]:
-    """Draw the gusts of each vehicle: what is seen of them is acceleration, so that torque goes with the inertia."""
-    if known is None:
-        yield from [None] * len(models)
-        return
+def _heavier(model: VehicleModel, models: Sequence[VehicleModel]) -> Array:
+    """Divide moments of inertia and masses of vehicles by those of the estimate, shape (vehicle, 6).
+
+    What is seen of gusts is acceleration, so that their torque goes with the inertia.
+    """
     axes = [symmetric(each.vehicle.inertia_kg_m2).diagonal() for each in (model, *models)]
-    heavier = np.array([np.append(own / axes[0], np.ones(3)) for own in axes[1:]])
-    shape = (len(models), len(known.size))
-    size = _factors_drawn(known.size, known.low, known.high, rng.standard_normal(shape))
-    memory = _factors_drawn(known.memory, known.memory_low, known.memory_high, rng.standard_normal(shape))
-    for own_size, own_memory in zip(size * heavier, memory, strict=True):
-        yield Gusts(own_size, own_memory)
+    return np.array([np.append(own / axes[0], np.ones(3)) for own in axes[1:]])
+
+
+def _gusts_drawn(
+    known: GustRanges | None, model: VehicleModel, heavier: Array, rng: np.random.Generator
+) -> Iterator[Gusts | None]:
+    """Draw the gusts of each vehicle."""
+    if known is None:
+        yield from [None] * len(heavier)
+        return
+    size = _factors_drawn(known.size, known.low, known.high, rng.standard_normal(heavier.shape))
+    memory = _factors_drawn(known.memory, known.memory_low, known.memory_high, rng.standard_normal(heavier.shape))
+    white = np.zeros(len(GUST_AXES)) if model.gusts is None else model.gusts.white
+    for own, own_size, own_memory in zip(heavier, size, memory, strict=True):
+        yield Gusts(own_size * own, own_memory, white * own)
+
+
+def _lack_drawn(known: Lack | None, heavier: Array, rng: np.random.Generator) -> Iterator[dict[str, Any]]:
+    """Draw by which shares the parts of each vehicle are off, and give what no part is like."""
+    if known is None:
+        yield from [{}] * len(heavier)
+        return
+    rotors = known.part.index(ROTORS)
+    shares = np.zeros((len(heavier), len(GUST_AXES), len(known.part)))
+    for axis, covariance in enumerate(np.nan_to_num(known.share)):
+        own, root = shares[:, axis], _root(covariance)
+        again = np.arange(len(heavier))
+        # Rotors that turn a vehicle the wrong way are those of none.
+        while len(again):
+            own[again] = rng.standard_normal((len(again), len(root))) @ root.T
+            again = again[own[again, rotors] <= -1.0]
+    rest = Gusts.known(known.size, known.memory)
+    for own, share in zip(heavier, shares, strict=True):
+        yield {
+            "deviations": dict(zip(known.part, share.T, strict=True)),
+            "lack": rest._replace(size=rest.size * own),
+        }
 
 
 _NORMAL = 1.959964

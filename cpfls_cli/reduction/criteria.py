@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
@@ -21,22 +19,6 @@ EXCHANGE_INFORMATION: dict[str, float] = {"K-exchange": 0.0, "KD-exchange": 2.0}
 """Weight of the information kept, for the criteria that choose by exchange. Without it models come out several times
 worse than from random samples; with 2 no worse; with 3, the condition number of 80 samples of the paper's path is not
 below half of the full set's any more."""
-
-
-class Criterion(Protocol):
-    """A rule that names the next sample; the caller then adds that sample to the factor."""
-
-    def next_sample(self, factor: TriangularFactor, available: BoolArray) -> int:
-        """Name the available sample that improves the criterion most; the lowest index where several do.
-
-        Parameters
-        ----------
-        factor : TriangularFactor
-            Factor of the samples chosen so far.
-        available : array of bool, shape (samples,)
-            Samples that are not chosen yet.
-        """
-        ...
 
 
 class SmallestSingularValue:
@@ -286,6 +268,10 @@ def largest_eigenvalue_bound(eigenvalues: Array, along: Array, lengths: Array) -
     first, second = eigenvalues[0] + inside, (eigenvalues[1] if len(eigenvalues) > 1 else 0.0) + outside
     bound = 0.5 * (first + second) + np.hypot(0.5 * (first - second), np.sqrt(inside * outside))
     return np.asarray(bound * (1.0 + 8.0 * np.finfo(float).eps))
+
+
+Criterion = SmallestSingularValue | OptimalDesign | PrintedRule
+"""A rule that names the next sample, the lowest index where several do; the caller then adds it to the factor."""
 
 
 def make_criterion(space: RowSpace, name: CriterionName) -> Criterion:

@@ -148,11 +148,16 @@ def mean_missing_torque(source: TorqueSource, torque: Callable[[Motion], Array])
     """
     total, count = np.zeros(3), 0
     for data in source.chunks():
-        kept = ~vertical(data.motion.attitude)
-        missing = (data.torque - torque(data.motion))[kept]
-        total += np.sum(rotations.body_torque(data.motion.attitude[kept], missing), axis=0)
+        missing = _upright(data, data.torque - torque(data.motion))
+        total += np.sum(missing, axis=0)
         count += len(missing)
     return total / max(count, 1)
+
+
+def _upright(data: TorqueData, torque: Array) -> Array:
+    """Give a torque about the body axes away from a vertical pitch, shape (samples, 3)."""
+    kept = ~vertical(data.motion.attitude)
+    return rotations.body_torque(data.motion.attitude[kept], torque[kept])
 
 
 def with_constant(torque: Callable[[Motion], Array], constant: Array) -> Callable[[Motion], Array]:
@@ -189,7 +194,9 @@ def compare_torque(
         Predict the generalised torque of a motion.
     """
     scale = _scale(source)
-    chunks = (_errors(data, (ours, theirs)) for data in source.chunks())
+    chunks = (
+        [_upright(data, data.torque - torque(data.motion)) for torque in (ours, theirs)] for data in source.chunks()
+    )
     both = [np.concatenate(errors) / scale for errors in zip(*chunks, strict=True)]
     samples = len(both[0])
     # What one of both leaves of an exact flight is rounding, and how long that remembers itself says nothing.
@@ -200,20 +207,13 @@ def compare_torque(
     return compare_errors(own, rival, size=3.0)
 
 
-def _errors(data: TorqueData, torques: tuple[Callable[[Motion], Array], ...]) -> list[Array]:
-    """Compute the errors of body torque of each predictor away from a vertical pitch, shape (samples, 3)."""
-    kept = ~vertical(data.motion.attitude)
-    attitude = data.motion.attitude[kept]
-    return [rotations.body_torque(attitude, (data.torque - torque(data.motion))[kept]) for torque in torques]
-
-
 def _scale(source: TorqueSource) -> Array:
     """Root mean square of the body torque; an axis without torque counts by the size of the largest."""
     square, count = np.zeros(3), 0
     for data in source.chunks():
-        kept = ~vertical(data.motion.attitude)
-        square += np.sum(rotations.body_torque(data.motion.attitude[kept], data.torque[kept]) ** 2, axis=0)
-        count += int(np.sum(kept))
+        torque = _upright(data, data.torque)
+        square += np.sum(torque**2, axis=0)
+        count += len(torque)
     size = square / max(count, 1)
     return np.sqrt(np.where(size > _ROUNDING * np.max(size), size, np.max(size) or 1.0))
 

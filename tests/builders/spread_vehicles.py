@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cpfls_cli.artifacts.disturbance import DisturbanceGroup
+from cpfls_cli.artifacts.disturbance import DisturbanceGroup, LackGroup
 from cpfls_cli.artifacts.vehicle_model import FoundNumbersGroup, LoopGroup
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.playback.gusts import GUST_AXES, Gusts
@@ -33,8 +33,11 @@ def numbers_of(model):
     return found
 
 
-def found_record(model=None, *, together=0.9, loop=None, gusts=True, relative=RELATIVE, **changed):
-    """An artifact; Izz and the drag factor go together, and so do the moments about roll and pitch a little."""
+def found_record(model=None, *, together=0.9, loop=None, gusts=True, lack=None, relative=RELATIVE, **changed):
+    """An artifact; Izz and the drag factor go together, and so do the moments about roll and pitch a little.
+
+    `lack` is the covariance by which rotors and damping are off about each axis of torque.
+    """
     model = model or truth()
     known = numbers_of(model)
     values = np.array([value for value, _ in known.values()])
@@ -49,7 +52,8 @@ def found_record(model=None, *, together=0.9, loop=None, gusts=True, relative=RE
     positive = [name.startswith("inertia") or name.endswith("factor") for name in names]
     size = inertia_and_mass(model.vehicle) * [3.4, 5.1, 2.0, 0.3, 0.3, 0.3]
     memory = np.array([0.3, 1.2, 0.5, 1.0, 1.0, 1.0])
-    held = Gusts(size, memory) if gusts else None
+    white = 0.1 * size * (lack is not None)
+    held = Gusts(size, memory, white) if gusts else None
     low, high = np.ones(3), np.ones(3)
     if loop is not None:
         low, high = np.asarray(loop)
@@ -79,9 +83,22 @@ def found_record(model=None, *, together=0.9, loop=None, gusts=True, relative=RE
             memory=memory,
             memory_low=0.7 * memory,
             memory_high=1.4 * memory,
+            white=white,
+            lack=None if lack is None else lack_group(np.asarray(lack), 0.5 * size),
         ),
     }
     return replace(record, **{**given, **changed})
+
+
+def lack_group(share, size):
+    """What a model lacks, the same about all axes of torque; of forces nothing is known."""
+    nothing = np.full((3, 2, 2), np.nan)
+    return LackGroup(
+        part=("rotors", "linear_damping"),
+        share=np.concatenate([np.tile(share, (3, 1, 1)), nothing]),
+        size=np.append(size[:3], [np.nan] * 3),
+        memory=np.array([0.5, 2.0, 8.0, *[np.nan] * 3]),
+    )
 
 
 def inertia_and_mass(vehicle):

@@ -82,6 +82,27 @@ def test_a_model_that_lacks_an_effect_is_said_to_spread_too_little(cpfls, vehicl
     assert json.loads(output.read_text())["verdict"] == Trust.LACKING
 
 
+def test_what_the_model_lacks_is_drawn_and_in_the_parameters(cpfls, vehicle, monkeypatch):
+    monkeypatch.setattr(VehicleRecord, "verdict", Trust.LACKING)
+    write_record(vehicle, found_record(lack=[[0.04, 0.02], [0.02, 0.09]]))
+    result, output = written(cpfls, vehicle, "npz")
+    assert "it is drawn as shares by which the parts of the model are off" in result.stderr
+    with np.load(output, allow_pickle=False) as arrays:
+        off, parameters = arrays["off.rotors"], arrays["parameters"]
+        assert off.shape == (COUNT, 6)
+        assert 0.1 < off[:, :3].std() < 0.3
+        assert not off[:, 3:].any()
+        assert arrays["lack_torque_n_m"].shape == (COUNT, 3)
+        assert arrays["gust_torque_white_n_m_sqrt_s"].min() > 0
+        # A weight of the first rotor about roll is its lever times its thrust factor, off by the share.
+        factor = 0.5 * arrays["thrust_factor_n_s2"][:, 0] * (1 + off[:, 0])
+        alike = [np.corrcoef(column, factor)[0, 1] for column in np.abs(parameters[:, 9:]).T if np.ptp(column)]
+        assert max(alike) > 0.999
+        names = arrays["range_names"].tolist()
+        assert "off.linear_damping_roll" in names
+        assert json.loads(str(arrays["facts"]))["units"]["off.rotors"].startswith("share of torque about")
+
+
 def test_guesses_are_held_and_named(cpfls, tmp_path):
     path = tmp_path / "vehicle.h5"
     write_record(path, found_record(guess=("drag_factor",), disturbance=None, gusts=False))

@@ -105,6 +105,29 @@ def test_an_unbalanced_rotor_above_half_of_the_rate():
     assert shaken[[0, 2, 3]].max() < 0.5 * shaken[1]
 
 
+def test_rotors_that_turn_nearly_alike_are_told_apart():
+    """Speeds 1.5 Hz apart, of which one shakes: alone it would be felt by the other too."""
+    signals = recorded().signals
+    speed = 2 * np.pi * np.array([105.0, 106.5, 111.0, 118.0]) * np.ones((len(signals), 1))
+    turns = PERIOD * (np.cumsum(speed[:, 1]) - 0.5 * speed[:, 1])
+    pull = 0.5 * np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1)
+    shaken = replace(signals, rotor_speed=speed, acceleration=0.01 * signals.acceleration + pull)
+    values = flight_numbers(Recording("flight.h5", shaken)).values
+    amplitudes = np.exp([values[f"unbalance M{index}"] for index in range(1, 5)])
+    assert amplitudes[1] == pytest.approx(0.5 * np.sqrt(2), rel=0.1)
+    assert amplitudes[[0, 2, 3]].max() < 0.15 * amplitudes[1]
+
+
+def test_what_turns_105_times_a_second_vibrates_in_a_log_of_100_hz():
+    """There it seems to swing five times a second."""
+    signals = recorded().signals
+    turns = 2 * np.pi * (1 / PERIOD + 5.0) * signals.time
+    felt = np.stack([0.5 * np.cos(turns), 0.5 * np.sin(turns), 9.81 + 0 * turns], axis=1)
+    values = flight_numbers(Recording("flight.h5", replace(signals, specific_force=felt))).values
+    across = np.exp([values[f"vibration accelerometer {axis}"] for axis in "xy"])
+    assert across == pytest.approx(np.full(2, 0.5 / np.sqrt(2)), rel=0.15)
+
+
 def test_too_short_and_without_rotors():
     flight = recorded()
     few = round(3.0 / PERIOD)

@@ -172,12 +172,12 @@ def test_a_lost_vehicle_is_told_and_the_others_go_on(make_plan, make_loop, inert
     plan, loop = make_plan(), make_loop()
     tracked = track(plan, [exact(inertia), Controller("bad", law), exact(inertia)], loop, START, NOTHING)
     found = scores(plan, tracked, 1.0)
-    assert np.isnan(found.lost[[0, 2]]).all()
-    lost = int(np.searchsorted(plan.time, found.lost[1]))
+    assert np.isnan(found.lost_at[[0, 2]]).all()
+    lost = int(np.searchsorted(plan.time, found.lost_at[1]))
     assert 0 < lost < len(plan) - 1
     assert np.isfinite(found.error[1, :lost]).all()
     assert np.isnan(found.error[1, lost:]).all()
-    for scored in (found.rms, found.settled_rms, found.largest, found.effort):
+    for scored in (found.rms, found.settled_rms, found.max_error, found.torque_rms):
         assert np.isnan(scored[1]).all()
         assert np.isfinite(scored[[0, 2]]).all()
     alone = track(plan, [exact(inertia)], loop, START, NOTHING)
@@ -208,7 +208,7 @@ def test_a_vehicle_that_goes_over_the_vertical_is_lost(make_loop):
     flown = tracked.attitude[0, np.isfinite(tracked.attitude[0]).all(axis=1)]
     assert np.cos(flown[:, 1]).min() > 0.02
     # Half the acceleration times the square of the time is what lacks to the vertical.
-    assert found.lost[0] == pytest.approx(np.sqrt(2 * (np.pi / 2 - 1.3) / 3.0), abs=0.03)
+    assert found.lost_at[0] == pytest.approx(np.sqrt(2 * (np.pi / 2 - 1.3) / 3.0), abs=0.03)
 
 
 @pytest.mark.parametrize("error", [[0.0, -0.4, 0.0], [1.6, 0.0, 0.0]])

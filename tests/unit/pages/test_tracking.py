@@ -5,9 +5,9 @@ import pytest
 
 from cpfls_cli.artifacts.flight import FlightRecord, TrackingGroup
 from cpfls_cli.artifacts.spec import Header, InputFile
-from cpfls_cli.config.study import ReportSettings
+from cpfls_cli.config.study import ReportSettings, Study, resolved
+from cpfls_cli.pages.page import sections_of
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.tracking import tracking_section
 from cpfls_cli.report.content import Cell, Plot, Table, Text, unfolded
 from cpfls_cli.report.numbers import number
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -19,10 +19,11 @@ NAMES = ("model", "rigid-body", "pd", "vehicle")
 
 def page(flight, settings=SETTINGS):
     inputs = {role: InputFile(f"{role}.h5", "0" * 64, "cpfls/x") for role in ("model", "trajectory")}
-    config = {"simulation": {"computed_torque": settings}}
+    config = resolved(Study()) | {"simulation": {"mode": "computed-torque", "computed_torque": settings}}
     record = flight.with_header(Header("0", 1, "", inputs))
     source = Source("tracked.h5", "1" * 64, record, config, VehicleSettings(), 0)
-    return tracking_section(Sources([source], VehicleSettings(), ReportSettings()))
+    made = sections_of(Sources([source], VehicleSettings(), ReportSettings()))
+    return next((section for section in made if section.name == "tracking"), None)
 
 
 def sections(shares, settings=SETTINGS, **changed):

@@ -14,14 +14,12 @@ from cpfls_cli.artifacts.vehicle_model import (
     ResponsesGroup,
     TradesGroup,
 )
-from cpfls_cli.config.study import Study
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.pages.model import answer
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
-from cpfls_cli.pages.source import Sources
 from cpfls_cli.pages.vehicle_model import (
     cautions,
-    found_vehicle_section,
+    found_vehicle_blocks,
     grounds,
     remainder_curves,
     title,
@@ -79,8 +77,9 @@ def test_the_curves_and_the_rotors_make_the_whole_wrench():
 @pytest.mark.parametrize(("rows", "panels"), [((0, 2), 3), ((5,), 3), ((1, 4), 6)])
 def test_torque_and_force_are_drawn_where_they_were_learned(rows, panels):
     source = source_of_record(record_of(replace(whole(), remainder=remainder(2, rows=rows))))
-    section = found_vehicle_section(Sources([source], source.vehicle, Study().report))
-    (drawn,) = [block for block in section.blocks if isinstance(block, Plot) and "remainder" in block.name]
+    (drawn,) = [
+        block for block in found_vehicle_blocks(source, 1) if isinstance(block, Plot) and "remainder" in block.name
+    ]
     assert len(drawn.picture.panels) == panels
 
 

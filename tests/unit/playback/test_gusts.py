@@ -27,3 +27,11 @@ def test_the_first_is_as_large_as_any():
 def test_gusts_come_again_with_their_seed():
     one, other = (GUSTS.drawn(np.random.default_rng(3), 0.01, 50) for _ in range(2))
     np.testing.assert_array_equal(one, other)
+
+
+def test_white_noise_grows_as_steps_get_shorter():
+    white = Gusts(np.zeros(6), np.ones(6), np.array([1e-3, 0.0, 2e-3, 0.1, 0.2, 0.3]))
+    for step in (0.01, 0.0025):
+        drawn = white.drawn(np.random.default_rng(4), step, 20_000)
+        assert drawn.std(axis=0) * np.sqrt(step) == pytest.approx(white.white, rel=0.03)
+        assert np.abs(np.corrcoef(drawn[1:, 0], drawn[:-1, 0])[0, 1]) < 0.05

@@ -156,6 +156,27 @@ def test_gusts_are_drawn_as_accelerations():
     assert np.mean((memories >= 0.7) & (memories <= 1.4)) == pytest.approx(0.95, abs=0.02)
 
 
+def test_parts_are_off_by_shares_that_go_together():
+    share = np.array([[0.3, 0.2], [0.2, 0.4]])
+    record = found_record(flat(truth()), lack=share)
+    spread = spread_of(record, 1500)
+    off = np.array([[own.deviations[name] for name in ("rotors", "linear_damping")] for own in spread.models])
+    # Rotors that turn a vehicle the wrong way are drawn again: a tail of one in thirty is missing.
+    assert (off[:, 0, :3] > -1.0).all()
+    assert np.cov(off[:, :, 0].T) == pytest.approx(share, rel=0.25)
+    assert abs(np.corrcoef(off[:, 0, 0], off[:, 0, 1])[0, 1]) < 0.1
+    assert not off[:, :, 3:].any()
+    first = spread.models[0]
+    exact = replace(first, deviations={}).parts
+    for row in range(6):
+        for part in ("rotors", "linear_damping"):
+            np.testing.assert_allclose(first.parts[part][row], (1 + first.deviations[part][row]) * exact[part][row])
+    bodies = inertia_and_mass(first.vehicle) / inertia_and_mass(vehicle_model(record.vehicle).vehicle)
+    assert first.lack.size[:3] == pytest.approx((record.disturbance.lack.size * bodies)[:3])
+    assert not first.lack.size[3:].any()
+    assert first.gusts.white == pytest.approx(record.disturbance.white * bodies)
+
+
 def test_a_part_that_is_not_in_the_model_stays_out_of_it():
     model = replace(flat(truth()), effects=(ModelEffect("linear_damping", {}, np.array([0.01, 0.0, 0.01])),))
     spread = spread_of(found_record(model), 3)
