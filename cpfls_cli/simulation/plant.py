@@ -14,7 +14,7 @@ from cpfls_cli.dynamics.equations_of_motion import TurningLaw, identified_turnin
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.hooks import CarriedBody, Carrier
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.signals import Signals, feeling, instant_like
 from cpfls_cli.simulation.actuators import Rotors
 from cpfls_cli.simulation.model import SimulatedEffect, SimulatedEffects
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -56,7 +56,7 @@ class EffectWrench:
         for one, acting in self._in_turn:
             felt = signals
             if one.effect.of_all_forces:
-                felt = signals.feeling((signals.wrench[:, 3:] + total[3:]) / signals.vehicle.mass_kg)
+                felt = feeling(signals, (signals.wrench[:, 3:] + total[3:]) / signals.vehicle.mass_kg)
             total += _columns(one, felt).direct[0] @ acting
         return total
 
@@ -136,7 +136,7 @@ class Plant:
             Of gusts.
         """
         body_rate = state[BODY_RATE]
-        signals = self._any_instant.at(**_channels(state, rotors.speed))
+        signals = instant_like(self._any_instant, **_channels(state, rotors.speed))
         by_rotors = signals.wrench[0]
         if self.whole is not None:
             squared = rotors.speed**2
@@ -196,7 +196,7 @@ def instant(vehicle: VehicleSettings, state: Array, rotor_speed: Array) -> Signa
     rotor_speed : array, shape (rotor,), rad/s
     """
     still = Signals(time=np.zeros(1), vehicle=vehicle, body_rate=np.zeros((1, 3)))
-    return still.at(**_channels(state, rotor_speed))
+    return instant_like(still, **_channels(state, rotor_speed))
 
 
 def _channels(state: Array, rotor_speed: Array) -> dict[str, Array]:
