@@ -84,7 +84,7 @@ def _dimensions(artifact: Checkable) -> Iterator[str]:
 def _kinds(artifact: Checkable) -> Iterator[str]:
     for spec, values in _present(artifact):
         wanted = "text" if spec.units == "text" else "numbers"
-        held = _KINDS.get(values.dtype.kind, str(values.dtype))
+        held = _KINDS.get(values.dtype.kind) or str(values.dtype)
         if held != wanted:
             yield f"{spec.path}: holds {held}, expected {wanted}"
 

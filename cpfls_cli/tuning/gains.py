@@ -319,12 +319,12 @@ class _Search:
     def _held(self, own: AxisLaw) -> float:
         """Give the least disk margin of all loops with all plants, as far as asked; less at overshoot and jitter."""
         law = _with(self.law, self.axis, own)
-        loud = _jitter(law, self.axis, self.noise) / self.loudest if self.loudest else 0.0
         loops = axis_loops(law, self.axis, self._moved, frequencies(law))
         passed = max(float(np.abs(loops.angle_closed).max()) / _OVERSHOOT, 1.0)
         cut = np.stack([loops.rate, loops.command, loops.angle])
         if not is_stable(loops.frequency, cut).all():
             return 0.0
+        loud = _jitter(law, self.axis, self.noise) / self.loudest if self.loudest else 0.0
         return min(float(disk_of(cut).min()), self.disk) / max(passed, loud, 1.0)
 
     @cached_property
@@ -336,11 +336,15 @@ class _Search:
 def _largest(held: Callable[[float], float], disk: float, low: float, high: float) -> float:
     """Find the largest gain that holds a margin, on a logarithmic scale; where none does the one that holds most."""
     steps = np.geomspace(low, high, _ROUNDS)
-    margins = np.array([held(step) for step in steps])
-    borne = np.flatnonzero(margins >= disk)
-    if not len(borne):
-        return float(steps[np.argmax(margins)])
-    below = float(steps[borne[-1]])
+    margins: list[float] = []
+    # From the largest down: what holds below the first that does is not asked for.
+    for step in steps[::-1]:
+        margins.append(held(step))
+        if margins[-1] >= disk:
+            break
+    else:
+        return float(steps[np.argmax(margins[::-1])])
+    below = float(step)
     above = below * float(steps[1] / steps[0])
     for _ in range(8):
         middle = float(np.sqrt(below * above))

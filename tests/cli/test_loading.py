@@ -88,6 +88,7 @@ def imported():
     assert len(names) > 20
     codes = {
         "the package": "import cpfls_cli",
+        "flying": "from cpfls_cli.commands import simulate, trajectory",
         "searches": "from cpfls_cli.commands import identify, reduce, sweep",
         "report": "import cpfls_cli.commands.report",
         "all commands and pages": f"import {', '.join(names)}",
@@ -99,9 +100,15 @@ def test_the_python_interface_loads_nothing_heavy_before_it_is_used(imported):
     assert (HEAVY | {"typer", "rich"}) & imported["the package"] == set()
 
 
+def test_what_plans_and_flies_loads_nothing_that_reads_models(imported):
+    """It takes half the start of both, and only a model that is given needs it."""
+    models = {"cpfls_cli.artifacts.vehicle_model", "cpfls_cli.flights.models", "cpfls_cli.playback.model"}
+    assert (models | {"scipy"}) & imported["flying"] == set()
+
+
 def test_a_search_loads_nothing_of_scipy_that_only_logs_need(imported):
     """Splines take a fifth of the start of a command, and no flight of `cpfls import` needs them again."""
-    assert {"scipy.interpolate", "scipy.optimize"} & imported["searches"] == set()
+    assert {"scipy.interpolate", "scipy.optimize", "scipy.spatial"} & imported["searches"] == set()
 
 
 def test_a_report_loads_no_compiled_loops(imported):
