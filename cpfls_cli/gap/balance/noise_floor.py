@@ -10,21 +10,27 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.channels import known_up_to
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.rounding import ROUNDING
 from cpfls_cli.weak_form.windows import Windows
 from cpfls_cli.weak_form.windows import windows as make_windows
 
+# Four times as many as the spectra of a fit have numbers; windows twice as long resolve them.
+_FREQUENCIES = 16
 _LONGER = 2
-"""Windows so many times longer resolve frequencies, and so many times the lowest one the highest one is at least."""
-
+# In reciprocals of a window: from near the first zero of its spectrum, at 3, it passes nothing of slow motion.
 _LOWEST_PER_WINDOW = 2.8
-"""In reciprocals of a window: from near the first zero of its spectrum, at 3, it passes nothing of slow motion."""
-
-_PASSED = 0.7
-"""Share of a cut-off, or of half the sampling rate, up to which even gentle filters pass nearly all."""
-
+# Of the sampling rate: above, filters against aliasing bend a spectrum.
+_HIGHEST_OF_RATE = 0.4
+# Share of a cut-off up to which even gentle filters pass nearly all, and the band that a fit needs.
+_PASSED = 0.6
+_BAND = 1.5
+# From sample to sample; each halves the band of the one before about.
 CORRELATIONS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95)
-"""Of noise from sample to sample; each halves the band of the one before about."""
+# Ratio of misfits from which on colour is believed: estimates of 16 powers scatter by less.
+_CLEARLY_BETTER = 1.5
+# Frequencies for each that a window resolves, so that a sum over them is an integral.
+_PADDED = 8
+# Of the power of noise, over its mean: the median does not see lines.
+_MEDIAN_OF_EXPONENTIAL = float(np.log(2))
 
 
 def noise_floor(residual: Columns, windows: Windows, cut_off: Array | None = None) -> Array:
@@ -84,30 +90,35 @@ def channel_cut_offs(signals: Signals, euler: bool) -> Array:
 def _below(residual: Columns, windows: Windows, cut_off: float) -> Array:
     """Estimate the floor of all channels from what lies between the motion and a cut-off."""
     length = len(windows.weight) * windows.period
-    highest = _PASSED * min(0.5 / windows.period, cut_off)
-    wanted = _LONGER * max(length, _LOWEST_PER_WINDOW / highest)
+    highest = min(_HIGHEST_OF_RATE / windows.period, _PASSED * cut_off)
+    wanted = max(_LONGER * length, _BAND * _LOWEST_PER_WINDOW / highest)
     fits = len(residual.direct) >= 4 * wanted / windows.period
     longer = make_windows(windows.period, wanted, 0.5) if fits else windows
     lowest = _LOWEST_PER_WINDOW / (len(longer.weight) * longer.period)
-    highest = max(highest, _LONGER * lowest)
-    # One for each that the noise bandwidth of a window tells apart.
-    apart = float(longer.weight @ longer.weight) / longer.period
-    frequencies = np.linspace(lowest, highest, 1 + max(1, round((highest - lowest) / apart)))
-    power = np.array([_power(residual, longer, frequency) for frequency in frequencies])
-    terms = np.array([_terms(longer, frequency) for frequency in frequencies])
-    return np.array([_extrapolated(terms, channel, _terms(windows, 0.0)) for channel in power.T])
+    frequencies = np.linspace(lowest, max(highest, _BAND * lowest), _FREQUENCIES)
+    power = np.array([_power(residual, longer, frequency) for frequency in frequencies]) / _energy(longer)
+    terms = np.array([_terms(longer.weight.tobytes(), longer.period, frequency) for frequency in frequencies])
+    window_terms = _terms(windows.weight.tobytes(), windows.period, 0.0) * _energy(windows)
+    return np.array([_extrapolated(terms, channel, window_terms) for channel in power.T])
 
 
 @lru_cache(maxsize=512)
-def _terms(windows: Windows, frequency: float) -> Array:
-    """Compute the power that windows at a frequency pass of each noise: of every colour, as it is and differentiated.
+def _terms(weights: bytes, period: float, centre: float) -> Array:
+    """Average the model spectra of noise over the passband of a window at a frequency; all flights share windows."""
+    weight = np.frombuffer(weights)
+    through = np.abs(np.fft.rfft(weight, _PADDED * len(weight))) ** 2
+    offset = np.fft.rfftfreq(_PADDED * len(weight), period)
+    both = np.concatenate([centre - offset[:0:-1], centre + offset])
+    share = np.concatenate([through[:0:-1], through])
+    phase = 2 * np.pi * both * period
+    rising = both**2
+    colours = [1 / (1 + rho**2 - 2 * rho * np.cos(phase)) for rho in CORRELATIONS]
+    spectra = np.array([spectrum for colour in colours for spectrum in (colour, rising * colour)])
+    return np.asarray(spectra @ share / share.sum())
 
-    All flights share windows.
-    """
-    there = modulated(windows, frequency)
-    apart = np.abs(np.arange(1 - len(there.weight), len(there.weight)))
-    alike = [np.correlate(kernel, kernel, "full").real for kernel in (there.weight, there.slope)]
-    return np.array([rho**apart @ kernel / (1 - rho**2) for rho in CORRELATIONS for kernel in alike])
+
+def _energy(windows: Windows) -> float:
+    return float((windows.weight**2).sum())
 
 
 def _extrapolated(terms: Array, power: Array, window_terms: Array) -> float:
@@ -138,10 +149,7 @@ def _best_pair(relative: Array) -> int:
     alone = np.minimum(_left(flat * (flat_sum / flat_squared)), _left(rising * (rising_sum / rising_squared)))
     together = _left(much_flat * flat + much_rising * rising)
     misfit = np.where((much_flat >= 0) & (much_rising >= 0), together, alone)
-    # Two colours are two numbers more (Schwarz 1978).
-    number = len(relative)
-    clearly = number * np.log(max(misfit[0, 0], ROUNDING) / max(misfit.min(), ROUNDING)) > 2 * np.log(number)
-    return int(np.argmin(misfit)) if clearly else 0
+    return 0 if misfit[0, 0] <= _CLEARLY_BETTER * misfit.min() else int(np.argmin(misfit))
 
 
 def _left(fitted: Array) -> Array:
@@ -153,8 +161,7 @@ def _power(residual: Columns, windows: Windows, frequency: float) -> Array:
     rows = through.average(residual.direct)
     if residual.momentum is not None:
         rows = rows + through.derivative(residual.momentum)
-    # The median does not see lines; that of an exponential is the logarithm of 2 of its mean.
-    return np.asarray(np.median(np.abs(rows) ** 2, axis=0) / np.log(2))
+    return np.asarray(np.median(np.abs(rows) ** 2, axis=0) / _MEDIAN_OF_EXPONENTIAL)
 
 
 def modulated(windows: Windows, frequency: float) -> Windows:
