@@ -36,10 +36,11 @@ COUNTS = 0.05
 """Share of a gap, in squares, from which on a part of it counts: an effect, a channel, what follows a signal."""
 
 CHANCE = 0.05
-"""Probability of chance from which on something makes an answer more careful: an unnamed effect, air that is none."""
+"""Probability of chance from which on something makes an answer more careful: an unnamed effect, an effect that may be
+0 by what instruments tell, air that would take a late name."""
 
 RARE = 0.01
-"""The rate of errors that names are given at: of chance for an effect, and of a rival beside the set that is chosen."""
+"""The rate of errors that names are given at, gusts among them: of chance, and of a rival beside the chosen set."""
 
 FEWEST_BLOCKS = 4
 """Blocks that tell an error, if a wide one."""
