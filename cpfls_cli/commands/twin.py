@@ -28,6 +28,7 @@ from cpfls_cli.flights.inputs import known_by
 from cpfls_cli.flights.models import learned_by, read_model
 from cpfls_cli.flights.playback import flights_to_play
 from cpfls_cli.logs.formats import is_log, log_contents
+from cpfls_cli.pages.disturbance import still_air_text
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.pages.twin import answer
@@ -98,7 +99,11 @@ def run(job: Job, path: Path, model: Path | None) -> Outcome:
         *_notes(settings, asked, gains),
     ]
     record = finish(job, record_of(flight, asked, flown, settings, gains, warnings, air), inputs)
-    return Outcome(record.summary, tuple(answer(source_of(job, record))), next=tuple(_next(job, record, path, model)))
+    silent = not settings.gusts and any(own is not None and own.gusts is not None for own in vehicles.values())
+    calm = [still_air_text()] if silent else []
+    return Outcome(
+        record.summary, (*answer(source_of(job, record)), *calm), next=tuple(_next(job, record, path, model))
+    )
 
 
 def _possible(
@@ -269,7 +274,7 @@ def _notes(settings: ClosedLoopSettings, asked: Asked, gains: GainsGroup) -> Ite
 def _next(job: Job, record: TwinRecord, path: Path, model: Path | None) -> Iterator[Command]:
     """Give the command that goes on: what the vehicle that parts lacks, or the model handed over."""
     last = len(record.vehicle) - 1
-    if any(record.parts(last, channel) for channel in range(len(record.channel))):
+    if record.beyond or any(record.parts(last, channel) for channel in range(len(record.channel))):
         yield to_gap(job, [path], model)
     elif model is not None:
         yield "cpfls", "export", model, "-o", job.beside(f"{model.stem}.c")
