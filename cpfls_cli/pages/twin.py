@@ -87,11 +87,17 @@ def _title(record: TwinRecord, vehicle: int, parted: list[int], judged: list[int
         alike = [names[channel] for channel in judged if channel not in parted]
         rest = f"; alike in {joined(alike)}" if alike else ""
         where = joined([names[channel] for channel in parted])
-        return f"{name} parts from {record.flight} in {where}{rest}", "warning"
+        small = ", by no more than its gusts do" if _by_gusts(record, parted) else ""
+        return f"{name} parts from {record.flight} in {where}{small}{rest}", "warning"
     if record.beyond:
         where = joined([names[channel] for channel in record.beyond])
         return f"{name} answers the setpoints of {record.flight} alike, but gusts do not explain {where}", "warning"
     return f"{name} flies like {record.flight}: {joined([names[channel] for channel in judged])}", "good"
+
+
+def _by_gusts(record: TwinRecord, channels: list[int]) -> bool:
+    """Tell whether gusts explain how far off a flight is in all of some channels."""
+    return not record.beyond and set(channels) <= set(record.held)
 
 
 def _gust_words(record: TwinRecord) -> Iterator[str]:
@@ -107,10 +113,10 @@ def _gust_words(record: TwinRecord) -> Iterator[str]:
             f"{_least_to_most(record, each)})"
             for each in record.beyond
         )
-        yield f"farther off than {flights}, so not by gusts: {joined(list(off))}"
+        yield f"farther off than {flights}, so gusts do not explain it: {joined(list(off))}"
     if within:
         names = joined([record.channel[each] for each in within])
-        yield f"no farther off than {flights}, so that they explain what differs: {names}"
+        yield f"no farther off than {flights}: {names}"
     else:
         yield f"no channel is like {flights}"
     if known.lost:

@@ -428,8 +428,8 @@ def is_apart(comparison: Comparison) -> BoolArray:
 DRAWS = 19
 """Flights in gusts: with so many the flight itself lies between the least and the most of them in 90 % of the time, and
 one such flight in twenty is told to be none of them."""
-_PUSHED = 9
-"""Channels that are held against flights in gusts: all but the thrust, whose white part no log holds."""
+_MOVED_BY = (0, 1, 2, 0, 1, 2, 3, 4, 5, 5)
+"""Axis of the gusts that move each channel first."""
 
 
 class InGusts(NamedTuple):
@@ -509,8 +509,7 @@ def in_gusts(
     values = np.stack([each.values for each in flown])
     noise = _white(measured, values)
     values = values + noise * rng.standard_normal(values.shape)
-    held = np.zeros(len(CHANNELS), dtype=bool)
-    held[:_PUSHED] = blown[[0, 1, 2, 0, 1, 2, 3, 4, 5]]
+    held = blown[list(_MOVED_BY)]
     held[6:8] = blown[3] & blown[4]  # in the world
     rms = np.array([root_mean_square(each) for each in (measured - still, *(values - still))])
     held &= np.isfinite(rms).all(axis=0)
