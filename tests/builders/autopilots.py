@@ -58,7 +58,7 @@ def flown_step(autopilot, values, vehicle, lag, axis, *, gusts, noise, seed=1, s
 def flown_margins(
     autopilot, values, vehicle, lag, axis, *, gusts, noise, lowest_hz, seed=1, periods=8, seconds=2.0, size=0.1
 ):
-    """Measure the loop by sines that are added to its command in flight: gain margin upward and phase, dB and degrees."""
+    """Measure the loop by sines that are added to its command in flight: gain margin upward, dB, and phase, degrees."""
     law = AUTOPILOTS[autopilot].law(values)
     count = round(seconds * law.rate_hz)
     bins = np.unique(np.geomspace(2, HIGHEST_HZ * seconds, 45).round().astype(int))
