@@ -1,6 +1,7 @@
 """`cpfls simulate` along a flight: its own setpoints, an autopilot's law, and where simulator and flight part."""
 
 import json
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -9,7 +10,8 @@ import yaml
 
 from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.commands.twin import with_autopilot
-from cpfls_cli.config.study import Study
+from cpfls_cli.config.load import load_study
+from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from tests.builders import blackbox_logs, ulogs
@@ -127,12 +129,14 @@ def test_what_cannot_be_flown_is_refused(refuse, logged, tmp_path):
 def test_in_gusts_of_a_model_the_answer_says_what_they_explain(cpfls, logged, monkeypatch):
     monkeypatch.setattr("cpfls_cli.commands.twin.DRAWS", 3)
     model = VehicleModel(vehicle=CROSS, effects=(ModelEffect("linear_damping", {}, np.full(3, 0.01)),))
-    write_record(logged / "vehicle.h5", found_record(model, lack=[0.3, 0.2]))
+    found = found_record(model, lack=[0.3, 0.2])
+    header = replace(found.origin, config=resolved_yaml(load_study(logged / "study.yaml")))
+    write_record(logged / "vehicle.h5", found.with_header(header))
 
     def flown(name, *options):
         words = ("simulate", logged / "study.yaml", logged / "log.ulg", "--autopilot", "px4", "-o", logged / name)
-        slow = ("--set", "simulation.closed_loop.integration_rate_hz=100")
-        result = cpfls(*words, "--model", logged / "vehicle.h5", *slow, *options)
+        short = ("--set", "import.crop_s=[0.0, 2.0]")
+        result = cpfls(*words, "--model", logged / "vehicle.h5", *short, *options)
         assert result.exit_code == 0, result.stderr
         return result.stdout
 

@@ -64,7 +64,7 @@ def test_a_model_whose_parts_give_nothing_has_a_rest_alone(rest):
 
 def test_it_is_played_as_large_as_the_parts_are_where_the_vehicle_flies():
     model, nothing = truth(), [np.nan] * 3
-    share = np.array([[0.3, 0.1, 0.2], [0.0, 0.5, 0.4], [0.1, 0.0, 0.0], *[nothing] * 3])
+    share = np.array([[0.3, 0.1, 0.2], [0.0, 2.0, 0.4], [0.1, 0.0, 0.0], *[nothing] * 3])
     lack = Lack(tuple(model.parts)[:3], share, np.array([0.01, 0.02, 0.0, *nothing]), np.array([0.5, 0.1, 2, *nothing]))
     drawn = lack.drawn(model, np.random.default_rng(1), 0.01, 4000)
     assert drawn.unit[:, :2].std(axis=0) == pytest.approx(1.0, abs=0.15)
@@ -83,5 +83,5 @@ def test_it_is_played_as_large_as_the_parts_are_where_the_vehicle_flies():
     )
     given = drawn.at(7, velocity, speed)
     assert given[:3] == pytest.approx(size * drawn.unit[7, :3], rel=1e-9)
-    assert size[1] > 0.021
+    assert size[1] > 1.02 * lack.rest[1]
     assert not given[3:].any()
