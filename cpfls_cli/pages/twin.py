@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cpfls_cli.arrays import BoolArray
 from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED
 from cpfls_cli.artifacts.twin import SETPOINT, STAYS, TwinRecord
@@ -22,6 +23,7 @@ from cpfls_cli.simulation.twin import LIFT
 from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _PREDICTIONS = {SETPOINT: "Setpoint", STAYS: "Still"}
@@ -279,13 +281,14 @@ def _stretch_figure(record: TwinRecord, index: int) -> Plot:
     middle = float(record.window.start[window]) + 0.5
     part = np.abs(record.time - middle) <= _SHOWN_S / 2
 
+    blown = [channel for channel in rows[:1] if channel in record.held]
+
     def draw(figure: Figure) -> None:
-        panels = np.atleast_1d(figure.subplots(len(rows), 1, sharex=True))
-        for axes, channel in zip(panels, rows, strict=True):
+        panels = np.atleast_1d(figure.subplots(len(rows) + len(blown), 1, sharex=True))
+        for axes, channel in zip(panels[len(rows) :], blown, strict=True):
+            _beside_gusts(axes, record, channel, part)
+        for axes, channel in zip(panels, rows, strict=False):
             line(axes, record.time[part], record.measured[part, channel], label="flight", **MEASURED)
-            if record.in_gusts is not None and channel in record.held:
-                low, high = record.in_gusts.low[part, channel], record.in_gusts.high[part, channel]
-                band(axes, record.time[part], low, high, color="#dfe8d8", label="in gusts")
             if np.isfinite(record.setpoint[part, channel]).any():
                 line(axes, record.time[part], record.setpoint[part, channel], label="setpoint", **BASELINE)
             for vehicle, style in enumerate(_styles(record)):
@@ -299,9 +302,24 @@ def _stretch_figure(record: TwinRecord, index: int) -> Plot:
         f"{joined([record.channel[each] for each in rows]).capitalize()} of {record.flight} and simulated, around the "
         "second in which the first of them is farthest off. They start in the flight's state and never see it again."
     )
-    if record.in_gusts is not None:
-        caption += f" Shaded: {len(record.in_gusts.rms)} flights in gusts, from the least to the most."
-    return plot(f"twin-stretch-{index}", caption, "Flight and simulated vehicles over time", 4.4, draw)
+    if record.in_gusts is not None and blown:
+        caption += (
+            f" Below, the first of them less that of {record.vehicle[-1]} in still air; shaded, "
+            f"{len(record.in_gusts.rms)} flights in gusts from the least to the most."
+        )
+    return plot(
+        f"twin-stretch-{index}", caption, "Flight and simulated vehicles over time", 6.0 if blown else 4.4, draw
+    )
+
+
+def _beside_gusts(axes: Axes, record: TwinRecord, channel: int, part: BoolArray) -> None:
+    """Draw how far a flight is off from the last vehicle, within what vehicles in gusts are."""
+    assert record.in_gusts is not None, "some are held"
+    time, still = record.time[part], record.simulated[-1, part, channel]
+    low, high = record.in_gusts.low[part, channel] - still, record.in_gusts.high[part, channel] - still
+    band(axes, time, low, high, color="#c9c9c9")
+    line(axes, time, record.measured[part, channel] - still, label="flight", **MEASURED | {"linewidth": 1.4})
+    axes.set_ylabel(f"difference, {_unit(record, channel)}")
 
 
 def _frequency_figure(record: TwinRecord, index: int) -> Plot:
