@@ -73,6 +73,7 @@ def run(job: Job, path: Path, model: Path | None) -> Outcome:
         effects = simulated_effects(settings.effects, study.vehicle)
         vehicles = _vehicles(study, model)
         played_gusts(list(vehicles.values())[-1], settings.gusts)
+    possible = _possible(model, vehicles[model.name], study) if settings.gusts and model is not None else None
     asked = asked_of(flight, settings, study.vehicle, share=_thrust_is_share(path, study))
     if job.dry_run:
         return nothing_written(job)
@@ -89,9 +90,8 @@ def run(job: Job, path: Path, model: Path | None) -> Outcome:
             lambda done, before=before: job.progress(before + done, total),  # type: ignore[misc]
         )
     air = None
-    if settings.gusts and model is not None:
-        possible = _possible(model, vehicles[model.name], generator(study, "spread"))
-        air = _in_gusts(job, settings, flight, asked, effects, possible, flown[model.name], len(vehicles))
+    if possible is not None:
+        air = _in_gusts(job, settings, flight, asked, effects, possible, list(flown.values())[-1], len(vehicles))
     warnings = [
         *seen_warnings(VEHICLE if model is None else model.name, learned_by(model), known_by({"flight": path}, inputs)),
         *flight.warnings,
@@ -106,16 +106,14 @@ def run(job: Job, path: Path, model: Path | None) -> Outcome:
     )
 
 
-def _possible(
-    path: Path, model: VehicleModel | None, rng: np.random.Generator
-) -> tuple[Sequence[VehicleModel], Lack | None]:
+def _possible(path: Path, model: VehicleModel | None, study: Study) -> tuple[Sequence[VehicleModel], Lack | None]:
     """Draw vehicles that the flights of a model allow, as `cpfls spread` does; of other models there is only one."""
     assert model is not None, "it is the model that holds the gusts"
     record = read_record(path, ModelRecord)
     if not isinstance(record, VehicleRecord):
         return [model] * DRAWS, None
     try:
-        spread = drawn(model, estimates(record), DRAWS, rng)
+        spread = drawn(model, estimates(record), DRAWS, generator(study, "spread"))
     except (InputError, ComputationError) as error:
         raise type(error)(f"{path}: {error}") from None
     return spread.models, spread.lack

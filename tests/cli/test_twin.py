@@ -126,7 +126,7 @@ def test_what_cannot_be_flown_is_refused(refuse, logged, tmp_path):
     assert "pixhawk" in said
 
 
-def test_in_gusts_of_a_model_the_answer_says_what_they_explain(cpfls, logged, monkeypatch):
+def test_in_gusts_of_a_model_the_answer_says_what_they_explain(cpfls, refuse, logged, monkeypatch):
     monkeypatch.setattr("cpfls_cli.commands.twin.DRAWS", 3)
     model = VehicleModel(vehicle=CROSS, effects=(ModelEffect("linear_damping", {}, np.full(3, 0.01)),))
     found = found_record(model, lack=[0.3, 0.2])
@@ -157,6 +157,10 @@ def test_in_gusts_of_a_model_the_answer_says_what_they_explain(cpfls, logged, mo
     assert not roll["beyond"]
     assert roll["inside_share"] > 0.5
     assert roll["rms"] < roll["rms_in_gusts"][0]
+    write_record(logged / "older.h5", replace(found, correlation=None).with_header(header))
+    words = ("simulate", logged / "study.yaml", logged / "log.ulg", "--autopilot", "px4", "-o", logged / "none.h5")
+    (message,) = refuse(*words, "--model", logged / "older.h5", "--gusts", "--dry-run")
+    assert "older.h5: holds intervals of single numbers" in message
     again = cpfls("info", logged / "gusty.h5").stdout
     assert "No farther off than 3 flights in the gusts of vehicle.h5" in again
     assert "In gusts" in again
