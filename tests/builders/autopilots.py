@@ -86,9 +86,9 @@ def flown_margins(
 
 def upward_gain_db(frequency, loop):
     """By how much the gain of a loop may rise, up to `HIGHEST_HZ`, dB; NaN where no crossing says so."""
-    seen = frequency <= HIGHEST_HZ
-    gains, *_ = stability_margins(FRD(loop[seen], 2 * np.pi * frequency[seen]), returnall=True)
-    return min((float(20 * np.log10(each)) for each in gains if each > 1), default=np.nan)
+    gains, _, _, turns, *_ = stability_margins(FRD(loop, 2 * np.pi * frequency), returnall=True)
+    upward = [gain for gain, turn in zip(gains, turns, strict=True) if gain > 1 and turn <= 2 * np.pi * HIGHEST_HZ]
+    return 20 * np.log10(min(upward)) if upward else np.nan
 
 
 def _flown(autopilot, values, vehicle, lag, time, attitude, gusts, noise, seed, added=None):
