@@ -224,7 +224,7 @@ def _beside_gusts(
     """Judge what was named beside gusts by what instruments tell, and find the gusts beside it.
 
     A loop that answers gusts looks as late. Where instruments do not tell which it is, a name of what is late stands
-    only if without it what is left is no longer the air.
+    only if without it less of what is left is the air.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def _beside_gusts(
         return without, gusts
     late = _by_instruments(named, given, settings, late=True)
     beside = _gusts(late, given, settings, rng)
-    return (late, beside) if beside is not None and beside.told.sum() >= told else (without, gusts)
+    return (late, beside) if beside is not None and beside.told.sum() > doubted.told.sum() else (without, gusts)
 
 
 def _names(named: _Named) -> list[str]:
