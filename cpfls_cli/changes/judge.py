@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -43,7 +44,9 @@ _IN_COMMON = 0.8
 """Share of their variance that flights of a day have in common where chance is drawn: another share makes a search over
 starts find as much by chance, or less."""
 
-_QUANTILES = (np.arange(12) + 0.5) / 12
+_NODES, _MOST_NODES = 12, 96
+"""Of the scatter of one kind, and at most so many of all kinds that go together."""
+
 _HALF_WIDTH = 1.96
 _NONE = slice(0, 0)
 
@@ -162,7 +165,7 @@ def judged(
     def held(flights: Sequence[FlightNumbers]) -> tuple[_Space, Array, float]:
         """Hold flights against what they, and no others of today, can be off by: their mean and its evidence."""
         beside, own = reference.apart(flights)
-        space = _Space(own, reference.freedom, listed)
+        space = _Space(own, reference.freedom, listed, kinds)
         mean = space.whitened(beside.mean(axis=0))
         return space, mean, float(space.strongest(mean[:, None])[0])
 
@@ -220,13 +223,10 @@ def beyond_chance(chance: Array, value: float) -> float:
 class _Space:
     """Densities of numbers under no change and under each one, as mixtures of normal ones."""
 
-    def __init__(self, covariance: Array, freedom: float, listed: Sequence[Cause]) -> None:
-        # Slow to load, and who reads a record computes nothing.
-        from scipy.special import chdtri
-
+    def __init__(self, covariance: Array, freedom: float, listed: Sequence[Cause], kinds: Sequence[str]) -> None:
         self.listed, self.freedom = listed, freedom
         self.root = np.linalg.cholesky(covariance)
-        self.scales = freedom / chdtri(freedom, 1 - _QUANTILES)
+        self.numbers = [np.flatnonzero(np.array(kinds) == kind) for kind in dict.fromkeys(kinds)]
         self.white = [self.whitened(cause.directions) for cause in listed]
         self.searched = [index for index, cause in enumerate(listed) if cause.searched]
         self.prior = np.log([cause.prior for cause in listed])
@@ -255,34 +255,59 @@ class _Space:
             Whitened directions of changes that are there anyway.
         """
         base = rows[:, :0] if beside is None else beside
-        without = self._density(rows, base)
-        known = base.shape[1]
-        each = [
-            self._density(rows, np.hstack([base, own]), slice(known, known + cause.losses))
-            for own, cause in ((self.white[index], self.listed[index]) for index in of)
-        ]
-        return np.array(each) - without
+        return np.array([self._evidence(rows, self.white[index], self.listed[index].losses, base) for index in of])
 
-    def _density(self, rows: Array, directions: Array, losses: slice = _NONE) -> Array:
-        """Compute the logarithm of the density of whitened rows, but for what all have in common, shape (row,).
+    def _evidence(self, rows: Array, own: Array, losses: int, base: Array) -> Array:
+        """Compute the evidence of one change beside what is there anyway, in the kinds that go with it."""
+        both, known = np.hstack([base, own]), base.shape[1]
+        kinds = self._linked(both, own)
+        with_it = _total(self._posterior(rows, both, kinds, slice(known, known + losses))[0])
+        return with_it - _total(self._posterior(rows, base, kinds)[0])
+
+    def _linked(self, directions: Array, own: Array) -> list[Array]:
+        """List the numbers of each kind that a change moves, and of kinds that others move along with these."""
+        moves, linked = (
+            np.array([np.any(each[numbers] != 0.0, axis=0) for numbers in self.numbers]) for each in (directions, own)
+        )
+        touched = linked.any(axis=1)
+        for _ in self.numbers:
+            touched |= moves[:, moves[touched].any(axis=0)].any(axis=1)
+        return [numbers for numbers, touches in zip(self.numbers, touched, strict=True) if touches]
+
+    def _posterior(
+        self, rows: Array, directions: Array, kinds: Sequence[Array], losses: slice = _NONE
+    ) -> tuple[Array, Array, Array]:
+        """Integrate over sizes, at nodes of how far each kind scatters beside what was learned of it.
+
+        Each kind is a multivariate t of its own: that the others scatter little tells nothing of it.
 
         Parameters
         ----------
+        rows : array, shape (number, row)
+            Whitened.
         losses : slice
             Directions whose sizes are nearly always above 0.
+
+        Returns
+        -------
+        logarithm : array, shape (node, row)
+            Of the density, with the weight of the node, but for what all have in common.
+        mean : array, shape (node, size, row)
+        covariance : array, shape (node, size, size)
         """
-        left, sizes, turned = np.linalg.svd(directions, full_matrices=False)
-        shown, square, scale = left.T @ rows, (rows**2).sum(axis=0), self.scales[:, None]
-        grown = scale + sizes**2
-        inside = (1 / scale - 1 / grown) @ shown**2
-        weight = len(rows) * np.log(scale) + np.log(grown / scale).sum(axis=1, keepdims=True)
-        parts = -0.5 * (square / scale - inside + weight)
+        scales, weights = _scatters(self.freedom, len(kinds))
+        precision = np.eye(directions.shape[1]) + np.tensordot(
+            1 / scales, [directions[own].T @ directions[own] for own in kinds], axes=1
+        )
+        shown = np.tensordot(1 / scales, [directions[own].T @ rows[own] for own in kinds], axes=1)
+        covariance = np.linalg.inv(precision)
+        mean = covariance @ shown
+        square = np.tensordot(1 / scales, [(rows[own] ** 2).sum(axis=0) for own in kinds], axes=1)
+        size = np.log(scales) @ [len(own) for own in kinds] - np.linalg.slogdet(covariance)[1]
+        logarithm = weights[:, None] - 0.5 * (square - (shown * mean).sum(axis=1) + size[:, None])
         if losses != _NONE:
-            along = turned.T[losses]
-            mean = (along * (sizes / grown)[:, None]) @ shown
-            parts += _losing(mean, 1 - ((1 - scale / grown)[:, None] * along**2).sum(axis=2))
-        most = np.max(parts, axis=0)
-        return np.asarray(most + np.log(np.mean(np.exp(parts - most), axis=0)))
+            logarithm += _losing(mean[:, losses], np.diagonal(covariance, axis1=1, axis2=2)[:, losses])
+        return logarithm, mean, covariance
 
     def sizes(self, row: Array, chosen: Sequence[int], of: int) -> tuple[Size, ...]:
         """Estimate the sizes of one of several changes that are there, in its unit.
@@ -293,18 +318,14 @@ class _Space:
         told = np.arange(first, first + self.listed[of].told)
         directions = np.hstack([self.white[index] for index in chosen])
         directions[:, told] *= _ANY
-        logarithms, means, variances = [], [], []
-        for scale in self.scales:
-            inverse = np.linalg.inv(directions.T @ directions / scale + np.eye(directions.shape[1]))
-            covariance = scale * np.eye(len(row)) + directions @ directions.T
-            _, determinant = np.linalg.slogdet(covariance)
-            logarithms.append(-0.5 * (row @ np.linalg.solve(covariance, row) + determinant))
-            means.append((inverse @ directions.T @ row / scale)[told])
-            variances.append(np.diag(inverse)[told])
-        share = np.exp(np.array(logarithms) - max(logarithms))[:, None]
+        logarithm, means, covariance = self._posterior(
+            row[:, None], directions, self._linked(directions, directions[:, told])
+        )
+        share = np.exp(logarithm - logarithm.max())
         share /= share.sum()
+        means, variances = means[:, told, 0], np.diagonal(covariance, axis1=1, axis2=2)[:, told]
         mean = (share * means).sum(axis=0)
-        error = np.sqrt((share * (np.array(variances) + (np.array(means) - mean) ** 2)).sum(axis=0))
+        error = np.sqrt((share * (variances + (means - mean) ** 2)).sum(axis=0))
         cause = self.listed[of]
         shown = _ANY * cause.usual * (mean + np.outer([0.0, -_HALF_WIDTH, _HALF_WIDTH], error))
         return tuple(Size(*map(cause.size, each)) for each in shown.T)
@@ -315,11 +336,33 @@ class _Space:
 
         def is_enough(size: float) -> bool:
             rows = drawn + size * own[:, :1]
-            evidence = self._density(rows, own, slice(0, cause.losses)) - self._density(rows, own[:, :0])
+            evidence = self._evidence(rows, own, cause.losses, own[:, :0])
             return bool(np.mean(evidence + np.log(cause.searched) >= threshold) >= _POWER)
 
         first = bisect_left(_SIZES, x=True, key=is_enough)
         return cause.size(_SIZES[first] * cause.usual) if first < len(_SIZES) else float("inf")
+
+
+def _total(logarithm: Array) -> Array:
+    """Add up densities over nodes, shape (row,)."""
+    most = logarithm.max(axis=0)
+    return np.asarray(most + np.log(np.exp(logarithm - most).sum(axis=0)))
+
+
+@cache
+def _scatters(freedom: float, kinds: int) -> tuple[Array, Array]:
+    """Give nodes of the variance of each kind, shape (node, kind), and the logarithms of their weights, shape (node,).
+
+    An inverse chi-squared distribution of so many degrees of freedom, by Gauss's quadrature.
+    """
+    # Slow to load, and who reads a record computes nothing.
+    from scipy.special import roots_genlaguerre
+
+    nodes, weights = roots_genlaguerre(min(_NODES, int(_MOST_NODES ** (1 / kinds))), freedom / 2 - 1)
+    own = np.log(weights / weights.sum())
+    scales = np.stack(np.meshgrid(*[freedom / 2 / nodes] * kinds, indexing="ij"), axis=-1)
+    logarithms = np.stack(np.meshgrid(*[own] * kinds, indexing="ij"), axis=-1)
+    return scales.reshape(-1, kinds), logarithms.sum(axis=-1).ravel()
 
 
 def _losing(mean: Array, variance: Array) -> Array:
