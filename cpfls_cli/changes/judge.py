@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.changes.causes import Cause, causes
 from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.changes.reference import Reference, common_numbers, kinds_of
@@ -44,11 +44,13 @@ _IN_COMMON = 0.8
 """Share of their variance that flights of a day have in common where chance is drawn: another share makes a search over
 starts find as much by chance, or less."""
 
-_NODES, _MOST_NODES = 12, 96
-"""Of the scatter of one kind, and at most so many of all kinds that go together."""
+_NODES, _MOST_NODES = 8, 256
+"""Of the scatter of one kind, and at most so many of kinds that go together: densities within 3 %."""
+
+_FARTHEST = 20.0
+"""Deviations up to which they tell how improbable numbers are."""
 
 _HALF_WIDTH = 1.96
-_NONE = slice(0, 0)
 
 
 class Size(NamedTuple):
@@ -255,27 +257,43 @@ class _Space:
             Whitened directions of changes that are there anyway.
         """
         base = rows[:, :0] if beside is None else beside
-        return np.array([self._evidence(rows, self.white[index], self.listed[index].losses, base) for index in of])
+        told: dict[tuple[bytes, ...], Array] = {}
+        with_it = [self._density(rows, np.hstack([base, self.white[index]]), base.shape[1], index, told) for index in of]
+        return np.array(with_it) - self._density(rows, base, 0, None, told)
 
-    def _evidence(self, rows: Array, own: Array, losses: int, base: Array) -> Array:
-        """Compute the evidence of one change beside what is there anyway, in the kinds that go with it."""
-        both, known = np.hstack([base, own]), base.shape[1]
-        kinds = self._linked(both, own)
-        with_it = _total(self._posterior(rows, both, kinds, slice(known, known + losses))[0])
-        return with_it - _total(self._posterior(rows, base, kinds)[0])
+    def _density(
+        self, rows: Array, directions: Array, known: int, of: int | None, told: dict[tuple[bytes, ...], Array]
+    ) -> Array:
+        """Compute the logarithm of the density of whitened rows, but for what all have in common, shape (row,).
 
-    def _linked(self, directions: Array, own: Array) -> list[Array]:
-        """List the numbers of each kind that a change moves, and of kinds that others move along with these."""
-        moves, linked = (
-            np.array([np.any(each[numbers] != 0.0, axis=0) for numbers in self.numbers]) for each in (directions, own)
-        )
-        touched = linked.any(axis=1)
-        for _ in self.numbers:
-            touched |= moves[:, moves[touched].any(axis=0)].any(axis=1)
-        return [numbers for numbers, touches in zip(self.numbers, touched, strict=True) if touches]
+        Parameters
+        ----------
+        known : int
+            Directions of other changes, before those of this one.
+        told : dict
+            Densities of parts, which changes have in common; what is not there is added.
+        """
+        losses = known + np.arange(0 if of is None else self.listed[of].losses)
+        total = np.zeros(rows.shape[1])
+        for kinds, columns in self._parts(directions):
+            own, lost = directions[:, columns], np.isin(columns, losses, assume_unique=True)
+            key = (np.concatenate(kinds).tobytes(), own.tobytes(), lost.tobytes())
+            if key not in told:
+                told[key] = _total(self._posterior(rows, own, kinds, lost)[0])
+            total += told[key]
+        return total
+
+    def _parts(self, directions: Array) -> Iterator[tuple[list[Array], Array]]:
+        """Part the kinds into such that no direction moves together: the numbers of each kind, and the directions."""
+        moves = np.array([(directions[numbers] != 0.0).any(axis=0) for numbers in self.numbers])
+        linked = np.eye(len(moves), dtype=bool) | (moves @ moves.T)
+        for _ in range(len(moves).bit_length()):
+            linked = linked @ linked
+        for part in np.unique(linked, axis=0):
+            yield [self.numbers[kind] for kind in np.flatnonzero(part)], np.flatnonzero(moves[part].any(axis=0))
 
     def _posterior(
-        self, rows: Array, directions: Array, kinds: Sequence[Array], losses: slice = _NONE
+        self, rows: Array, directions: Array, kinds: Sequence[Array], losses: BoolArray
     ) -> tuple[Array, Array, Array]:
         """Integrate over sizes, at nodes of how far each kind scatters beside what was learned of it.
 
@@ -285,8 +303,8 @@ class _Space:
         ----------
         rows : array, shape (number, row)
             Whitened.
-        losses : slice
-            Directions whose sizes are nearly always above 0.
+        losses : array, shape (size,)
+            Marks directions whose sizes are nearly always above 0.
 
         Returns
         -------
@@ -305,7 +323,7 @@ class _Space:
         square = np.tensordot(1 / scales, [(rows[own] ** 2).sum(axis=0) for own in kinds], axes=1)
         size = np.log(scales) @ [len(own) for own in kinds] - np.linalg.slogdet(covariance)[1]
         logarithm = weights[:, None] - 0.5 * (square - (shown * mean).sum(axis=1) + size[:, None])
-        if losses != _NONE:
+        if losses.any():
             logarithm += _losing(mean[:, losses], np.diagonal(covariance, axis1=1, axis2=2)[:, losses])
         return logarithm, mean, covariance
 
@@ -318,12 +336,13 @@ class _Space:
         told = np.arange(first, first + self.listed[of].told)
         directions = np.hstack([self.white[index] for index in chosen])
         directions[:, told] *= _ANY
-        logarithm, means, covariance = self._posterior(
-            row[:, None], directions, self._linked(directions, directions[:, told])
-        )
+        ((kinds, columns),) = [part for part in self._parts(directions) if first in part[1]]
+        marks = np.zeros(len(columns), dtype=bool)
+        logarithm, means, covariance = self._posterior(row[:, None], directions[:, columns], kinds, marks)
         share = np.exp(logarithm - logarithm.max())
         share /= share.sum()
-        means, variances = means[:, told, 0], np.diagonal(covariance, axis1=1, axis2=2)[:, told]
+        own = np.isin(columns, told)
+        means, variances = means[:, own, 0], np.diagonal(covariance, axis1=1, axis2=2)[:, own]
         mean = (share * means).sum(axis=0)
         error = np.sqrt((share * (variances + (means - mean) ** 2)).sum(axis=0))
         cause = self.listed[of]
@@ -332,12 +351,11 @@ class _Space:
 
     def shows(self, index: int, threshold: float, drawn: Array) -> float:
         """Find the smallest size of a change that shows with 90 %, in its unit; infinite where none does."""
-        own, cause = self.white[index], self.listed[index]
+        cause = self.listed[index]
 
         def is_enough(size: float) -> bool:
-            rows = drawn + size * own[:, :1]
-            evidence = self._evidence(rows, own, cause.losses, own[:, :0])
-            return bool(np.mean(evidence + np.log(cause.searched) >= threshold) >= _POWER)
+            rows = drawn + size * self.white[index][:, :1]
+            return bool(np.mean(self.evidence(rows, [index])[0] + np.log(cause.searched) >= threshold) >= _POWER)
 
         first = bisect_left(_SIZES, x=True, key=is_enough)
         return cause.size(_SIZES[first] * cause.usual) if first < len(_SIZES) else float("inf")
@@ -353,16 +371,17 @@ def _total(logarithm: Array) -> Array:
 def _scatters(freedom: float, kinds: int) -> tuple[Array, Array]:
     """Give nodes of the variance of each kind, shape (node, kind), and the logarithms of their weights, shape (node,).
 
-    An inverse chi-squared distribution of so many degrees of freedom, by Gauss's quadrature.
+    An inverse chi-squared distribution of so many degrees of freedom, by the trapezoidal rule over its logarithm, from
+    three deviations below what was learned to the scatter that numbers far off ask for.
     """
-    # Slow to load, and who reads a record computes nothing.
-    from scipy.special import roots_genlaguerre
-
-    nodes, weights = roots_genlaguerre(min(_NODES, int(_MOST_NODES ** (1 / kinds))), freedom / 2 - 1)
-    own = np.log(weights / weights.sum())
-    scales = np.stack(np.meshgrid(*[freedom / 2 / nodes] * kinds, indexing="ij"), axis=-1)
-    logarithms = np.stack(np.meshgrid(*[own] * kinds, indexing="ij"), axis=-1)
-    return scales.reshape(-1, kinds), logarithms.sum(axis=-1).ravel()
+    count = min(_NODES, int(_MOST_NODES ** (1 / kinds)))
+    near = 3 * np.sqrt(2 / freedom)
+    logarithms = np.linspace(-np.log1p(near), np.log1p(max(near, _FARTHEST**2 / freedom)), count)
+    weights = -freedom / 2 * (logarithms + np.expm1(-logarithms))
+    weights -= np.log(np.exp(weights).sum())
+    scales = np.stack(np.meshgrid(*[np.exp(logarithms)] * kinds, indexing="ij"), axis=-1)
+    together = np.stack(np.meshgrid(*[weights] * kinds, indexing="ij"), axis=-1)
+    return scales.reshape(-1, kinds), together.sum(axis=-1).ravel()
 
 
 def _losing(mean: Array, variance: Array) -> Array:
