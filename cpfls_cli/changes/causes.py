@@ -60,11 +60,17 @@ class Cause:
         return frozenset(rest) - {"and"} if first in ("rotor", "rotors") else frozenset()
 
     def holds(self, other: Cause) -> bool:
-        """Tell whether another change is this one, or this one with something more: a second rotor, a place."""
-        if self.name == "mass" and other.name.startswith("weight "):
+        """Tell whether another change is this one, or this one with something more: a second rotor, a place.
+
+        What is heavier needs more thrust in hover, and off its centre it moves that.
+        """
+        if (self.name == "mass" and other.name.startswith("weight ")) or (self.name in OF_MASS and other.name == "mass"):
             return True
         return self.name == other.name or (bool(self.rotors) and self.rotors < other.rotors)
 
+
+OF_MASS = ("hover", "centre of mass")
+"""What a mass at any place does."""
 
 _LOSS = 0.15
 """Share of thrust that a damaged propeller lacks."""
@@ -85,6 +91,9 @@ _DAMAGE_SHAKES = 0.8
 """Probability that a rotor which pulls less shakes otherwise too."""
 
 _HEAVIER = 0.1
+_IN_WASH = 0.5
+"""Probability that what hangs near a rotor takes of its thrust."""
+
 _ON_ARMS = (1 / 3, 2 / 3)
 """Of the way from the middle to a rotor: places of a mass, beside those half way between two rotors."""
 
@@ -182,9 +191,12 @@ def _of_loads(numbers: _Numbers, vehicle: VehicleSettings) -> Iterator[Cause]:
     yield Cause("hover", heavier[:, None], _HEAVIER, "1", ratio=1)
     share = 1 / len(arms)
     for index, place in enumerate(arms):
-        # In hover hardly another thing than a rotor that pulls less.
-        columns = _HEAVIER * _hung(numbers, vehicle, place)[:, None]
-        yield Cause(f"weight near M{index + 1}", columns, _HEAVIER, "1", share, share, losses=1)
+        # In hover hardly another thing than a rotor that pulls less, and what stands in its wash makes it do so.
+        hung, prior = _HEAVIER * _hung(numbers, vehicle, place), (1 - _IN_WASH) * share
+        weight = Cause(f"weight near M{index + 1}", hung[:, None], _HEAVIER, "1", prior, share, losses=1)
+        yield weight
+        both = np.stack([hung, single[index]], axis=1)
+        yield replace(weight, directions=both, prior=_IN_WASH * share, searched=0.0, losses=2)
     yield Cause("torque about z", _OF_YAW * loads(own.yaw)[:, None], _OF_YAW, "1")
 
 

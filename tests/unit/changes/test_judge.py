@@ -157,13 +157,17 @@ def test_a_mass_at_a_place_by_a_hover_that_is_solved():
     """It adds to the weight, moves the centre of mass, and is turned about it, by the same number."""
     size, place = 1e-5, ARM * np.array([-1.0, 1.0])
     names = [*LOADS, "follow roll", "follow pitch"]
-    (weight,) = [cause for cause in causes(names, QUAD) if cause.name == "weight near M3"]
+    weight, in_wash = [cause for cause in causes(names, QUAD) if cause.name == "weight near M3"]
+    weak = next(cause for cause in causes(names, QUAD) if cause.name == "rotor M3")
     moved = np.append(size * place, 0.0)
     rotors = [replace(rotor, position_m=tuple(rotor.position_m - moved)) for rotor in QUAD.rotors]
     before, after = hover(QUAD, 1.2 * 9.81), hover(replace(QUAD, rotors=tuple(rotors)), 1.2 * 9.81 * (1 + size))
     shown = weight.directions[:, 0] / weight.usual
     assert np.log(after / before) / size == pytest.approx(shown[:4], abs=1e-3)
     assert shown[4:] == pytest.approx(-1.2 * place**2 / np.array([0.01, 0.012]), rel=1e-9)
+    # What stands in the rotor's wash makes it pull less, or does not.
+    assert in_wash.directions[:, 0] == pytest.approx(weight.directions[:, 0])
+    assert in_wash.directions[:, 1] == pytest.approx(weak.directions[:, 0])
 
 
 @pytest.mark.parametrize(

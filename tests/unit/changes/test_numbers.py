@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.changes.judge import FALSE_ALARM, changed
+from cpfls_cli.changes.judge import FALSE_ALARM, NAMED, changed
 from cpfls_cli.changes.numbers import KINDS, flight_numbers, in_flight
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
@@ -65,7 +65,7 @@ def test_a_weak_rotor_is_asked_for_more(usual):
 
 
 def test_a_load_on_a_cable():
-    """Mass and length of a load, beside three flights without, each of a day of its own."""
+    """Mass and length of a load, beside five flights without, each of a day of its own."""
     rng = np.random.default_rng(4)
 
     def of_a_day(seed, **closed_loop):
@@ -75,14 +75,14 @@ def test_a_load_on_a_cable():
         ]
         return recorded(replace(VEHICLE, rotors=tuple(trim)), seed, **closed_loop)
 
-    before = [flight_numbers(of_a_day(seed)) for seed in range(10, 13)]
+    before = [flight_numbers(of_a_day(seed)) for seed in range(10, 15)]
     flight = of_a_day(20, effects={"payload": LOAD})
     today = flight_numbers(flight)
     found = changed([today], before, VEHICLE, rng)
     assert found.p_value <= FALSE_ALARM
     (load,) = found.found
     assert load.cause.name == "load on a cable"
-    assert load.belief > 0.9
+    assert load.belief > NAMED
     assert load.sizes[0].low < 0.1 < load.sizes[0].high
     assert today.cable_m == pytest.approx(1.0, rel=0.05)
 
