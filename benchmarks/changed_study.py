@@ -27,7 +27,6 @@ import numpy as np
 
 from benchmarks.shared.changing_flights import HEXA, NANO, QUAD, Body, Kind, Trim, day_of, flown, vehicle_of
 from cpfls_cli.changes import judge
-from cpfls_cli.changes.causes import OF_MASS
 from cpfls_cli.changes.judge import NAMED, Change, _Space, changed
 from cpfls_cli.changes.numbers import FlightNumbers, flight_numbers
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -292,7 +291,7 @@ def _verdict(case: Case, run: Change) -> Verdict:
 
 def _part_of(rights: Iterable[str]) -> set[str]:
     """List what is not wrong to name of what is right: each of two rotors, and what a mass off the centre does."""
-    off_centre = OF_MASS if "mass" in rights and "hover" not in rights else ()
+    off_centre = ("hover", "centre of mass") if "mass" in rights and "hover" not in rights else ()
     pairs = [right.removeprefix("rotors ").split(" and ") for right in rights if right.startswith("rotors ")]
     return {*off_centre, *(f"rotor {rotor}" for pair in pairs for rotor in pair)}
 

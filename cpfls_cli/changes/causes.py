@@ -64,13 +64,12 @@ class Cause:
 
         What is heavier needs more thrust in hover, and off its centre it moves that.
         """
-        if (self.name == "mass" and other.name.startswith("weight ")) or (self.name in OF_MASS and other.name == "mass"):
-            return True
-        return self.name == other.name or (bool(self.rotors) and self.rotors < other.rotors)
+        of_mass = self.name in _SEEN_IN and other.name.startswith(_SEEN_IN[self.name])
+        return self.name == other.name or of_mass or (bool(self.rotors) and self.rotors < other.rotors)
 
 
-OF_MASS = ("hover", "centre of mass")
-"""What a mass at any place does."""
+_SEEN_IN = {"mass": "weight near", "hover": "mass", "centre of mass": "mass"}
+"""Changes that hold more than another, by the beginnings of their names."""
 
 _LOSS = 0.15
 """Share of thrust that a damaged propeller lacks."""

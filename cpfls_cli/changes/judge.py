@@ -6,11 +6,12 @@ from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.changes.causes import Cause, causes
 from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.changes.reference import Reference, common_numbers, kinds_of
@@ -50,6 +51,7 @@ _NODES, _MOST_NODES = 8, 256
 _FARTHEST = 20.0
 """Deviations up to which they tell how improbable numbers are."""
 
+_NONE = np.arange(0)
 _HALF_WIDTH = 1.96
 
 
@@ -258,32 +260,32 @@ class _Space:
         """
         base = rows[:, :0] if beside is None else beside
         told: dict[tuple[bytes, ...], Array] = {}
-        with_it = [self._density(rows, np.hstack([base, self.white[index]]), base.shape[1], index, told) for index in of]
-        return np.array(with_it) - self._density(rows, base, 0, None, told)
+        each = [
+            self._density(rows, np.hstack([base, own]), base.shape[1] + np.arange(cause.losses), told)
+            for own, cause in ((self.white[index], self.listed[index]) for index in of)
+        ]
+        return np.array(each) - self._density(rows, base, _NONE, told)
 
-    def _density(
-        self, rows: Array, directions: Array, known: int, of: int | None, told: dict[tuple[bytes, ...], Array]
-    ) -> Array:
+    def _density(self, rows: Array, directions: Array, losses: IntArray, told: dict[tuple[bytes, ...], Array]) -> Array:
         """Compute the logarithm of the density of whitened rows, but for what all have in common, shape (row,).
 
         Parameters
         ----------
-        known : int
-            Directions of other changes, before those of this one.
+        losses : array, shape (loss,)
+            Directions whose sizes are nearly always above 0.
         told : dict
             Densities of parts, which changes have in common; what is not there is added.
         """
-        losses = known + np.arange(0 if of is None else self.listed[of].losses)
         total = np.zeros(rows.shape[1])
         for kinds, columns in self._parts(directions):
-            own, lost = directions[:, columns], np.isin(columns, losses, assume_unique=True)
+            own, lost = directions[:, columns], np.flatnonzero(np.isin(columns, losses, assume_unique=True))
             key = (np.concatenate(kinds).tobytes(), own.tobytes(), lost.tobytes())
             if key not in told:
                 told[key] = _total(self._posterior(rows, own, kinds, lost)[0])
             total += told[key]
         return total
 
-    def _parts(self, directions: Array) -> Iterator[tuple[list[Array], Array]]:
+    def _parts(self, directions: Array) -> Iterator[tuple[list[IntArray], IntArray]]:
         """Part the kinds into such that no direction moves together: the numbers of each kind, and the directions."""
         moves = np.array([(directions[numbers] != 0.0).any(axis=0) for numbers in self.numbers])
         linked = np.eye(len(moves), dtype=bool) | (moves @ moves.T)
@@ -293,7 +295,7 @@ class _Space:
             yield [self.numbers[kind] for kind in np.flatnonzero(part)], np.flatnonzero(moves[part].any(axis=0))
 
     def _posterior(
-        self, rows: Array, directions: Array, kinds: Sequence[Array], losses: BoolArray
+        self, rows: Array, directions: Array, kinds: Sequence[IntArray], losses: IntArray
     ) -> tuple[Array, Array, Array]:
         """Integrate over sizes, at nodes of how far each kind scatters beside what was learned of it.
 
@@ -303,8 +305,8 @@ class _Space:
         ----------
         rows : array, shape (number, row)
             Whitened.
-        losses : array, shape (size,)
-            Marks directions whose sizes are nearly always above 0.
+        losses : array, shape (loss,)
+            Directions whose sizes are nearly always above 0.
 
         Returns
         -------
@@ -323,7 +325,7 @@ class _Space:
         square = np.tensordot(1 / scales, [(rows[own] ** 2).sum(axis=0) for own in kinds], axes=1)
         size = np.log(scales) @ [len(own) for own in kinds] - np.linalg.slogdet(covariance)[1]
         logarithm = weights[:, None] - 0.5 * (square - (shown * mean).sum(axis=1) + size[:, None])
-        if losses.any():
+        if len(losses):
             logarithm += _losing(mean[:, losses], np.diagonal(covariance, axis1=1, axis2=2)[:, losses])
         return logarithm, mean, covariance
 
@@ -336,13 +338,11 @@ class _Space:
         told = np.arange(first, first + self.listed[of].told)
         directions = np.hstack([self.white[index] for index in chosen])
         directions[:, told] *= _ANY
-        ((kinds, columns),) = [part for part in self._parts(directions) if first in part[1]]
-        marks = np.zeros(len(columns), dtype=bool)
-        logarithm, means, covariance = self._posterior(row[:, None], directions[:, columns], kinds, marks)
+        moved = [kinds for kinds, columns in self._parts(directions) if np.isin(told, columns).any()]
+        logarithm, means, covariance = self._posterior(row[:, None], directions, list(chain(*moved)), _NONE)
         share = np.exp(logarithm - logarithm.max())
         share /= share.sum()
-        own = np.isin(columns, told)
-        means, variances = means[:, own, 0], np.diagonal(covariance, axis1=1, axis2=2)[:, own]
+        means, variances = means[:, told, 0], np.diagonal(covariance, axis1=1, axis2=2)[:, told]
         mean = (share * means).sum(axis=0)
         error = np.sqrt((share * (variances + (means - mean) ** 2)).sum(axis=0))
         cause = self.listed[of]
