@@ -80,7 +80,7 @@ _OF_YAW = 0.2
 _RARER = 0.5
 """Prior of two rotors beside that of one."""
 
-_SHAKES = 0.5
+_SHAKES = 1.0
 """Logarithm of vibration beside the reference, of something that came loose or out of balance."""
 
 _OF_AXIS = 0.5
@@ -130,7 +130,9 @@ def causes(names: Sequence[str], vehicle: VehicleSettings) -> list[Cause]:
     found = [*_of_loads(numbers, vehicle)] if numbers.of_kind("load") else []
     if numbers.of_kind("vibration"):
         found = [each for cause in found for each in _shaken_or_not(cause, numbers)]
-        found.append(Cause("vibration", np.stack(numbers.shakes, axis=1), _SHAKES, "1"))
+        # Of each rotor the balance alone.
+        each = float(len(vehicle.rotors))
+        found.append(Cause("vibration", np.stack(numbers.shakes, axis=1), _SHAKES, "1", each, each))
     return [*found, *(cause for kind in _ALONE for cause in _of_kind(numbers, kind))]
 
 
@@ -185,7 +187,9 @@ def _of_loads(numbers: _Numbers, vehicle: VehicleSettings) -> Iterator[Cause]:
         yield Cause("mass", columns, _HEAVIER, "1", 0.5 / len(places), 0.0, ratio=1)
     if numbers.of_kind("swing"):
         hangs = heavier + _HEAVIER * numbers.direction({"swing": 1.0})
-        yield Cause("load on a cable", np.stack([hangs, *moved], axis=1), _HEAVIER, "1", losses=1)
+        # Under the middle as likely as anywhere.
+        for columns in ([hangs], [hangs, *moved]):
+            yield Cause("load on a cable", np.stack(columns, axis=1), _HEAVIER, "1", 0.5, 0.5, losses=1)
     yield Cause("centre of mass", np.stack(moved, axis=1), _OFF_CENTRE * arm, "m", told=2)
     yield Cause("hover", heavier[:, None], _HEAVIER, "1", ratio=1)
     share = 1 / len(arms)
@@ -218,9 +222,10 @@ def _shaken_or_not(cause: Cause, numbers: _Numbers) -> Iterator[Cause]:
     """
     damaged = bool(cause.rotors)
     shakes = _DAMAGE_SHAKES if damaged else 0.5
-    yield replace(cause, prior=(1 - shakes) * cause.prior, searched=0.0 if damaged else cause.searched)
+    searched = (1 - shakes) * cause.searched if damaged else cause.searched
+    yield replace(cause, prior=(1 - shakes) * cause.prior, searched=searched)
     directions = np.column_stack([cause.directions, *numbers.shakes])
-    searched = cause.searched if damaged else 0.0
+    searched = shakes * cause.searched if damaged else 0.0
     yield replace(cause, prior=shakes * cause.prior, searched=searched, directions=directions)
 
 

@@ -201,14 +201,14 @@ def judged(
 
 
 def drawn_by_chance(
-    rng: np.random.Generator, kinds: Sequence[str], freedom: float, counts: Sequence[int] = (1,), draws: int = _DRAWS
+    rng: np.random.Generator, kinds: Sequence[str], freedom: Array, counts: Sequence[int] = (1,), draws: int = _DRAWS
 ) -> Array:
     """Draw means of so many of the last flights of an unchanged day, whitened, shape (count, number, draw).
 
     Each kind has a scatter of its own to be off by; numbers of two kinds do not go together.
     """
-    kind = np.unique(kinds, return_inverse=True)[1]
-    scale = np.sqrt(freedom / rng.chisquare(freedom, (draws, kind.max() + 1)))[:, kind]
+    _, first, kind = np.unique(kinds, return_index=True, return_inverse=True)
+    scale = np.sqrt(freedom[first] / rng.chisquare(freedom[first], (draws, len(first))))[:, kind]
     day, own = rng.normal(size=(2, draws, len(kind)))
     means, total, flights = [], np.zeros_like(own), 0
     for count in sorted(counts):
@@ -227,8 +227,8 @@ def beyond_chance(chance: Array, value: float) -> float:
 class _Space:
     """Densities of numbers under no change and under each one, as mixtures of normal ones."""
 
-    def __init__(self, covariance: Array, freedom: float, listed: Sequence[Cause], kinds: Sequence[str]) -> None:
-        self.listed, self.freedom = listed, freedom
+    def __init__(self, covariance: Array, freedom: Array, listed: Sequence[Cause], kinds: Sequence[str]) -> None:
+        self.listed, self.freedom = listed, freedom.tolist()
         self.root = np.linalg.cholesky(covariance)
         self.numbers = [np.flatnonzero(np.array(kinds) == kind) for kind in dict.fromkeys(kinds)]
         self.white = [self.whitened(cause.directions) for cause in listed]
@@ -315,7 +315,7 @@ class _Space:
         mean : array, shape (node, size, row)
         covariance : array, shape (node, size, size)
         """
-        scales, weights = _scatters(self.freedom, len(kinds))
+        scales, weights = _scatters(tuple(self.freedom[own[0]] for own in kinds))
         precision = np.eye(directions.shape[1]) + np.tensordot(
             1 / scales, [directions[own].T @ directions[own] for own in kinds], axes=1
         )
@@ -368,20 +368,21 @@ def _total(logarithm: Array) -> Array:
 
 
 @cache
-def _scatters(freedom: float, kinds: int) -> tuple[Array, Array]:
+def _scatters(freedom: tuple[float, ...]) -> tuple[Array, Array]:
     """Give nodes of the variance of each kind, shape (node, kind), and the logarithms of their weights, shape (node,).
 
-    An inverse chi-squared distribution of so many degrees of freedom, by the trapezoidal rule over its logarithm, from
+    Inverse chi-squared distributions of so many degrees of freedom, by the trapezoidal rule over their logarithms, from
     three deviations below what was learned to the scatter that numbers far off ask for.
     """
-    count = min(_NODES, int(_MOST_NODES ** (1 / kinds)))
-    near = 3 * np.sqrt(2 / freedom)
-    logarithms = np.linspace(-np.log1p(near), np.log1p(max(near, _FARTHEST**2 / freedom)), count)
-    weights = -freedom / 2 * (logarithms + np.expm1(-logarithms))
-    weights -= np.log(np.exp(weights).sum())
-    scales = np.stack(np.meshgrid(*[np.exp(logarithms)] * kinds, indexing="ij"), axis=-1)
-    together = np.stack(np.meshgrid(*[weights] * kinds, indexing="ij"), axis=-1)
-    return scales.reshape(-1, kinds), together.sum(axis=-1).ravel()
+    count = min(_NODES, int(_MOST_NODES ** (1 / len(freedom))))
+    each = []
+    for own in freedom:
+        near = 3 * np.sqrt(2 / own)
+        logarithms = np.linspace(-np.log1p(near), np.log1p(max(near, _FARTHEST**2 / own)), count)
+        weights = -own / 2 * (logarithms + np.expm1(-logarithms))
+        each.append((np.exp(logarithms), weights - np.log(np.exp(weights).sum())))
+    scales, weights = (np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1) for nodes in zip(*each, strict=True))
+    return scales.reshape(-1, len(freedom)), weights.sum(axis=-1).ravel()
 
 
 def _losing(mean: Array, variance: Array) -> Array:

@@ -137,7 +137,7 @@ def trend(
         held.mean,
         apart,
         deviation,
-        limit=_limit(held.freedom, apart[first:].size),
+        limit=_limit(float(held.freedom.min()), apart[first:].size),
         p_value=p_value,
         shifts=tuple(_shifts(row, kept, starts, vehicle, rng)),
         shows=judged(kept[first : first + 1], held, vehicle, rng).shows,
@@ -235,7 +235,7 @@ class Row:
             agility=np.outer(reference.more_agile(flights), reference.agility_error),
         )
 
-    def covariance(self, values: Array) -> tuple[Array, float]:
+    def covariance(self, values: Array) -> tuple[Array, Array]:
         """Learn the covariance of a row from its differences, and give its degrees of freedom."""
         steps = len(values) - 1
         # Each flight is in two of them.
@@ -250,7 +250,8 @@ class Row:
 
     def unchanged(self, rng: np.random.Generator, count: int) -> Iterator[Array]:
         """Draw such rows of unchanged vehicles: of each its covariance (inverse Wishart), then its flights."""
-        covariance, freedom = self.covariance(self.values)
+        covariance, each = self.covariance(self.values)
+        freedom = each.min()
         root, size = np.linalg.cholesky(covariance), len(covariance)
         kind = np.unique(kinds_of(self.names), return_inverse=True)[1]
         for _ in range(count):

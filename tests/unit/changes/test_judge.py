@@ -58,7 +58,7 @@ def space(listed, freedom=6.0, kinds=("load",) * 3):
     rng, size = np.random.default_rng(2), len(kinds)
     root = rng.normal(size=(size, size))
     covariance = (root @ root.T + np.eye(size)) * (np.array(kinds) == np.array(kinds)[:, None])
-    return _Space(covariance, freedom, listed, kinds), covariance
+    return _Space(covariance, np.full(size, freedom), listed, kinds), covariance
 
 
 def test_density_of_no_change_is_a_multivariate_t_of_each_kind():
