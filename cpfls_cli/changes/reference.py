@@ -20,7 +20,7 @@ _DAYS = 6.0
 
 _SCALE_ERROR = 0.8
 """By how much numbers of a kind scatter beside what is usual, from vehicle to vehicle: deviation of the logarithm, of
-loads, vibration and batteries of five vehicles."""
+loads, vibration and batteries of four."""
 
 _FEWEST_LEFT = 3.0
 """Degrees of freedom of what is usual of vehicles, where hardly any reference flight tells more."""

@@ -114,6 +114,28 @@ def flights(count, rng, change=None, names=NAMES, voltage=np.nan):
     ]
 
 
+@pytest.mark.parametrize("factor", [0.2, 1.0, 3.0])
+def test_how_much_a_kind_scatters_is_learned(factor):
+    """Of loads that scatter far less or more than is usual: nearer to the truth than to that, and surer for more."""
+    rng = np.random.default_rng(1)
+    true = factor**2 * np.trace(usual_covariance(LOADS, QUAD))
+    root = factor * np.linalg.cholesky(usual_covariance(LOADS, QUAD))
+
+    def learned(count):
+        drawn = rng.normal(size=(count, 4)) @ root.T
+        made = [
+            FlightNumbers("", dict(zip(LOADS, row, strict=True)), dict.fromkeys(LOADS, 0.0), np.nan, 20.0, True)
+            for row in drawn
+        ]
+        reference = Reference.of(made, LOADS, QUAD)
+        return np.trace(reference.covariance) / (1 + 1 / count), reference.freedom[0]
+
+    few, many = (np.median([learned(count) for _ in range(40)], axis=0) for count in (5, 40))
+    assert abs(np.log(few[0] / true)) < max(0.2, 0.4 * abs(np.log(factor**2)))
+    assert np.log(many[0] / true) == pytest.approx(0.0, abs=0.15)
+    assert 4 < few[1] < 9 < 25 < many[1] < 46
+
+
 def test_unchanged_flights_seldom_look_changed():
     """Of the predictive distribution itself: a share of 0.01 within what 2000 draws tell."""
     rng = np.random.default_rng(5)
