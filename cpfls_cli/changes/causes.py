@@ -188,8 +188,9 @@ def _of_loads(numbers: _Numbers, vehicle: VehicleSettings) -> Iterator[Cause]:
     if numbers.of_kind("swing"):
         hangs = heavier + _HEAVIER * numbers.direction({"swing": 1.0})
         # Under the middle as likely as anywhere.
-        for columns in ([hangs], [hangs, *moved]):
-            yield Cause("load on a cable", np.stack(columns, axis=1), _HEAVIER, "1", 0.5, 0.5, losses=1)
+        for besides in ([], moved):
+            swung = np.stack([hangs, *besides], axis=1)
+            yield Cause("load on a cable", swung, _HEAVIER, "1", 0.5, 0.5, losses=1)
     yield Cause("centre of mass", np.stack(moved, axis=1), _OFF_CENTRE * arm, "m", told=2)
     yield Cause("hover", heavier[:, None], _HEAVIER, "1", ratio=1)
     share = 1 / len(arms)
