@@ -29,6 +29,7 @@ from benchmarks.shared.changing_flights import HEXA, NANO, QUAD, Body, Kind, Tri
 from cpfls_cli.changes import judge
 from cpfls_cli.changes.judge import NAMED, Change, _Space, changed
 from cpfls_cli.changes.numbers import FlightNumbers, flight_numbers
+from cpfls_cli.errors import InputError
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 KINDS = {"quadrotor": QUAD, "hexarotor": HEXA, "nano": NANO}
@@ -192,7 +193,11 @@ def _cases(kind: Kind, trim: Trim, fleet: Fleet, names: Sequence[str], series: i
         for step, size in enumerate(sizes if name in names else ()):
             seed = [kind.rotors, 1000 * (series + 1) + draw, number, step]
             now = altered(name, size, kind, day_of(kind, body, trim, np.random.default_rng(seed)), draw)
-            told = _told(kind, vehicle, now.body, seed)
+            try:
+                told = _told(kind, vehicle, now.body, seed)
+            except InputError as error:
+                print(f"{name} {size:g}, draw {draw}: {error}", file=sys.stderr)
+                continue
             cases.append(Case(name, size, index, draw, now.right, told))
     return cases
 

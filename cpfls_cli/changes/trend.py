@@ -137,7 +137,7 @@ def trend(
         held.mean,
         apart,
         deviation,
-        limit=_limit(float(held.freedom.min()), apart[first:].size),
+        limit=_limit(held.freedom, len(apart) - first),
         p_value=p_value,
         shifts=tuple(_shifts(row, kept, starts, vehicle, rng)),
         shows=judged(kept[first : first + 1], held, vehicle, rng).shows,
@@ -186,11 +186,14 @@ def _apart(reference: Reference, flights: Sequence[FlightNumbers]) -> tuple[Arra
     return np.vstack([apart for apart, _ in each]), deviation
 
 
-def _limit(freedom: float, count: int) -> float:
+def _limit(freedom: Array, flights: int) -> float:
+    """Find the deviations that any number of so many flights exceeds at the rate of false alarms at most."""
     # Slow to load, and who reads a record computes nothing.
-    from scipy.special import stdtrit
+    from scipy.special import stdtr
 
-    return float(stdtrit(freedom, 1 - 0.5 * FALSE_ALARM / count))
+    limits = np.geomspace(1.0, 1e4, 4000)
+    beyond = 2 * flights * stdtr(freedom[:, None], -limits).sum(axis=0)
+    return float(limits[np.argmax(beyond <= FALSE_ALARM)])
 
 
 @dataclass(frozen=True)
