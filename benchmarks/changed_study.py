@@ -314,7 +314,7 @@ def _changes(fleet: Fleet, cases: Sequence[Case], instrument: str) -> tuple[list
             said = [_verdict(case, run) for case, run in zip(own, runs, strict=True)]
             counts = [sum(getattr(each, what) for each in said) for what in ("found", "right", "among", "wrong")]
             held += [each for verdict in said for each in verdict.held]
-            shares.append(counts[0] / len(own))
+            shares.append(counts[0] / max(len(own), 1))
             shows += [_shows(case, run) for case, run in zip(own, runs, strict=True) if case.draw < _SHOWN]
             others = [each.named for case, each in zip(own, said, strict=True) if each.named not in ("", *case.right)]
             rows.append([name, size, len(own), *counts, ", ".join(sorted(others)) or "—"])
