@@ -11,12 +11,12 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.flight import ClockGroup
 from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, CurveGroup, DeviationGroup, response_word
-from cpfls_cli.artifacts.spec import WORLD, Format, Record, columns_of, dataset, group, record, rows_of
+from cpfls_cli.artifacts.spec import WORLD, Format, Record, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.response.mismatch import Deviation
 
 if TYPE_CHECKING:
     from cpfls_cli.playback.flight import LoggedFlight
-    from cpfls_cli.simulation.twin import Asked, Comparison, TwinFlight
+    from cpfls_cli.simulation.twin import Asked, Comparison, InGusts, TwinFlight
 
 SETPOINT, STAYS = "setpoint", "nothing-moves"
 """What knows no vehicle: the setpoints themselves, and a vehicle that stays as it begins."""
@@ -125,6 +125,24 @@ class WindowsGroup:
 
 
 @record
+class InGustsGroup:
+    """The flight beside vehicles that the model allows, each in gusts of its own and with what the model lacks."""
+
+    rms: Array = dataset(
+        "root mean square of each less the model in still air; not finite where no gusts are known",
+        "draw",
+        "channel",
+        units="SI",
+        gaps=True,
+    )
+    low: Array = dataset("least of them", "sample", "channel", units="SI", gaps=True)
+    high: Array = dataset("most of them", "sample", "channel", units="SI", gaps=True)
+    noise: Array = dataset("white noise that the flight has, and they are given", "channel", units="SI")
+    beyond: BoolArray = dataset("1 where the flight is farther off than they are", "channel")
+    lost: int = dataset("how many overturn")
+
+
+@record
 class TwinRecord(Record):
     """The artifact `cpfls/twin`."""
 
@@ -166,6 +184,7 @@ class TwinRecord(Record):
     )
     window: WindowsGroup = group()
     answers: AnswersGroup = group()
+    in_gusts: InGustsGroup | None = group(default=None)
     clock: ClockGroup | None = group(default=None)
     warning: tuple[str, ...] = dataset("what to know about flight and vehicles", "warning")
     contradiction: tuple[str, ...] | None = dataset(
@@ -181,6 +200,7 @@ class TwinRecord(Record):
         compared: Sequence[Comparison],
         arrays: Mapping[str, Array],
         window: WindowsGroup,
+        in_gusts: InGusts | None,
         **about: Any,
     ) -> Self:
         """Arrange flights of simulated vehicles; arrays are the datasets of that name that need nothing else."""
@@ -197,6 +217,7 @@ class TwinRecord(Record):
             floor=np.array([one.floor for one in compared]),
             window=window,
             answers=AnswersGroup.of(compared),
+            in_gusts=None if in_gusts is None else group_of(InGustsGroup, in_gusts),
             clock=ClockGroup.of(flight.begins),
             **arrays,  # type: ignore[arg-type]  # each is an array
             **about,
@@ -219,6 +240,26 @@ class TwinRecord(Record):
         """List the channels in which a vehicle is judged."""
         costs = [self.cost(vehicle, channel) for channel in range(len(self.channel))]
         return [channel for channel, cost in enumerate(costs) if np.isfinite(cost)]
+
+    @property
+    def held(self) -> list[int]:
+        """Channels in which the flight is held against vehicles in gusts."""
+        known = self.in_gusts
+        return [] if known is None else np.flatnonzero(np.isfinite(known.rms).all(axis=0)).tolist()
+
+    @property
+    def beyond(self) -> list[int]:
+        """Channels in which the flight is farther from the model than gusts explain."""
+        return [] if self.in_gusts is None else np.flatnonzero(self.in_gusts.beyond).tolist()
+
+    def inside(self, channel: int) -> float:
+        """Give the share of the time in which the flight lies between vehicles in gusts; NaN where none are known."""
+        known = self.in_gusts
+        if known is None or channel not in self.held:
+            return float("nan")
+        low, high, own = (values[:, channel] for values in (known.low, known.high, self.measured))
+        there = np.isfinite(own) & np.isfinite(low)
+        return float(((low <= own) & (own <= high))[there].mean())
 
     def first_apart(self, vehicle: int, channel: int) -> float:
         """Give when a vehicle first parts, s; NaN where it never does."""
@@ -248,9 +289,30 @@ class TwinRecord(Record):
                 for name, row in zip(self.prediction, self.rms.tolist(), strict=True)
             },
             "movement": dict(zip(self.channel, self.movement.tolist(), strict=True)),
+            "in_gusts": self._in_gusts(),
             "vehicles": {name: self._vehicle(index) for index, name in enumerate(self.vehicle)},
             "contradictions": list(self.contradiction or ()),
             "warnings": list(self.warning),
+        }
+
+    def _in_gusts(self) -> dict[str, Any] | None:
+        known = self.in_gusts
+        if known is None:
+            return None
+        return {
+            "vehicle": self.vehicle[-1],
+            "flights": len(known.rms),
+            "lost": known.lost,
+            "channels": {
+                self.channel[each]: {
+                    "rms": float(self.rms[len(self.vehicle) - 1, each]),
+                    "rms_in_gusts": [float(known.rms[:, each].min()), float(known.rms[:, each].max())],
+                    "noise": float(known.noise[each]),
+                    "inside_share": self.inside(each),
+                    "beyond": bool(known.beyond[each]),
+                }
+                for each in self.held
+            },
         }
 
     def _vehicle(self, vehicle: int) -> dict[str, Any]:

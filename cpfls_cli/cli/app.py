@@ -321,7 +321,12 @@ def simulate(
         ),
     ] = None,
     gusts: Annotated[
-        bool, typer.Option("--gusts", help="Fly in the gusts that the model of `cpfls vehicle` holds, in closed loop.")
+        bool,
+        typer.Option(
+            "--gusts",
+            help="Fly in the gusts that the model of `cpfls vehicle` holds, in closed loop. Along a FLIGHT: beside it "
+            "fly vehicles that the model allows, each in gusts of its own, to see what gusts explain.",
+        ),
     ] = False,
     autopilot: Annotated[
         str | None,

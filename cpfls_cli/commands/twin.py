@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,39 +11,50 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.rebuilt import estimates
 from cpfls_cli.artifacts.replay import VEHICLE, contradictions_of
 from cpfls_cli.artifacts.store import read_header, read_record
 from cpfls_cli.artifacts.twin import GainsGroup, TwinRecord, WindowsGroup
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.commands.compare import to_gap
 from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.commands.replay import model_notes
 from cpfls_cli.config.load import stored_study
-from cpfls_cli.config.study import Study, settings_of
-from cpfls_cli.errors import InputError
+from cpfls_cli.config.study import Study, generator, settings_of
+from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.inputs import known_by
 from cpfls_cli.flights.models import learned_by, read_model
 from cpfls_cli.flights.playback import flights_to_play
 from cpfls_cli.logs.formats import is_log, log_contents
+from cpfls_cli.pages.disturbance import still_air_text
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.pages.twin import answer
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import instruments
+from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.spread import drawn
 from cpfls_cli.report.outcome import Command, Outcome, nothing_written
-from cpfls_cli.simulation.model import simulated_effects, with_effects
+from cpfls_cli.simulation.model import SimulatedEffects, played_gusts, simulated_effects, with_effects
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.simulation.twin import (
     CHANNELS,
+    DRAWS,
     Asked,
     Comparison,
+    InGusts,
     TwinFlight,
     asked_of,
     baselines,
     compared,
+    fly_in_gusts,
     fly_twin,
+    in_gusts,
     is_apart,
+    known_axes,
     measured_channels,
     root_mean_square,
     windows,
@@ -59,15 +70,15 @@ def run(job: Job, path: Path, model: Path | None) -> Outcome:
     study, (settings, gains) = job.study, with_autopilot(job.study, path)
     (flight,) = flights_to_play([path], study)
     with settings_of("simulation", study):
-        if settings.gusts:
-            raise InputError("simulation.closed_loop.gusts: none are played along a flight; leave --gusts out")
         effects = simulated_effects(settings.effects, study.vehicle)
-    vehicles = _vehicles(study, model)
+        vehicles = _vehicles(study, model)
+        played_gusts(list(vehicles.values())[-1], settings.gusts)
+    possible = _possible(model, vehicles[model.name], study) if settings.gusts and model is not None else None
     asked = asked_of(flight, settings, study.vehicle, share=_thrust_is_share(path, study))
     if job.dry_run:
         return nothing_written(job)
     flown: dict[str, TwinFlight] = {}
-    total = len(vehicles) * len(flight.time)
+    total = (len(vehicles) + DRAWS * settings.gusts) * len(flight.time)
     for number, (name, own) in enumerate(vehicles.items()):
         before = number * len(flight.time)
         flown[name] = fly_twin(
@@ -78,14 +89,60 @@ def run(job: Job, path: Path, model: Path | None) -> Outcome:
             *with_effects(own, effects),
             lambda done, before=before: job.progress(before + done, total),  # type: ignore[misc]
         )
+    air = None
+    if possible is not None:
+        air = _in_gusts(job, settings, flight, asked, effects, possible, list(flown.values())[-1], len(vehicles))
     warnings = [
         *seen_warnings(VEHICLE if model is None else model.name, learned_by(model), known_by({"flight": path}, inputs)),
         *flight.warnings,
         *(note for name, own in vehicles.items() if own is not None for note in model_notes(name, own, [flight])),
         *_notes(settings, asked, gains),
     ]
-    record = finish(job, record_of(flight, asked, flown, settings, gains, warnings), inputs)
-    return Outcome(record.summary, tuple(answer(source_of(job, record))), next=tuple(_next(job, record, path, model)))
+    record = finish(job, record_of(flight, asked, flown, settings, gains, warnings, air), inputs)
+    silent = not settings.gusts and any(own is not None and own.gusts is not None for own in vehicles.values())
+    calm = [still_air_text()] if silent else []
+    return Outcome(
+        record.summary, (*answer(source_of(job, record)), *calm), next=tuple(_next(job, record, path, model))
+    )
+
+
+def _possible(path: Path, model: VehicleModel | None, study: Study) -> tuple[Sequence[VehicleModel], Lack | None]:
+    """Draw vehicles that the flights of a model allow, as `cpfls spread` does; of other models there is only one."""
+    assert model is not None, "it is the model that holds the gusts"
+    record = read_record(path, ModelRecord)
+    if not isinstance(record, VehicleRecord):
+        return [model] * DRAWS, None
+    try:
+        spread = drawn(model, estimates(record), DRAWS, generator(study, "spread"))
+    except (InputError, ComputationError) as error:
+        raise type(error)(f"{path}: {error}") from None
+    return spread.models, spread.lack
+
+
+def _in_gusts(
+    job: Job,
+    settings: ClosedLoopSettings,
+    flight: LoggedFlight,
+    asked: Asked,
+    effects: SimulatedEffects,
+    possible: tuple[Sequence[VehicleModel], Lack | None],
+    still: TwinFlight,
+    before: int,
+) -> InGusts:
+    """Fly possible vehicles in gusts, with what the model lacks, and hold the flight against them."""
+    (models, lack), rng, count = possible, generator(job.study, "simulate"), len(flight.time)
+    flown = fly_in_gusts(
+        flight,
+        asked,
+        job.study.vehicle,
+        settings,
+        models,
+        effects,
+        lack,
+        rng,
+        lambda done: job.progress(before * count + done, (before + DRAWS) * count),
+    )
+    return in_gusts(measured_channels(flight), still.values, flown, known_axes(models[0].gusts, lack), rng)
 
 
 def record_of(
@@ -95,6 +152,7 @@ def record_of(
     settings: ClosedLoopSettings,
     gains: GainsGroup,
     warnings: list[str],
+    air: InGusts | None = None,
 ) -> TwinRecord:
     """Compare simulated vehicles, by name, with a flight, and arrange all of it."""
     measured, moved_by = measured_channels(flight), instruments([flight.playback])
@@ -118,6 +176,7 @@ def record_of(
         found,
         arrays,
         _windows(flight, found),
+        air,
         channel=CHANNELS,
         autopilot=settings.autopilot,
         gains=gains,
@@ -213,7 +272,7 @@ def _notes(settings: ClosedLoopSettings, asked: Asked, gains: GainsGroup) -> Ite
 def _next(job: Job, record: TwinRecord, path: Path, model: Path | None) -> Iterator[Command]:
     """Give the command that goes on: what the vehicle that parts lacks, or the model handed over."""
     last = len(record.vehicle) - 1
-    if any(record.parts(last, channel) for channel in range(len(record.channel))):
+    if record.beyond or any(record.parts(last, channel) for channel in range(len(record.channel))):
         yield to_gap(job, [path], model)
     elif model is not None:
         yield "cpfls", "export", model, "-o", job.beside(f"{model.stem}.c")

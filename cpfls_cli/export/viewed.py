@@ -330,6 +330,8 @@ def _of_twin(title: str, record: TwinRecord, study: Study) -> View:
         simulated = {name: record.simulated[each, :, index] for each, name in enumerate(names)}
         difference = record.measured[:, index] - record.simulated[last, :, index]
         own = {MEASURED: record.measured[:, index], SETPOINT: record.setpoint[:, index], **simulated}
+        if record.in_gusts is not None and index in record.held:
+            own |= {"gusts_low": record.in_gusts.low[:, index], "gusts_high": record.in_gusts.high[:, index]}
         tracks.append(
             Track(
                 name=channel.replace(" ", "_"),

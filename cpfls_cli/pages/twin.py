@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cpfls_cli.arrays import BoolArray
 from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED
 from cpfls_cli.artifacts.twin import SETPOINT, STAYS, TwinRecord
@@ -22,6 +23,7 @@ from cpfls_cli.simulation.twin import LIFT
 from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _PREDICTIONS = {SETPOINT: "Setpoint", STAYS: "Still"}
@@ -44,6 +46,10 @@ _LEGEND = (
     "the first second in which what follows the setpoints and differs is more than gusts and noise, and than 1 dB of "
     "the motion."
 )
+_GUSTS_LEGEND = (
+    " In gusts: least and most by which {count} vehicles that the model allows, each in gusts of its own and with what "
+    "the model lacks, are off from it."
+)
 _SHOWN_S = 6.0
 _BEFORE: dict[str, Any] = {**style_of(2), "linewidth": 1.4, "zorder": 3}
 _AFTER: dict[str, Any] = {**style_of(1), "linewidth": 1.4, "zorder": 3.5}
@@ -63,12 +69,14 @@ def twin_box(record: TwinRecord) -> Box:
     """Say of the last vehicle first whether it flies like the flight, then channel by channel, then of the others."""
     last = len(record.vehicle) - 1
     parted, judged = _parted(record, last), record.judged(last)
-    told = [sentence(_channel(record, last, channel)) for channel in parted]
+    told = [sentence(words) for words in _gust_words(record)]
+    told += [sentence(_channel(record, last, channel)) for channel in parted]
     told += [sentence(_in_short(record, each)) for each in range(last)]
     if record.contradiction:
         return Box("TWIN", contradicted(record.contradiction[0]), told, "warning")
     title, tone = _title(record, last, parted, judged)
-    return Box("TWIN", sentence(title), told if parted or not judged else [sentence(_NO_PART), *told], tone)
+    alike = judged and not (parted or record.beyond)
+    return Box("TWIN", sentence(title), [sentence(_NO_PART), *told] if alike else told, tone)
 
 
 def _title(record: TwinRecord, vehicle: int, parted: list[int], judged: list[int]) -> tuple[str, Any]:
@@ -81,8 +89,46 @@ def _title(record: TwinRecord, vehicle: int, parted: list[int], judged: list[int
         alike = [names[channel] for channel in judged if channel not in parted]
         rest = f"; alike in {joined(alike)}" if alike else ""
         where = joined([names[channel] for channel in parted])
-        return f"{name} parts from {record.flight} in {where}{rest}", "warning"
+        small = ", by no more than its gusts do" if _by_gusts(record, parted) else ""
+        return f"{name} parts from {record.flight} in {where}{small}{rest}", "warning"
+    if record.beyond:
+        where = joined([names[channel] for channel in record.beyond])
+        return f"{name} answers the setpoints of {record.flight} alike, but gusts do not explain {where}", "warning"
     return f"{name} flies like {record.flight}: {joined([names[channel] for channel in judged])}", "good"
+
+
+def _by_gusts(record: TwinRecord, channels: list[int]) -> bool:
+    """Tell whether gusts explain how far off a flight is in all of some channels."""
+    return not record.beyond and set(channels) <= set(record.held)
+
+
+def _gust_words(record: TwinRecord) -> Iterator[str]:
+    """Say in what the flight is one of those in gusts, and in what it is farther off."""
+    known = record.in_gusts
+    if known is None:
+        return
+    last, within = len(record.vehicle) - 1, [each for each in record.held if each not in record.beyond]
+    flights = f"{len(known.rms)} flights in the gusts of {record.vehicle[last]}"
+    if record.beyond:
+        off = (
+            f"{record.channel[each]} ({number(float(record.rms[last, each]), 2)} {_unit(record, each)}, they "
+            f"{_least_to_most(record, each)})"
+            for each in record.beyond
+        )
+        yield f"farther off than {flights}, so gusts do not explain it: {joined(list(off))}"
+    if within:
+        names = joined([record.channel[each] for each in within])
+        yield f"no farther off than {flights}: {names}"
+    else:
+        yield f"no channel is like {flights}"
+    if known.lost:
+        yield f"in gusts {known.lost} of {len(known.rms)} overturn"
+
+
+def _least_to_most(record: TwinRecord, channel: int) -> str:
+    assert record.in_gusts is not None, "asked for"
+    rms = record.in_gusts.rms[:, channel]
+    return f"{number(float(rms.min()), 2)} to {number(float(rms.max()), 2)}"
 
 
 def _parted(record: TwinRecord, vehicle: int) -> list[int]:
@@ -136,11 +182,12 @@ def _unit(record: TwinRecord, channel: int) -> str:
 def _tables(record: TwinRecord, index: int) -> Iterator[Block]:
     """Show the channels that are judged; the others are folded away."""
     known = [channel for channel in range(len(record.channel)) if np.isfinite(record.movement[channel])]
-    judged = [each for each in known if each in record.judged(len(record.vehicle) - 1)]
+    judged = [each for each in known if each in record.judged(len(record.vehicle) - 1) or each in record.held]
     others = [each for each in known if each not in judged]
     caption = f"Differences of simulated vehicles that fly freely along the setpoints of {record.flight}."
     if judged:
-        yield _table(f"twin-{index}", caption, record, judged, _LEGEND)
+        legend = _LEGEND if record.in_gusts is None else _LEGEND + _GUSTS_LEGEND.format(count=len(record.in_gusts.rms))
+        yield _table(f"twin-{index}", caption, record, judged, legend)
     if others:
         more = _table(
             f"twin-others-{index}", f"The same of channels that are not judged: {record.flight}.", record, others
@@ -155,6 +202,7 @@ def _table(name: str, caption: str, record: TwinRecord, channels: list[int], leg
         "Channel",
         *names,
         *_PREDICTIONS.values(),
+        *([] if record.in_gusts is None else ["In gusts"]),
         *(f"J {name.lower()}" for name in names),
         *(f"{name} apart" for name in names),
     )
@@ -162,12 +210,19 @@ def _table(name: str, caption: str, record: TwinRecord, channels: list[int], leg
         [
             f"{record.channel[channel]}, {_unit(record, channel)}",
             *(number(float(value), 2) for value in record.rms[:, channel]),
+            *([] if record.in_gusts is None else [_in_gusts(record, channel)]),
             *(_judged(record, each, channel, record.word(each, channel)) for each in vehicles),
             *(_seconds(record.first_apart(each, channel)) for each in vehicles),
         ]
         for channel in channels
     ]
     return Table(name, caption, header, rows, frozenset({0}), legend=legend)
+
+
+def _in_gusts(record: TwinRecord, channel: int) -> Cell:
+    if channel not in record.held:
+        return Cell("—")
+    return Cell(_least_to_most(record, channel), "warning" if channel in record.beyond else "plain")
 
 
 def _seconds(value: float) -> str:
@@ -226,9 +281,13 @@ def _stretch_figure(record: TwinRecord, index: int) -> Plot:
     middle = float(record.window.start[window]) + 0.5
     part = np.abs(record.time - middle) <= _SHOWN_S / 2
 
+    blown = [channel for channel in rows[:1] if channel in record.held]
+
     def draw(figure: Figure) -> None:
-        panels = np.atleast_1d(figure.subplots(len(rows), 1, sharex=True))
-        for axes, channel in zip(panels, rows, strict=True):
+        panels = np.atleast_1d(figure.subplots(len(rows) + len(blown), 1, sharex=True))
+        for axes, channel in zip(panels[len(rows) :], blown, strict=True):
+            _beside_gusts(axes, record, channel, part)
+        for axes, channel in zip(panels, rows, strict=False):
             line(axes, record.time[part], record.measured[part, channel], label="flight", **MEASURED)
             if np.isfinite(record.setpoint[part, channel]).any():
                 line(axes, record.time[part], record.setpoint[part, channel], label="setpoint", **BASELINE)
@@ -243,7 +302,24 @@ def _stretch_figure(record: TwinRecord, index: int) -> Plot:
         f"{joined([record.channel[each] for each in rows]).capitalize()} of {record.flight} and simulated, around the "
         "second in which the first of them is farthest off. They start in the flight's state and never see it again."
     )
-    return plot(f"twin-stretch-{index}", caption, "Flight and simulated vehicles over time", 4.4, draw)
+    if record.in_gusts is not None and blown:
+        caption += (
+            f" Below, the first of them less that of {record.vehicle[-1]} in still air; shaded, "
+            f"{len(record.in_gusts.rms)} flights in gusts from the least to the most."
+        )
+    return plot(
+        f"twin-stretch-{index}", caption, "Flight and simulated vehicles over time", 6.0 if blown else 4.4, draw
+    )
+
+
+def _beside_gusts(axes: Axes, record: TwinRecord, channel: int, part: BoolArray) -> None:
+    """Draw how far a flight is off from the last vehicle, within what vehicles in gusts are."""
+    assert record.in_gusts is not None, "some are held"
+    time, still = record.time[part], record.simulated[-1, part, channel]
+    low, high = record.in_gusts.low[part, channel] - still, record.in_gusts.high[part, channel] - still
+    band(axes, time, low, high, color="#c9c9c9")
+    line(axes, time, record.measured[part, channel] - still, label="flight", **MEASURED | {"linewidth": 1.4})
+    axes.set_ylabel(f"difference, {_unit(record, channel)}")
 
 
 def _frequency_figure(record: TwinRecord, index: int) -> Plot:

@@ -16,6 +16,8 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.playback.gusts import GUST_AXES, Gusts
+from cpfls_cli.playback.model import VehicleModel
 
 _BEGIN_S = (0.15, 0.6)
 """Where the memory begins."""
@@ -91,6 +93,55 @@ class Lack:
         """Arrange axes."""
         share, rest, memory = zip(*axes, strict=True)
         return cls(tuple(part), np.array(share), np.array(rest), np.array(memory))
+
+    def drawn(self, model: VehicleModel, rng: np.random.Generator, step: float, count: int) -> DrawnLack:
+        """Draw it for a flight of the model, whose parts these are, at instants a step apart, s."""
+        process = Gusts.known(np.where(np.isfinite(self.memory), 1.0, np.nan), self.memory)
+        weights = np.array([model.parts[name] for name in self.part])
+        alike = np.stack([weights[..., 0], *(weights[..., own].sum(axis=-1) for own in _powers(model.rotors))])
+        share, rest = np.zeros((len(self.part), len(GUST_AXES))), np.zeros(len(GUST_AXES))
+        share[:, : len(self.rest)], rest[: len(self.rest)] = np.nan_to_num(self.share).T, np.nan_to_num(self.rest)
+        return DrawnLack(model, process.drawn(rng, step, count), alike, share, rest)
+
+
+def _powers(rotors: int) -> tuple[slice, slice]:
+    """Place the speeds of rotors and their squares among the terms of the rotors."""
+    return slice(1, 1 + rotors), slice(1 + rotors, 1 + 2 * rotors)
+
+
+@dataclass(frozen=True)
+class DrawnLack:
+    """What a model lacks along one flight.
+
+    Attributes
+    ----------
+    unit : array, shape (step, 6)
+        Of unit size.
+    weights : array, shape (3, part, 6, term)
+        Of what each part gives by the terms of the motion, for powers 0 to 2 of the speed that all rotors have.
+    share : array, shape (part, 6)
+    rest : array, shape (6,), N m and N
+    """
+
+    model: VehicleModel
+    unit: Array
+    weights: Array
+    share: Array
+    rest: Array
+
+    def at(self, number: int, velocity: Array, speed: Array) -> Array:
+        """Give torque and force at a step, shape (6,), N m and N, body frame.
+
+        Parameters
+        ----------
+        velocity : array, shape (3,), m/s, body frame
+            Through the air.
+        speed : array, shape (rotor,), rad/s
+        """
+        square = float((speed**2).mean())
+        terms = self.model.table.terms(velocity[None], np.zeros((1, 3)))[0]
+        given = np.tensordot([1.0, np.sqrt(square), square], self.weights, 1) @ terms
+        return np.asarray(self.unit[number] * np.sqrt(self.rest**2 + ((self.share * given) ** 2).sum(axis=0)))
 
 
 def lack_of(power: Array, squares: Array, known: Array, rest: Rest) -> AxisLack:

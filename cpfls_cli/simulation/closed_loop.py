@@ -32,6 +32,7 @@ from cpfls_cli.trajectory.planning import sample_interval
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
+    from cpfls_cli.playback.lack import DrawnLack
     from cpfls_cli.playback.model import VehicleModel
 
 _ROUNDING = 1e-6
@@ -275,6 +276,8 @@ class Loop:
         Derivative of the state in the step before.
     push : array, shape (step, 6), N m and N, body frame
         Of gusts, in the middle of each step.
+    lacking : DrawnLack or None
+        What acts beside it and the model lacks.
     """
 
     pilot: Pilot
@@ -283,6 +286,7 @@ class Loop:
     state: Array
     change: Array
     push: Array
+    lacking: DrawnLack | None = None
 
     def advance(self, number: int) -> LoopStep:
         """Take one step.
@@ -295,7 +299,11 @@ class Loop:
         middle = self.state + 0.5 * self.actuators.step * self.change
         command, demand = self.pilot.command(number, self.state, middle)
         rotors = self.actuators.advance(command)
-        self.change = self.plant.derivative(middle, rotors, self.push[number])
+        push = self.push[number]
+        if self.lacking is not None:
+            _, velocity, rotation, _ = _seen(middle)
+            push = push + self.lacking.at(number, velocity @ rotation, rotors.speed)
+        self.change = self.plant.derivative(middle, rotors, push)
         self.state = self.state + self.actuators.step * self.change
         return LoopStep(self.change, rotors, demand)
 
@@ -413,6 +421,7 @@ def fly_setpoints(
     noise: GyroscopeNoise | None = None,
     speed: Array | None = None,
     injected: Array | None = None,
+    lacking: DrawnLack | None = None,
 ) -> SimulatedMotion:
     """Integrate the law of `settings.autopilot` and a vehicle along setpoints of attitude or rate and thrust.
 
@@ -428,6 +437,8 @@ def fly_setpoints(
         Of the rotors at the start; None for what the first thrust asks of them.
     injected : array, shape (step, 3), or None
         Added to the commands about the body axes at each step of `clock_of`, shares of the full ones.
+    lacking : DrawnLack or None
+        What the model lacks, drawn for the steps of `clock_of`.
 
     Raises
     ------
@@ -443,6 +454,7 @@ def fly_setpoints(
         speed = motors.speeds(float(setpoints.thrust[0]), np.zeros(3)).speed
     pilot = law_pilot(law, motors, _as_asked(setpoints, clock.parts), clock.step, speed, noise, injected)
     flight = _loop(pilot, np.array(start, dtype=float), speed, vehicle, settings, model, effects, clock, push)
+    flight.lacking = lacking
     return _flown(flight, clock, lambda sample, state: _refuse_lost(state, time, sample), lambda _done, _all: None)
 
 

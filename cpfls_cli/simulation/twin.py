@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -15,13 +15,15 @@ from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.gusts import GUST_AXES, Gusts
+from cpfls_cli.playback.lack import DrawnLack, Lack
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.response.flown import estimated
 from cpfls_cli.response.mismatch import Mismatch, mismatch
 from cpfls_cli.response.spectra import Channel, FrequencyResponse, Stretch
 from cpfls_cli.rounding import less
-from cpfls_cli.simulation.closed_loop import LostVehicleError, Setpoints, fly_setpoints
-from cpfls_cli.simulation.model import SimulatedEffects
+from cpfls_cli.simulation.closed_loop import Clock, LostVehicleError, Setpoints, clock_of, fly_setpoints
+from cpfls_cli.simulation.model import SimulatedEffects, with_effects
 from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, POSITION, VELOCITY
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -59,6 +61,21 @@ class Asked(NamedTuple):
     setpoints: tuple[Setpoints, ...]
     kind: str
     thrust_from: str
+
+
+@dataclass(frozen=True)
+class Air:
+    """What pushes a vehicle beside its model: gusts, and what the model lacks, drawn for each stretch."""
+
+    model: VehicleModel
+    lack: Lack | None
+    rng: np.random.Generator
+
+    def drawn(self, clock: Clock) -> tuple[Array | None, DrawnLack | None]:
+        """Draw both for the steps of an integration."""
+        gusts, lack = self.model.gusts, self.lack
+        push = None if gusts is None else gusts.drawn(self.rng, clock.step, clock.steps)
+        return push, None if lack is None else lack.drawn(self.model, self.rng, clock.step, clock.steps)
 
 
 @dataclass(frozen=True)
@@ -209,6 +226,7 @@ def fly_twin(
     model: VehicleModel | None,
     effects: SimulatedEffects,
     progress: Callable[[int], None] = lambda _done: None,
+    air: Air | None = None,
 ) -> TwinFlight:
     """Fly the setpoints of a flight, each stretch from the flight's own state on, without looking at the flight again.
 
@@ -218,10 +236,12 @@ def fly_twin(
         As `with_effects` gives them.
     progress : callable
         Takes samples done.
+    air : Air or None
+        None for still air.
     """
     parts, positions, lost = [], [], np.nan
     for part, setpoints in zip(flight.parts, asked.setpoints, strict=True):
-        values, places, where = _flown(part, setpoints, vehicle, settings, model, effects)
+        values, places, where = _flown(part, setpoints, vehicle, settings, model, effects, air)
         parts.append(values)
         positions.append(places)
         lost = where if np.isnan(lost) else lost
@@ -236,6 +256,7 @@ def _flown(
     settings: ClosedLoopSettings,
     model: VehicleModel | None,
     effects: SimulatedEffects,
+    air: Air | None,
 ) -> tuple[Array, Array, float]:
     start = np.zeros(12)
     for place, values in (
@@ -247,11 +268,14 @@ def _flown(
         start[place] = 0.0 if values is None else values[0]
     speed = None if part.rotor_speed is None else part.rotor_speed[0]
     values, places = np.full((len(part), len(CHANNELS)), np.nan), np.full((len(part), 3), np.nan)
+    push, lacking = (None, None) if air is None else air.drawn(clock_of(part.time, settings))
     count, lost = len(part), np.nan
     while count > 1:
         time = part.time[:count]
         try:
-            motion = fly_setpoints(time, setpoints, start, vehicle, settings, model, effects, speed=speed)
+            motion = fly_setpoints(
+                time, setpoints, start, vehicle, settings, model, effects, push, speed=speed, lacking=lacking
+            )
         except LostVehicleError as error:
             lost, count = float(part.time[error.sample]), error.sample
             continue
@@ -399,3 +423,112 @@ def is_apart(comparison: Comparison) -> BoolArray:
     follows, whole = (np.nan_to_num(each) for each in (comparison.follows, comparison.windows))
     floor, told = (np.nan_to_num(each, nan=np.inf) for each in (comparison.floor, comparison.told))
     return np.asarray(less(np.maximum(floor, told), follows) | less(np.maximum(SURE * floor, told), whole), dtype=bool)
+
+
+DRAWS = 19
+"""Flights in gusts: with so many the flight itself lies between the least and the most of them in 90 % of the time, and
+one such flight in twenty is told to be none of them."""
+_MOVED_BY = (0, 1, 2, 0, 1, 2, 3, 4, 5, 5)
+"""Axis of the gusts that move each channel first."""
+
+
+class InGusts(NamedTuple):
+    """A flight beside vehicles in gusts, by channel of `CHANNELS`.
+
+    Attributes
+    ----------
+    rms : array, shape (draw, channel)
+        Root mean square by which each is off from the vehicle in still air; NaN in channels that are not held.
+    low, high : array, shape (time, channel)
+        Least and most of them at each instant.
+    noise : array, shape (channel,)
+        White noise that the flight has and they have not: they are given as much.
+    beyond : array, shape (channel,)
+        Whether the flight is farther off than gusts explain.
+    lost : int
+        How many overturn.
+    """
+
+    rms: Array
+    low: Array
+    high: Array
+    noise: Array
+    beyond: BoolArray
+    lost: int
+
+
+def fly_in_gusts(
+    flight: LoggedFlight,
+    asked: Asked,
+    vehicle: VehicleSettings,
+    settings: ClosedLoopSettings,
+    models: Sequence[VehicleModel],
+    effects: SimulatedEffects,
+    lack: Lack | None,
+    rng: np.random.Generator,
+    progress: Callable[[int], None] = lambda _done: None,
+) -> list[TwinFlight]:
+    """Fly the setpoints of a flight by vehicles that may differ, each in gusts of its own and with what is lacking."""
+    found = []
+    for number, (model, own) in enumerate(zip(models, rng.spawn(len(models)), strict=True)):
+        given = with_effects(model, effects)
+        found.append(fly_twin(flight, asked, vehicle, settings, *given, air=Air(model, lack, own)))
+        progress((number + 1) * len(flight.time))
+    return found
+
+
+def known_axes(gusts: Gusts | None, lack: Lack | None) -> BoolArray:
+    """Mark the axes on which gusts, or what is lacking, are known, shape (6,)."""
+    known = np.zeros(len(GUST_AXES), dtype=bool)
+    if gusts is not None:
+        known |= (gusts.size > 0) | (gusts.white > 0)
+    if lack is not None:
+        known[: len(lack.memory)] |= np.isfinite(lack.memory)
+    return known
+
+
+def in_gusts(
+    measured: Array, still: Array, flown: Sequence[TwinFlight], blown: BoolArray, rng: np.random.Generator
+) -> InGusts:
+    """Hold a flight against vehicles that flew its setpoints in gusts.
+
+    How far it is off from the vehicle in still air is set beside how far they are. If it is one of them, the channel in
+    which it stands out most does so by more than the largest of theirs with a chance of one in all of them: logarithms
+    of root mean squares are counted in their standard deviations.
+
+    Parameters
+    ----------
+    measured, still : array, shape (time, channel)
+    blown : array, shape (6,)
+        Axes on which gusts, or what is lacking, are known.
+
+    References
+    ----------
+    Barnard 1963 (Monte Carlo tests); Westfall and Young 1993 (the largest of several).
+    """
+    values = np.stack([each.values for each in flown])
+    noise = _white(measured, values)
+    values = values + noise * rng.standard_normal(values.shape)
+    held = blown[list(_MOVED_BY)]
+    held[6:8] = blown[3] & blown[4]  # in the world
+    rms = np.array([root_mean_square(each) for each in (measured - still, *(values - still))])
+    held &= np.isfinite(rms).all(axis=0)
+    rms[:, ~held] = np.nan
+    told = TOLD * root_mean_square(measured, about_mean=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        size = np.log(rms)
+        standing = (size - size.mean(axis=0)) / size.std(axis=0)
+        farthest = np.nanmax(standing[1:], initial=-np.inf)
+        beyond = held & less(farthest, standing[0]) & less(told, rms[0])
+    low, high = np.fmin.reduce(values), np.fmax.reduce(values)
+    low[:, ~held], high[:, ~held] = np.nan, np.nan
+    lost = sum(bool(np.isfinite(each.lost_s)) for each in flown)
+    return InGusts(rms[1:], low, high, noise, np.asarray(beyond), lost)
+
+
+def _white(measured: Array, flown: Array) -> Array:
+    """Estimate white noise that a flight has beyond others, by third differences, shape (channel,)."""
+    mine, theirs = (
+        root_mean_square(np.diff(each, 3, axis=-2).reshape(-1, each.shape[-1])) for each in (measured, flown)
+    )
+    return np.asarray(np.sqrt(np.nan_to_num(np.maximum(mine**2 - theirs**2, 0.0)) / 20.0))

@@ -38,6 +38,10 @@ CROSS = crossed(1.2, 0.16, (0.011, 0.012, 0.02), 1.0e-5, 1.6e-7, 900.0)
 """An X of 450 mm: 1.2 kg, hovers at 0.36 of its full thrust."""
 
 
+HIGHEST_HZ = 60.0
+"""To which loops are measured in flight."""
+
+
 def flown_step(autopilot, values, vehicle, lag, axis, *, gusts, noise, seed=1, steps=4, size=0.1, held_s=3.0):
     """Step the asked angle about one axis there and back, in gusts: the mean answer, in parts of the step."""
     law = AUTOPILOTS[autopilot].law(values)
@@ -54,10 +58,10 @@ def flown_step(autopilot, values, vehicle, lag, axis, *, gusts, noise, seed=1, s
 def flown_margins(
     autopilot, values, vehicle, lag, axis, *, gusts, noise, lowest_hz, seed=1, periods=8, seconds=2.0, size=0.1
 ):
-    """Measure the loop by sines that are added to its command in flight, and compute its margins, dB and degrees."""
+    """Measure the loop by sines that are added to its command in flight: gain margin upward, dB, and phase, degrees."""
     law = AUTOPILOTS[autopilot].law(values)
     count = round(seconds * law.rate_hz)
-    bins = np.unique(np.geomspace(2, min(0.4 * law.rate_hz, 60.0) * seconds, 45).round().astype(int))
+    bins = np.unique(np.geomspace(2, HIGHEST_HZ * seconds, 45).round().astype(int))
     phases = np.random.default_rng(0).uniform(0, 2 * np.pi, len(bins))
     one = np.cos(2 * np.pi * np.outer(np.arange(count), bins) / count + phases).sum(axis=1)
     one *= size / np.abs(one).max()
@@ -76,8 +80,15 @@ def flown_margins(
     loop = (put - total) / total
     # Below, gusts are larger than what was added, and the loop is far from -1.
     shown = bins / seconds >= lowest_hz
-    gain, phase, *_ = stability_margins(FRD(loop[shown], 2 * np.pi * bins[shown] / seconds))
-    return abs(20 * np.log10(gain)), abs(phase)
+    _, phase, *_ = stability_margins(FRD(loop[shown], 2 * np.pi * bins[shown] / seconds))
+    return upward_gain_db(bins[shown] / seconds, loop[shown]), abs(phase)
+
+
+def upward_gain_db(frequency, loop):
+    """By how much the gain of a loop may rise, up to `HIGHEST_HZ`, dB; NaN where no crossing says so."""
+    gains, _, _, turns, *_ = stability_margins(FRD(loop, 2 * np.pi * frequency), returnall=True)
+    upward = [gain for gain, turn in zip(gains, turns, strict=True) if gain > 1 and turn <= 2 * np.pi * HIGHEST_HZ]
+    return 20 * np.log10(min(upward)) if upward else np.nan
 
 
 def _flown(autopilot, values, vehicle, lag, time, attitude, gusts, noise, seed, added=None):

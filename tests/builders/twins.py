@@ -10,11 +10,13 @@ from cpfls_cli.artifacts.twin import GainsGroup
 from cpfls_cli.commands.twin import record_of
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.gusts import Gusts
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.simulation.closed_loop import Setpoints, clock_of, fly_setpoints
 from cpfls_cli.simulation.law_pilot import GyroscopeNoise
 from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.settings import ClosedLoopSettings
-from cpfls_cli.simulation.twin import asked_of, fly_twin
+from cpfls_cli.simulation.twin import CHANNELS, InGusts, asked_of, fly_twin
 from tests.builders.autopilots import CROSS
 from tests.builders.studies import VEHICLE as STUDY
 
@@ -22,20 +24,23 @@ LOOP = ClosedLoopSettings(autopilot="px4", rotor_time_constant_s=0.03, integrati
 PERIOD = 0.02
 NOISE = 0.01
 HOVER = 0.36
-_GUST, _MEMORY_S = np.array([0.02, 0.02, 0.005, 0.3, 0.3, 0.3]), 0.4
+GUSTS = Gusts(np.array([0.02, 0.02, 0.005, 0.3, 0.3, 0.3]), np.full(6, 0.4))
 
 
-def flown(seconds=12.0, seed=3, gusts=True):
-    """Fly steps of the attitude; what is measured is noisy."""
+def flown(seconds=12.0, seed=3, gusts=True, inertia_x=1.0):
+    """Fly steps of the attitude with a body that turns so much harder about x; what is measured is noisy."""
     rng = np.random.default_rng(seed)
     time = PERIOD * np.arange(round(seconds / PERIOD) + 1)
     steps = rng.uniform(-1, 1, (round(seconds / 0.4) + 2, 3)) * [0.25, 0.25, 0.4]
     attitude, thrust = steps[(time / 0.4).astype(int)], np.full(len(time), HOVER)
     clock = clock_of(time, LOOP)
-    push = gust_along(clock, rng) if gusts else None
+    push = GUSTS.drawn(rng, clock.step, clock.steps) if gusts else None
     noise = GyroscopeNoise(NOISE, rng.spawn(1)[0]) if gusts else None
     asked = Setpoints(attitude, None, thrust)
-    motion = fly_setpoints(time, asked, np.zeros(12), CROSS, LOOP, None, SimulatedEffects(), push, noise)
+    x, *others = CROSS.inertia_kg_m2
+    body = VehicleModel(vehicle=replace(CROSS, inertia_kg_m2=(inertia_x * x, *others)))
+    model = None if inertia_x == 1.0 else body
+    motion = fly_setpoints(time, asked, np.zeros(12), CROSS, LOOP, model, SimulatedEffects(), push, noise)
     scatter = NOISE * rng.standard_normal((2, len(time), 3)) * gusts
     signals = Signals(
         time=time,
@@ -51,16 +56,6 @@ def flown(seconds=12.0, seed=3, gusts=True):
     return LoggedFlight.of("flight", signals)
 
 
-def gust_along(clock, rng):
-    """Torque and force that last for a while, in the middle of each step."""
-    kept = np.exp(-clock.step / _MEMORY_S)
-    drawn = _GUST * rng.standard_normal((clock.steps, 6))
-    push = drawn.copy()
-    for step in range(1, clock.steps):
-        push[step] = kept * push[step - 1] + np.sqrt(1 - kept**2) * drawn[step]
-    return push
-
-
 def twin_record():
     """Arrange a flight beside a vehicle with rotors that are too slow, and beside the one that flew."""
     flight = flown(6.0)
@@ -68,5 +63,15 @@ def twin_record():
     loops = {VEHICLE: replace(LOOP, rotor_time_constant_s=0.1), "found.h5": LOOP}
     twins = {name: fly_twin(flight, asked, CROSS, loop, None, SimulatedEffects()) for name, loop in loops.items()}
     gains = GainsGroup(source="defaults", name=("MC_ROLLRATE_P",), value=np.array([0.15]))
-    made = record_of(flight, asked, twins, LOOP, gains, ["the gains are guessed"])
+    made = record_of(flight, asked, twins, LOOP, gains, ["the gains are guessed"], beside(twins["found.h5"]))
     return made.with_header(Header("0", 1, STUDY))
+
+
+def beside(twin):
+    """Vehicles in gusts, as if they had flown beside a twin: nearer than the flight in roll rate alone."""
+    rms = np.full((3, len(CHANNELS)), np.nan)
+    rms[:, [0, 2, 6]] = [[0.001, 0.1, 0.5], [0.002, 0.2, 0.6], [0.003, 0.3, 2.0]]
+    held = np.where(np.isfinite(rms[0]), 0.0, np.nan)
+    beyond = np.arange(len(CHANNELS)) == 0
+    low, high = twin.values - 0.1 + held, twin.values + 0.1 + held
+    return InGusts(rms, low, high, np.zeros(len(CHANNELS)), beyond, 1)

@@ -1,17 +1,22 @@
 """`cpfls simulate` along a flight: its own setpoints, an autopilot's law, and where simulator and flight part."""
 
 import json
+from dataclasses import replace
 
 import h5py
 import numpy as np
 import pytest
 import yaml
 
+from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.commands.twin import with_autopilot
-from cpfls_cli.config.study import Study
+from cpfls_cli.config.load import load_study
+from cpfls_cli.config.study import Study, resolved_yaml
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from tests.builders import blackbox_logs, ulogs
 from tests.builders.autopilots import CROSS
+from tests.builders.spread_vehicles import found_record
 from tests.builders.twins import LOOP, PERIOD, flown
 
 STATED = {
@@ -114,11 +119,51 @@ def test_what_cannot_be_flown_is_refused(refuse, logged, tmp_path):
     (said,) = refuse(*words)
     assert "--autopilot px4, ardupilot, betaflight, crazyflie" in said
     (said,) = refuse(*words, "--autopilot", "px4", "--gusts")
-    assert "leave --gusts out" in said
+    assert "no gusts are known; give --model a vehicle of `cpfls vehicle`" in said
     (said,) = refuse(*words, "--autopilot", "px4", "--mode", "inverse")
     assert "along a flight all is flown in closed loop" in said
     (said,) = refuse(*words, "--autopilot", "pixhawk")
     assert "pixhawk" in said
+
+
+def test_in_gusts_of_a_model_the_answer_says_what_they_explain(cpfls, refuse, logged, monkeypatch):
+    monkeypatch.setattr("cpfls_cli.commands.twin.DRAWS", 3)
+    model = VehicleModel(vehicle=CROSS, effects=(ModelEffect("linear_damping", {}, np.full(3, 0.01)),))
+    found = found_record(model, lack=[0.3, 0.2])
+    header = replace(found.origin, config=resolved_yaml(load_study(logged / "study.yaml")))
+    write_record(logged / "vehicle.h5", found.with_header(header))
+
+    def flown(name, *options):
+        words = ("simulate", logged / "study.yaml", logged / "log.ulg", "--autopilot", "px4", "-o", logged / name)
+        short = ("--set", "import.crop_s=[0.0, 2.0]")
+        result = cpfls(*words, "--model", logged / "vehicle.h5", *short, *options)
+        assert result.exit_code == 0, result.stderr
+        return result.stdout
+
+    calm = flown("calm.h5")
+    assert "--gusts plays them" in calm
+    assert "In gusts" not in calm
+    said = json.loads(flown("gusty.h5", "--gusts", "--json"))
+    flown("again.h5", "--gusts")
+    other = json.loads(flown("other.h5", "--gusts", "--json", "--set", "seed=2"))
+    assert (logged / "gusty.h5").read_bytes() == (logged / "again.h5").read_bytes()
+    assert said["vehicles"] == other["vehicles"]
+    assert said["in_gusts"] != other["in_gusts"]
+    assert (said["in_gusts"]["vehicle"], said["in_gusts"]["flights"]) == ("vehicle.h5", 3)
+    # The log holds neither velocity nor acceleration.
+    assert list(said["in_gusts"]["channels"]) == ["roll rate", "pitch rate", "yaw rate", "roll", "pitch", "yaw"]
+    # These gusts are far larger than those of the flight.
+    roll = said["in_gusts"]["channels"]["roll rate"]
+    assert not roll["beyond"]
+    assert roll["inside_share"] > 0.5
+    assert roll["rms"] < roll["rms_in_gusts"][0]
+    write_record(logged / "older.h5", replace(found, correlation=None).with_header(header))
+    words = ("simulate", logged / "study.yaml", logged / "log.ulg", "--autopilot", "px4", "-o", logged / "none.h5")
+    (message,) = refuse(*words, "--model", logged / "older.h5", "--gusts", "--dry-run")
+    assert "older.h5: holds intervals of single numbers" in message
+    again = cpfls("info", logged / "gusty.h5").stdout
+    assert "No farther off than 3 flights in the gusts of vehicle.h5" in again
+    assert "In gusts" in again
 
 
 def test_it_is_looked_at_in_other_programs(cpfls, twin, tmp_path):

@@ -7,21 +7,27 @@ import pytest
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.twin import (
     CHANNELS,
+    DRAWS,
     RATE_LAW,
+    TwinFlight,
     asked_of,
     baselines,
     compared,
+    fly_in_gusts,
     fly_twin,
+    in_gusts,
     is_apart,
+    known_axes,
     measured_channels,
     windows,
 )
 from tests.builders.autopilots import CROSS
-from tests.builders.twins import HOVER, LOOP, PERIOD, flown
+from tests.builders.twins import GUSTS, HOVER, LOOP, PERIOD, flown
 
 INERTIA = CROSS.inertia_kg_m2
 
@@ -136,3 +142,58 @@ def test_a_thrust_in_newton_is_the_share_that_gives_it(flight):
     newton = changed(flight, **{**part.setpoints, "thrust": np.full((len(part), 1), lift * HOVER**2)})
     given = asked_of(newton, LOOP, CROSS, share=False).setpoints[0]
     np.testing.assert_allclose(given.thrust, share.thrust, rtol=1e-6)
+
+
+def test_a_flight_in_the_same_gusts_is_one_of_those_in_gusts_and_that_of_a_heavier_body_is_not():
+    loop = replace(LOOP, integration_rate_hz=200.0)
+    model = VehicleModel(vehicle=CROSS, gusts=GUSTS)
+    flights = {ratio: flown(3.0, inertia_x=ratio) for ratio in (1.0, 2.5)}
+    asked = asked_of(flights[1.0], loop, CROSS, share=True)
+    still = fly_twin(flights[1.0], asked, CROSS, loop, model, SimulatedEffects())
+    gusty = fly_in_gusts(flights[1.0], asked, CROSS, loop, [model] * 7, SimulatedEffects(), None, drawing(1))
+    blown = known_axes(GUSTS, None)
+    found = {
+        ratio: in_gusts(measured_channels(own), still.values, gusty, blown, drawing(2))
+        for ratio, own in flights.items()
+    }
+    assert not found[1.0].beyond.any()
+    assert found[2.5].beyond[0]
+    # Of the gyroscope's noise in a flight nothing is told to be the vehicle's.
+    assert found[1.0].noise[:3] == pytest.approx(0.01, abs=0.005)
+    assert np.isfinite(found[1.0].rms).all()
+    assert np.isfinite(found[1.0].low).all()
+
+
+def drawing(seed):
+    return np.random.default_rng(seed)
+
+
+def among(rng, larger=1.0):
+    """A flight among others: walks that differ in their size from channel to channel, the first one larger."""
+    size = rng.uniform(0.5, 2.0, len(CHANNELS)) * np.exp(0.3 * rng.standard_normal((1 + DRAWS, 1, len(CHANNELS))))
+    size[0, :, 3] *= larger
+    walks = size * np.cumsum(rng.standard_normal((1 + DRAWS, 60, len(CHANNELS))), axis=1)
+    others = [TwinFlight(values, values[:, :3], np.nan) for values in walks[1:]]
+    return in_gusts(walks[0], np.zeros_like(walks[0]), others, np.ones(6, dtype=bool), rng)
+
+
+def test_one_flight_of_twenty_that_is_like_the_others_is_told_not_to_be():
+    rng = drawing(5)
+    told = [among(rng).beyond.any() for _ in range(400)]
+    # 20 are expected; 4 deviations of a binomial on either side.
+    assert 3 <= sum(told) <= 37
+    larger = [among(rng, 20.0).beyond for _ in range(50)]
+    assert all(beyond[3] for beyond in larger)
+    # Its other channels are told no more often.
+    assert sum(np.delete(beyond, 3).any() for beyond in larger) <= 8
+
+
+def test_channels_that_no_known_gust_moves_are_not_held():
+    gusts = Gusts(GUSTS.size * [1, 1, 0, 1, 0, 1], GUSTS.memory)
+    assert known_axes(gusts, None).tolist() == [True, True, False, True, False, True]
+    walks = np.cumsum(drawing(1).standard_normal((4, 60, len(CHANNELS))), axis=1)
+    others = [TwinFlight(values, values[:, :3], np.nan) for values in walks[1:]]
+    found = in_gusts(walks[0], 0 * walks[0], others, known_axes(gusts, None), drawing(1))
+    held = [name for name, own in zip(CHANNELS, found.rms[0], strict=True) if np.isfinite(own)]
+    assert held == ["roll rate", "pitch rate", "roll", "pitch", "velocity z", "thrust"]
+    assert np.isnan(found.low[:, CHANNELS.index("yaw")]).all()
