@@ -29,6 +29,7 @@ from benchmarks.shared.changing_flights import HEXA, NANO, QUAD, Body, Kind, Tri
 from cpfls_cli.changes import judge
 from cpfls_cli.changes.judge import NAMED, Change, _Space, changed
 from cpfls_cli.changes.numbers import FlightNumbers, flight_numbers
+from cpfls_cli.errors import InputError
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 KINDS = {"quadrotor": QUAD, "hexarotor": HEXA, "nano": NANO}
@@ -192,7 +193,11 @@ def _cases(kind: Kind, trim: Trim, fleet: Fleet, names: Sequence[str], series: i
         for step, size in enumerate(sizes if name in names else ()):
             seed = [kind.rotors, 1000 * (series + 1) + draw, number, step]
             now = altered(name, size, kind, day_of(kind, body, trim, np.random.default_rng(seed)), draw)
-            told = _told(kind, vehicle, now.body, seed)
+            try:
+                told = _told(kind, vehicle, now.body, seed)
+            except InputError as error:
+                print(f"{name} {size:g}, draw {draw}: {error}", file=sys.stderr)
+                continue
             cases.append(Case(name, size, index, draw, now.right, told))
     return cases
 
@@ -290,9 +295,10 @@ def _verdict(case: Case, run: Change) -> Verdict:
 
 
 def _part_of(rights: Iterable[str]) -> set[str]:
-    """List what is not wrong to name of what is right: each of two rotors, "perhaps with another"."""
+    """List what is not wrong to name of what is right: each of two rotors, and what a mass off the centre does."""
+    off_centre = ("hover", "centre of mass") if "mass" in rights and "hover" not in rights else ()
     pairs = [right.removeprefix("rotors ").split(" and ") for right in rights if right.startswith("rotors ")]
-    return {f"rotor {rotor}" for pair in pairs for rotor in pair}
+    return {*off_centre, *(f"rotor {rotor}" for pair in pairs for rotor in pair)}
 
 
 def _changes(fleet: Fleet, cases: Sequence[Case], instrument: str) -> tuple[list[list[object]], list[list[object]]]:
@@ -308,7 +314,7 @@ def _changes(fleet: Fleet, cases: Sequence[Case], instrument: str) -> tuple[list
             said = [_verdict(case, run) for case, run in zip(own, runs, strict=True)]
             counts = [sum(getattr(each, what) for each in said) for what in ("found", "right", "among", "wrong")]
             held += [each for verdict in said for each in verdict.held]
-            shares.append(counts[0] / len(own))
+            shares.append(counts[0] / max(len(own), 1))
             shows += [_shows(case, run) for case, run in zip(own, runs, strict=True) if case.draw < _SHOWN]
             others = [each.named for case, each in zip(own, said, strict=True) if each.named not in ("", *case.right)]
             rows.append([name, size, len(own), *counts, ", ".join(sorted(others)) or "—"])

@@ -60,11 +60,16 @@ class Cause:
         return frozenset(rest) - {"and"} if first in ("rotor", "rotors") else frozenset()
 
     def holds(self, other: Cause) -> bool:
-        """Tell whether another change is this one, or this one with something more: a second rotor, a place."""
-        if self.name == "mass" and other.name.startswith("weight "):
-            return True
-        return self.name == other.name or (bool(self.rotors) and self.rotors < other.rotors)
+        """Tell whether another change is this one, or this one with something more: a second rotor, a place.
 
+        What is heavier needs more thrust in hover, and off its centre it moves that.
+        """
+        of_mass = self.name in _SEEN_IN and other.name.startswith(_SEEN_IN[self.name])
+        return self.name == other.name or of_mass or (bool(self.rotors) and self.rotors < other.rotors)
+
+
+_SEEN_IN = {"mass": "weight near", "hover": "mass", "centre of mass": "mass"}
+"""Changes that hold more than another, by the beginnings of their names."""
 
 _LOSS = 0.15
 """Share of thrust that a damaged propeller lacks."""
@@ -75,7 +80,7 @@ _OF_YAW = 0.2
 _RARER = 0.5
 """Prior of two rotors beside that of one."""
 
-_SHAKES = 0.5
+_SHAKES = 1.0
 """Logarithm of vibration beside the reference, of something that came loose or out of balance."""
 
 _OF_AXIS = 0.5
@@ -85,6 +90,9 @@ _DAMAGE_SHAKES = 0.8
 """Probability that a rotor which pulls less shakes otherwise too."""
 
 _HEAVIER = 0.1
+_IN_WASH = 0.5
+"""Probability that what hangs near a rotor takes of its thrust."""
+
 _ON_ARMS = (1 / 3, 2 / 3)
 """Of the way from the middle to a rotor: places of a mass, beside those half way between two rotors."""
 
@@ -122,7 +130,9 @@ def causes(names: Sequence[str], vehicle: VehicleSettings) -> list[Cause]:
     found = [*_of_loads(numbers, vehicle)] if numbers.of_kind("load") else []
     if numbers.of_kind("vibration"):
         found = [each for cause in found for each in _shaken_or_not(cause, numbers)]
-        found.append(Cause("vibration", np.stack(numbers.shakes, axis=1), _SHAKES, "1"))
+        # Of each rotor the balance alone.
+        each = float(len(vehicle.rotors))
+        found.append(Cause("vibration", np.stack(numbers.shakes, axis=1), _SHAKES, "1", each, each))
     return [*found, *(cause for kind in _ALONE for cause in _of_kind(numbers, kind))]
 
 
@@ -177,14 +187,20 @@ def _of_loads(numbers: _Numbers, vehicle: VehicleSettings) -> Iterator[Cause]:
         yield Cause("mass", columns, _HEAVIER, "1", 0.5 / len(places), 0.0, ratio=1)
     if numbers.of_kind("swing"):
         hangs = heavier + _HEAVIER * numbers.direction({"swing": 1.0})
-        yield Cause("load on a cable", np.stack([hangs, *moved], axis=1), _HEAVIER, "1", losses=1)
+        # Under the middle as likely as anywhere.
+        for besides in ([], moved):
+            swung = np.stack([hangs, *besides], axis=1)
+            yield Cause("load on a cable", swung, _HEAVIER, "1", 0.5, 0.5, losses=1)
     yield Cause("centre of mass", np.stack(moved, axis=1), _OFF_CENTRE * arm, "m", told=2)
     yield Cause("hover", heavier[:, None], _HEAVIER, "1", ratio=1)
     share = 1 / len(arms)
     for index, place in enumerate(arms):
-        # In hover hardly another thing than a rotor that pulls less.
-        columns = _HEAVIER * _hung(numbers, vehicle, place)[:, None]
-        yield Cause(f"weight near M{index + 1}", columns, _HEAVIER, "1", share, share, losses=1)
+        # In hover hardly another thing than a rotor that pulls less, and what stands in its wash makes it do so.
+        hung, prior = _HEAVIER * _hung(numbers, vehicle, place), (1 - _IN_WASH) * share
+        weight = Cause(f"weight near M{index + 1}", hung[:, None], _HEAVIER, "1", prior, share, losses=1)
+        yield weight
+        both = np.stack([hung, single[index]], axis=1)
+        yield replace(weight, directions=both, prior=_IN_WASH * share, searched=0.0, losses=2)
     yield Cause("torque about z", _OF_YAW * loads(own.yaw)[:, None], _OF_YAW, "1")
 
 
@@ -207,9 +223,10 @@ def _shaken_or_not(cause: Cause, numbers: _Numbers) -> Iterator[Cause]:
     """
     damaged = bool(cause.rotors)
     shakes = _DAMAGE_SHAKES if damaged else 0.5
-    yield replace(cause, prior=(1 - shakes) * cause.prior, searched=0.0 if damaged else cause.searched)
+    searched = (1 - shakes) * cause.searched if damaged else cause.searched
+    yield replace(cause, prior=(1 - shakes) * cause.prior, searched=searched)
     directions = np.column_stack([cause.directions, *numbers.shakes])
-    searched = cause.searched if damaged else 0.0
+    searched = shakes * cause.searched if damaged else 0.0
     yield replace(cause, prior=shakes * cause.prior, searched=searched, directions=directions)
 
 

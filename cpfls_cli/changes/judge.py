@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.changes.causes import Cause, causes
 from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.changes.reference import Reference, common_numbers, kinds_of
@@ -43,9 +45,14 @@ _IN_COMMON = 0.8
 """Share of their variance that flights of a day have in common where chance is drawn: another share makes a search over
 starts find as much by chance, or less."""
 
-_QUANTILES = (np.arange(12) + 0.5) / 12
+_NODES, _MOST_NODES = 8, 256
+"""Of the scatter of one kind, and at most so many of kinds that go together: densities within 3 %."""
+
+_FARTHEST = 20.0
+"""Deviations up to which they tell how improbable numbers are."""
+
+_NONE = np.arange(0)
 _HALF_WIDTH = 1.96
-_NONE = slice(0, 0)
 
 
 class Size(NamedTuple):
@@ -162,7 +169,7 @@ def judged(
     def held(flights: Sequence[FlightNumbers]) -> tuple[_Space, Array, float]:
         """Hold flights against what they, and no others of today, can be off by: their mean and its evidence."""
         beside, own = reference.apart(flights)
-        space = _Space(own, reference.freedom, listed)
+        space = _Space(own, reference.freedom, listed, kinds)
         mean = space.whitened(beside.mean(axis=0))
         return space, mean, float(space.strongest(mean[:, None])[0])
 
@@ -194,14 +201,14 @@ def judged(
 
 
 def drawn_by_chance(
-    rng: np.random.Generator, kinds: Sequence[str], freedom: float, counts: Sequence[int] = (1,), draws: int = _DRAWS
+    rng: np.random.Generator, kinds: Sequence[str], freedom: Array, counts: Sequence[int] = (1,), draws: int = _DRAWS
 ) -> Array:
     """Draw means of so many of the last flights of an unchanged day, whitened, shape (count, number, draw).
 
     Each kind has a scatter of its own to be off by; numbers of two kinds do not go together.
     """
-    kind = np.unique(kinds, return_inverse=True)[1]
-    scale = np.sqrt(freedom / rng.chisquare(freedom, (draws, kind.max() + 1)))[:, kind]
+    _, first, kind = np.unique(kinds, return_index=True, return_inverse=True)
+    scale = np.sqrt(freedom[first] / rng.chisquare(freedom[first], (draws, len(first))))[:, kind]
     day, own = rng.normal(size=(2, draws, len(kind)))
     means, total, flights = [], np.zeros_like(own), 0
     for count in sorted(counts):
@@ -220,13 +227,10 @@ def beyond_chance(chance: Array, value: float) -> float:
 class _Space:
     """Densities of numbers under no change and under each one, as mixtures of normal ones."""
 
-    def __init__(self, covariance: Array, freedom: float, listed: Sequence[Cause]) -> None:
-        # Slow to load, and who reads a record computes nothing.
-        from scipy.special import chdtri
-
-        self.listed, self.freedom = listed, freedom
+    def __init__(self, covariance: Array, freedom: Array, listed: Sequence[Cause], kinds: Sequence[str]) -> None:
+        self.listed, self.freedom = listed, freedom.tolist()
         self.root = np.linalg.cholesky(covariance)
-        self.scales = freedom / chdtri(freedom, 1 - _QUANTILES)
+        self.numbers = [np.flatnonzero(np.array(kinds) == kind) for kind in dict.fromkeys(kinds)]
         self.white = [self.whitened(cause.directions) for cause in listed]
         self.searched = [index for index, cause in enumerate(listed) if cause.searched]
         self.prior = np.log([cause.prior for cause in listed])
@@ -255,34 +259,75 @@ class _Space:
             Whitened directions of changes that are there anyway.
         """
         base = rows[:, :0] if beside is None else beside
-        without = self._density(rows, base)
-        known = base.shape[1]
+        told: dict[tuple[bytes, ...], Array] = {}
         each = [
-            self._density(rows, np.hstack([base, own]), slice(known, known + cause.losses))
+            self._density(rows, np.hstack([base, own]), base.shape[1] + np.arange(cause.losses), told)
             for own, cause in ((self.white[index], self.listed[index]) for index in of)
         ]
-        return np.array(each) - without
+        return np.array(each) - self._density(rows, base, _NONE, told)
 
-    def _density(self, rows: Array, directions: Array, losses: slice = _NONE) -> Array:
+    def _density(self, rows: Array, directions: Array, losses: IntArray, told: dict[tuple[bytes, ...], Array]) -> Array:
         """Compute the logarithm of the density of whitened rows, but for what all have in common, shape (row,).
 
         Parameters
         ----------
-        losses : slice
+        losses : array, shape (loss,)
             Directions whose sizes are nearly always above 0.
+        told : dict
+            Densities of parts, which changes have in common; what is not there is added.
         """
-        left, sizes, turned = np.linalg.svd(directions, full_matrices=False)
-        shown, square, scale = left.T @ rows, (rows**2).sum(axis=0), self.scales[:, None]
-        grown = scale + sizes**2
-        inside = (1 / scale - 1 / grown) @ shown**2
-        weight = len(rows) * np.log(scale) + np.log(grown / scale).sum(axis=1, keepdims=True)
-        parts = -0.5 * (square / scale - inside + weight)
-        if losses != _NONE:
-            along = turned.T[losses]
-            mean = (along * (sizes / grown)[:, None]) @ shown
-            parts += _losing(mean, 1 - ((1 - scale / grown)[:, None] * along**2).sum(axis=2))
-        most = np.max(parts, axis=0)
-        return np.asarray(most + np.log(np.mean(np.exp(parts - most), axis=0)))
+        total = np.zeros(rows.shape[1])
+        for kinds, columns in self._parts(directions):
+            own, lost = directions[:, columns], np.flatnonzero(np.isin(columns, losses, assume_unique=True))
+            key = (np.concatenate(kinds).tobytes(), own.tobytes(), lost.tobytes())
+            if key not in told:
+                told[key] = _total(self._posterior(rows, own, kinds, lost)[0])
+            total += told[key]
+        return total
+
+    def _parts(self, directions: Array) -> Iterator[tuple[list[IntArray], IntArray]]:
+        """Part the kinds into such that no direction moves together: the numbers of each kind, and the directions."""
+        moves = np.array([(directions[numbers] != 0.0).any(axis=0) for numbers in self.numbers])
+        linked = np.eye(len(moves), dtype=bool) | (moves @ moves.T)
+        for _ in range(len(moves).bit_length()):
+            linked = linked @ linked
+        for part in np.unique(linked, axis=0):
+            yield [self.numbers[kind] for kind in np.flatnonzero(part)], np.flatnonzero(moves[part].any(axis=0))
+
+    def _posterior(
+        self, rows: Array, directions: Array, kinds: Sequence[IntArray], losses: IntArray
+    ) -> tuple[Array, Array, Array]:
+        """Integrate over sizes, at nodes of how far each kind scatters beside what was learned of it.
+
+        Each kind is a multivariate t of its own: that the others scatter little tells nothing of it.
+
+        Parameters
+        ----------
+        rows : array, shape (number, row)
+            Whitened.
+        losses : array, shape (loss,)
+            Directions whose sizes are nearly always above 0.
+
+        Returns
+        -------
+        logarithm : array, shape (node, row)
+            Of the density, with the weight of the node, but for what all have in common.
+        mean : array, shape (node, size, row)
+        covariance : array, shape (node, size, size)
+        """
+        scales, weights = _scatters(tuple(self.freedom[own[0]] for own in kinds))
+        precision = np.eye(directions.shape[1]) + np.tensordot(
+            1 / scales, [directions[own].T @ directions[own] for own in kinds], axes=1
+        )
+        shown = np.tensordot(1 / scales, [directions[own].T @ rows[own] for own in kinds], axes=1)
+        covariance = np.linalg.inv(precision)
+        mean = covariance @ shown
+        square = np.tensordot(1 / scales, [(rows[own] ** 2).sum(axis=0) for own in kinds], axes=1)
+        size = np.log(scales) @ [len(own) for own in kinds] - np.linalg.slogdet(covariance)[1]
+        logarithm = weights[:, None] - 0.5 * (square - (shown * mean).sum(axis=1) + size[:, None])
+        if len(losses):
+            logarithm += _losing(mean[:, losses], np.diagonal(covariance, axis1=1, axis2=2)[:, losses])
+        return logarithm, mean, covariance
 
     def sizes(self, row: Array, chosen: Sequence[int], of: int) -> tuple[Size, ...]:
         """Estimate the sizes of one of several changes that are there, in its unit.
@@ -293,33 +338,51 @@ class _Space:
         told = np.arange(first, first + self.listed[of].told)
         directions = np.hstack([self.white[index] for index in chosen])
         directions[:, told] *= _ANY
-        logarithms, means, variances = [], [], []
-        for scale in self.scales:
-            inverse = np.linalg.inv(directions.T @ directions / scale + np.eye(directions.shape[1]))
-            covariance = scale * np.eye(len(row)) + directions @ directions.T
-            _, determinant = np.linalg.slogdet(covariance)
-            logarithms.append(-0.5 * (row @ np.linalg.solve(covariance, row) + determinant))
-            means.append((inverse @ directions.T @ row / scale)[told])
-            variances.append(np.diag(inverse)[told])
-        share = np.exp(np.array(logarithms) - max(logarithms))[:, None]
+        moved = [kinds for kinds, columns in self._parts(directions) if np.isin(told, columns).any()]
+        logarithm, means, covariance = self._posterior(row[:, None], directions, list(chain(*moved)), _NONE)
+        share = np.exp(logarithm - logarithm.max())
         share /= share.sum()
+        means, variances = means[:, told, 0], np.diagonal(covariance, axis1=1, axis2=2)[:, told]
         mean = (share * means).sum(axis=0)
-        error = np.sqrt((share * (np.array(variances) + (np.array(means) - mean) ** 2)).sum(axis=0))
+        error = np.sqrt((share * (variances + (means - mean) ** 2)).sum(axis=0))
         cause = self.listed[of]
         shown = _ANY * cause.usual * (mean + np.outer([0.0, -_HALF_WIDTH, _HALF_WIDTH], error))
         return tuple(Size(*map(cause.size, each)) for each in shown.T)
 
     def shows(self, index: int, threshold: float, drawn: Array) -> float:
         """Find the smallest size of a change that shows with 90 %, in its unit; infinite where none does."""
-        own, cause = self.white[index], self.listed[index]
+        cause = self.listed[index]
 
         def is_enough(size: float) -> bool:
-            rows = drawn + size * own[:, :1]
-            evidence = self._density(rows, own, slice(0, cause.losses)) - self._density(rows, own[:, :0])
-            return bool(np.mean(evidence + np.log(cause.searched) >= threshold) >= _POWER)
+            rows = drawn + size * self.white[index][:, :1]
+            return bool(np.mean(self.evidence(rows, [index])[0] + np.log(cause.searched) >= threshold) >= _POWER)
 
         first = bisect_left(_SIZES, x=True, key=is_enough)
         return cause.size(_SIZES[first] * cause.usual) if first < len(_SIZES) else float("inf")
+
+
+def _total(logarithm: Array) -> Array:
+    """Add up densities over nodes, shape (row,)."""
+    most = logarithm.max(axis=0)
+    return np.asarray(most + np.log(np.exp(logarithm - most).sum(axis=0)))
+
+
+@cache
+def _scatters(freedom: tuple[float, ...]) -> tuple[Array, Array]:
+    """Give nodes of the variance of each kind, shape (node, kind), and the logarithms of their weights, shape (node,).
+
+    Inverse chi-squared distributions of so many degrees of freedom, by the trapezoidal rule over their logarithms, from
+    three deviations below what was learned to the scatter that numbers far off ask for.
+    """
+    count = min(_NODES, int(_MOST_NODES ** (1 / len(freedom))))
+    each = []
+    for own in freedom:
+        near = 3 * np.sqrt(2 / own)
+        logarithms = np.linspace(-np.log1p(near), np.log1p(max(near, _FARTHEST**2 / own)), count)
+        weights = -own / 2 * (logarithms + np.expm1(-logarithms))
+        each.append((np.exp(logarithms), weights - np.log(np.exp(weights).sum())))
+    scales, weights = (np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1) for nodes in zip(*each, strict=True))
+    return scales.reshape(-1, len(freedom)), weights.sum(axis=-1).ravel()
 
 
 def _losing(mean: Array, variance: Array) -> Array:

@@ -15,8 +15,15 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 FEWEST = 3
 """Reference flights that tell their scatter; of fewer, what is usual has to stand for it."""
 
-_DAYS = 3.0
+_DAYS = 6.0
 """Reference flights that what is usual counts as."""
+
+_SCALE_ERROR = 0.8
+"""By how much numbers of a kind scatter beside what is usual, from vehicle to vehicle: deviation of the logarithm, of
+loads, vibration and batteries of four."""
+
+_FEWEST_LEFT = 3.0
+"""Degrees of freedom of what is usual of vehicles, where hardly any reference flight tells more."""
 
 _OFFSET_M = 0.001
 """By which the centre of mass lies elsewhere from day to day: a battery put back."""
@@ -41,8 +48,8 @@ class Reference:
     mean : array, shape (number,)
     covariance : array, shape (number, number)
         Of the mean of flights of one other day beside that of the reference.
-    freedom : float
-        Degrees of freedom of the covariance.
+    freedom : array, shape (number,)
+        Degrees of freedom of the covariance; of numbers of a kind the same.
     measured : array, shape (number,)
         Mean variance by which a number of one flight is off, by its blocks; it is in the covariance.
     by_voltage, voltage_error : array, shape (number,)
@@ -61,7 +68,7 @@ class Reference:
     names: tuple[str, ...]
     mean: Array
     covariance: Array
-    freedom: float
+    freedom: Array
     measured: Array
     by_voltage: Array
     voltage_error: Array
@@ -152,16 +159,54 @@ def expected_covariance(flights: Sequence[FlightNumbers], names: Sequence[str], 
     return usual_covariance(names, vehicle) + np.diag(_measured(flights, names))
 
 
-def learned_covariance(apart: Array, freedom: float, expected: Array, names: Sequence[str]) -> tuple[Array, float]:
-    """Learn the covariance of flights from what is expected and what is seen, and give its degrees of freedom.
+def learned_covariance(apart: Array, freedom: float, expected: Array, names: Sequence[str]) -> tuple[Array, Array]:
+    """Learn the covariance of flights from what is expected and what is seen, and degrees of freedom of each number.
+
+    What is expected of a kind counts as three flights, at a scale that the numbers of the kind tell together.
 
     Parameters
     ----------
     apart : array, shape (row, number)
         Whose squares add up to the covariance, times the degrees of freedom that they have.
     """
-    seen = (apart.T @ apart) * _alike(names)
-    return (_DAYS * expected + seen) / (_DAYS + freedom), _DAYS + freedom
+    alike = _alike(names)
+    seen, kinds = (apart.T @ apart) * alike, np.array(kinds_of(names))
+    scale, left = np.ones((2, len(names)))
+    for kind in dict.fromkeys(kinds):
+        own = kinds == kind
+        scale[own], left[own] = _scale(expected[np.ix_(own, own)], seen[np.ix_(own, own)], freedom)
+    return (_DAYS * scale * expected + seen) / (_DAYS + freedom), left
+
+
+def _scale(expected: Array, seen: Array, freedom: float) -> tuple[float, float]:
+    """Tell by how much numbers of a kind vary beside what is expected of them, a ratio, and the freedom that is left.
+
+    The posterior mean of its logarithm, by the marginal likelihood of what is seen where each covariance is drawn from
+    an inverse Wishart distribution about that scale: numbers of a kind tell it together, and few flights hardly do. How
+    unsure it is costs degrees of freedom, as the variance of a logarithm of chi-squared is two over these.
+
+    Parameters
+    ----------
+    expected : array, shape (number, number)
+    seen : array, shape (number, number)
+        Sum of squares, of so many degrees of freedom.
+
+    References
+    ----------
+    Gelman 2006, Prior distributions for variance parameters in hierarchical models.
+    """
+    logarithms = np.linspace(-4.0, 4.0, 81) * 2 * _SCALE_ERROR
+    beyond = np.maximum(np.linalg.eigvals(np.linalg.solve(expected, seen)).real, 0.0)
+    strength = _DAYS + len(beyond) - 1
+    told = np.log(_DAYS * np.exp(logarithms)[:, None] + beyond).sum(axis=1)
+    likely = 0.5 * (strength * len(beyond) * logarithms - (strength + freedom) * told)
+    likely -= 0.5 * (logarithms / (2 * _SCALE_ERROR)) ** 2
+    share = np.exp(likely - likely.max())
+    share /= share.sum()
+    mean = share @ logarithms
+    counts = np.mean(_DAYS / (_DAYS + beyond * np.exp(-mean)))
+    unsure = counts**2 * (share @ (logarithms - mean) ** 2)
+    return float(np.exp(mean)), max(float(1 / (1 / (_DAYS + freedom) + 0.5 * unsure)), _FEWEST_LEFT)
 
 
 def usual_covariance(names: Sequence[str], vehicle: VehicleSettings) -> Array:

@@ -137,7 +137,7 @@ def trend(
         held.mean,
         apart,
         deviation,
-        limit=_limit(held.freedom, apart[first:].size),
+        limit=_limit(held.freedom, len(apart) - first),
         p_value=p_value,
         shifts=tuple(_shifts(row, kept, starts, vehicle, rng)),
         shows=judged(kept[first : first + 1], held, vehicle, rng).shows,
@@ -186,11 +186,14 @@ def _apart(reference: Reference, flights: Sequence[FlightNumbers]) -> tuple[Arra
     return np.vstack([apart for apart, _ in each]), deviation
 
 
-def _limit(freedom: float, count: int) -> float:
+def _limit(freedom: Array, flights: int) -> float:
+    """Find the deviations that any number of so many flights exceeds at the rate of false alarms at most."""
     # Slow to load, and who reads a record computes nothing.
-    from scipy.special import stdtrit
+    from scipy.special import stdtr
 
-    return float(stdtrit(freedom, 1 - 0.5 * FALSE_ALARM / count))
+    limits = np.geomspace(1.0, 1e4, 4000)
+    beyond = 2 * flights * stdtr(freedom[:, None], -limits).sum(axis=0)
+    return float(limits[np.argmax(beyond <= FALSE_ALARM)])
 
 
 @dataclass(frozen=True)
@@ -235,7 +238,7 @@ class Row:
             agility=np.outer(reference.more_agile(flights), reference.agility_error),
         )
 
-    def covariance(self, values: Array) -> tuple[Array, float]:
+    def covariance(self, values: Array) -> tuple[Array, Array]:
         """Learn the covariance of a row from its differences, and give its degrees of freedom."""
         steps = len(values) - 1
         # Each flight is in two of them.
@@ -250,7 +253,8 @@ class Row:
 
     def unchanged(self, rng: np.random.Generator, count: int) -> Iterator[Array]:
         """Draw such rows of unchanged vehicles: of each its covariance (inverse Wishart), then its flights."""
-        covariance, freedom = self.covariance(self.values)
+        covariance, each = self.covariance(self.values)
+        freedom = each.min()
         root, size = np.linalg.cholesky(covariance), len(covariance)
         kind = np.unique(kinds_of(self.names), return_inverse=True)[1]
         for _ in range(count):

@@ -46,6 +46,9 @@ _ALIKE = 3
 """Others that are told beside a change that is not sure."""
 
 _CHECKED = 2
+_WITH_MORE = {"rotor": ", perhaps with another", "hover": ", perhaps off the centre", "centre": ", perhaps by a mass"}
+"""By the first word of a change: what may come with it."""
+
 _SUREST = 0.999
 _MARKERS = "osD^vP"
 """Of today's flights; more look alike."""
@@ -102,15 +105,16 @@ def told(record: FoundRecord, index: int, vehicle: VehicleSettings) -> str:
     what = change_words(cause, record.sizes(index), vehicle, axes, record.cable_length)
     sure = f"sure to {whole_percent(min(float(record.found.belief[index]), _SUREST))}"
     if record.named[index]:
-        with_another = any(is_within(cause, name) for name, _ in others)
-        return f"{what}{', perhaps with another' if with_another else ''}; {sure}"
+        more = any(is_within(cause, name) for name, _ in others)
+        return f"{what}{_WITH_MORE[cause.split()[0]] if more else ''}; {sure}"
     alike = [f"{cause_name(name)}, {whole_percent(belief)}" for name, belief in others[:_ALIKE]]
     return f"one of: {'; or '.join([f'{what}, {sure}', *alike])}"
 
 
 def is_within(cause: str, other: str) -> bool:
-    """Tell whether a pair of rotors holds the one that changed."""
-    return cause.startswith("rotor ") and other.startswith("rotors ") and cause.split()[-1] in other.split()
+    """Tell whether a pair of rotors holds the one that changed, or a mass what it does."""
+    of_pair = cause.startswith("rotor ") and other.startswith("rotors ") and cause.split()[-1] in other.split()
+    return of_pair or (cause in ("hover", "centre of mass") and other == "mass")
 
 
 def _facts(record: ChangedRecord, vehicle: VehicleSettings) -> Iterator[tuple[str, str]]:

@@ -54,19 +54,34 @@ def test_directions_of_loads(what):
     assert np.log(after / before) / size == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())
 
 
-def space(listed, freedom=6.0, size=3):
-    rng = np.random.default_rng(2)
+def space(listed, freedom=6.0, kinds=("load",) * 3):
+    rng, size = np.random.default_rng(2), len(kinds)
     root = rng.normal(size=(size, size))
-    return _Space(root @ root.T + np.eye(size), freedom, listed), root @ root.T + np.eye(size)
+    covariance = (root @ root.T + np.eye(size)) * (np.array(kinds) == np.array(kinds)[:, None])
+    return _Space(covariance, np.full(size, freedom), listed, kinds), covariance
 
 
-def test_density_of_no_change_is_a_multivariate_t():
-    own, covariance = space([])
-    rows = np.random.default_rng(1).normal(size=(5, 3))
-    told = own._density(own.whitened(rows.T), np.zeros((3, 0)))
-    expected = multivariate_t(shape=covariance, df=6.0).logpdf(rows)
-    # The quadrature has twelve points; what all have in common is left out.
-    assert told - told[0] == pytest.approx(expected - expected[0], abs=0.15)
+def test_density_of_no_change_is_a_multivariate_t_of_each_kind():
+    own, covariance = space([], kinds=["load"] * 3 + ["late"] * 2)
+    rows = np.random.default_rng(1).normal(size=(5, 5)) * np.linspace(0.2, 3.0, 5)[:, None]
+    told = own._density(own.whitened(rows.T), np.zeros((5, 0)), np.arange(0), {})
+    expected = sum(
+        multivariate_t(shape=covariance[part, part], df=6.0).logpdf(rows[:, part]) for part in (np.s_[:3], np.s_[3:])
+    )
+    # By quadrature; what all have in common is left out.
+    assert told - told[0] == pytest.approx(expected - expected[0], abs=0.1)
+
+
+def test_quiet_numbers_of_another_kind_tell_nothing_of_a_change():
+    """That what vibrates is as ever does not make a load surer, unless the change makes it vibrate as well."""
+    direction = np.array([1.0, 0.5, 0.0, 0.0, 0.0])
+    kinds = ["load"] * 3 + ["late"] * 2
+    ways = [direction, direction + np.array([0.0, 0.0, 0.0, 0.0, 0.7])]
+    own, _ = space([Cause("rotor M1", way[:, None], 0.1, "1") for way in ways], kinds=kinds)
+    rows = np.array([[4.0, 2.0, 1.0, 0.0, 0.0], [4.0, 2.0, 1.0, 1.5, -2.0]]).T
+    alone, too = own.evidence(own.whitened(rows), [0, 1])
+    assert alone[0] == pytest.approx(alone[1], abs=1e-9)
+    assert too[0] != pytest.approx(too[1], abs=0.1)
 
 
 @pytest.mark.parametrize("losses", [0, 1])
@@ -99,11 +114,33 @@ def flights(count, rng, change=None, names=NAMES, voltage=np.nan):
     ]
 
 
+@pytest.mark.parametrize("factor", [0.2, 1.0, 3.0])
+def test_how_much_a_kind_scatters_is_learned(factor):
+    """Of loads that scatter far less or more than is usual: nearer to the truth than to that, and surer for more."""
+    rng = np.random.default_rng(1)
+    true = factor**2 * np.trace(usual_covariance(LOADS, QUAD))
+    root = factor * np.linalg.cholesky(usual_covariance(LOADS, QUAD))
+
+    def learned(count):
+        drawn = rng.normal(size=(count, 4)) @ root.T
+        made = [
+            FlightNumbers("", dict(zip(LOADS, row, strict=True)), dict.fromkeys(LOADS, 0.0), np.nan, 20.0, True)
+            for row in drawn
+        ]
+        reference = Reference.of(made, LOADS, QUAD)
+        return np.trace(reference.covariance) / (1 + 1 / count), reference.freedom[0]
+
+    few, many = (np.median([learned(count) for _ in range(40)], axis=0) for count in (5, 40))
+    assert abs(np.log(few[0] / true)) < max(0.2, 0.4 * abs(np.log(factor**2)))
+    assert np.log(many[0] / true) == pytest.approx(0.0, abs=0.15)
+    assert 4 < few[1] < 9 < 25 < many[1] < 46
+
+
 def test_unchanged_flights_seldom_look_changed():
     """Of the predictive distribution itself: a share of 0.01 within what 2000 draws tell."""
     rng = np.random.default_rng(5)
     reference = Reference.of(flights(6, rng), NAMES, QUAD)
-    own = _Space(reference.covariance, reference.freedom, causes(NAMES, QUAD))
+    own = _Space(reference.covariance, reference.freedom, causes(NAMES, QUAD), kinds_of(NAMES))
     chance, again = (own.strongest(drawn_by_chance(rng, kinds_of(NAMES), reference.freedom)[0]) for _ in range(2))
     assert 0.002 < np.mean(again > np.quantile(chance, 1 - FALSE_ALARM)) < 0.025
 
@@ -142,13 +179,17 @@ def test_a_mass_at_a_place_by_a_hover_that_is_solved():
     """It adds to the weight, moves the centre of mass, and is turned about it, by the same number."""
     size, place = 1e-5, ARM * np.array([-1.0, 1.0])
     names = [*LOADS, "follow roll", "follow pitch"]
-    (weight,) = [cause for cause in causes(names, QUAD) if cause.name == "weight near M3"]
+    weight, in_wash = [cause for cause in causes(names, QUAD) if cause.name == "weight near M3"]
+    weak = next(cause for cause in causes(names, QUAD) if cause.name == "rotor M3")
     moved = np.append(size * place, 0.0)
     rotors = [replace(rotor, position_m=tuple(rotor.position_m - moved)) for rotor in QUAD.rotors]
     before, after = hover(QUAD, 1.2 * 9.81), hover(replace(QUAD, rotors=tuple(rotors)), 1.2 * 9.81 * (1 + size))
     shown = weight.directions[:, 0] / weight.usual
     assert np.log(after / before) / size == pytest.approx(shown[:4], abs=1e-3)
     assert shown[4:] == pytest.approx(-1.2 * place**2 / np.array([0.01, 0.012]), rel=1e-9)
+    # What stands in the rotor's wash makes it pull less, or does not.
+    assert in_wash.directions[:, 0] == pytest.approx(weight.directions[:, 0])
+    assert in_wash.directions[:, 1] == pytest.approx(weak.directions[:, 0])
 
 
 @pytest.mark.parametrize(
@@ -172,7 +213,7 @@ def test_what_shows_does():
     before = flights(8, rng)
     size = changed(before[:1], before[1:], QUAD, rng).shows["rotor M3"]
     reference = Reference.of(before[1:], NAMES, QUAD)
-    own = _Space(reference.covariance, reference.freedom, causes(NAMES, QUAD))
+    own = _Space(reference.covariance, reference.freedom, causes(NAMES, QUAD), kinds_of(NAMES))
     drawn = partial(drawn_by_chance, kinds=kinds_of(NAMES), freedom=reference.freedom)
     threshold = np.quantile(own.strongest(drawn(rng)[0]), 1 - FALSE_ALARM)
     rows = drawn(rng, draws=400)[0] + own.whitened(-np.log(1 - size) * np.eye(10)[2])[:, None]

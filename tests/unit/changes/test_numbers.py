@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.changes.judge import FALSE_ALARM, changed
+from cpfls_cli.changes.judge import FALSE_ALARM, NAMED, changed
 from cpfls_cli.changes.numbers import KINDS, flight_numbers, in_flight
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
@@ -82,7 +82,7 @@ def test_a_load_on_a_cable():
     assert found.p_value <= FALSE_ALARM
     (load,) = found.found
     assert load.cause.name == "load on a cable"
-    assert load.belief > 0.9
+    assert load.belief > NAMED
     assert load.sizes[0].low < 0.1 < load.sizes[0].high
     assert today.cable_m == pytest.approx(1.0, rel=0.05)
 
