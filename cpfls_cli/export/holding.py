@@ -9,7 +9,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel, body_inertia
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import vertical
 from cpfls_cli.effects.polynomial import STATE_TERMS
@@ -20,7 +20,7 @@ from cpfls_cli.inertia import nearest_body
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Body, MeasuredMotion
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.player import Player, apart, body_inertia, free_runs, player_of, rotor_terms_along
+from cpfls_cli.playback.player import Player, apart, free_runs, player_of, rotor_terms_along
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.table import WrenchTable, body_of
 from cpfls_cli.rotations import rotation_matrix

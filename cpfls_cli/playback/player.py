@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel, momentum_form
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel, body_inertia, momentum_form
 from cpfls_cli.dynamics.rigid_body import positive_definite
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_flight
@@ -455,14 +455,6 @@ def _turning(attitude: Array, inertia: tuple[InertiaValues, Array], momentum: Ar
     rate: Array = np.asarray(np.linalg.solve(safe, momentum[..., None])[..., 0], dtype=float)
     _, direct = momentum_form(attitude, rate, values)
     return _Fuzzy(rate, direct, exists)
-
-
-def body_inertia(model: InertiaModel, attitude: Array) -> tuple[InertiaValues, Array]:
-    """Evaluate an inertia on Euler angles, and about the body axes, ``W^-T J W^-1``, shape (samples, 3, 3), kg m^2."""
-    values = model.inertia(attitude)
-    axes = [rotations.attitude_rate(attitude, np.broadcast_to(axis, attitude.shape)) for axis in np.eye(3)]
-    inverse = np.stack(axes, axis=2)
-    return values, np.asarray(inverse.swapaxes(1, 2) @ values.value @ inverse)
 
 
 def _finite_attitude(rotation: Array) -> Array:

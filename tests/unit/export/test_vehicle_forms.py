@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.equations_of_motion import identified_turning
+from cpfls_cli.dynamics.equations_of_motion import turning_law
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.points import reference_points, reference_run, term_sizes
 from cpfls_cli.export.source import c_source, python_source
@@ -118,11 +118,10 @@ def test_a_step_under_an_inertia_over_attitude_is_that_of_the_library(name, form
     assert np.max(np.abs(moved - wanted)) < ALLOWED * np.abs(wanted).max()
     assert np.max(np.abs(constant - wanted)) > 1e-5
     air = np.einsum("nji,nj->ni", state.rotation, velocity)
-    torque, turning = model.table.wrench(air, rate, rotor)[:, :3], identified_turning(model.fuzzy)
-    for row, own in enumerate(found[:, 3:]):
-        law = turning(attitude[row], rate[row])
-        left = law.inertia @ own + law.direct - torque[row]
-        assert np.abs(left).max() < ALLOWED * (np.abs(torque[row]).max() + np.abs(law.direct).max())
+    torque, turning = model.table.wrench(air, rate, rotor)[:, :3], turning_law(model.fuzzy)(attitude, rate)
+    for own, wanted, inertia, direct in zip(found[:, 3:], torque, *turning, strict=True):
+        left = inertia @ own + direct - wanted
+        assert np.abs(left).max() < ALLOWED * (np.abs(wanted).max() + np.abs(direct).max())
 
 
 @pytest.mark.parametrize("form", ["c", "python"])
