@@ -124,7 +124,7 @@ class Turning(NamedTuple):
 
     def acceleration(self, torque: Array) -> Array:
         """Compute what torques, shape (bodies, 3), N m, do to the body rates; NaN where there is nothing to turn."""
-        known = np.isfinite(self.inertia).all(axis=(1, 2))
+        known: BoolArray = np.asarray(np.isfinite(self.inertia).all(axis=(1, 2)))
         size = np.linalg.det(np.where(known[:, None, None], self.inertia, 0.0))
         solvable: BoolArray = np.asarray(known & (size != 0))
         found = np.full_like(self.direct, np.nan)
