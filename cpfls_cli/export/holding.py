@@ -16,6 +16,7 @@ from cpfls_cli.effects.polynomial import STATE_TERMS
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import InputError
+from cpfls_cli.export.numbers import Numbers
 from cpfls_cli.inertia import nearest_body
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Body, MeasuredMotion
@@ -152,11 +153,18 @@ class Held:
 
 
 def held_by(
-    model: VehicleModel, holds: Holds, response: RotorResponse, body: Body | None = None, *, squares: bool = False
+    model: VehicleModel,
+    holds: Holds,
+    response: RotorResponse,
+    body: Body | None = None,
+    numbers: Numbers | None = None,
+    *,
+    squares: bool = False,
 ) -> Held:
-    """Take what a target of these rotors and this body, or the model's, holds of a vehicle."""
-    table = WrenchTable(holds(model.table.weights)[:, : len(STATE_TERMS)])
-    return Held(table, response, body or model.body, squares)
+    """Take what a target of these rotors, this body, or the model's, and numbers of its own holds of a vehicle."""
+    weights = model.table.weights
+    table = WrenchTable(holds(weights)[:, : len(STATE_TERMS)])
+    return Held(table, response, body or model.body, squares, numbers={} if numbers is None else numbers.of(weights))
 
 
 def constant_body(model: VehicleModel) -> Body:
