@@ -124,7 +124,7 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
     words = {
         "rotor_speed": "measured rotor speeds",
         "rotor_command": "rotor commands",
-        "body_torque": "stated torque" if parts[0].stated_thrust is None else "stated torque and thrust",
+        "body_torque": "stated torque and thrust" if parts[0].thrust is not None else "stated torque",
     }
     named = tuple(f"{flight.name}: {warning}" for warning in warnings)
     wrong = contradictions(finding.of(flight.name) for finding in findings)

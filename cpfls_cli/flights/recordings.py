@@ -30,7 +30,8 @@ from cpfls_cli.flights.same_vehicle import require_same_vehicle
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.units import SPEED_UNITS
-from cpfls_cli.vehicle.rotors import require_control
+from cpfls_cli.vehicle.rotors import AXES, require_control, rotor_demand
+from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording, common_windows
 
 _LOGGED = ("attitude", "velocity", "position", "acceleration", "specific_force")
@@ -178,7 +179,8 @@ def signals_of(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
     Time and signals are all known; setpoints that are not known in all of it are left out.
     """
     signals, notes = _of_motion(flight, known, study)
-    return _actuated(signals, flight, known, study), notes
+    actuated, of_rotors = _actuated(signals, flight, known, study)
+    return actuated, (*notes, *of_rotors)
 
 
 def _of_motion(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> tuple[Signals, tuple[str, ...]]:
@@ -205,7 +207,9 @@ def _of_motion(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
     return made, notes
 
 
-def _actuated(signals: Signals, flight: ReadFlight, known: Mapping[str, Array], study: Study) -> Signals:
+def _actuated(
+    signals: Signals, flight: ReadFlight, known: Mapping[str, Array], study: Study
+) -> tuple[Signals, tuple[str, ...]]:
     speed, commanded = known.get("rotor_speed"), False
     if speed is None:
         unit = flight.units.get("rotor_command", "rad/s")
@@ -221,8 +225,31 @@ def _actuated(signals: Signals, flight: ReadFlight, known: Mapping[str, Array], 
         )
     if speed is not None:
         command = _command_beside(flight, known, study)
-        return replace(signals, rotor_speed=speed, commanded=commanded, rotor_command=command)
-    return replace(signals, stated_torque=known["body_torque"], stated_thrust=known.get("thrust"), commanded=True)
+        return replace(signals, rotor_speed=speed, commanded=commanded, rotor_command=command), ()
+    told = _told_by_wrench(known, study.vehicle)
+    if told is None:
+        torque, thrust = known["body_torque"], known.get("thrust")
+        return replace(signals, stated_torque=torque, stated_thrust=thrust, commanded=True), ()
+    speed, backward = told
+    notes = ["rotor commands are those that give its thrust and torque by the four rotors of the config"]
+    if backward:
+        notes.append(f"a rotor would have to push down at {backward} of {len(speed)} samples, and stands still there")
+    return replace(signals, rotor_speed=speed, commanded=True), tuple(notes)
+
+
+def _told_by_wrench(known: Mapping[str, Array], vehicle: VehicleSettings) -> tuple[Array, int] | None:
+    """Find the commands behind thrust and torque, shape (time, rotor), rad/s, of four rotors, which leave no choice.
+
+    The factors of thrust only scale them. At the samples that are counted a rotor would have to push down.
+    """
+    of_factors = {"thrust_factor", "drag_factor"} & set(vehicle.unknown)
+    if "thrust" not in known or len(vehicle.rotors) != len(AXES) or of_factors:
+        return None
+    try:
+        squared = rotor_demand(vehicle, known["thrust"], known["body_torque"]).squared_speed
+    except ComputationError:
+        return None
+    return np.sqrt(np.maximum(squared, 0.0)), int((squared < 0).any(axis=1).sum())
 
 
 def _command_beside(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> Array | None:
@@ -310,7 +337,7 @@ def check_flight(flight: ReadFlight, study: Study, *, driven: bool = True) -> tu
         return ()
     if driven:
         with suppress(InputError):
-            signals = _actuated(signals, flight, known, study)
+            signals = _actuated(signals, flight, known, study)[0]
     return check([signals], study.gap)
 
 

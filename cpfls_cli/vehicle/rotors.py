@@ -13,7 +13,7 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle_limits import Figures, figures_of, figures_of_hubs
 
-_AXES = ("thrust", "roll", "pitch", "yaw")
+AXES = ("thrust", "roll", "pitch", "yaw")
 ViolationKind = Literal["negative squared speed", "above the limit"]
 # Fraction of the largest squared speed that is rounding error of the allocation.
 _ROUNDING = 1e-12
@@ -180,7 +180,7 @@ def _allocation_inverse(allocation: Array) -> Array:
     rank = int((singular_values > 1e-9 * singular_values[0]).sum())
     if rank < 4:
         unreachable = np.abs(left[:, rank:]).max(axis=1) > 1e-6
-        missing = [axis for axis, beyond in zip(_AXES, unreachable, strict=True) if beyond]
+        missing = [axis for axis, beyond in zip(AXES, unreachable, strict=True) if beyond]
         raise ComputationError(
             f"vehicle.rotors: the rotors cannot produce {', '.join(missing)} independently of the rest; check their "
             "positions and spins"
