@@ -9,10 +9,11 @@ from cpfls_cli import rotations
 from cpfls_cli.control.controllers import Controller, TorqueActuators, computed_torque, plan_of, proportional_derivative
 from cpfls_cli.control.track import Sensing, flown_signals, scores, track
 from cpfls_cli.dynamics.equations_of_motion import RigidBody, turning_law
-from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient, torque
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.errors import SettingError
 from cpfls_cli.inertia import six_parameters, symmetric
 from cpfls_cli.regressor.regressor import InertiaValues
+from tests.builders.christoffel import torque
 
 PARAMETERS = np.array([0.6, 0.7, 1.2, 0.02, -0.03, 0.01])
 INERTIA = symmetric(PARAMETERS)
