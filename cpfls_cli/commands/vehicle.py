@@ -142,8 +142,8 @@ def _write_config(config: ConfigCopy | None, record: VehicleRecord) -> tuple[Tex
 def _require_rotors(flight: LoggedFlight) -> None:
     if flight.playback.wrench is not None:
         raise InputError(
-            f"{flight.name}: holds torque and thrust instead of rotor speeds; `cpfls vehicle` needs rotor_speed or "
-            "rotor_command: name their columns in import.signals"
+            f"{flight.name}: holds torque instead of rotor speeds; `cpfls vehicle` needs rotor_speed or rotor_command, "
+            "or thrust beside body_torque, of four rotors with known factors: name their columns in import.signals"
         )
 
 

@@ -255,8 +255,8 @@ def gusts_in(
     """
     period = given.flown[0].motion.period
     longest = max((part.stop - part.start for flight in given.flown for part in flight.stretches), default=0) * period
-    length = min(_PIECE_S, _RUN_SHARE * longest)
-    if length < _SHORTEST_S or any(flight.motion.period != period for flight in given.flown):
+    length = min(_PIECE_S, max(_RUN_SHARE * longest, _SHORTEST_S))
+    if length > longest or any(flight.motion.period != period for flight in given.flown):
         return None
     band = _Band.of(period, length)
     powers = _powers(sides, given, band, told_by)

@@ -18,10 +18,10 @@ _ALIKE = 0.7
 """Correlation of changes of the rates, or of the velocity, from which on two flights fly the same path. Unlike paths of
 a real vehicle reach 0.6, and runs of one path stay above 0.85 in storms."""
 _COMMON_S = 8.0
-"""That two flights have in common at least: shorter, unlike paths may look alike."""
+"""That two flights have in common at least: shorter, unlike paths may look alike, if not what was asked of them."""
 _SAME, _FARTHEST = 0.98, 0.6
-"""Correlation of what was asked of a flight with itself from which on it is asked its path again, and the share of the
-flight up to which that is sought."""
+"""Correlation of what was asked from which on it is the same path, of two flights or of one that is asked it again, and
+the share of a flight up to which that is sought."""
 _COARSE_HZ = 20.0
 """Of the search over all shifts, which paths do not exceed."""
 _PIECE_S, _DRIFT_S = 5.0, 0.15
@@ -365,8 +365,8 @@ class Repeats:
 def repeats(flights: Sequence[PlaybackFlight]) -> Repeats:
     """Find flights that fly the same path, and align them.
 
-    Velocities and changes of the rates are correlated over all shifts; then rates piece by piece, and a
-    straight line through the shifts is taken, so that clocks may drift.
+    Velocities and changes of the rates are correlated over all shifts, or else the positions that were asked for; then
+    rates piece by piece, and a straight line through the shifts is taken, so that clocks may drift.
 
     Parameters
     ----------
@@ -375,12 +375,15 @@ def repeats(flights: Sequence[PlaybackFlight]) -> Repeats:
     """
     found: tuple[dict[int, Array], ...] = tuple({} for _ in flights)
     likeness = {}
-    paths = [_paths(flight) for flight in flights]
+    paths, asked = [_paths(flight) for flight in flights], [_asked(flight) for flight in flights]
     for one, other in combinations(range(len(flights)), 2):
-        shifts = [
-            _best_shift(*pair, flights[one].motion.period) for pair in zip(paths[one], paths[other], strict=False)
-        ]
+        period = flights[one].motion.period
+        shifts = [_best_shift(*pair, period, _COMMON_S) for pair in zip(paths[one], paths[other], strict=False)]
         shift, alike = max(shifts, key=lambda found: found[1])
+        if alike < _ALIKE:
+            shift, _ = _best_shift(asked[one], asked[other], period, 0.0)
+            alike = _same_size(asked[one], asked[other], round(shift / _step(period)))
+            alike *= alike >= _SAME
         if alike >= _ALIKE:
             likeness[one, other] = alike
             found[one][other] = _aligned(flights[one], flights[other], shift)
@@ -406,6 +409,13 @@ def _changes(flight: PlaybackFlight) -> Array:
     return np.diff(_coarse(flight.motion.rate[_longest(flight), :2], _step(flight.motion.period)), axis=0)
 
 
+def _asked(flight: PlaybackFlight) -> Array:
+    """Give the positions that were asked for, at the coarse rate; all 0 where none were, or one all the time."""
+    asked = flight.setpoints.get("position", np.zeros((len(flight), 3)))
+    coarse = _coarse(asked[_longest(flight)], _step(flight.motion.period))
+    return np.asarray(coarse - coarse.mean(axis=0))
+
+
 def _coarse(values: Array, step: int) -> Array:
     """Average signals over a few samples each, shape (time, column)."""
     return np.asarray(values[: len(values) // step * step].reshape(-1, step, values.shape[1]).mean(axis=1))
@@ -415,8 +425,8 @@ def _step(period: float) -> int:
     return max(1, round(1 / (_COARSE_HZ * period)))
 
 
-def _best_shift(one: Array, other: Array, period: float) -> tuple[float, float]:
-    """Find by how many samples the other flight is ahead, and the correlation there."""
+def _best_shift(one: Array, other: Array, period: float, least_s: float) -> tuple[float, float]:
+    """Find by how many samples the other flight is ahead, and how alike they are there, with so much in common."""
     length = period * _step(period)
     count = len(one) + len(other) - 1
     padded = next_fast_len(count, real=True)
@@ -426,10 +436,18 @@ def _best_shift(one: Array, other: Array, period: float) -> tuple[float, float]:
     shifts = np.arange(-(len(one) - 1), len(other))
     first, last = np.maximum(0, -shifts), np.minimum(len(one), len(other) - shifts)
     energy = (ones[last] - ones[first]) * (others[last + shifts] - others[first + shifts])
-    long_enough = (last - first) * length >= max(_COMMON_S, 0.5 * min(len(one), len(other)) * length)
+    long_enough = (last - first) * length >= max(least_s, 0.5 * min(len(one), len(other)) * length)
     alike = np.where(long_enough, product / np.sqrt(np.maximum(energy, np.finfo(float).tiny)), -1.0)
     best = int(np.argmax(alike))
     return float(shifts[best] * _step(period)), float(alike[best])
+
+
+def _same_size(one: Array, other: Array, shift: int) -> float:
+    """Correlate signals with another that is ahead; less than 1 where it has the same shape and another size."""
+    mine, theirs = one[max(0, -shift) :], other[max(0, shift) :]
+    common = min(len(mine), len(theirs))
+    mine, theirs = mine[:common], theirs[:common]
+    return float(2 * np.sum(mine * theirs) / max(np.sum(mine**2) + np.sum(theirs**2), np.finfo(float).tiny))
 
 
 def _aligned(one: PlaybackFlight, other: PlaybackFlight, shift: float) -> Array:

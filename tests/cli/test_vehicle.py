@@ -368,7 +368,7 @@ def test_a_log_of_stated_torque_is_refused(refused, tmp_path):
     }
     options = ("--set", f"import.signals={json.dumps(signals)}", "--set", "import.torque_source=column")
     message = refused(log, options=options)
-    assert message.startswith("stated.csv: holds torque and thrust instead of rotor speeds")
+    assert message.startswith("stated.csv: holds torque instead of rotor speeds")
 
 
 def test_the_copy_of_the_config_has_what_the_command_line_changes(cpfls, config, flights, tmp_path):

@@ -90,6 +90,16 @@ def test_sizes_and_memories_are_those_of_the_truth(flights, key):
     assert (np.abs(off) < half).sum() >= 9
 
 
+def test_many_runs_of_a_few_seconds_tell_them_as_well():
+    """What was asked of them says that they fly the same paths."""
+    found = instruments(list(gusty_flights(asked(SMALL, GUSTS, "repeats"), 6.0)))
+    assert found.kind == "repeats"
+    gusts = find_gusts(VehicleModel(vehicle=SMALL.vehicle), found)
+    sizes = bodies(SMALL)[:3] * GUSTS
+    assert np.abs(np.log(gusts.size[:3] / sizes)).max() < 0.4
+    assert ((gusts.low[:3] < sizes) & (sizes < gusts.high[:3])).sum() >= 2
+
+
 def test_in_still_air_torques_of_gusts_have_a_bound(flights):
     found = find_gusts(VehicleModel(vehicle=SMALL.vehicle), flights["still", "setpoints"])
     assert not np.isfinite(found.size[:3]).any()

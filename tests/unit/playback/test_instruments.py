@@ -78,6 +78,22 @@ def test_what_other_runs_have_at_the_same_place_is_averaged():
     assert np.isnan(repeats.others(0, [flight.motion.rate for flight in [flights[0], *flights[1:]]])[:40]).all()
 
 
+def test_runs_that_are_too_short_to_look_alike_are_told_by_what_was_asked_of_them():
+    """Of six seconds chance makes unlike paths alike; nobody is asked the same place by chance."""
+    asked = {late: _flown(1, late=late, seconds=6.0).motion.position for late in (0.0, 0.4)}
+    asked[3.0] = 0.7 * asked[0.0]
+    short = [replace(_flown(1, late=late, seconds=6.0), setpoints={"position": own}) for late, own in asked.items()]
+    assert instruments([replace(flight, setpoints={}) for flight in short]).kind == "none"
+    found = instruments(short)
+    # The last is asked the same path, and smaller.
+    assert found.repeats.paths() == ((0, 1),)
+    place = found.repeats.beside[0][1]
+    known = np.isfinite(place)
+    assert place[known] == pytest.approx(np.arange(600)[known] - 40, abs=3)
+    still = [replace(flight, setpoints={"position": np.ones((600, 3))}) for flight in short]
+    assert instruments(still).kind == "none"
+
+
 def test_paths_that_differ_repeat_nothing():
     found = instruments([_flown(path) for path in range(6)])
     assert found.kind == "none"
