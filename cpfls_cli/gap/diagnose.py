@@ -240,7 +240,9 @@ def _beside_gusts(
         return without, gusts
     late = _by_instruments(named, given, settings, late=True)
     beside = _gusts(late, given, settings, rng)
-    return (late, beside) if beside is not None and beside.told.sum() >= told else (without, gusts)
+    # Where nothing is the air without it, some of it is enough.
+    enough = told if doubted.told.any() else 1
+    return (late, beside) if beside is not None and beside.told.sum() >= enough else (without, gusts)
 
 
 def _names(named: _Named) -> list[str]:

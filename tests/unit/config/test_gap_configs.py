@@ -22,7 +22,8 @@ def torque(name, speed=SPEED):
 
 
 def test_every_config_is_looked_at():
-    known = {"rotorpy", "sixkg", "arpl", "crazyswarm2", "crazypad", "crazypad_usd", "nanodrone", "neurobem"}
+    crazyflies = {"arpl", "crazyswarm2", "crazyswarm2_card", "crazypad", "crazypad_usd", "nanodrone"}
+    known = crazyflies | {"rotorpy", "sixkg", "neurobem"}
     assert known <= {path.stem for path in FOLDER.glob("*.yaml")}
 
 
@@ -50,7 +51,7 @@ def test_the_crazyflie_gives_the_stated_thrust_for_a_command():
     np.testing.assert_allclose(wrench.body_torque[0, :2], expected, rtol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["arpl", "crazypad", "crazypad_usd", "crazyswarm2", "nanodrone"])
+@pytest.mark.parametrize("name", ["arpl", "crazypad", "crazypad_usd", "crazyswarm2", "crazyswarm2_card", "nanodrone"])
 def test_the_motors_of_every_crazyflie_stand_and_turn_alike(name):
     rotors = study(name).vehicle.rotors
     assert [tuple(np.sign(rotor.position_m[:2])) for rotor in rotors] == [(1, -1), (-1, -1), (-1, 1), (1, 1)]

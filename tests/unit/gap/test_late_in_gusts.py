@@ -19,8 +19,8 @@ def air(channels):
 
 @pytest.mark.parametrize(
     ("without", "beside", "kept"),
-    [(0, 6, True), (6, 6, False), (0, 3, False)],
-    ids=["without it no gusts", "gusts explain it", "no gusts beside it either"],
+    [(0, 6, True), (6, 6, False), (0, 3, True), (2, 3, False), (0, 0, False)],
+    ids=["without it no gusts", "gusts explain it", "fewer beside it", "fewer either way", "no gusts beside it either"],
 )
 def test_a_late_name_stands_only_where_without_it_what_is_left_is_no_gusts(without, beside, kept, monkeypatch):
     late = named("command_delay", "com_offset")
