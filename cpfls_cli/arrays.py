@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,17 @@ IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 Numbers = npt.NDArray[Any]
 """Real, or complex for a derivative by a complex step."""
+
+
+def stretches(label: npt.NDArray[Any]) -> list[tuple[int, int]]:
+    """List where each stretch of one label, shape (sample,), begins, and the sample after its end."""
+    changes = (np.flatnonzero(label[1:] != label[:-1]) + 1).tolist()
+    return list(pairwise([0, *changes, len(label)])) if len(label) else []
+
+
+def runs(marked: BoolArray) -> list[tuple[int, int]]:
+    """List where each run of marked samples begins, and the sample after its end."""
+    return [(first, after) for first, after in stretches(marked) if marked[first]]
 
 
 def require_columns(name: str, values: Array, columns: int) -> None:

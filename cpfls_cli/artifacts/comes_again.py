@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.artifacts.spec import BODY, dataset, group_of, record
 from cpfls_cli.blocks import half_width
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
@@ -125,11 +125,8 @@ class ComesAgainGroup:
     def parts(self, channel: int) -> list[Part]:
         """List neighbouring bands in which a gap comes again; all of them where it shows in none alone."""
         sure = self.sure[channel]
-        edges = np.flatnonzero(np.diff([0, *sure[1:].astype(int), 0])) + 1
-        found = [
-            Part(slice(first, last), float(self.low[last - 1]), float(self.high[first]))
-            for first, last in edges.reshape(-1, 2).tolist()
-        ]
+        bands = [slice(first + 1, after + 1) for first, after in runs(sure[1:])]
+        found = [Part(own, float(self.low[own.stop - 1]), float(self.high[own.start])) for own in bands]
         return found or ([Part(slice(0, 1), float(self.low[0]), float(self.high[0]))] if sure[0] else [])
 
     def share_in(self, channel: int, part: Part) -> float:

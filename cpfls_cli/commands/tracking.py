@@ -26,13 +26,13 @@ from cpfls_cli.control.controllers import (
     proportional_derivative,
 )
 from cpfls_cli.control.track import AttitudeLoop, Sensing, flown_signals, scores, start_of, track
-from cpfls_cli.dynamics.equations_of_motion import RigidBody, TorqueModel, model_plant, rigid_plant
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel, RigidBody, TorqueModel, turning_law
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import body_torque, inertia_matrix, inertia_tensor
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.models import rebuilt
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
-from cpfls_cli.inertia import symmetric
+from cpfls_cli.inertia import six_parameters, symmetric
 from cpfls_cli.pages.identification import unjudged
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.tracking import answer
@@ -108,13 +108,17 @@ def _controllers(plan: Plan, model: TorqueModel, rigid_body: Array, vehicle: Veh
 
 
 def _loop(
-    plan: Plan, settings: ComputedTorqueSettings, model: TorqueModel, vehicle: VehicleSettings, rng: np.random.Generator
+    plan: Plan,
+    settings: ComputedTorqueSettings,
+    model: InertiaModel,
+    vehicle: VehicleSettings,
+    rng: np.random.Generator,
 ) -> AttitudeLoop:
     """Arrange what closes the loop; the generator gives the noise that the controllers measure."""
     limit, noise = settings.torque_max_n_m, (settings.attitude_noise_rad, settings.body_rate_noise_rad_s)
     measured = (std * rng.standard_normal(plan.attitude.shape) for std in noise)
     return AttitudeLoop(
-        plant=model_plant(model) if settings.plant == "model" else rigid_plant(inertia_tensor(vehicle)),
+        plant=turning_law(model if settings.plant == "model" else six_parameters(vehicle.inertia_kg_m2)),
         gains=gains(settings.natural_frequency_hz, settings.damping),
         actuators=TorqueActuators(settings.rotor_time_constant_s, None if limit is None else np.array(limit)),
         sensing=Sensing(*measured) if any(noise) else None,

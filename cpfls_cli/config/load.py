@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -65,6 +65,15 @@ def parse_config(text: str, source: str) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise ConfigError(f"{source}: a config is a mapping of sections; this is a {type(data).__name__}")
     return data
+
+
+def flat_keys(config: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """List all keys with dots, each with its value."""
+    for key, value in config.items():
+        if isinstance(value, Mapping) and value:
+            yield from flat_keys(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value
 
 
 def validate(data: dict[str, Any], source: str, *, sweep: bool = False, wrong: Sequence[str] = ()) -> Study:

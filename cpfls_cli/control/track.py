@@ -12,7 +12,7 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.control.controllers import Controller, Gains, Plan, TorqueActuators
-from cpfls_cli.dynamics.equations_of_motion import RotationalPlant
+from cpfls_cli.dynamics.equations_of_motion import TurningLaw
 from cpfls_cli.dynamics.integration import advance
 from cpfls_cli.errors import SettingError
 
@@ -66,7 +66,7 @@ class AttitudeLoop:
     integration_rate : float, Hz
     """
 
-    plant: RotationalPlant
+    plant: TurningLaw
     gains: Gains
     actuators: TorqueActuators
     sensing: Sensing | None
@@ -180,7 +180,7 @@ def _commands(
     return rotations.body_torque(attitude, np.array(torque).reshape(-1, 3))
 
 
-def flown_signals(plan: Plan, tracked: Tracked, controller: int, plant: RotationalPlant) -> dict[str, Array]:
+def flown_signals(plan: Plan, tracked: Tracked, controller: int, plant: TurningLaw) -> dict[str, Array]:
     """Extract the signals of one vehicle at the samples of the plan, up to where it was lost.
 
     Torques are the mean of what acts before and after each command, and accelerations what they do to the vehicle: on
@@ -202,7 +202,7 @@ def flown_signals(plan: Plan, tracked: Tracked, controller: int, plant: Rotation
     body_torque = 0.5 * (tracked.body_torque + tracked.torque_before)[controller, kept]
     # Nothing is known of what acted before the flight.
     body_torque[0] = tracked.body_torque[controller, 0]
-    acceleration = plant(attitude, body_rate, body_torque)
+    acceleration = plant(attitude, body_rate).acceleration(body_torque)
     return {
         "time": plan.time[kept],
         "attitude": attitude,

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient, rigid_columns
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
@@ -116,20 +115,6 @@ class InertiaFunctions:
     def corrected(self, added: Array) -> InertiaFunctions:
         """Add an inertia tensor, shape (3, 3), kg m^2, body frame."""
         return replace(self, rigid_body=self.rigid_body + [added[entry] for entry in INERTIA_ENTRIES])
-
-    def coriolis(self, attitude: Array, rate: Array) -> Array:
-        """Evaluate C(q, qd) by Christoffel symbols, so that the torque is ``J qdd + C qd``.
-
-        Parameters
-        ----------
-        attitude : array, shape (samples, 3), rad
-        rate : array, shape (samples, 3), rad/s
-
-        Returns
-        -------
-        array, shape (samples, 3, 3), kg m^2/s
-        """
-        return coriolis_matrix(self.inertia(attitude), rate)
 
     def outside(self, attitude: Array) -> BoolArray:
         """Flag attitudes, shape (samples, 3), rad, outside the region that the training data visited."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.inertia import body_torque_columns, symmetric
+from cpfls_cli.inertia import MEASURED, body_torque_columns, symmetric
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -65,8 +65,8 @@ def inertia_matrix_gradient(attitude: Array, inertia: Array) -> Array:
     return gradient
 
 
-def torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Array, inertia: Array) -> Array:
-    """Compute the generalised torque, ``tau = J qdd + (dJ/dt) qd - 1/2 grad_q (qd^T J qd)``.
+def newton_euler_torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Array, inertia: Array) -> Array:
+    """Compute the generalised torque from the body rates, ``tau = W^T (I omegad + omega x I omega)``.
 
     Parameters
     ----------
@@ -80,28 +80,14 @@ def torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Array, 
 
     References
     ----------
-    Equations (2) to (4) of the paper; method.md section 2.
-    """
-    qd = attitude_rate
-    dJ = inertia_matrix_gradient(attitude, inertia)
-    inertial = rotations.multiply(inertia_matrix(attitude, inertia), attitude_acceleration)
-    turning = np.einsum("nkij,nk,nj->ni", dJ, qd, qd)
-    energy_gradient = 0.5 * np.einsum("nkij,ni,nj->nk", dJ, qd, qd)
-    total: Array = inertial + turning - energy_gradient
-    return total
-
-
-def newton_euler_torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Array, inertia: Array) -> Array:
-    """Compute the generalised torque from the body rates, ``tau = W^T (I omegad + omega x I omega)``.
-
-    It is `torque` by an independent formula, and takes the same.
+    Equations (2) to (4) of the paper, which give the same; method.md section 2.
     """
     body = body_torque(attitude, attitude_rate, attitude_acceleration, inertia)
     return rotations.generalised_torque(attitude, body)
 
 
 def body_torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Array, inertia: Array) -> Array:
-    """Compute the torque about the body axes, ``I omegad + omega x I omega``, of what `torque` takes.
+    """Compute the torque about the body axes, ``I omegad + omega x I omega``, of what `newton_euler_torque` takes.
 
     Returns
     -------
@@ -181,6 +167,6 @@ def why_unphysical(inertia: Array) -> str | None:
     if smallest < 0 or largest == 0:
         return f"is not positive definite ({moments})"
     # Measured moments of a flat body exceed the limit by noise alone.
-    if largest > 1.1 * (smallest + middle):
+    if largest > MEASURED * (smallest + middle):
         return f"breaks the triangle inequality ({moments})"
     return None

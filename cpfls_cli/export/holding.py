@@ -9,18 +9,19 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel, body_inertia
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import vertical
 from cpfls_cli.effects.polynomial import STATE_TERMS
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import InputError
+from cpfls_cli.export.numbers import Numbers
 from cpfls_cli.inertia import nearest_body
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Body, MeasuredMotion
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.player import Player, apart, body_inertia, free_runs, player_of, rotor_terms_along
+from cpfls_cli.playback.player import Player, apart, free_runs, player_of, rotor_terms_along
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.table import WrenchTable, body_of
 from cpfls_cli.rotations import rotation_matrix
@@ -152,11 +153,18 @@ class Held:
 
 
 def held_by(
-    model: VehicleModel, holds: Holds, response: RotorResponse, body: Body | None = None, *, squares: bool = False
+    model: VehicleModel,
+    holds: Holds,
+    response: RotorResponse,
+    body: Body | None = None,
+    numbers: Numbers | None = None,
+    *,
+    squares: bool = False,
 ) -> Held:
-    """Take what a target of these rotors and this body, or the model's, holds of a vehicle."""
-    table = WrenchTable(holds(model.table.weights)[:, : len(STATE_TERMS)])
-    return Held(table, response, body or model.body, squares)
+    """Take what a target of these rotors, this body, or the model's, and numbers of its own holds of a vehicle."""
+    weights = model.table.weights
+    table = WrenchTable(holds(weights)[:, : len(STATE_TERMS)])
+    return Held(table, response, body or model.body, squares, numbers={} if numbers is None else numbers.of(weights))
 
 
 def constant_body(model: VehicleModel) -> Body:

@@ -148,13 +148,15 @@ class _Channel:
     @classmethod
     def of_pose(cls, writer: Any, pose: Pose) -> list[_Channel]:
         """Give a pose, and the same as the way from one frame to the other, as panels in space want it."""
+        from scipy.spatial.transform import Rotation
+
         about = {"unit": "m, quaternion", "frame": WORLD_FRAME}
         known = np.isfinite(pose.attitude).all(axis=1)
         stamps = _nanoseconds(pose.time[known]).tolist()
-        places, turned = np.nan_to_num(pose.position[known]).tolist(), _quaternions(pose.attitude[known]).tolist()
+        turned = Rotation.from_euler("ZYX", pose.attitude[known, ::-1]).as_quat().tolist() if stamps else []
         samples = [
             (stamp, dict(zip("xyz", place, strict=True)), dict(zip("xyzw", turn, strict=True)))
-            for stamp, place, turn in zip(stamps, places, turned, strict=True)
+            for stamp, place, turn in zip(stamps, np.nan_to_num(pose.position[known]).tolist(), turned, strict=True)
         ]
         topic = "/pose" if pose.child == BODY_FRAME else f"/pose/{pose.child}"
         posed, moved = (
@@ -195,16 +197,3 @@ def _timestamp(stamp: int) -> dict[str, int]:
 
 def _rounded(values: Array) -> list[float | None]:
     return [float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else None for value in values.tolist()]
-
-
-def _quaternions(attitude: Array) -> Array:
-    """Turn roll, pitch, yaw, shape (time, 3), rad, into quaternions x, y, z, w from body to world."""
-    roll, pitch, yaw = 0.5 * attitude.T
-    (cr, cp, cy), (sr, sp, sy) = (function(np.stack([roll, pitch, yaw])) for function in (np.cos, np.sin))
-    parts = (
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-        cr * cp * cy + sr * sp * sy,
-    )
-    return np.stack(parts, axis=1)

@@ -11,14 +11,14 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
+from cpfls_cli.dynamics.equations_of_motion import body_inertia, coriolis_matrix
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import body_torque
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
-from cpfls_cli.playback.player import body_inertia, one_step
+from cpfls_cli.playback.player import one_step
 from cpfls_cli.playback.rotors import Hold
 from cpfls_cli.playback.table import wrench_of
 from cpfls_cli.regressor.motion import Motion

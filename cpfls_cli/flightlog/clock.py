@@ -6,7 +6,7 @@ from math import floor, log10
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.settings import ImportSettings
 
@@ -136,12 +136,6 @@ def _gap_steps(time: Array, present: BoolArray, gap_s: float) -> BoolArray:
         depth[known[long + 1]] -= 1
     inside: BoolArray = np.cumsum(depth)[:-1] > 0
     return inside
-
-
-def runs(marked: BoolArray) -> list[tuple[int, int]]:
-    """List where each run of marked rows begins, and the row after its end."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
-    return [(int(first), int(after)) for first, after in edges.reshape(-1, 2)]
 
 
 def refuse_restart(time: Array, rows: IntArray) -> None:

@@ -317,16 +317,8 @@ def attitude_from_quaternion(quaternion: Array, order: Literal["wxyz", "xyzw"]) 
 
 
 def euler_angles(rotation: Array) -> Array:
-    """Extract roll, pitch, yaw (intrinsic ZYX) from rotations of body to world, shape (time, 3, 3).
-
-    Returns
-    -------
-    array, shape (time, 3), rad
-        Roll and yaw without jumps; both arbitrary where the pitch is +-90 degrees.
-    """
-    roll = np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])
-    pitch = -np.arcsin(np.clip(rotation[:, 2, 0], -1.0, 1.0))
-    yaw = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+    """Extract `rotations.euler_angles`, roll and yaw without jumps; both arbitrary where the pitch is +-90 degrees."""
+    roll, pitch, yaw = rotations.euler_angles(rotation).T
     return np.column_stack([unwrap_angles(roll), pitch, unwrap_angles(yaw)])
 
 

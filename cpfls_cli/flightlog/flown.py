@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import binary_closing, binary_opening, find_objects, label
+from scipy.ndimage import binary_closing, binary_opening
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.errors import SettingError
 from cpfls_cli.flightlog.clock import increasing_rows
 from cpfls_cli.flightlog.names import BY_HAND
@@ -181,13 +181,12 @@ def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArr
     if highest < 2 * _LEAST_HEIGHT:
         return turning
     risen = np.abs(height - ground) > max(_LEAST_HEIGHT, _OF_HEIGHT * highest)
-    numbers, _ = label(turning)
     off = np.zeros_like(turning)
     # Between the first and the last moment above it a flight may well come down to the height of its ground.
-    for (stretch,) in find_objects(numbers):
-        high = np.flatnonzero(risen[stretch])
+    for first, after in runs(turning):
+        high = first + np.flatnonzero(risen[first:after])
         if len(high):
-            off[stretch.start + high[0] : stretch.start + high[-1] + 1] = True
+            off[high[0] : high[-1] + 1] = True
     return _smoothed(off, period)
 
 
@@ -214,24 +213,23 @@ def _still(active: BoolArray, height: Array | None, rate: Array | None) -> bool:
 
 
 def _longest(time: Array, active: BoolArray, told: str, level: Array | None) -> FlownPart:
-    numbers, count = label(active)
-    stretches = [np.flatnonzero(numbers == number) for number in range(1, count + 1)]
-    longest = max(stretches, key=len)
-    begin, end = float(time[longest[0]]), float(time[longest[-1]])
+    stretches = runs(active)
+    first, after = max(stretches, key=lambda part: part[1] - part[0])
+    begin, end = float(time[first]), float(time[after - 1])
     margin = min(_MARGIN_S, (end - begin) / 10)
     reasons = []
-    if longest[0] > 0:
+    if first > 0:
         begin += margin
-        reasons.append(f"the first {begin:.1f} s are cut: {_how(level, slice(0, longest[0]), told)}")
-    if longest[-1] < len(time) - 1:
+        reasons.append(f"the first {begin:.1f} s are cut: {_how(level, slice(0, first), told)}")
+    if after < len(time):
         end -= margin
         last = float(time[-1]) - end
-        reasons.append(f"the last {last:.1f} s are cut: {_how(level, slice(longest[-1] + 1, None), told)}")
-    others = [(float(time[part[0]]), float(time[part[-1]])) for part in stretches if part is not longest]
+        reasons.append(f"the last {last:.1f} s are cut: {_how(level, slice(after, None), told)}")
+    others = [part for part in stretches if part[0] != first]
     if others:
-        words = ", ".join(f"{a:.1f} to {b:.1f} s" for a, b in others)
+        words = ", ".join(f"{time[a]:.1f} to {time[b - 1]:.1f} s" for a, b in others)
         reasons.append(f"it also flies at {words}; import.crop_s takes one stretch, the longest")
-    whole = not reasons or (longest[0] == 0 and longest[-1] == len(time) - 1)
+    whole = not reasons or (first == 0 and after == len(time))
     return FlownPart(None if whole else (round(begin, 2), round(end, 2)), tuple(reasons))
 
 

@@ -7,9 +7,9 @@ from math import pi
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.errors import InputError, SettingError
-from cpfls_cli.flightlog.clock import increasing_rows, refuse_restart, runs
+from cpfls_cli.flightlog.clock import increasing_rows, refuse_restart
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.units import KNOWN_UNITS
 

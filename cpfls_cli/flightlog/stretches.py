@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.clock import SMALLEST_SHARE_KEPT, runs
+from cpfls_cli.flightlog.clock import SMALLEST_SHARE_KEPT
 from cpfls_cli.flightlog.repair import SignalTable, count_saturated
 from cpfls_cli.flightlog.settings import ROTORS, ImportSettings, SignalMap
 from cpfls_cli.units import KNOWN_UNITS

@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import find_objects
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array, BoolArray, stretches
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import read_record
@@ -282,8 +281,8 @@ def known_stretches(name: str, known: BoolArray, time: Array) -> list[slice]:
     """List the stretches without a pause in which everything is known: what of a flight can be used."""
     steps = np.diff(time)
     paused = steps > _PAUSE * np.median(steps) if len(steps) else np.zeros(0, dtype=bool)
-    number = np.concatenate([[1], 1 + np.cumsum(paused | (known[1:] != known[:-1]))])
-    long = [part for (part,) in find_objects(number[: len(known)]) if known[part.start] and len(known[part]) >= FEWEST]
+    number = np.concatenate([[1], 1 + np.cumsum(paused)])[: len(known)] * known
+    long = [slice(*part) for part in stretches(number) if number[part[0]] and part[1] - part[0] >= FEWEST]
     if not long:
         wanted = f"{FEWEST} consecutive samples" if known.any() else "sample"
         raise InputError(f"{name}: no {wanted} at which all of its signals are known")

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.rigid_body import inertia_tensor
+from cpfls_cli.dynamics.rigid_body import inertia_tensor, positive_definite
 from cpfls_cli.effects.catalogue.parameter_error import inertia_correction
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.hooks import VehicleParts
@@ -78,16 +78,11 @@ def _parts(extended: ExtendedModel, vehicle: VehicleSettings) -> tuple[VehiclePa
 
 
 def _with_inertia(vehicle: VehicleSettings, inertia: Array) -> VehicleSettings:
-    if not is_body(inertia):
+    if not positive_definite(inertia[None]).all():
         return vehicle
     xx, yy, zz, xy, xz, yz = (float(inertia[entry]) for entry in INERTIA_ENTRIES)
     moments = (xx, yy, zz, xy, xz, yz) if xy or xz or yz else (xx, yy, zz)
     return vehicle if moments == vehicle.inertia_kg_m2 else replace(vehicle, inertia_kg_m2=moments)
-
-
-def is_body(inertia: Array) -> bool:
-    """Tell whether an inertia tensor, shape (3, 3), is positive definite."""
-    return bool(np.linalg.eigvalsh(inertia).min() > 0)
 
 
 def require_body(extended: ExtendedModel, vehicle: VehicleSettings) -> None:
@@ -102,7 +97,8 @@ def require_body(extended: ExtendedModel, vehicle: VehicleSettings) -> None:
     ------
     ComputationError
     """
-    if extended.base is None and not is_body(inertia_tensor(vehicle) + _parts(extended, vehicle)[0].inertia):
+    inertia = inertia_tensor(vehicle) + _parts(extended, vehicle)[0].inertia
+    if extended.base is None and not positive_definite(inertia[None]).all():
         raise ComputationError("not extended: with the named effects, the inertia is not that of any body")
 
 

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli import rotations
-from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray, stretches
 from cpfls_cli.blocks import half_width, jackknife_covariance
 from cpfls_cli.dynamics.rigid_body import rigid_columns, vertical, why_unphysical
 from cpfls_cli.identification.data import Flights, TorqueData, TorqueSource, axis_scale, gathered, sample_times
@@ -367,11 +366,9 @@ def _stretches(data: TorqueData, torque: Callable[[Motion], Array]) -> Iterator[
     if not len(steps):
         return
     period, known = float(np.median(steps)), ~vertical(data.motion.attitude)
-    ends = np.flatnonzero((np.abs(steps - period) > _PAUSE * period) | (known[1:] != known[:-1])) + 1
+    number = np.concatenate([[1], 1 + np.cumsum(np.abs(steps - period) > _PAUSE * period)]) * known
     takes = torque(data.motion)
-    for first, last in pairwise([0, *ends.tolist(), len(data)]):
-        if known[first]:
-            part = slice(first, last)
-            attitude = data.motion.attitude[part]
-            measured, modelled = (rotations.body_torque(attitude, each[part]) for each in (data.torque, takes))
-            yield BalancedTorque(measured, np.zeros_like(measured), modelled, period)
+    for part in (slice(*found) for found in stretches(number) if number[found[0]]):
+        attitude = data.motion.attitude[part]
+        measured, modelled = (rotations.body_torque(attitude, each[part]) for each in (data.torque, takes))
+        yield BalancedTorque(measured, np.zeros_like(measured), modelled, period)

@@ -14,6 +14,7 @@ from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.parameters import FOUND_AS, Parameter, parameters_of
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.config.load import flat_keys
 from cpfls_cli.pages.identification import TORQUE
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import model_words, trust_words
@@ -336,20 +337,11 @@ def differences(configs: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[st
     list of (str, list of str)
         Dotted key, and its value in each study; long values are cut.
     """
-    flat = [dict(_flat(config)) for config in configs]
+    told = [{name: own for name, own in config.items() if name not in _LEFT_OUT} for config in configs]
+    flat = [dict(flat_keys(config)) for config in told]
     keys = dict.fromkeys(key for one in flat for key in one)
     by_key = {key: [config.get(key, _ABSENT) for config in flat] for key in keys}
     return [(key, list(map(_short, values))) for key, values in by_key.items() if len(set(map(str, values))) > 1]
-
-
-def _flat(config: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    for key, value in config.items():
-        if not above and key in _LEFT_OUT:
-            continue
-        if isinstance(value, Mapping) and value:
-            yield from _flat(value, f"{above}{key}.")
-        else:
-            yield f"{above}{key}", value
 
 
 def _short(value: Any) -> str:

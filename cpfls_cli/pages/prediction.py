@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.scores import AXES
@@ -15,7 +15,7 @@ from cpfls_cli.artifacts.spec import Record
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.trust import seen_words
 from cpfls_cli.pages.uncertainty import MISFIT_WORDS, OUTSIDE_WORDS
-from cpfls_cli.report.canvas import BASELINE, band, legend_above, line, plot, runs, stacked, style_of
+from cpfls_cli.report.canvas import BASELINE, band, legend_above, line, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Heading, Plot, Text
 from cpfls_cli.report.numbers import number
 
@@ -241,7 +241,7 @@ def _ends(low: Array | None, high: Array | None) -> tuple[Array, Array] | None:
 def _shade(axes: Axes, time: Array, outside: BoolArray) -> None:
     """Shade the samples whose attitude the training data never visited."""
     half = 0.5 * float(np.median(np.diff(time))) if len(time) > 1 else 0.5
-    spans = [(time[first] - half, time[last] - time[first] + 2 * half) for first, last in runs(outside)]
+    spans = [(time[first] - half, time[after - 1] - time[first] + 2 * half) for first, after in runs(outside)]
     if spans:
         axes.broken_barh(
             spans, (0.0, 1.0), transform=axes.get_xaxis_transform(), facecolor="#f3d9b8", edgecolor="none", zorder=0

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, runs
 from cpfls_cli.artifacts.replay import (
     VEHICLE,
     ErrorsByHorizon,
@@ -45,7 +45,6 @@ from cpfls_cli.report.canvas import (
     line,
     plain_ticks,
     plot,
-    runs,
     stacked,
     style_of,
 )
@@ -253,7 +252,7 @@ def _where(record: ErrorsByHorizon, group: SignalErrorGroup, rival: int) -> str:
     better = less(group.mae[played_row(record)], group.mae[rival])
     longest = sorted(sorted(runs(better), key=lambda run: run[0] - run[1])[:_SAID])
     horizon = [_seconds(value) for value in record.horizon_s]
-    stretches = [f"{horizon[a]} to {horizon[b]}" if a < b else horizon[a] for a, b in longest]
+    stretches = [f"{horizon[a]} to {horizon[b - 1]}" if a + 1 < b else horizon[a] for a, b in longest]
     other = f"“{_WORDS[record.prediction[rival]]}”"
     if better.all():
         return f"better than {other} at every horizon to {horizon[-1]}"

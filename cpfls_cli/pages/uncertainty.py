@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.artifacts.evidence import CurvesGroup, RoundTripGroup, UncertaintyGroup
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source
-from cpfls_cli.report.canvas import BASELINE, band, legend_over, named, plain_ticks, plot, runs, style_of
+from cpfls_cli.report.canvas import BASELINE, band, legend_over, named, plain_ticks, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Heading, Plot, Table, Text
 from cpfls_cli.report.numbers import number, percent, printed, with_interval
 from cpfls_cli.validation.bands import band as interval
@@ -155,8 +155,8 @@ def _draw_entry(axes: Axes, curves: CurvesGroup, curve: int, entry: str, again: 
     from matplotlib.ticker import MaxNLocator
 
     angle, visited, values, low, high, rigid = _along(curves, curve, entry)
-    for first, last in runs(visited):
-        axes.axvspan(angle[first], angle[last], color=_VISITED, label="training was here", zorder=0)
+    for first, after in runs(visited):
+        axes.axvspan(angle[first], angle[after - 1], color=_VISITED, label="training was here", zorder=0)
     band(axes, angle, low, high, color="#9db8d6", alpha=0.7, label="95 % band")
     axes.plot(angle, rigid, label="rigid body", **{**BASELINE, "linewidth": 1.6})
     axes.plot(angle, values, label="model", **{**style_of(0), "linewidth": 1.6})

@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel, momentum_form
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel, body_inertia, momentum_form
 from cpfls_cli.dynamics.rigid_body import positive_definite
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_flight
@@ -18,10 +18,8 @@ from cpfls_cli.playback.history import Observer, missed_wrench, past_of
 from cpfls_cli.playback.kernels import FASTEST, Body, MeasuredMotion, Terms, errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
-from cpfls_cli.playback.motion import step as step_of_rigid_body
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.table import WrenchTable, lever_weights
-from cpfls_cli.regressor.regressor import InertiaValues
 
 _TINY = 1e-12
 """Sine of an angle, in rad, that is rounding: the axis does not show."""
@@ -161,8 +159,6 @@ def one_step(model: VehicleModel, state: State, rotor: Array, period: float) -> 
     State
         NaN where an inertia that depends on the attitude is not positive definite.
     """
-    if model.fuzzy is None:
-        return step_of_rigid_body(model, state, rotor, period)
     if any(model.wind):
         # Seen from the air there is no wind.
         wind = np.array(model.wind)
@@ -171,7 +167,7 @@ def one_step(model: VehicleModel, state: State, rotor: Array, period: float) -> 
         return after._replace(position=after.position + period * wind, velocity=after.velocity + wind)
     player = Player(table=model.table, rotor=rotor, body=model.body, fuzzy=model.fuzzy)
     used, weights = player.step_weights(slice(None))
-    return _FuzzyRuns(player, model.fuzzy, MeasuredMotion(*state, period), used, weights, translates=True).one_step()
+    return _MomentumRuns(player, MeasuredMotion(*state, period), used, weights, translates=True).one_step()
 
 
 class Runs(NamedTuple):
@@ -215,7 +211,7 @@ def free_runs(player: Player, flight: PlaybackFlight, starts: IntArray, horizon:
     if player.fuzzy is None:
         moved = errors_of_runs(motion, player.body, used, weights, starts - first, flight.translates, errors)
         return Runs(errors, moved)
-    runs = _FuzzyRuns(player, player.fuzzy, motion, used, weights, flight.translates)
+    runs = _MomentumRuns(player, motion, used, weights, flight.translates)
     return Runs(errors, runs.written(starts - first, errors))
 
 
@@ -349,8 +345,8 @@ def rotation_vectors(measured: Array, predicted: Array) -> Array:
     return np.asarray(np.where(np.expand_dims(half_turn, -1), [np.pi, 0.0, 0.0], vector))
 
 
-class _Fuzzy(NamedTuple):
-    """A model in Euler coordinates at the attitudes of the runs.
+class _Turned(NamedTuple):
+    """How bodies turn at the attitudes of the runs.
 
     Attributes
     ----------
@@ -377,11 +373,13 @@ class _State(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _FuzzyRuns:
-    """Free runs under an inertia that depends on the attitude, all at once, by the step rule of the compiled ones."""
+class _MomentumRuns:
+    """Free runs under any inertia, one that depends on the attitude too, all at once, by the rule of the compiled ones.
+
+    The compiled loops know a constant inertia alone, and are what thousands of runs are played by.
+    """
 
     player: Player
-    fuzzy: InertiaModel
     motion: MeasuredMotion
     used: Terms
     weights: Array
@@ -412,21 +410,22 @@ class _FuzzyRuns:
         parts = (moved.position, moved.velocity, moved.rotation, after.rate)
         return State(*(_kept(after.exists, part, np.full_like(part, np.nan)) for part in parts))
 
-    def _begun(self, starts: IntArray) -> tuple[_State, Array, _Fuzzy]:
-        motion = self.motion
+    def _begun(self, starts: IntArray) -> tuple[_State, Array, _Turned]:
+        motion, fuzzy = self.motion, self.player.fuzzy
         rate, rotation = motion.rate[starts], motion.rotation[starts]
-        attitude = _finite_attitude(rotation)
-        inertia = body_inertia(self.fuzzy, attitude)
-        momentum = rotations.multiply(np.nan_to_num(inertia[1]), rate)
+        if fuzzy is None:
+            momentum = rate @ self.player.body.inertia
+        else:
+            momentum = rotations.multiply(np.nan_to_num(body_inertia(fuzzy, _finite_attitude(rotation))[1]), rate)
         state = _State(motion.position[starts], motion.velocity[starts], rotation, momentum)
-        return state, rate, _turning(attitude, inertia, momentum)
+        return state, rate, self._turned(rotation, momentum)
 
-    def _step(self, state: _State, rate: Array, now: _Fuzzy, weights: Array) -> tuple[_State, _Fuzzy]:
+    def _step(self, state: _State, rate: Array, now: _Turned, weights: Array) -> tuple[_State, _Turned]:
         period = self.motion.period
         middle = self._moved(state, state, rate, now.direct, weights, 0.5 * period)
-        there = self._fuzzy(middle.rotation, middle.momentum)
+        there = self._turned(middle.rotation, middle.momentum)
         end = self._moved(state, middle, there.rate, there.direct, weights, period)
-        after = self._fuzzy(end.rotation, end.momentum)
+        after = self._turned(end.rotation, end.momentum)
         return end, after._replace(exists=now.exists & there.exists & after.exists)
 
     def _moved(self, start: _State, at: _State, rate: Array, direct: Array, weights: Array, interval: float) -> _State:
@@ -443,26 +442,17 @@ class _FuzzyRuns:
         position = start.position + interval * at.velocity
         return _State(position, start.velocity + interval * acceleration, rotation, momentum)
 
-    def _fuzzy(self, rotation: Array, momentum: Array) -> _Fuzzy:
+    def _turned(self, rotation: Array, momentum: Array) -> _Turned:
+        fuzzy = self.player.fuzzy
+        if fuzzy is None:
+            rate = np.asarray(momentum @ self.player.body.inverse)
+            return _Turned(rate, np.cross(rate, momentum), np.ones(len(rate), dtype=bool))
         attitude = _finite_attitude(rotation)
-        return _turning(attitude, body_inertia(self.fuzzy, attitude), momentum)
-
-
-def _turning(attitude: Array, inertia: tuple[InertiaValues, Array], momentum: Array) -> _Fuzzy:
-    values, matrices = inertia
-    exists = positive_definite(matrices)
-    safe = np.where(exists[:, None, None], matrices, np.eye(3))
-    rate: Array = np.asarray(np.linalg.solve(safe, momentum[..., None])[..., 0], dtype=float)
-    _, direct = momentum_form(attitude, rate, values)
-    return _Fuzzy(rate, direct, exists)
-
-
-def body_inertia(model: InertiaModel, attitude: Array) -> tuple[InertiaValues, Array]:
-    """Evaluate an inertia on Euler angles, and about the body axes, ``W^-T J W^-1``, shape (samples, 3, 3), kg m^2."""
-    values = model.inertia(attitude)
-    axes = [rotations.attitude_rate(attitude, np.broadcast_to(axis, attitude.shape)) for axis in np.eye(3)]
-    inverse = np.stack(axes, axis=2)
-    return values, np.asarray(inverse.swapaxes(1, 2) @ values.value @ inverse)
+        values, matrices = body_inertia(fuzzy, attitude)
+        exists = positive_definite(matrices)
+        safe = np.where(exists[:, None, None], matrices, np.eye(3))
+        rate = np.asarray(np.linalg.solve(safe, momentum[..., None])[..., 0], dtype=float)
+        return _Turned(rate, momentum_form(attitude, rate, values)[1], exists)
 
 
 def _finite_attitude(rotation: Array) -> Array:

@@ -84,10 +84,6 @@ class WrenchTable:
         """
         return wrench_of(self.weights, self.terms(velocity, rate), rotor)
 
-    def by_rotor_term(self, velocity: Array, rate: Array) -> Array:
-        """Compute what the terms of the rotors are multiplied with, shape (time, 6, 1 + 4 rotors); see `wrench`."""
-        return np.asarray(np.einsum("ta,kau->tku", self.terms(velocity, rate), self.weights, optimize=True))
-
     def by_step(self, rotor: Array) -> tuple[Terms, Array]:
         """Evaluate the weights of the terms of the motion over each step.
 

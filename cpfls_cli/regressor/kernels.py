@@ -51,7 +51,7 @@ class Table(NamedTuple):
     single : int
         Features of one angle beside the constant: 1, or twice the harmonic order.
     ranges : array, shape (2, 2)
-        Minimum and width of the roll and pitch inputs.
+        Minimum and maximum of the roll and pitch inputs.
     """
 
     blocks: IntArray

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.fuzzy.inputs import InputRange
+from cpfls_cli.fuzzy.inputs import InputRange, map_input
 from cpfls_cli.regressor.kernels import Table
 from cpfls_cli.regressor.regressor import Breakpoints
 from cpfls_cli.regressor.structure import PITCH, ROLL, Block, ModelStructure, Partition
@@ -42,7 +42,7 @@ def structure_table(structure: ModelStructure, ranges: tuple[InputRange, InputRa
         harmonic=harmonic,
         tensor=settings.products == "tensor",
         single=2 * settings.harmonic_order if harmonic else 1,
-        ranges=np.array([(data_range.minimum, data_range.width) for data_range in ranges]),
+        ranges=np.array([(data_range.minimum, data_range.maximum) for data_range in ranges]),
     )
 
 
@@ -59,27 +59,14 @@ def mapped_inputs(table: Table, attitude: Array) -> Array:
         Antecedent, its slope, consequent and its slope of roll, then of pitch. The slope of an antecedent beyond the
         partition is zero, as that of its membership functions is.
     """
-    angle = attitude.T[:2]
-    wrapped = angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
-    value, slope = wrapped, np.ones_like(angle)
-    if table.circular:
-        folded = np.abs(wrapped) > 0.5 * np.pi
-        value = np.where(folded, np.copysign(np.pi, wrapped) - wrapped, wrapped) * (2.0 / np.pi)
-        slope = np.where(folded, -2.0 / np.pi, 2.0 / np.pi)
-    if table.data_range:
-        minimum, width = table.ranges.T[:, :, None]
-        value, slope = (value - minimum) / width, slope / width
-        antecedent, antecedent_slope = value, slope
-    else:
-        turns = angle / (2.0 * np.pi)
-        antecedent = turns - np.floor(turns) if table.circular else wrapped / (2.0 * np.pi) + 0.5
-        antecedent_slope = np.full_like(angle, 0.5 / np.pi)
-        if not table.circular:
-            value, slope = antecedent, antecedent_slope
-    inside = (antecedent >= 0.0) & (antecedent <= 1.0)
-    lines = antecedent, np.where(inside, antecedent_slope, 0.0), value, slope
+    lines: list[Array] = []
+    for angle, ends in zip(attitude.T[:2], table.ranges.tolist(), strict=True):
+        found = map_input(angle, "data-range" if table.data_range else "full-circle", table.circular, InputRange(*ends))
+        inside = (found.antecedent >= 0.0) & (found.antecedent <= 1.0)
+        slope = np.where(inside, found.antecedent_slope, 0.0)
+        lines += [found.antecedent, slope, found.consequent, found.consequent_slope]
     # In one layout, whatever that of the attitude: for each the loops would be compiled anew.
-    return np.ascontiguousarray(np.stack(lines, axis=1).reshape(8, -1))
+    return np.ascontiguousarray(np.stack(lines))
 
 
 def padded_breakpoints(partitions: Breakpoints) -> Array:

@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.report.content import Panel, Plot
 from cpfls_cli.report.numbers import plain, power_of_ten
 
@@ -231,12 +231,6 @@ def kept_samples(values: Array, largest: int = _LARGEST) -> IntArray:
 def evenly_spread(samples: int) -> IntArray:
     """Choose the samples of a curve that a table shows: both ends and some between."""
     return np.unique(np.linspace(0, max(samples - 1, 0), min(samples, _ROWS)).round().astype(int))
-
-
-def runs(marked: Array | BoolArray) -> list[tuple[int, int]]:
-    """Find stretches of marked samples, each by its first and its last index."""
-    edges = np.diff(np.concatenate([[0], (np.asarray(marked) != 0).astype(int), [0]]))
-    return list(zip(np.flatnonzero(edges == 1).tolist(), (np.flatnonzero(edges == -1) - 1).tolist(), strict=True))
 
 
 def _show_as_written(figure: Figure) -> None:

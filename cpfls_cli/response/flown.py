@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.equations_of_motion import RotationState, acceleration_law
+from cpfls_cli.dynamics.equations_of_motion import turning_law
+from cpfls_cli.dynamics.rigid_body import positive_definite
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.lag import delayed, lagged
@@ -195,9 +196,9 @@ def _acceleration(model: VehicleModel, signals: Signals, torque: Array) -> Array
         momentum = signals.body_rate @ model.body.inertia
         return np.asarray((torque - np.cross(signals.body_rate, momentum)) @ model.body.inverse)
     assert signals.attitude is not None, "what a model with inertia functions requires"
-    beyond = np.asarray(np.cos(signals.attitude[:, 1]) < 0)
-    state = RotationState(signals.rotation, signals.body_rate, beyond, np.ones(len(signals), dtype=bool))
-    return acceleration_law(model.fuzzy)(state, torque).value
+    turning = turning_law(model.fuzzy)(signals.attitude, signals.body_rate)
+    turns = positive_definite(turning.inertia)
+    return np.where(turns[:, None], turning.acceleration(torque), 0.0)
 
 
 def specific_force(signals: Signals) -> Channel | None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array, BoolArray, stretches
 
 if TYPE_CHECKING:
     # Who reads what was found waits for nothing that finds it.
@@ -140,9 +140,7 @@ def _deviations(frequency: Array, ratio: Array, off: BoolArray) -> list[Deviatio
     """Cut a band into stretches in which a model is right, too strong, too weak, late or early."""
     kind = np.where(off, _kinds(ratio), 0)
     kind = _without_scatter(kind)
-    starts = np.flatnonzero(np.concatenate([[True], kind[1:] != kind[:-1]]))
-    stretches = zip(starts, [*starts[1:], len(kind)], strict=True)
-    return [_deviation(frequency[a:b], ratio[a:b], bool(kind[a] == 0)) for a, b in stretches]
+    return [_deviation(frequency[a:b], ratio[a:b], bool(kind[a] == 0)) for a, b in stretches(kind)]
 
 
 def _kinds(ratio: Array) -> Array:
@@ -155,15 +153,14 @@ def _without_scatter(kind: Array) -> Array:
     """Give stretches that are too short to be told to their neighbours, the shortest first."""
     kind = kind.copy()
     while True:
-        starts = np.flatnonzero(np.concatenate([[True], kind[1:] != kind[:-1]]))
-        ends = np.append(starts[1:], len(kind))
-        sizes = ends - starts
+        told = stretches(kind)
+        sizes = [after - first for first, after in told]
         shortest = int(np.argmin(sizes))
-        if sizes[shortest] >= _SHORTEST or len(starts) == 1:
+        if sizes[shortest] >= _SHORTEST or len(told) == 1:
             return kind
-        beside = [index for index in (shortest - 1, shortest + 1) if 0 <= index < len(starts)]
-        longer = max(beside, key=lambda index: int(sizes[index]))
-        kind[starts[shortest] : ends[shortest]] = kind[starts[longer]]
+        beside = [index for index in (shortest - 1, shortest + 1) if 0 <= index < len(told)]
+        longer = max(beside, key=lambda index: sizes[index])
+        kind[slice(*told[shortest])] = kind[told[longer][0]]
 
 
 def _deviation(frequency: Array, ratio: Array, right: bool) -> Deviation:

@@ -14,9 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.ndimage import find_objects
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.response.mismatch import clearness
 
 _LENGTHS = 5
@@ -177,14 +176,12 @@ def _known(stretch: Stretch, instrumented: bool) -> Iterator[Stretch]:
     if not instrumented:
         yield stretch
     elif stretch.instrument is not None:
-        known: BoolArray = np.asarray(np.isfinite(stretch.instrument).all(axis=1))
-        number = np.concatenate([[1], 1 + np.cumsum(known[1:] != known[:-1])]) * known
-        for found in find_objects(number):
-            if found is not None:
-                part = found[0]
-                model = None if stretch.model is None else stretch.model.cut(part)
-                cut = stretch.instrument[part]
-                yield Stretch(stretch.input[part], stretch.output.cut(part), model, cut, stretch.start + part.start)
+        for first, after in runs(np.asarray(np.isfinite(stretch.instrument).all(axis=1))):
+            part = slice(first, after)
+            model = None if stretch.model is None else stretch.model.cut(part)
+            yield Stretch(
+                stretch.input[part], stretch.output.cut(part), model, stretch.instrument[part], stretch.start + first
+            )
 
 
 def _lengths(stretches: Sequence[Stretch], period: float) -> list[int]:

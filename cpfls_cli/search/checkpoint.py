@@ -17,7 +17,7 @@ from cpfls_cli.artifacts.checkpoint import ArchiveGroup, CheckpointRecord, Unfin
 from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.artifacts.store import format_name, read_any, read_record, write_record
-from cpfls_cli.config.load import parse_config
+from cpfls_cli.config.load import flat_keys, parse_config
 from cpfls_cli.errors import ComputationError, InputError, OutputError
 from cpfls_cli.evolution.archive import Archive, Evaluation
 from cpfls_cli.evolution.engine import EvolutionState, History
@@ -222,16 +222,7 @@ def _genes(stored: Any) -> IntArray:
 def keys_of(header: Header, sections: Sequence[str] = (_SECTION,)) -> dict[str, Any]:
     """List the keys that a search depends on, with dots."""
     config = parse_config(header.config, "/config")
-    flat = (_flat(section, config[section]) for section in sections)
-    return {"seed": header.seed, **{key: value for listed in flat for key, value in listed}}
-
-
-def _flat(prefix: str, values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    for key, value in values.items():
-        if isinstance(value, Mapping):
-            yield from _flat(f"{prefix}.{key}", value)
-        else:
-            yield f"{prefix}.{key}", value
+    return {"seed": header.seed, **dict(flat_keys({section: config[section] for section in sections}))}
 
 
 def differences(

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.dynamics.rigid_body import body_torque, inertia_tensor, torque
+from cpfls_cli.dynamics.rigid_body import body_torque, inertia_tensor
 from cpfls_cli.errors import SettingError
 from cpfls_cli.simulation.measured import noisy
 from cpfls_cli.simulation.settings import SimulationSettings
@@ -62,7 +62,7 @@ def simulate(
     """
     about_body, thrust = _needed(planned, vehicle)
     demand = rotor_demand(vehicle, thrust, about_body)
-    generalised = torque(*_rotation(planned), inertia_tensor(vehicle))
+    generalised = rotations.generalised_torque(planned["attitude"], about_body)
     exact = {**planned, "torque": generalised, "body_torque": about_body, "rotor_speed": demand.speed}
     _refuse_noise_of_nothing(exact, settings)
     signals, noise_std = noisy(exact, settings, rng)
@@ -147,13 +147,10 @@ def tilt_of(attitude: Array) -> Array:
     return np.asarray(np.arctan2(np.hypot(sp * cr, sr), cr * cp))
 
 
-def _rotation(planned: Mapping[str, Array]) -> tuple[Array, Array, Array]:
-    return planned["attitude"], planned["attitude_rate"], planned["attitude_acceleration"]
-
-
 def _needed(planned: Mapping[str, Array], vehicle: VehicleSettings) -> tuple[Array, Array]:
     """Compute the body torque, shape (time, 3), N m, and the thrust, shape (time,), N, that a motion needs."""
-    about_body = body_torque(*_rotation(planned), inertia_tensor(vehicle))
+    rotation = planned["attitude"], planned["attitude_rate"], planned["attitude_acceleration"]
+    about_body = body_torque(*rotation, inertia_tensor(vehicle))
     return about_body, collective_thrust(vehicle, about_body, planned.get("acceleration"))
 
 

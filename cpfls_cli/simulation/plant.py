@@ -10,11 +10,11 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.equations_of_motion import TurningLaw, identified_turning, rigid_turning
-from cpfls_cli.dynamics.rigid_body import inertia_tensor
+from cpfls_cli.dynamics.equations_of_motion import TurningLaw, turning_law
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.hooks import CarriedBody, Carrier
 from cpfls_cli.effects.signals import Signals, at_another_instant, feeling
+from cpfls_cli.inertia import six_parameters
 from cpfls_cli.simulation.actuators import Rotors
 from cpfls_cli.simulation.model import SimulatedEffect, SimulatedEffects
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -143,11 +143,11 @@ class Plant:
             terms = np.concatenate([[1.0], rotors.speed, squared, rotors.acceleration, rotors.slow - squared])
             by_rotors = self.whole.table.wrench(signals.air_velocity, signals.body_rate, terms[None])[0]
         wrench = np.asarray(by_rotors) + self.wrench.direct(signals) + push
-        inertial = self.turning(state[ATTITUDE], body_rate)
-        torque = wrench[:3] - inertial.direct + self.wrench.rotor_coupling @ rotors.acceleration
+        inertial = self.turning(state[None, ATTITUDE], body_rate[None])
+        torque = wrench[:3] - inertial.direct[0] + self.wrench.rotor_coupling @ rotors.acceleration
         acceleration = signals.rotation[0] @ wrench[3:] / self.vehicle.mass_kg
         acceleration[2] -= self.vehicle.gravity_m_s2
-        inertia = inertial.inertia + self.wrench.added_inertia
+        inertia = inertial.inertia[0] + self.wrench.added_inertia
         turning = np.asarray(np.linalg.solve(inertia, torque), dtype=float)
         change = np.zeros(len(state))
         first = VEHICLE_STATES
@@ -181,8 +181,7 @@ def plant_of(
     """
     flown = vehicle if model is None else model.vehicle
     carried = tuple(one.effect.carried(flown, one.values) for one in effects.ordered if one.effect.carried is not None)
-    fuzzy = None if model is None else model.fuzzy
-    turning = rigid_turning(inertia_tensor(flown)) if fuzzy is None else identified_turning(fuzzy)
+    turning = turning_law(six_parameters(flown.inertia_kg_m2) if model is None or model.fuzzy is None else model.fuzzy)
     wrench = effect_wrench(effects, instant(flown, state, speed))
     return Plant(flown, turning, wrench, carried, None if model is None or model.is_rigid_body else model)
 

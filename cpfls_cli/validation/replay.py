@@ -13,9 +13,10 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.dynamics.equations_of_motion import Predictor, RotationState, acceleration_law
-from cpfls_cli.dynamics.integration import free_runs
+from cpfls_cli.dynamics.equations_of_motion import Predictor, turning_law
+from cpfls_cli.dynamics.integration import RotationState, free_runs
 from cpfls_cli.identification.data import TorqueSource, gathered, sample_times
+from cpfls_cli.playback.player import rotation_vectors
 from cpfls_cli.validation.timeline import sample_period, stretch_numbers
 
 # 40 MB of rotations, rates and torques at a time.
@@ -51,9 +52,7 @@ class MeasuredWindows:
     @property
     def start(self) -> RotationState:
         """Measured state at the start of the windows."""
-        return RotationState(
-            self.rotation[:, 0], self.body_rate[:, 0], self.beyond, np.ones(len(self.time), dtype=bool)
-        )
+        return RotationState(self.rotation[:, 0], self.body_rate[:, 0])
 
 
 @dataclass(frozen=True)
@@ -229,11 +228,12 @@ class _SquaredErrors:
     def add(self, measured: MeasuredWindows, run: Iterator[RotationState]) -> None:
         by_window = np.zeros((len(measured.time), 3))
         for step, state in enumerate(run):
-            turned, rate = _errors(measured, step + 1, state)
-            self.lost[step] += np.sum(~state.exists)
+            turned = rotation_vectors(measured.rotation[:, step + 1], state.rotation)
+            rate = state.body_rate - measured.body_rate[:, step + 1]
+            self.lost[step] += np.sum(np.isnan(rate).any(axis=1))
             self.attitude[step] += np.sum(turned**2, axis=0)
             self.body_rate[step] += np.sum(rate**2, axis=0)
-            by_window += np.where(state.exists[:, None], rate**2, np.nan)
+            by_window += rate**2
         self.windows += len(by_window)
         self.window_error.append(by_window / len(self.lost))
 
@@ -242,17 +242,10 @@ class _SquaredErrors:
         return np.where(whole[:, None], np.sqrt(squares / max(self.windows, 1)), np.nan)
 
 
-def _errors(measured: MeasuredWindows, sample: int, state: RotationState) -> tuple[Array, Array]:
-    from scipy.spatial.transform import Rotation
-
-    away = measured.rotation[:, sample].swapaxes(1, 2) @ state.rotation
-    return Rotation.from_matrix(away).as_rotvec(), state.body_rate - measured.body_rate[:, sample]
-
-
 def _still(measured: MeasuredWindows) -> Iterator[RotationState]:
     return iter([measured.start] * (measured.time.shape[1] - 1))
 
 
 def _run(predictor: Predictor, windows: MeasuredWindows) -> Iterator[RotationState]:
     fastest = float(np.max(np.linalg.norm(windows.body_rate, axis=2), initial=0.0))
-    return free_runs(acceleration_law(predictor), windows.start, windows.time, windows.torque, fastest)
+    return free_runs(turning_law(predictor), windows.start, windows.beyond, windows.time, windows.torque, fastest)

@@ -128,3 +128,12 @@ def record_of(model, config="seed: 1\n"):
         blocks=30,
         warning=text,
     )
+
+
+def accelerations(model, state, rotor):
+    """``v' = g + R F / m`` and ``omega' = I^-1 (M - omega x I omega)`` of a constant inertia, shape (samples, 6)."""
+    body = model.body
+    air = np.einsum("nji,nj->ni", state.rotation, state.velocity - model.wind)
+    wrench = model.table.wrench(air, state.rate, rotor)
+    linear = np.einsum("nij,nj->ni", state.rotation, wrench[:, 3:]) / body.mass - [0.0, 0.0, body.gravity]
+    return np.hstack([linear, (wrench[:, :3] - np.cross(state.rate, state.rate @ body.inertia)) @ body.inverse])

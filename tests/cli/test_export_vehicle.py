@@ -15,7 +15,8 @@ from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.effects.polynomial import Probe, polynomial
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.playback.model import ModelEffect
-from cpfls_cli.playback.motion import State, step
+from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.player import one_step
 from tests.builders.artifacts import edited
 from tests.builders.compiled_c import build, require_gcc
 from tests.builders.vehicle_models import QUAD, polynomial_effects, record_of, whole
@@ -189,7 +190,7 @@ def test_the_page_predicts_what_the_library_does(cpfls, tmp_path, monkeypatch):
     speed = (1000.0 + 7 * (np.arange(80) % 13)).reshape(20, 4)
     state = State(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0]]), np.eye(3)[None], np.zeros((1, 3)))
     for row in model.response.terms_by_step(speed, 0.01, "previous"):
-        state = step(model, state, row[None], 0.01)
+        state = one_step(model, state, row[None], 0.01)
     wanted = [0, state.position[0, 0], state.velocity[0, 2], state.rate[0, 1]]
     np.testing.assert_allclose(said, wanted, rtol=1e-9)
     monkeypatch.syspath_prepend(tmp_path)

@@ -29,7 +29,7 @@ from cpfls_cli.export.course import Course, fly_body
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
 from cpfls_cli.export.numbers import Numbers, numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.text import comment_lines, number
+from cpfls_cli.export.text import comment_lines
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
@@ -133,7 +133,7 @@ def ardupilot_text(sheet: Sheet, held: Held, told: Sequence[str], file: str) -> 
     }
     said = [*sheet.facts, "", *told, "", *(each.format(**words) for each in _USE)]
     lines = [f"# {line}".rstrip() for line in comment_lines(said)]
-    given = [f'  "{name}": {_written(value)}' for name, value in _keys(sheet.model, held, order).items()]
+    given = [f'  "{name}": {json.dumps(value)}' for name, value in _keys(sheet.model, held, order).items()]
     return "\n".join([*lines, "{", ",\n".join(given), "}", ""])
 
 
@@ -199,12 +199,6 @@ def _reference_angle(momentum: float, weight: float, column: float) -> float:
 def _momentum_drag(momentum: float, weight: float, column: float, speed: float, tilt: float) -> float:
     lift = weight / np.cos(tilt)
     return float(np.cos(tilt) * momentum * speed * np.cos(tilt) * np.sqrt(lift * column))
-
-
-def _written(value: Any) -> str:
-    if isinstance(value, list):
-        return f"[{', '.join(map(_written, value))}]"
-    return str(value) if isinstance(value, int) else number(value)
 
 
 def fly_ardupilot(text: str, course: Course) -> State:

@@ -10,15 +10,16 @@ one curve for all rotors, and speeds follow commands by rotor_dyn_coef.
 
 from __future__ import annotations
 
+import json
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.integration import runge_kutta_step
 from cpfls_cli.effects.effect import thrust_wrench, wrench
 from cpfls_cli.effects.scales import arm, hover_speed
 from cpfls_cli.effects.signals import Signals
@@ -27,7 +28,7 @@ from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.text import comment_lines, number
+from cpfls_cli.export.text import comment_lines
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
@@ -61,8 +62,7 @@ def crazyflow_held(model: VehicleModel) -> tuple[Held, Holds]:
         held[_DRAG] = _in_hover(weights[_FORCE_OF_VELOCITY], hover)
         return held
 
-    held = held_by(model, holds, RotorResponse(lag_s=model.response.lag_s), constant_body(model))
-    return replace(held, numbers=numbers.of(model.table.weights)), holds
+    return held_by(model, holds, RotorResponse(lag_s=model.response.lag_s), constant_body(model), numbers), holds
 
 
 def _in_hover(weights: Array, hover: float) -> Array:
@@ -108,14 +108,8 @@ def crazyflow_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) ->
     lag = () if rate else ("The rotors have no lag: give no rotor_vel, or commands and rotor_vel alike.",)
     lines = [f"#{line}".rstrip() for line in comment_lines([*sheet.facts, "", *told, "", _USE, *lag])]
     return "\n".join(
-        [*lines, "", f"[{sheet.name}]", *(f"{name} = {_written(each)}" for name, each in given.items()), ""]
+        [*lines, "", f"[{sheet.name}]", *(f"{name} = {json.dumps(each)}" for name, each in given.items()), ""]
     )
-
-
-def _written(value: Any) -> str:
-    if isinstance(value, list):
-        return f"[{', '.join(map(_written, value))}]"
-    return number(value)
 
 
 def fly_crazyflow(text: str, course: Course) -> State:
@@ -130,31 +124,26 @@ def fly_crazyflow(text: str, course: Course) -> State:
     rate = given["rotor_dyn_coef"][0]
     before = course.lagged(RotorResponse(lag_s=1.0 / rate if rate else 0.0))
     start, runs = course.start, len(course.starts)
-    now = [start.position, start.velocity, start.rotation, start.rate, _RPM * before]
+    now = np.hstack([*(part.reshape(runs, -1) for part in start), _RPM * before])
 
-    def slopes(state: Sequence[Array], command: Array) -> list[Array]:
-        position, velocity, rotation, turning, speed = state
-        quaternion = Rotation.from_matrix(_turned(rotation)).as_quat()
-        speed = speed if rate else command
+    def parts(state: Array) -> list[Array]:
+        position, velocity, rotation, turning, speed = np.split(state, [3, 6, 15, 18], axis=-1)
+        return [position, velocity, _turned(rotation.reshape(*rotation.shape[:-1], 3, 3)), turning, speed]
+
+    def slope(state: Array, command: Array) -> Array:
+        position, velocity, rotation, turning, speed = parts(state)
+        quaternion, speed = Rotation.from_matrix(rotation).as_quat(), speed if rate else command
         moved, _, faster, spun, wound = dynamics(position, quaternion, velocity, turning, command, speed, **given)
-        cross = np.cross(np.eye(3), turning[:, None])
-        return [moved, faster, rotation @ cross, spun, wound if rate else np.zeros((runs, _ROTORS))]
+        turned = state[:, 6:15].reshape(runs, 3, 3) @ np.cross(np.eye(3), turning[:, None])
+        return np.hstack([moved, faster, turned.reshape(runs, 9), spun, wound if rate else 0 * speed])
 
-    def ahead(state: Sequence[Array], by: Sequence[Array], step: float) -> list[Array]:
-        return [each + step * slope for each, slope in zip(state, by, strict=True)]
-
-    rows, step = [], course.period
+    rows = []
     for index, command in enumerate(_RPM * course.commands.swapaxes(0, 1), 1):
-        first = slopes(now, command)
-        second = slopes(ahead(now, first, 0.5 * step), command)
-        third = slopes(ahead(now, second, 0.5 * step), command)
-        fourth = slopes(ahead(now, third, step), command)
-        mean = [(a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(first, second, third, fourth, strict=True)]
-        now = ahead(now, mean, step)
-        now[2] = _turned(now[2])
+        now = runge_kutta_step(slope, now, (command, command, command), course.period)
+        now[:, 6:15] = parts(now)[2].reshape(runs, 9)
         if index % course.finer == 0:
-            rows.append(State(*now[:4]))
-    return State(*(np.stack(parts, axis=1) for parts in zip(*rows, strict=True)))
+            rows.append(now)
+    return State(*parts(np.stack(rows, axis=1))[:4])
 
 
 def _dynamics() -> Any:

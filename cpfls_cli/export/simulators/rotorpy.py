@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -39,8 +38,7 @@ def rotorpy_held(model: VehicleModel) -> tuple[Held, Holds]:
         )
     numbers = numbers_of(model, _wrenches, alike=True)
     body = constant_body(model)._replace(gravity=_GRAVITY)
-    held = held_by(model, numbers.holds, RotorResponse(lag_s=model.response.lag_s), body)
-    return replace(held, numbers=numbers.of(model.table.weights)), numbers.holds
+    return held_by(model, numbers.holds, RotorResponse(lag_s=model.response.lag_s), body, numbers), numbers.holds
 
 
 def _wrenches(signals: Signals) -> Mapping[str, Array]:

@@ -11,7 +11,6 @@ and its speed follows the command by a first-order filter. `fly_sdf` is these eq
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -52,8 +51,7 @@ def sdf_held(model: VehicleModel) -> tuple[Held, Holds]:
     heights = np.array([rotor.position_m[2] for rotor in model.vehicle.rotors])
     margin = 2.0 * _MARGIN * _ROTOR_SHARE * model.body.mass * float((heights**2).sum())
     body = of_a_body(constant_body(model), margin)
-    held = held_by(model, numbers.holds, RotorResponse(lag_s=model.response.lag_s), body)
-    return replace(held, numbers=numbers.of(model.table.weights)), numbers.holds
+    return held_by(model, numbers.holds, RotorResponse(lag_s=model.response.lag_s), body, numbers), numbers.holds
 
 
 def _wrenches(signals: Signals) -> Mapping[str, Array]:

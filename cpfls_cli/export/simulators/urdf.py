@@ -9,7 +9,6 @@ vehicle has its drag, are alike where it is level. `fly_urdf` is these equations
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -49,8 +48,7 @@ def urdf_held(model: VehicleModel) -> tuple[Held, Holds]:
         )
     numbers = numbers_of(model, _wrenches, alike=True)
     body = of_a_body(constant_body(model))._replace(gravity=_GRAVITY)
-    held = held_by(model, numbers.holds, RotorResponse(), body)
-    return replace(held, numbers=numbers.of(model.table.weights)), numbers.holds
+    return held_by(model, numbers.holds, RotorResponse(), body, numbers), numbers.holds
 
 
 def _wrenches(signals: Signals) -> Mapping[str, Array]:

@@ -17,7 +17,7 @@ from cpfls_cli.gap.settings import COUNTS, ERRORS, RARE, GapSettings
 from cpfls_cli.playback.disturbance import FoundGusts, gusts_in
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.gusts import RANGES
-from cpfls_cli.playback.instruments import Instruments, Repeats, foretold, held, instruments, late, late_by
+from cpfls_cli.playback.instruments import Instruments, Repeats, foretold_by_run, held, instruments, late, late_by
 from cpfls_cli.rounding import levelled
 from cpfls_cli.weak_form.resampling import about_flight_mean
 from cpfls_cli.weak_form.windows import Recording, Windows
@@ -191,19 +191,13 @@ def foretold_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) -
         Of each run.
     """
     lags = late_by(windows.period, max(1, windows.hop // 2))
-    numbers = [number for number, asked in enumerate(given.setpoints) if asked is not None and len(rows[number])]
-    asked = [
-        windows.average(np.hstack([late(setpoint, lag) for lag in lags]))
-        for number in numbers
-        if (setpoint := given.setpoints[number]) is not None
-    ]
-    found = [np.full_like(own, np.nan) for own in rows]
-    if numbers:
-        told = foretold(np.concatenate(asked), np.concatenate([rows[number] for number in numbers]))
-        ends = np.cumsum([len(rows[number]) for number in numbers])[:-1]
-        for number, own in zip(numbers, np.split(told, ends), strict=True):
-            found[number] = own
-    return found
+    asked = {
+        number: windows.average(np.hstack([late(setpoint, lag) for lag in lags]))
+        for number, setpoint in enumerate(given.setpoints)
+        if setpoint is not None and len(rows[number])
+    }
+    told = foretold_by_run(asked, rows)
+    return [told.get(number, np.full_like(own, np.nan)) for number, own in enumerate(rows)]
 
 
 def _like_air(

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import binary_closing, find_objects, label, uniform_filter1d
+from scipy.ndimage import binary_closing, uniform_filter1d
 from scipy.special import chdtrc
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.residual.dependence import OUTER_PERCENT
 from cpfls_cli.gap.settings import FEWEST_BLOCKS
@@ -88,7 +88,7 @@ def _of_channel(
 def _runs(above: BoolArray, pause: int) -> list[slice]:
     padded = np.pad(above, pause)
     joined = above | binary_closing(padded, np.ones(pause + 1, dtype=bool))[pause : pause + len(above)]
-    return [run[0] for run in find_objects(label(joined)[0])]
+    return [slice(*run) for run in runs(joined)]
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from cpfls_cli.dynamics.rigid_body import (
     inertia_matrix_gradient,
     newton_euler_torque,
     rigid_columns,
-    torque,
 )
 from cpfls_cli.regressor.motion import Motion
+from tests.builders.christoffel import torque
 
 
 def vectors(low, high):

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.regressor.motion import Motion
@@ -50,7 +51,7 @@ few = settings(deadline=None, max_examples=10)
 def test_no_energy_is_made(structure, seed):
     model, rng = drawn(structure, seed)
     q, qd = attitudes(rng), rng.standard_normal((40, 3))
-    C = model.coriolis(q, qd)
+    C = coriolis_matrix(model.inertia(q), qd)
     ahead, behind = (model.inertia(q + sign * STEP * qd).value for sign in (1, -1))
     along = (ahead - behind) / (2 * STEP)
     skew = along - 2 * C
@@ -66,6 +67,6 @@ def test_torque_is_inertia_times_acceleration_and_coriolis_times_rate(structure,
     model, rng = drawn(structure, seed)
     motion = Motion(attitudes(rng), *rng.standard_normal((2, 40, 3)))
     inertial = np.einsum("nij,nj->ni", model.inertia(motion.attitude).value, motion.acceleration)
-    turning = np.einsum("nij,nj->ni", model.coriolis(motion.attitude, motion.rate), motion.rate)
+    turning = np.einsum("nij,nj->ni", coriolis_matrix(model.inertia(motion.attitude), motion.rate), motion.rate)
     torque = model.torque(motion)
     np.testing.assert_allclose(torque, inertial + turning, atol=1e-12 * np.max(np.abs(torque)))

@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
+from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.identification.data import TorqueData
@@ -98,7 +99,7 @@ def test_a_model_turns_as_its_equation_in_euler_angles_says(seed):
 
     def slope(t, state):
         q, qd = state[None, :3], state[None, 3:]
-        tau = rotations.generalised_torque(q, torque(t)[None])[0] - model.coriolis(q, qd)[0] @ qd[0]
+        tau = rotations.generalised_torque(q, torque(t)[None])[0] - coriolis_matrix(model.inertia(q), qd)[0] @ qd[0]
         return np.concatenate([qd[0], np.linalg.solve(model.inertia(q).value[0], tau)])
 
     states = integrated(slope, np.concatenate([data.motion.attitude[0], data.motion.rate[0]]), data)

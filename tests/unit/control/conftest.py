@@ -5,9 +5,11 @@ import pytest
 
 from cpfls_cli.control.controllers import TorqueActuators, gains, plan_of
 from cpfls_cli.control.track import AttitudeLoop
-from cpfls_cli.dynamics.equations_of_motion import rigid_plant
+from cpfls_cli.dynamics.equations_of_motion import turning_law
+from cpfls_cli.inertia import symmetric
 
-INERTIA = np.array([[0.6, 0.02, -0.03], [0.02, 0.7, 0.01], [-0.03, 0.01, 1.2]])
+PARAMETERS = np.array([0.6, 0.7, 1.2, 0.02, -0.03, 0.01])
+INERTIA = symmetric(PARAMETERS)
 FREQUENCY, DAMPING = (1.2, 1.0, 0.6), 0.7
 AMPLITUDE, SWING = np.array([0.4, -0.3, 0.9]), np.array([2.0, 1.5, 1.1])
 
@@ -37,7 +39,7 @@ def make_plan():
 @pytest.fixture
 def make_loop():
     def make(plant=None, actuators=None, sensing=None, integration_rate=400.0):
-        plant = rigid_plant(INERTIA) if plant is None else plant
+        plant = turning_law(PARAMETERS) if plant is None else plant
         return AttitudeLoop(plant, gains(FREQUENCY, DAMPING), actuators or TorqueActuators(), sensing, integration_rate)
 
     return make

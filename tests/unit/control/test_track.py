@@ -8,10 +8,15 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli import rotations
 from cpfls_cli.control.controllers import Controller, TorqueActuators, computed_torque, plan_of, proportional_derivative
 from cpfls_cli.control.track import Sensing, flown_signals, scores, track
-from cpfls_cli.dynamics.equations_of_motion import RigidBody, model_plant, rigid_plant
-from cpfls_cli.dynamics.rigid_body import torque
+from cpfls_cli.dynamics.equations_of_motion import RigidBody, turning_law
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.errors import SettingError
+from cpfls_cli.inertia import six_parameters, symmetric
+from cpfls_cli.regressor.regressor import InertiaValues
+from tests.builders.christoffel import torque
 
+PARAMETERS = np.array([0.6, 0.7, 1.2, 0.02, -0.03, 0.01])
+INERTIA = symmetric(PARAMETERS)
 START = np.array([0.1, -0.15, 0.2])
 NOTHING = np.zeros(3)
 
@@ -83,7 +88,7 @@ def test_feedback_alone_lags_behind_a_steady_acceleration_by_its_size_over_the_s
     names = ("attitude", "attitude_rate", "attitude_acceleration")
     plan = plan_of(time, dict(zip(names, rolling, strict=True)), 100.0)
     diagonal = np.array([0.6, 0.7, 1.2])
-    loop = make_loop(plant=rigid_plant(np.diag(diagonal)))
+    loop = make_loop(plant=turning_law(six_parameters(diagonal)))
     tracked = track(plan, [Controller("pd", proportional_derivative(diagonal))], loop, NOTHING, NOTHING)
     error = scores(plan, tracked, 1.0).error[0]
     np.testing.assert_allclose(error[-1], [push / loop.gains.frequency[0] ** 2, 0, 0], rtol=2e-3, atol=1e-12)
@@ -118,12 +123,19 @@ def test_torques_of_the_log_push_like_those_that_are_held(make_plan, make_loop, 
     assert missing[0] / missing[1] > 2.5
 
 
+class Heavier:
+    """The body of the plan, a third too heavy, in Euler coordinates."""
+
+    def inertia(self, attitude):
+        tensor = 1.3 * INERTIA
+        return InertiaValues(inertia_matrix(attitude, tensor), inertia_matrix_gradient(attitude, tensor))
+
+
 def test_a_model_in_the_place_of_the_vehicle_turns_as_it_says(make_plan, make_loop, inertia):
     plan = make_plan(duration=1.0)
-    wrong = RigidBody(1.3 * inertia)
     ones = [
-        track(plan, [exact(inertia)], make_loop(plant=plant), START, NOTHING).attitude
-        for plant in (model_plant(wrong), rigid_plant(wrong.inertia), rigid_plant(inertia))
+        track(plan, [exact(inertia)], make_loop(plant=turning_law(each)), START, NOTHING).attitude
+        for each in (Heavier(), 1.3 * PARAMETERS, PARAMETERS)
     ]
     np.testing.assert_allclose(ones[0], ones[1], atol=1e-11)
     assert np.abs(ones[0] - ones[2]).max() > 1e-3
@@ -186,7 +198,7 @@ def test_a_lost_vehicle_is_told_and_the_others_go_on(make_plan, make_loop, inert
 
 
 def test_a_plant_without_inertia_is_lost_at_once(make_plan, make_loop, inertia):
-    nothing = model_plant(RigidBody(np.zeros((3, 3))))
+    nothing = turning_law(np.zeros(6))
     found = track(make_plan(duration=0.2), [exact(inertia)], make_loop(plant=nothing), START, NOTHING)
     assert np.isfinite(found.attitude[0, 0]).all()
     assert np.isnan(found.attitude[0, 1:]).all()
@@ -203,7 +215,7 @@ def test_a_vehicle_that_goes_over_the_vertical_is_lost(make_loop):
     """Euler angles beyond a vertical pitch belong to another branch, even if no angle is off by 90 degrees."""
     plan = steep(1.3)
     push = Controller("push", lambda *_: np.array([0.0, 3.0, 0.0]))
-    tracked = track(plan, [push], make_loop(plant=rigid_plant(np.eye(3))), NOTHING, NOTHING)
+    tracked = track(plan, [push], make_loop(plant=turning_law(six_parameters([1.0, 1.0, 1.0]))), NOTHING, NOTHING)
     found = scores(plan, tracked, 1.0)
     flown = tracked.attitude[0, np.isfinite(tracked.attitude[0]).all(axis=1)]
     assert np.cos(flown[:, 1]).min() > 0.02

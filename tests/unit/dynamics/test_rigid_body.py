@@ -1,6 +1,7 @@
 import numpy as np
 
-from cpfls_cli.dynamics.rigid_body import inertia_matrix, torque
+from cpfls_cli.dynamics.rigid_body import inertia_matrix
+from tests.builders.christoffel import torque
 
 MOMENTS = 0.6, 0.7, 1.2
 

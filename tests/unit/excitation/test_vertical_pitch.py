@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import inertia_matrix, newton_euler_torque, torque
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, newton_euler_torque
 from cpfls_cli.excitation.objective import regressor_of
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.trajectory.rotation import RotationPath
+from tests.builders.christoffel import torque
 
 INERTIA = np.array([[0.6, 0.02, -0.01], [0.02, 0.7, 0.03], [-0.01, 0.03, 1.2]])
 

@@ -8,20 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.equations_of_motion import identified_turning
+from cpfls_cli.dynamics.equations_of_motion import turning_law
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.points import reference_points, reference_run, term_sizes
 from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.playback.kernels import MeasuredMotion, errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.motion import State, accelerations, step
+from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.player import one_step
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.rotations import rotation_matrix
 from tests.builders.compiled_c import build, require_gcc, written
 from tests.builders.exported_models import CASES, model_of
 from tests.builders.exported_vehicles import FORMS, InC, flat, sheet_of_vehicle
-from tests.builders.vehicle_models import HEXA, QUAD, RESPONSE, polynomial_effects, remainder, whole
+from tests.builders.vehicle_models import HEXA, QUAD, RESPONSE, accelerations, polynomial_effects, remainder, whole
 
 MODELS = {
     "harmonic": whole(),
@@ -89,9 +89,9 @@ def test_accelerations_and_a_step_are_those_of_the_library(exports, name, form):
     state, rotor = states_of(samples), reference_points(model, np.random.default_rng(6), samples).rotor
     found, moved = exports(name, form).motion(state, rotor, PERIOD)
     sizes = sizes_of(model, state, rotor)
-    assert np.max(np.abs(found - np.hstack(accelerations(model, state, rotor))) / sizes) < ALLOWED
+    assert np.max(np.abs(found - accelerations(model, state, rotor)) / sizes) < ALLOWED
     size = np.max(np.abs(flat(state)), axis=1, keepdims=True) + PERIOD * sizes.max(axis=1, keepdims=True)
-    assert np.max(np.abs(moved - flat(step(model, state, rotor, PERIOD))) / size) < ALLOWED
+    assert np.max(np.abs(moved - flat(one_step(model, state, rotor, PERIOD))) / size) < ALLOWED
 
 
 def over_attitude(name):
@@ -118,11 +118,10 @@ def test_a_step_under_an_inertia_over_attitude_is_that_of_the_library(name, form
     assert np.max(np.abs(moved - wanted)) < ALLOWED * np.abs(wanted).max()
     assert np.max(np.abs(constant - wanted)) > 1e-5
     air = np.einsum("nji,nj->ni", state.rotation, velocity)
-    torque, turning = model.table.wrench(air, rate, rotor)[:, :3], identified_turning(model.fuzzy)
-    for row, own in enumerate(found[:, 3:]):
-        law = turning(attitude[row], rate[row])
-        left = law.inertia @ own + law.direct - torque[row]
-        assert np.abs(left).max() < ALLOWED * (np.abs(torque[row]).max() + np.abs(law.direct).max())
+    torque, turning = model.table.wrench(air, rate, rotor)[:, :3], turning_law(model.fuzzy)(attitude, rate)
+    for own, wanted, inertia, direct in zip(found[:, 3:], torque, *turning, strict=True):
+        left = inertia @ own + direct - wanted
+        assert np.abs(left).max() < ALLOWED * (np.abs(wanted).max() + np.abs(direct).max())
 
 
 @pytest.mark.parametrize("form", ["c", "python"])

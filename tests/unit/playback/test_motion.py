@@ -6,10 +6,11 @@ import pytest
 from cpfls_cli.effects import scales
 from cpfls_cli.playback.kernels import MeasuredMotion, errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.motion import State, accelerations, step
+from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.player import one_step
 from cpfls_cli.rotations import rotation_matrix
 from cpfls_cli.vehicle.rotors import rotor_demand
-from tests.builders.vehicle_models import HEXA, QUAD, whole
+from tests.builders.vehicle_models import HEXA, QUAD, accelerations, whole
 
 MODELS = {"quad": whole(), "hexa, seesaw": whole(HEXA, order=0), "plain": VehicleModel(vehicle=QUAD)}
 PERIOD = 0.01
@@ -36,7 +37,7 @@ def test_a_step_is_that_of_the_compiled_loops(model):
     rotor = model.response.terms_by_step(speeds(model, 12), PERIOD, "linear")
     path = [State(*(part[:1] for part in states(1)))]
     for row in rotor[:-1]:
-        path.append(step(model, path[-1], row[None], PERIOD))
+        path.append(one_step(model, path[-1], row[None], PERIOD))
     motion = MeasuredMotion(*(np.concatenate(parts) for parts in zip(*path, strict=True)), PERIOD)
     used, weights = model.table.by_step(rotor)
     errors = np.zeros((1, len(path) - 1, 4, 3))
@@ -47,8 +48,8 @@ def test_a_step_is_that_of_the_compiled_loops(model):
 
 def test_a_short_step_is_the_acceleration(model):
     state, rotor = states(5), model.response.terms_by_step(speeds(model, 5), PERIOD, "previous")
-    linear, angular = accelerations(model, state, rotor)
-    moved = step(model, state, rotor, 1e-6)
+    linear, angular = np.split(accelerations(model, state, rotor), 2, axis=1)
+    moved = one_step(model, state, rotor, 1e-6)
     np.testing.assert_allclose((moved.velocity - state.velocity) / 1e-6, linear, rtol=0, atol=1e-4 * abs(linear).max())
     np.testing.assert_allclose((moved.rate - state.rate) / 1e-6, angular, rtol=0, atol=1e-4 * abs(angular).max())
 
@@ -57,6 +58,6 @@ def test_a_vehicle_at_hover_stays(model):
     plain = VehicleModel(vehicle=model.vehicle)
     speed = rotor_demand(model.vehicle, np.array([model.vehicle.mass_kg * 9.81]), np.zeros((1, 3))).speed
     still = State(np.zeros((1, 3)), np.zeros((1, 3)), np.eye(3)[None], np.zeros((1, 3)))
-    moved = step(plain, still, plain.response.terms_by_step(speed, PERIOD, "previous"), PERIOD)
+    moved = one_step(plain, still, plain.response.terms_by_step(speed, PERIOD, "previous"), PERIOD)
     for now, before in zip(moved, still, strict=True):
         np.testing.assert_allclose(now, before, rtol=0, atol=1e-12)

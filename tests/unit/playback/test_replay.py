@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from cpfls_cli.dynamics.equations_of_motion import identified_turning
+from cpfls_cli.dynamics.equations_of_motion import turning_law
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.kernels import MeasuredMotion
@@ -133,12 +133,12 @@ def test_a_tensor_in_euler_coordinates_plays_like_the_rigid_body(known):
 
 
 def test_an_inertia_that_depends_on_the_attitude_is_integrated_to_second_order():
-    turning = identified_turning(Bent())
+    turning = turning_law(Bent())
 
     def of_bent(rotation, air, rate, speed):
         torque, force = wrench_with_effects(air, rate, speed)
-        law = turning(euler_angles(rotation[None])[0], rate)
-        return rotation @ force / 6.0 - [0, 0, 9.81], np.linalg.solve(law.inertia, torque - law.direct)
+        (turned,) = turning(euler_angles(rotation[None]), rate[None]).acceleration(torque[None])
+        return rotation @ force / 6.0 - [0, 0, 9.81], turned
 
     flight, model = flight_of(), VehicleModel(vehicle=VEHICLE, effects=EFFECTS, fuzzy=Bent())
     coarse = off(flight, 0, 40, model, of_bent)

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpfls_cli.report.canvas import kept_samples, legend_above, legend_over, line, plot, runs, stacked
+from cpfls_cli.arrays import runs
+from cpfls_cli.report.canvas import kept_samples, legend_above, legend_over, line, plot, stacked
 
 
 def draw(figure):
@@ -90,7 +91,7 @@ def test_a_lone_spike_survives():
 
 @given(st.lists(st.booleans(), max_size=60))
 def test_runs_cover_exactly_what_is_marked(marked):
-    covered = [index for first, last in runs(np.array(marked)) for index in range(first, last + 1)]
+    covered = [index for first, after in runs(np.array(marked, dtype=bool)) for index in range(first, after)]
     assert covered == [index for index, value in enumerate(marked) if value]
 
 
