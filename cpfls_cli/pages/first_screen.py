@@ -56,6 +56,7 @@ _USE = "take the model with it, extended.h5"
 _GUSTS = (
     "nothing on the model: what is left is gusts or noise; to see smaller effects, fly in still air or fly more runs"
 )
+_FORECAST = "it forecasts worse than no model in all that is played back; `cpfls vehicle` looks for one that forecasts"
 _PLAN = "`cpfls trajectory CONFIG --for diagnosis.h5 -o path.h5` plans such a flight"
 _NEXT: dict[str, str] = {
     GapVerdict.NAMED: _USE,
@@ -304,12 +305,15 @@ def next_steps(record: DiagnosisRecord) -> list[str]:
     farther = [] if record.playback is None else _farther_off(record.playback)
     if usual and _USE in usual and farther:
         usual = f"leave the model as it is: with what is named, held-out flights play back worse in {joined(farther)}"
+    ends = () if record.playback is None else record.playback.at_end.values()
+    # A named effect is a fact about the vehicle; whether all of the model forecasts is another question.
+    lost = [_FORECAST] if usual and _USE in usual and ends and all(end.worse for end in ends) else []
     first = [f"to tell {flight}" for flight in _telling_flights(record)]
     # A rival that was not tried wants a signal, and two that do what one does another log; else a flight is planned.
     rivals = record.alternative.rows()
     plan = [_PLAN] if any(np.isfinite(rival.relative_gain) and not rival.beside for rival in rivals) else []
     told = [*first, *plan] if record.verdict == GapVerdict.AMBIGUOUS else []
-    return [sentence(step) for step in (*told, usual) if step]
+    return [sentence(step) for step in (*told, usual, *lost) if step]
 
 
 def _telling_flights(record: DiagnosisRecord) -> Iterator[str]:

@@ -125,6 +125,13 @@ def test_a_model_that_plays_back_worse_is_not_to_be_taken(verdict):
     assert "ake the model with it" in next_steps(diagnosis(verdict, **alike))[-1]
 
 
+def test_names_that_make_no_forecast_come_with_what_does():
+    losing = made.played_pair(body_rate=(0.4, 0.3, 0.3, 0.6), attitude=(0.5, 0.3, 0.3, 0.7))
+    assert "`cpfls vehicle` looks for one that forecasts" in next_steps(diagnosis("PARTIAL", **losing))[-1]
+    winning = made.played_pair(body_rate=(0.2, 0.3, 0.3, 0.6), attitude=(0.5, 0.3, 0.3, 0.7))
+    assert "cpfls vehicle" not in " ".join(next_steps(diagnosis("PARTIAL", **winning)))
+
+
 def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_tells():
     sure, below = (screen(diagnosis("PARTIAL", alternatives=RIVALS))[place] for place in (1, 4))
     assert sure["How sure"] == (
