@@ -13,7 +13,8 @@ from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.diagnose import considered
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
-from cpfls_cli.gap.naming.scoring import candidates_of, normal_equations, score, scoring_matrix
+from cpfls_cli.gap.naming.scoring import candidates_of, score, scoring_matrix
+from cpfls_cli.weak_form.resampling import folds
 from cpfls_cli.weak_form.windows import common_windows
 
 
@@ -79,7 +80,7 @@ def _gains(flights, chosen, effects, settings):
     names = {candidate.effect.name for candidate in chosen}
     tried = [c for c in candidates_of([e for e in effects if e.name not in names]) if hypothesis.can(c)]
     arranged = scoring_matrix(hypothesis, tried, floor)
-    normal = normal_equations(arranged, hypothesis.residual, floor, block_index(hypothesis, settings))
+    normal = folds(arranged.matrix, hypothesis.residual / floor, block_index(hypothesis, settings), arranged.prior)
     scored, _ = score(arranged, normal.beside(arranged.base), hypothesis)
     # The score is asked only which columns the bounds leave.
     admitted = [each for each in scored if np.isfinite(each.gain)]

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
 from cpfls_cli.changes.judge import changed
 from cpfls_cli.changes.numbers import flight_numbers
 from cpfls_cli.consistency.audit import Audit, audit
@@ -32,11 +30,10 @@ from cpfls_cli.gap.naming.causes import (
     shares,
     wrong_numbers,
 )
-from cpfls_cli.gap.naming.confirmed import Judge, Judgement, differences
-from cpfls_cli.gap.naming.earned import NamedFit, Refusal, earned, fitted
-from cpfls_cli.gap.naming.estimate import Estimates
+from cpfls_cli.gap.naming.confirmed import Judge, Judgement, Refusal, differences, earned
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted
 from cpfls_cli.gap.naming.held_out import HeldOut
-from cpfls_cli.gap.naming.leftover import Leftover, beside_the_unnamed, not_excited, untried
+from cpfls_cli.gap.naming.leftover import beside_the_unnamed, not_excited, untried
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
 from cpfls_cli.gap.naming.search import forward_selection
@@ -45,9 +42,6 @@ from cpfls_cli.gap.settings import CHANCE, NOISE, RARE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.windows import Recording, common_windows
-
-_FEWEST_COMPARED = 2
-"""Training flights that the held-out ones are compared with: of one nobody knows what it differs by from the next."""
 
 
 @dataclass(frozen=True)
@@ -122,30 +116,24 @@ def diagnose(
             told, quiet = int(gusts.told.sum()), np.minimum(quiet, gusts.noise(windows))
             flights = flights.in_air(gusts)
             named, gusts = _beside_gusts(_named(flights, settings, rng, progress), given, told, settings, rng)
-    weak, (effects, steps, judge, judgement, refusals, differ, alike) = flights.training, named
-    hypothesis, _, estimates = judgement.found
+    weak, (hypothesis, _, estimates), held_out = flights.training, *named.judgement
     progress(0.75, "rivals")
-    effect_shares = shares(weak, hypothesis.chosen, estimates, judge.floor)
-    estimates, unnamed = beside_the_unnamed(judgement.found, steps[-1], effects, settings, rng)
+    effect_shares = shares(weak, hypothesis.chosen, estimates, named.judge.floor)
+    estimates, unnamed = beside_the_unnamed(named.judgement.found, named.steps[-1], named.effects, settings, rng)
     judged = [
-        judge_effect(weak, hypothesis.chosen, index, estimates, float(effect_shares[index]), effects, settings, rng)
-        for index in range(len(hypothesis.chosen))
+        judge_effect(weak, hypothesis.chosen, index, estimates, float(share), named.effects, settings, rng)
+        for index, share in enumerate(effect_shares)
     ]
     progress(0.9, "sensor faults")
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
-    torque_alone = _torque_alone(weak, settings, effects)
-    notes = [] if differ else [*_doubts(unnamed, judged, settings), *(refused.sentence for refused in refusals)]
-    notes = [*not_judged(judgement.held_out), *notes]
-    remainder = judge.remainder(judgement.found)
-    excited = _excited(hypothesis, quiet)
-    concluded = partial(_concluded, judged, faults, judgement, remainder)
-    further = (notes, steps, excited, settings, torque_alone, audited, alike)
-    diagnosis = concluded(differ, *further)
-    # A gap that is left may be that of another vehicle.
-    left = diagnosis.verdict in (GapVerdict.UNEXPLAINED, GapVerdict.PARTIAL)
-    if left and (between := _changed_between(training, held)):
-        diagnosis = concluded(between, *further)
-    return DiagnosisRun(diagnosis, gusts, audited, hypothesis, estimates, judgement.held_out)
+    torque_alone = _torque_alone(weak, settings, named.effects)
+    doubts = [*_doubts(unnamed, judged, settings), *(refused.sentence for refused in named.refusals)]
+    notes = [*not_judged(held_out), *([] if named.differ else doubts)]
+    inertial = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
+    # Above the floor of the sensors alone.
+    excited = bool((inertial[:, :3].std(axis=0) > TURNING * quiet[:3]).any())
+    diagnosis = _concluded(named, judged, faults, excited, torque_alone, audited, notes, (training, held), settings)
+    return DiagnosisRun(diagnosis, gusts, audited, hypothesis, estimates, held_out)
 
 
 def _changed_between(training: Sequence[Recording], held: Sequence[Recording]) -> tuple[str, ...]:
@@ -153,7 +141,8 @@ def _changed_between(training: Sequence[Recording], held: Sequence[Recording]) -
 
     What no effect explains may be the same in all of them; what they differ by is not.
     """
-    if len(training) < _FEWEST_COMPARED:
+    if len(training) < 2:
+        # Of one flight nobody knows what it differs by from the next.
         return ()
     try:
         before, today = ([flight_numbers(recording) for recording in flights] for flights in (training, held))
@@ -278,12 +267,6 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings, *,
     return named._replace(judgement=judge.judge(found), refusals=refusals, alike=alike)
 
 
-def _excited(hypothesis: System, floor: Array) -> bool:
-    """Tell whether anything moved enough to show a gap, above the floor of the sensors alone."""
-    inertial = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
-    return bool((inertial[:, :3].std(axis=0) > TURNING * floor[:3]).any())
-
-
 def _doubts(unnamed: Sequence[str], judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[str]:
     """Say what intervals leave room for, and which effects chance could stand for once the others did what they can."""
     if unnamed:
@@ -346,27 +329,27 @@ def _torque_alone(
 
 
 def _concluded(
+    found: _Named,
     judged: Sequence[JudgedEffect],
     faults: Sequence[NamedEffect],
-    judgement: Judgement,
-    remainder: Leftover,
-    differ: tuple[str, ...],
-    notes: Sequence[str],
-    steps: Sequence[RankedStep],
     excited: bool,
-    settings: GapSettings,
     torque_alone: tuple[tuple[str, float], ...],
     audited: Audit,
-    alike: Sequence[Alternative],
+    notes: Sequence[str],
+    flown: tuple[Sequence[Recording], Sequence[Recording]],
+    settings: GapSettings,
 ) -> Diagnosis:
-    (hypothesis, _, estimates), held_out = judgement
+    (hypothesis, _, estimates), held_out = found.judgement
+    remainder = found.judge.remainder(found.judgement.found)
     named = ascending((each.effect for each in judged), lambda effect: -effect.share)
     effects = [*faults, *named]
-    floor = steps[-1].floor
+    floor, differ = found.steps[-1].floor, found.differ
     # In gusts instruments tell the numbers, and a gap need not stand out.
     still = not any(flight.air.any() for flight in hypothesis.flights)
     taken = held_out.removed_by_numbers(NOISE if still else 0.0)
-    numbers = wrong_numbers(estimates, effects, taken, _pull(hypothesis, floor))
+    # Noise in the motion bounds what each number of the vehicle may be off by.
+    information = ((hypothesis.columns(hypothesis.free[0]) / floor[:, None]) ** 2).mean(axis=0).max(axis=0)
+    numbers = wrong_numbers(estimates, effects, taken, 1.0 / np.maximum(information, 1e-12))
     effects += [numbers] if numbers is not None else []
     removed = held_out.shares()
     if not named:
@@ -375,7 +358,7 @@ def _concluded(
         by_numbers = numbers is not None and still and min(removed.values()) < settings.partial_share
         removed = removed if effects and (remainder.unexplained or by_numbers) else {}
     share = min(removed.values(), default=1.0)
-    told = [*alike, *(rival for each in judged for rival in each.alternatives)]
+    told = [*found.alike, *(rival for each in judged for rival in each.alternatives)]
     once = {(rival.name, rival.instead_of, rival.beside): rival for rival in told}
     rivals = (*once.values(), *untried(hypothesis, named, settings))
     gap = held_out.size(held_out.before).floors
@@ -387,6 +370,9 @@ def _concluded(
     verdict = verdict_of(effects, rivals, known, tuple(removed.values()) or (1.0,), stays, excited, settings)
     # A fit that asks for numbers that no vehicle has says that the log is wrong, not the vehicle.
     wrong = (*audited.contradictions, *contradictions(impossible(impossible_ratios(estimates.parameters))))
+    if not (wrong or differ) and verdict in (GapVerdict.UNEXPLAINED, GapVerdict.PARTIAL):
+        # A gap that is left may be that of another vehicle.
+        differ = _changed_between(*flown)
     if wrong:
         verdict = GapVerdict.CONTRADICTED
     elif differ:
@@ -416,10 +402,3 @@ def _concluded(
 def _late(judged: Sequence[JudgedEffect]) -> bool:
     """Tell whether anything makes the rotors late: in gusts its fits see the loop, and do not compare."""
     return any(CATALOGUE[each.effect.name].late for each in judged)
-
-
-def _pull(hypothesis: System, floor: Array) -> Array:
-    """Bound the bias of each number of the vehicle that noise in the motion causes."""
-    columns = hypothesis.columns(hypothesis.free[0]) / floor[:, None]
-    information = (columns**2).mean(axis=0).max(axis=0)
-    return np.asarray(1.0 / np.maximum(information, 1e-12))

@@ -14,7 +14,7 @@ from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.gap.balance.balance_system import System, is_free, relative_scatter, system
+from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import (
     CHANNELS,
@@ -24,10 +24,9 @@ from cpfls_cli.gap.balance.weak_flight import (
     nuisance,
 )
 from cpfls_cli.gap.naming.by_instruments import by_instruments
-from cpfls_cli.gap.naming.earned import NamedFit
-from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, weighted_estimates
+from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, fitted
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out
-from cpfls_cli.gap.naming.ranking import best_floor, block_index
+from cpfls_cli.gap.naming.ranking import best_floor
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.residual.air import in_air, known_motion
 from cpfls_cli.gap.settings import VISIBLE, GapSettings
@@ -168,13 +167,11 @@ def extend(
     chosen = [effect.candidate for effect in effects if effect.candidate is not None]
     start = refined(flights, chosen, best_floor(system(flights, chosen)))
     floor = best_floor(start)
-    block = block_index(start, settings)
-    hypothesis, estimates = weighted_estimates(start, floor, block)
+    found = fitted(flights, start.chosen, floor, settings)
     if gusty_floor is not None:
-        found = NamedFit(hypothesis, block, estimates)
-        hypothesis, _, estimates = by_instruments(found, known_motion(training), floor, settings)
-    scatter = relative_scatter(hypothesis, estimates.linear, floor)
-    unseen = held_out(logged, repaired, hypothesis, estimates.linear, scatter)
+        found = by_instruments(found, known_motion(training), floor, settings)
+    hypothesis, _, estimates = found
+    unseen = held_out(logged, repaired, hypothesis, estimates.linear, floor)
     _require_smaller(unseen)
     model = ExtendedModel.of(base, hypothesis, estimates, audit)
     return Refit(model, tuple(_renewed(effects, hypothesis, estimates)), estimates, unseen)

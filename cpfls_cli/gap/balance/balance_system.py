@@ -184,7 +184,10 @@ def floors(hypothesis: System, coefficients: Array) -> Array:
         square += len(flight) * flight.known * floor**2
         count += len(flight) * flight.known
     noise = np.sqrt(square / np.maximum(count, 1))
-    return np.where(count > 0, np.maximum(noise, NEGLIGIBLE * _activity(hypothesis)), 1.0)
+    inertial = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
+    torque, weight = np.sqrt(np.mean(inertial[:, :3] ** 2, axis=0)), np.sqrt(np.mean(inertial[:, 3:] ** 2))
+    moves = np.array([*np.maximum(torque, _QUIET_AXIS * torque.max()), *[weight] * 3])
+    return np.where(count > 0, np.maximum(noise, NEGLIGIBLE * moves), 1.0)
 
 
 def left_over(hypothesis: System, number: int, coefficients: Array) -> Columns:
@@ -214,14 +217,6 @@ def left_over(hypothesis: System, number: int, coefficients: Array) -> Columns:
     return Columns(direct * flight.known, momentum * flight.known)
 
 
-def _activity(hypothesis: System) -> Array:
-    """Compute the root mean square of the inertial torque and force of each channel about its mean."""
-    rows = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
-    torque = np.sqrt(np.mean(rows[:, :3] ** 2, axis=0))
-    weight = np.sqrt(np.mean(rows[:, 3:] ** 2))
-    return np.array([*np.maximum(torque, _QUIET_AXIS * torque.max()), *[weight] * 3])
-
-
 def scatter_variance(hypothesis: System) -> Array:
     """Average over windows the variance of the random part of the chosen effects, for a unit of relative scatter.
 
@@ -241,25 +236,8 @@ def scatter_variance(hypothesis: System) -> Array:
     return hypothesis.by_flight(of_flight)
 
 
-def relative_scatter(hypothesis: System, linear: Array, floor: Array) -> float:
-    """Estimate the relative scatter of the chosen effects from what a fit leaves.
-
-    Parameters
-    ----------
-    linear : array, shape (column,)
-        Coefficients of its base.
-    floor : array, shape (6,)
-
-    Returns
-    -------
-    float
-        Its mean square over a window.
-    """
-    return scatter_size(scatter_variance(hypothesis), hypothesis.left(linear), floor)
-
-
 def scatter_size(variance: Array, residual: Array, floor: Array) -> float:
-    """Estimate the relative scatter, one number for all channels, by its likelihood in the residual.
+    """Estimate the relative scatter of effects, one number for all channels, by its likelihood in what a fit leaves.
 
     Parameters
     ----------

@@ -29,8 +29,6 @@ CORRELATIONS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95)
 _CLEARLY_BETTER = 1.5
 # Frequencies for each that a window resolves, so that a sum over them is an integral.
 _PADDED = 8
-# Of the power of noise, over its mean: the median does not see lines.
-_MEDIAN_OF_EXPONENTIAL = float(np.log(2))
 
 
 def noise_floor(residual: Columns, windows: Windows, cut_off: Array | None = None) -> Array:
@@ -96,9 +94,16 @@ def _below(residual: Columns, windows: Windows, cut_off: float) -> Array:
     longer = make_windows(windows.period, wanted, 0.5) if fits else windows
     lowest = _LOWEST_PER_WINDOW / (len(longer.weight) * longer.period)
     frequencies = np.linspace(lowest, max(highest, _BAND * lowest), _FREQUENCIES)
-    power = np.array([_power(residual, longer, frequency) for frequency in frequencies]) / _energy(longer)
+    power = np.empty((len(frequencies), 6))
+    for number, frequency in enumerate(frequencies):
+        through = modulated(longer, frequency)
+        rows = through.average(residual.direct)
+        if residual.momentum is not None:
+            rows = rows + through.derivative(residual.momentum)
+        # The median, which does not see lines; that of the power of noise is ln 2 of its mean.
+        power[number] = np.median(np.abs(rows) ** 2, axis=0) / np.log(2) / (longer.weight**2).sum()
     terms = np.array([_terms(longer.weight.tobytes(), longer.period, frequency) for frequency in frequencies])
-    window_terms = _terms(windows.weight.tobytes(), windows.period, 0.0) * _energy(windows)
+    window_terms = _terms(windows.weight.tobytes(), windows.period, 0.0) * (windows.weight**2).sum()
     return np.array([_extrapolated(terms, channel, window_terms) for channel in power.T])
 
 
@@ -115,10 +120,6 @@ def _terms(weights: bytes, period: float, centre: float) -> Array:
     colours = [1 / (1 + rho**2 - 2 * rho * np.cos(phase)) for rho in CORRELATIONS]
     spectra = np.array([spectrum for colour in colours for spectrum in (colour, rising * colour)])
     return np.asarray(spectra @ share / share.sum())
-
-
-def _energy(windows: Windows) -> float:
-    return float((windows.weight**2).sum())
 
 
 def _extrapolated(terms: Array, power: Array, window_terms: Array) -> float:
@@ -154,14 +155,6 @@ def _best_pair(relative: Array) -> int:
 
 def _left(fitted: Array) -> Array:
     return np.asarray(np.sum((1 - fitted) ** 2, axis=0))
-
-
-def _power(residual: Columns, windows: Windows, frequency: float) -> Array:
-    through = modulated(windows, frequency)
-    rows = through.average(residual.direct)
-    if residual.momentum is not None:
-        rows = rows + through.derivative(residual.momentum)
-    return np.asarray(np.median(np.abs(rows) ** 2, axis=0) / _MEDIAN_OF_EXPONENTIAL)
 
 
 def modulated(windows: Windows, frequency: float) -> Windows:

@@ -12,7 +12,7 @@ from scipy.optimize import lsq_linear, minimize_scalar
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.catalogue.parameter_error import Change, physical, too_light
-from cpfls_cli.effects.effect import Effect, Shape
+from cpfls_cli.effects.effect import Shape
 from cpfls_cli.gap.balance.balance_system import System, has_force, is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.settings import VISIBLE
@@ -311,18 +311,15 @@ def _exact(hypothesis: System, weight: Array) -> System:
     """Exchange effects for what takes their place once they are chosen."""
     linear, chosen = fit(hypothesis, weight), {each.effect.name: each for each in hypothesis.chosen}
     for candidate, place in hypothesis.places:
-        if candidate.effect.exact is not None:
-            chosen[candidate.effect.name] = _in_place_of(candidate.effect, candidate.effect.exact, linear[place])
+        effect, exact = candidate.effect, candidate.effect.exact
+        if exact is not None:
+            # Shapes start at what the linear coefficients say.
+            numbers = linear[place] if effect.physical is None else np.nan_to_num(effect.physical.of(linear[place]))
+            values = {known.name: float(value) for known, value in zip(effect.coefficients, numbers, strict=True)}
+            shapes = {s.name: float(np.clip(values[s.name], s.grid[0], s.grid[-1])) for s in exact.shapes}
+            chosen[effect.name] = Candidate(exact, shapes)
     listed = tuple(chosen.values())
     return hypothesis if listed == hypothesis.chosen else system(hypothesis.flights, listed)
-
-
-def _in_place_of(effect: Effect, exact: Effect, linear: Array) -> Candidate:
-    """Start the shapes at what the linear coefficients say."""
-    physical = linear if effect.physical is None else np.nan_to_num(effect.physical.of(linear))
-    values = {known.name: float(value) for known, value in zip(effect.coefficients, physical, strict=True)}
-    shapes = {s.name: float(np.clip(values[s.name], s.grid[0], s.grid[-1])) for s in exact.shapes}
-    return Candidate(exact, shapes)
 
 
 def _squares(hypothesis: System, weight: Array, rotor_wrench: Array) -> float:

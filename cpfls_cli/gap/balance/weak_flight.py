@@ -177,38 +177,26 @@ def weak_flight(
     floor : array, shape (6,), N m and N, or None
         Noise of a flight that is planned; None: as its residual shows it.
     """
+    with_force = force and signals.has_force
 
     def make() -> WeakFlight:
-        return _weak_flight(name, signals, windows, model, force and signals.has_force, axes, floor)
+        nothing = np.zeros((len(signals), 3))
+        sides = rotation_balance(signals, model), translation_balance(signals) if with_force else Columns(nothing)
+        momenta = [nothing if side.momentum is None else side.momentum for side in sides]
+        inertial = Columns(np.concatenate([side.direct for side in sides], axis=1), np.concatenate(momenta, axis=1))
+        known = np.array([signals.torque is not None and axis in axes for axis in "xyz"] + [with_force] * 3)
+        everything = np.ones(len(nuisance().effect.coefficients))
+        cut_off = channel_cut_offs(signals, model is not None)
+        flight = WeakFlight(name, signals, windows, inertial, known, everything, cut_off)
+        noise = noise_floor(flight.residual(signals), windows, cut_off) if floor is None else floor
+        # Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to lose the noise
+        # of the gyroscope, which is not what anybody asked.
+        turning = flight.averaged(inertial)[:, :3].std(axis=0) > TURNING * noise[:3]
+        return replace(flight, turns=shown(turning))
 
     # Each stage rebuilds its model, and a flight is planned once.
     shared = model is None and floor is None
     return signals.once((weak_flight, name, windows, force, tuple(axes)), make) if shared else make()
-
-
-def _weak_flight(
-    name: str,
-    signals: Signals,
-    windows: Windows,
-    model: InertiaModel | None,
-    with_force: bool,
-    axes: Sequence[str],
-    floor: Array | None,
-) -> WeakFlight:
-    nothing = np.zeros((len(signals), 3))
-    sides = rotation_balance(signals, model), translation_balance(signals) if with_force else Columns(nothing)
-    momenta = [nothing if side.momentum is None else side.momentum for side in sides]
-    inertial = Columns(np.concatenate([side.direct for side in sides], axis=1), np.concatenate(momenta, axis=1))
-    known = np.array([signals.torque is not None and axis in axes for axis in "xyz"] + [with_force] * 3)
-    everything = np.ones(len(nuisance().effect.coefficients))
-    cut_off = channel_cut_offs(signals, model is not None)
-    flight = WeakFlight(name, signals, windows, inertial, known, everything, cut_off)
-    if floor is None:
-        floor = noise_floor(flight.residual(signals), windows, cut_off)
-    # Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to lose the noise
-    # of the gyroscope, which is not what anybody asked.
-    turning = flight.averaged(inertial)[:, :3].std(axis=0) > TURNING * floor[:3]
-    return replace(flight, turns=shown(turning))
 
 
 def dense(windows: Windows) -> Windows:

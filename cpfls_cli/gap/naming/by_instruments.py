@@ -14,8 +14,8 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.refine import fit_within_bounds, refined, shape_columns
 from cpfls_cli.gap.balance.weak_flight import PER_WINDOW, dense
-from cpfls_cli.gap.naming.earned import NamedFit, fitted, nothing_by_size
-from cpfls_cli.gap.naming.estimate import Estimates, estimates_of
+from cpfls_cli.gap.naming.confirmed import nothing_by_size
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of, fitted
 from cpfls_cli.gap.naming.ranking import more_left, rank_effects, surely
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import information

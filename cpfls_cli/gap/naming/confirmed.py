@@ -1,4 +1,4 @@
-"""Whether names stand on the flights that no fit has seen, and whether those flights say the same as the others."""
+"""Which names stand on the flights that they were found in, and on those that no fit has seen; and if both agree."""
 
 from __future__ import annotations
 
@@ -10,16 +10,131 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
-from cpfls_cli.gap.balance.balance_system import relative_scatter, system
+from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
-from cpfls_cli.gap.naming.earned import NamedFit, Refusal, fitted, on_bound
-from cpfls_cli.gap.naming.estimate import channel_weight, estimates
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
+from cpfls_cli.gap.naming.estimate import NamedFit, channel_weight, estimates, fitted, free_estimates, sized
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out, share_removed
 from cpfls_cli.gap.naming.leftover import Leftover, leftover
 from cpfls_cli.gap.naming.ranking import RankedStep, block_index
+from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import CLEAR, ERRORS, NOISE, OFF, VISIBLE, GapSettings
-from cpfls_cli.rounding import ascending, largest, levelled, smallest
+from cpfls_cli.rounding import ascending, largest, levelled, smallest, tied
+
+
+class Refusal(NamedTuple):
+    """An effect that is no name, and why, as the end of a sentence.
+
+    Attributes
+    ----------
+    in_the_way : bool
+        Whether others are to be looked for without it: on a bound it may stand for what another one is.
+    """
+
+    name: str
+    reason: str
+    in_the_way: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """The whole sentence."""
+        return f"{self.name} explains part of the gap, but is not named: {self.reason}"
+
+
+def earned(
+    flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, settings: GapSettings
+) -> tuple[NamedFit, list[Refusal]]:
+    """Fit chosen effects, and refit without those that have not earned a name on the flights that they were found in.
+
+    These are effects whose size does not differ from zero, which are not told, and effects that sit on a bound.
+    """
+    found, refusals = fitted(flights, chosen, floor, settings), []
+    while found.hypothesis.chosen:
+        nothing = nothing_by_size(found)
+        out = [candidate for candidate in found.hypothesis.chosen if candidate.effect.name in nothing]
+        if not out:
+            refused = on_bound(found, floor)
+            if refused is None:
+                break
+            out, refusal = refused
+            refusals.append(refusal)
+        kept = [candidate for candidate in found.hypothesis.chosen if candidate not in out]
+        found = fitted(flights, kept, floor, settings)
+    return found, refusals
+
+
+def nothing_by_size(found: NamedFit) -> list[str]:
+    """Name the effects whose size does not differ from zero."""
+    names = []
+    for (effect, _), numbers in zip(found.hypothesis.chosen, found.estimates.effects, strict=True):
+        without_size = effect.unit_coefficient and not effect.shapes
+        if not (without_size or any(number.low > 0 or number.high < 0 for number in sized(effect, numbers))):
+            names.append(effect.name)
+    return names
+
+
+def on_bound(found: NamedFit, floor: Array) -> tuple[list[Candidate], Refusal] | None:
+    """Find an effect whose main number sits on a bound, or any number that is surely asked for beyond one.
+
+    Zero is not such a bound: many coefficients cannot be less.
+
+    Parameters
+    ----------
+    floor : array, shape (6,)
+    """
+    chosen = found.hypothesis.chosen
+    for candidate, numbers in zip(chosen, found.estimates.effects, strict=True):
+        names = [shape.name for shape in candidate.effect.shapes]
+        ends = (
+            any(bound and number.low <= bound <= number.high for bound in number.plausible)
+            for number in numbers
+            if number.name in names
+        )
+        if len(names) > 1 and all(ends):
+            says = f"{' and '.join(names)} may all be at the bounds of what is possible"
+            return [candidate], Refusal(candidate.effect.name, says, True)
+    reached = {
+        index: own
+        for index, candidate in enumerate(chosen)
+        if (own := _reached(sized(candidate.effect, found.estimates.effects[index])))
+    }
+    if not reached:
+        return None
+    free = free_estimates(found.hypothesis, floor, found.block)
+    for index, bounds in reached.items():
+        name = chosen[index].effect.name
+        beyond = [number.name for number in free.effects[index] if number.name in bounds and number.impossible]
+        if beyond:
+            says = f"its {beyond[0]} would surely be beyond what is possible, {bounds[beyond[0]]}"
+            return [chosen[index]], Refusal(name, says, True)
+        sizes = sized(chosen[index].effect, found.estimates.effects[index])
+        main = [number.name for number in _main(found, index, sizes, floor) if number.name in bounds]
+        if main:
+            says = f"its {main[0]} sits on the bound of what is possible, {bounds[main[0]]}"
+            return [chosen[index]], Refusal(name, says, True)
+    return None
+
+
+def _reached(numbers: Sequence[Estimate]) -> dict[str, str]:
+    """Name the numbers that sit on a bound other than zero, and the bound."""
+    found = {}
+    for number in numbers:
+        for bound in number.plausible:
+            if bound and tied(np.array(number.value), np.array(bound)):
+                found[number.name] = f"{bound:.3g} {number.unit}"
+    return found
+
+
+def _main(found: NamedFit, index: int, numbers: Sequence[Estimate], floor: Array) -> Sequence[Estimate]:
+    """Keep the coefficient that explains most; all numbers where they are not coefficients of columns."""
+    candidate = found.hypothesis.chosen[index]
+    linear = found.estimates.of_effect[index]
+    names = [coefficient.name for coefficient in candidate.effect.coefficients]
+    if not names or candidate.effect.physical is not None or len(linear) != len(names):
+        return numbers
+    columns = found.hypothesis.columns(candidate) * linear / floor[:, None]
+    largest = names[int(np.argmax(levelled((columns**2).sum(axis=(0, 1)))))]
+    return [number for number in numbers if number.name == largest]
 
 
 class Judgement(NamedTuple):
@@ -50,9 +165,8 @@ class Judge:
 
     def judge(self, found: NamedFit) -> Judgement:
         """Evaluate effects on the held-out flights, beside the model with its own numbers refitted."""
-        hypothesis, _, estimates = found
-        scatter = relative_scatter(hypothesis, estimates.linear, self.floor)
-        return Judgement(found, held_out(self.logged, self.repaired, hypothesis, estimates.linear, scatter))
+        linear = found.estimates.linear
+        return Judgement(found, held_out(self.logged, self.repaired, found.hypothesis, linear, self.floor))
 
     def remainder(self, found: NamedFit) -> Leftover:
         """Analyse what effects leave of the flights that they were found in."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,9 +21,10 @@ from cpfls_cli.gap.balance.refine import (
     refitted,
     shape_columns,
 )
-from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.naming.results import Estimate
-from cpfls_cli.gap.settings import CLEAR
+from cpfls_cli.gap.settings import CLEAR, GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _KNOWN_TO = 0.005
@@ -55,6 +57,19 @@ class Estimates:
     def of_vehicle(self) -> Array:
         """The vehicle's own numbers in `linear`."""
         return self.linear[: len(self.linear) - sum(len(linear) for linear in self.of_effect)]
+
+
+class NamedFit(NamedTuple):
+    """Effects fitted together to flights.
+
+    Attributes
+    ----------
+    block : array of int, shape (window,)
+    """
+
+    hypothesis: System
+    block: IntArray
+    estimates: Estimates
 
 
 def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
@@ -124,25 +139,24 @@ def estimates_of(hypothesis: System, values: Array, left_out: Array) -> Estimate
     return Estimates(linear, tuple(by_effect), parameters, tuple(linear_by_effect))
 
 
-def weighted_estimates(hypothesis: System, floor: Array, block: IntArray) -> tuple[System, Estimates]:
-    """Fit with the floors as weights, then, shapes and all, with the larger of floor and residual.
+def fitted(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, settings: GapSettings) -> NamedFit:
+    """Fit effects together within their bounds, with the larger of floor and residual as weights.
 
     Parameters
     ----------
     floor : array, shape (6,)
-    block : array of int, shape (window,)
 
     Returns
     -------
-    hypothesis : System
+    NamedFit
         With the shapes that fit best beside one another, where they fit to the noise.
-    estimates : Estimates
     """
-    there = refitted(hypothesis, channel_weight(hypothesis, floor))
+    start = system(flights, chosen)
+    block, there = block_index(start, settings), refitted(start, channel_weight(start, floor))
     if (_left(there, floor)[1] > CLEAR).any():
         # Formulas that do not fit to the noise would move to what is left: they stay where the search found them.
-        there = hypothesis
-    return there, estimates(there, channel_weight(there, floor), block)
+        there = start
+    return NamedFit(there, block, estimates(there, channel_weight(there, floor), block))
 
 
 def free_estimates(hypothesis: System, floor: Array, block: IntArray) -> Estimates:
@@ -174,19 +188,6 @@ def _left(hypothesis: System, floor: Array) -> tuple[Array, Array]:
     if (noise > floor).any():
         residual = hypothesis.left(fit(hypothesis, noise))
     return noise, np.sqrt(np.mean((residual / noise) ** 2, axis=0))
-
-
-def differs_from_zero(effect: Effect, numbers: Sequence[Estimate]) -> bool:
-    """Tell whether any number that sets the size of an effect differs significantly from zero.
-
-    Parameters
-    ----------
-    numbers : sequence of Estimate
-        Physical coefficients, then shapes.
-    """
-    if effect.unit_coefficient and not effect.shapes:
-        return True
-    return any(number.low > 0 or number.high < 0 for number in sized(effect, numbers))
 
 
 def sized(effect: Effect, numbers: Sequence[Estimate]) -> list[Estimate]:

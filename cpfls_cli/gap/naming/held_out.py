@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.balance.balance_system import System, channel_size, floors, scatter_variance, system
+from cpfls_cli.gap.balance.balance_system import System, channel_size, floors, scatter_size, scatter_variance, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.naming.results import GapSize
@@ -134,7 +134,7 @@ def held_out(
     repaired: Sequence[WeakFlight],
     fitted: System,
     linear: Array,
-    scatter: float,
+    floor: Array,
 ) -> HeldOut:
     """Apply a fitted hypothesis to held-out flights, and the model with its own numbers refitted beside it.
 
@@ -145,8 +145,8 @@ def held_out(
     fitted : System
         Of the training flights.
     linear : array, shape (column,)
-    scatter : float
-        Mean square of the relative scatter of the effects, from the training flights.
+    floor : array, shape (6,)
+        Of the training flights, above which the effects scatter there.
 
     Raises
     ------
@@ -156,21 +156,21 @@ def held_out(
     raw, plain, full = system(logged), system(repaired), system(repaired, fitted.chosen)
     if not all(full.can(candidate) for candidate in (*full.free, *full.chosen)):
         raise InputError("the held-out flights lack a signal that a named effect needs; hold out others")
-    beyond = {each.effect.name: _beyond(full.columns(each), fitted.columns(each)) for each in full.chosen}
+    # What needs a coefficient whose column is zero in all that was learned from.
+    beyond = {
+        each.effect.name: (full.columns(each)[..., ~fitted.columns(each).any(axis=(0, 1))] != 0).any(axis=2)
+        for each in full.chosen
+    }
     known = np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in repaired])
     known &= ~np.any(list(beyond.values()) or np.zeros((1, *known.shape), dtype=bool), axis=0)
-    floor, own = floors(full, linear), system(fitted.flights)
+    here, own = floors(full, linear), system(fitted.flights)
+    scatter = scatter_size(scatter_variance(fitted), fitted.left(linear), floor)
     return HeldOut(
         raw.residual,
         plain.left(fit(own, channel_size(own.residual))),
         full.left(linear),
-        floor,
+        here,
         known,
-        np.sqrt(floor**2 + scatter * scatter_variance(full)),
+        np.sqrt(here**2 + scatter * scatter_variance(full)),
         {name: share for name, there in beyond.items() if (share := float(there.any(axis=1).mean()))},
     )
-
-
-def _beyond(columns: Array, learned: Array) -> BoolArray:
-    """Mark what needs a coefficient whose column is zero in all that was learned from, shape (window, 6)."""
-    return np.asarray((columns[..., ~learned.any(axis=(0, 1))] != 0).any(axis=2))

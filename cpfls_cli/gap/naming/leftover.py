@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import half_width, mean_error
-from cpfls_cli.effects.effect import Effect
+from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import System, left_over, system, window_noise
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, dense
-from cpfls_cli.gap.naming.earned import NamedFit, bends_of, fitted
-from cpfls_cli.gap.naming.estimate import Estimates
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight, dense
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect, NotExcited, Unexplained
 from cpfls_cli.gap.naming.search import of_motion
@@ -191,6 +191,29 @@ def beside_the_unnamed(
     return replace(found.estimates, effects=held), tuple(each.effect.name for each in chosen[len(named) :])
 
 
+def bends_of(named: Sequence[Candidate], flights: Sequence[WeakFlight]) -> list[Effect]:
+    """Make an effect of the bend of each formula in the air velocity u: the formula times ``|u|^2 / (|u|^2 + U^2)``.
+
+    U is the root mean square of u over the flights. Bounded, because powers hang on the fastest seconds of a flight.
+    """
+    flown = [flight.signals for flight in flights if "velocity" in flight.signals.available]
+    squared = [(signals.air_velocity**2).sum(axis=1) for signals in flown]
+    usual = float(np.sqrt(np.mean(np.concatenate(squared)))) if squared else np.inf
+    effects = (each.effect for each in named)
+    of_speed = (each for each in effects if each.kind == "wrench" and "velocity" in each.needs)
+    return [_bend(effect, usual) for effect in of_speed if not (effect.shapes or effect.physical)]
+
+
+def _bend(effect: Effect, usual: float) -> Effect:
+    def columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+        assert effect.columns is not None
+        squared = (signals.air_velocity**2).sum(axis=1)
+        return Columns(effect.columns(signals, shape).direct * (squared / (squared + usual**2))[:, None, None])
+
+    either = tuple(replace(each, low=-each.high) for each in effect.coefficients)
+    return replace(effect, name=f"a bend of {effect.name} over speed", columns=columns, coefficients=either)
+
+
 def _beyond_chance(
     step: RankedStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
 ) -> list[Candidate]:
@@ -255,9 +278,14 @@ def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
         return ""
     shape = {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes}
     columns = hypothesis.columns(Candidate(effect, shape)) / floor[:, None]
-    new = _beyond_base(hypothesis.base / floor[:, None], columns) * usual_size(
-        effect, hypothesis.vehicle, columns.shape[2]
+    flat, tested = (
+        (hypothesis.base / floor[:, None]).reshape(-1, hypothesis.base.shape[2]),
+        columns.reshape(-1, columns.shape[2]),
     )
+    length = np.linalg.norm(flat, axis=0)
+    scaled = flat / np.where(length > 0, length, 1.0)
+    beyond = (tested - scaled @ np.linalg.lstsq(scaled, tested, rcond=ROUNDING)[0]).reshape(columns.shape)
+    new = beyond * usual_size(effect, hypothesis.vehicle, columns.shape[2])
     # The best channel of the best coefficient decides.
     if np.sqrt((new**2).mean(axis=0)).max(initial=0.0) >= VISIBLE:
         return ""
@@ -282,10 +310,3 @@ def usual_size(effect: Effect, vehicle: VehicleSettings, width: int) -> Array:
     if effect.physical is not None:
         return np.abs(effect.physical.linear(_USUAL_OF_BOUND * np.array(bounds)))
     return _USUAL_OF_BOUND * np.array(bounds)[:width]
-
-
-def _beyond_base(base: Array, columns: Array) -> Array:
-    flat, tested = base.reshape(-1, base.shape[2]), columns.reshape(-1, columns.shape[2])
-    length = np.linalg.norm(flat, axis=0)
-    scaled = flat / np.where(length > 0, length, 1.0)
-    return np.asarray((tested - scaled @ np.linalg.lstsq(scaled, tested, rcond=ROUNDING)[0]).reshape(columns.shape))

@@ -16,13 +16,12 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
 from cpfls_cli.gap.naming.scoring import (
     Scored,
     candidates_of,
-    normal_equations,
     score,
     scoring_matrix,
 )
 from cpfls_cli.gap.settings import CHANCE, COUNTS, NOISE, OFF, RARE, VISIBLE, GapSettings
 from cpfls_cli.rounding import tied
-from cpfls_cli.weak_form.resampling import blocks_of, mirror_shifted
+from cpfls_cli.weak_form.resampling import blocks_of, folds, mirror_shifted
 
 _DRAWS = 10_000
 """Of weights of blocks: a probability of a hundredth is known to a tenth of itself."""
@@ -106,7 +105,7 @@ def rank_effects(
         unexplained = hypothesis.left(fit(hypothesis, floor))
         shifted = mirror_shifted(unexplained, hypothesis.flight_index, settings.shifts, rng)
         right = np.concatenate([right, shifted], axis=2)
-    beside = normal_equations(arranged, right, floor, block).beside(arranged.base)
+    beside = folds(arranged.matrix, right / floor[:, None], block, arranged.prior).beside(arranged.base)
     scored, chance = score(arranged, beside, hypothesis)
     above_floor = float(max(beside.before[:, 0].sum() - rows(hypothesis), 1e-9))
     once: dict[str, Scored] = {}

@@ -17,7 +17,7 @@ from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.settings import ERRORS
 from cpfls_cli.rounding import ascending
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.resampling import Beside, Folds, folds
+from cpfls_cli.weak_form.resampling import Beside
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,10 @@ def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: A
         columns = hypothesis.columns(candidate)
         parts.append(columns)
         indices = np.arange(first, first + columns.shape[2])
-        placed.append(PlacedCandidate(candidate, indices, _weight(hypothesis, candidate)))
+        weight = np.ones(6)
+        if candidate.effect.kind == "actuator":
+            weight = compensation(hypothesis.rotor_wrench, hypothesis.rotor_wrench + columns[..., 0])
+        placed.append(PlacedCandidate(candidate, indices, weight))
         first += columns.shape[2]
     free = [information(each.effect, place.stop - place.start, hypothesis.vehicle) for each, place in hypothesis.places]
     shapes = np.array([1.0 / np.ptp(shape.grid) ** 2 for shape in hypothesis.shapes])
@@ -144,26 +147,6 @@ def score(arranged: ScoringMatrix, beside: Beside, hypothesis: System) -> tuple[
         chance = np.maximum(chance, (beside.before - error)[:, 1:].sum(axis=0))
         scored.append(_scored(placed, error[:, 0], beside, hypothesis.vehicle))
     return ascending(scored, lambda candidate: -candidate.gain), chance
-
-
-def normal_equations(arranged: ScoringMatrix, right: Array, floor: Array, block: IntArray) -> Folds:
-    """Build the normal equations of base and candidates.
-
-    Parameters
-    ----------
-    right : array, shape (window, 6) or (window, 6, draw), N m and N
-    floor : array, shape (6,)
-    block : array of int, shape (window,)
-    """
-    weighted = right / (floor if right.ndim == 2 else floor[:, None])
-    return folds(arranged.matrix, weighted, block, arranged.prior)
-
-
-def _weight(hypothesis: System, candidate: Candidate) -> Array:
-    if candidate.effect.kind != "actuator":
-        return np.ones(6)
-    rotor_wrench = hypothesis.rotor_wrench
-    return compensation(rotor_wrench, rotor_wrench + hypothesis.columns(candidate)[..., 0])
 
 
 def _error(placed: PlacedCandidate, columns: IntArray, beside: Beside) -> Array:

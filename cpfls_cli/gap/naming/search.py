@@ -25,9 +25,10 @@ from cpfls_cli.gap.naming.ranking import (
     rows,
 )
 from cpfls_cli.gap.naming.results import Alternative
-from cpfls_cli.gap.naming.scoring import Scored, normal_equations, scoring_matrix
+from cpfls_cli.gap.naming.scoring import Scored, scoring_matrix
 from cpfls_cli.gap.settings import OFF, RARE, GapSettings
 from cpfls_cli.rounding import ascending, less
+from cpfls_cli.weak_form.resampling import folds
 
 _BEAM = 3
 """Sets that are followed at once: a lag, a delay and a filter each do alone most of what two of them do."""
@@ -226,7 +227,7 @@ def _unseen(hypothesis: System, floor: Array, settings: GapSettings, *, moving: 
     """Compute what a hypothesis leaves of each block that a fit of coefficients, and of moving shapes, did not see."""
     weight = floor / compensation(system(hypothesis.flights).rotor_wrench, hypothesis.rotor_wrench)
     arranged = scoring_matrix(hypothesis, (), weight)
-    normal = normal_equations(arranged, hypothesis.residual, weight, block_index(hypothesis, settings))
+    normal = folds(arranged.matrix, hypothesis.residual / weight, block_index(hypothesis, settings), arranged.prior)
     return np.asarray(normal.solve(arranged.base if moving else np.arange(hypothesis.base.shape[2]))[1][:, 0])
 
 

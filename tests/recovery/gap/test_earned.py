@@ -12,8 +12,8 @@ from cpfls_cli.gap import diagnose
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit_within_bounds
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming.confirmed import Judge, differences
-from cpfls_cli.gap.naming.earned import earned, fitted
+from cpfls_cli.gap.naming.confirmed import Judge, differences, earned
+from cpfls_cli.gap.naming.estimate import fitted
 from cpfls_cli.gap.naming.ranking import best_floor, rank_effects
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import candidate, fly, weak

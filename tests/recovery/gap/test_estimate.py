@@ -9,8 +9,7 @@ from cpfls_cli.effects.effect import Columns, stack, thrust_wrench
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import equations, fit
-from cpfls_cli.gap.naming.earned import fitted
-from cpfls_cli.gap.naming.estimate import estimates
+from cpfls_cli.gap.naming.estimate import estimates, fitted
 from cpfls_cli.gap.naming.leftover import beside_the_unnamed
 from cpfls_cli.gap.naming.ranking import best_floor, block_index, rank_effects
 from cpfls_cli.gap.naming.search import forward_selection

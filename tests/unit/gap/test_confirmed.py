@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.gap.naming import confirmed
-from cpfls_cli.gap.naming.confirmed import Judge, Without
-from cpfls_cli.gap.naming.earned import Refusal
+from cpfls_cli.gap.naming.confirmed import Judge, Refusal, Without
 from cpfls_cli.gap.settings import GapSettings
 
 NOTHING = np.zeros(6)

@@ -52,7 +52,7 @@ def training(chosen, seeds=(1, 2), **given):
 def unseen(chosen, seed=3, gyro=0.005):
     flight = weak(fly(seed, [(candidate("com_offset"), [0.01, -0.008])], gyro=gyro, rotor=1.0))
     fitted = training(chosen, gyro=gyro, rotor=1.0)
-    return held_out([flight], [flight], fitted, fit(fitted, np.ones(6)), 0.0)
+    return held_out([flight], [flight], fitted, fit(fitted, np.ones(6)), np.ones(6))
 
 
 def test_an_effect_that_is_there_closes_the_gap_of_a_flight_not_seen():
@@ -83,7 +83,7 @@ def test_nothing_is_judged_where_no_flight_learned_from_went():
     ring = [candidate("vertical_descent", sideways=1.0)]
     fitted, slow, fast = system([weak(sinking(1, 4.0))], ring), weak(sinking(2, 4.0)), weak(sinking(2, 12.0))
     linear = fit(fitted, np.ones(6))
-    within, beyond = (held_out([one], [one], fitted, linear, 0.0) for one in (slow, fast))
+    within, beyond = (held_out([one], [one], fitted, linear, np.ones(6)) for one in (slow, fast))
     assert (within.unlearned, within.known[:, :3].all()) == ({}, True)
     signals = fast.signals
     sinks = np.interp(fast.windows.centres(signals.time), signals.time, signals.velocity[:, 2]) < -6
@@ -122,4 +122,4 @@ def test_flights_without_the_signals_of_an_effect_are_refused(chosen):
     blind = weak(replace(fly(2), velocity=None, position=None))
     fitted = system([weak(seen)], [chosen])
     with pytest.raises(InputError, match="lack a signal that a named effect needs"):
-        held_out([blind], [blind], fitted, np.zeros(fitted.base.shape[2]), 0.0)
+        held_out([blind], [blind], fitted, np.zeros(fitted.base.shape[2]), np.ones(6))
