@@ -6,6 +6,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 
+FEWEST_BLOCKS = 4
+"""That tell an error, if a wide one: Student's t of three is 4.3."""
+
 _CONFIDENCE = 0.975
 """Two-sided 95 %."""
 

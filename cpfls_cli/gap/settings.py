@@ -42,9 +42,6 @@ CHANCE = 0.05
 RARE = 0.01
 """The rate of errors that names are given at, gusts among them: of chance, and of a rival beside the chosen set."""
 
-FEWEST_BLOCKS = 4
-"""Blocks that tell an error, if a wide one."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class GapSettings(Settings):

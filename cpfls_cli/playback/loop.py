@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.blocks import contiguous, half_width, jackknife_error
+from cpfls_cli.blocks import FEWEST_BLOCKS, contiguous, half_width, jackknife_error
 from cpfls_cli.inertia import EXPLAINED
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
@@ -30,8 +30,6 @@ Together they span what an autopilot answers late and what it answers in time, w
 _OVERLAP = 0.75
 _BLOCK_S = 4.0
 """Longer than what rotors and rotation remember of each other."""
-_FEWEST_BLOCKS = 4
-"""Below which their scatter says nothing."""
 _ANY = 10.0
 """Factor either way from which on a body can be any."""
 _TINY = np.finfo(float).tiny
@@ -109,7 +107,7 @@ def bounds_between(stretches: Sequence[BalancedTorque]) -> LoopBounds:
     low, high, explained = np.full(3, np.nan), np.full(3, np.nan), np.full(3, np.nan)
     for band in _BANDS:
         sums = np.array([block for stretch in stretches for block in _sums(stretch, *band)])
-        if len(sums) < _FEWEST_BLOCKS:
+        if len(sums) < FEWEST_BLOCKS:
             continue
         total = sums.sum(axis=0)
         seen = (total[:, 3:] < _MOST_NOISE * total[:, [0, 2]]).all(axis=1)

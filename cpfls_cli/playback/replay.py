@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.blocks import contiguous, half_width, jackknife_error
+from cpfls_cli.blocks import FEWEST_BLOCKS, contiguous, half_width, jackknife_error
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.player import Player, Runs, free_runs, still_runs
 from cpfls_cli.playback.rotors import Hold
@@ -38,8 +38,8 @@ _BATCH = 100_000
 _FADING = (1e2, 1e-1, 2000)
 """Time constants that are tried: the longest in horizons, the shortest in samples, and how many."""
 
-_BLOCKS, _FEWEST_BLOCKS, _HORIZONS = 20, 4, 2
-"""Blocks of windows that chance is told from, at most and at least, and how many horizons each is long at least."""
+_BLOCKS, _HORIZONS = 20, 2
+"""Blocks of windows that chance is told from, at most, and how many horizons each is long at least."""
 
 
 @dataclass(frozen=True)
@@ -306,7 +306,7 @@ class _Sums:
         total, norm = int(self.count[row].sum()), self.norm[row]
         chance: Array | None = None
         seen = np.flatnonzero(self.count[row])
-        if len(seen) >= _FEWEST_BLOCKS:
+        if len(seen) >= FEWEST_BLOCKS:
             left_out = (norm.sum(axis=0) - norm[seen]) / (total - self.count[row, seen])[:, None, None]
             apart = left_out - left_out[:, [self.predictions.index(MODEL)]]
             chance = half_width(jackknife_error(apart), len(seen))

@@ -10,13 +10,11 @@ from scipy import fft
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.blocks import contiguous, half_width, mean_error
+from cpfls_cli.blocks import FEWEST_BLOCKS, contiguous, half_width, mean_error
 from cpfls_cli.dynamics.rigid_body import vertical
 from cpfls_cli.identification.data import TorqueData, TorqueSource
 from cpfls_cli.regressor.motion import Motion
 
-# Fewer blocks can prove nothing: Student's t of three is 4.3.
-_FEWEST_BLOCKS = 4
 # What two solutions of the same equations may differ by, and rounding as a share of what is predicted, squared.
 _SAME, _ROUNDING = 1e-6, 1e-18
 
@@ -80,7 +78,7 @@ def compare_errors(ours: Array, theirs: Array, size: float) -> Comparison:
         return Comparison(mean, rival, 1.0, False, False, len(ours))
     least = max(rounding, np.finfo(float).tiny)
     logarithm = np.log(np.maximum(ours, least) / np.maximum(theirs, least))
-    enough = len(ours) >= _FEWEST_BLOCKS
+    enough = len(ours) >= FEWEST_BLOCKS
     typical = float(np.mean(logarithm))
     chance = float(half_width(mean_error(logarithm), len(ours))) if enough else float("inf")
     ratio = mean / rival if rival > rounding else float("inf")

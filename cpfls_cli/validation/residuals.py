@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import chdtrc, ndtri, stdtr
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import mean_error
+from cpfls_cli.blocks import FEWEST_BLOCKS, mean_error
 from cpfls_cli.identification.data import TorqueData, TorqueSource
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.rotations import wrapped
@@ -29,7 +29,7 @@ _FEWEST_PER_LAG = 4
 
 # Few enough that a block outlasts the memory of most noise, and enough for a test.
 _BLOCKS = 20
-_FEWEST_BLOCKS, _FEWEST_SAMPLES = 4, 50
+_FEWEST_SAMPLES = 50
 
 # What varies by less than this share of the largest value of its kind is the rounding of a constant.
 _CONSTANT = 1e-9
@@ -188,7 +188,7 @@ def mean_p_value(errors: Array, without: BoolArray) -> Array:
     array, shape (3,)
         Small where the mean is not 0; NaN for an axis without errors, and for all of fewer than four samples.
     """
-    blocks = min(max(len(errors) // _FEWEST_SAMPLES, _FEWEST_BLOCKS), _BLOCKS)
+    blocks = min(max(len(errors) // _FEWEST_SAMPLES, FEWEST_BLOCKS), _BLOCKS)
     if len(errors) < blocks:
         return np.full(errors.shape[1], np.nan)
     means = np.array([block.mean(axis=0) for block in np.array_split(errors, blocks)])

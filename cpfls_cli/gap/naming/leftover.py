@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.blocks import half_width, mean_error
+from cpfls_cli.blocks import FEWEST_BLOCKS, half_width, mean_error
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
@@ -26,7 +26,7 @@ from cpfls_cli.gap.residual.dependence import (
     without_actuation,
 )
 from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
-from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, FEWEST_BLOCKS, NOISE, RARE, VISIBLE, GapSettings
+from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, NOISE, RARE, VISIBLE, GapSettings
 from cpfls_cli.rounding import ROUNDING
 from cpfls_cli.vehicle.settings import VehicleSettings
 

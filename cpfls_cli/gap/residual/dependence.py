@@ -9,9 +9,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import FEWEST_BLOCKS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
-from cpfls_cli.gap.settings import FEWEST_BLOCKS
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.resampling import about_flight_mean, folds, mirror_shifted
 

@@ -10,12 +10,11 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.blocks import jackknife_error
+from cpfls_cli.blocks import FEWEST_BLOCKS, jackknife_error
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.gap.balance.balance_system import System, left_over
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
-from cpfls_cli.gap.settings import FEWEST_BLOCKS
 from cpfls_cli.playback.balances import BANDS, BANDS_HZ, band_windows, block_length, fitting_bands
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Instruments, instruments

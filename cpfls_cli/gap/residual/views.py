@@ -11,9 +11,9 @@ from scipy.ndimage import binary_closing, uniform_filter1d
 from scipy.special import chdtrc
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
+from cpfls_cli.blocks import FEWEST_BLOCKS
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.residual.dependence import OUTER_PERCENT
-from cpfls_cli.gap.settings import FEWEST_BLOCKS
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.resampling import about_flight_mean
 
