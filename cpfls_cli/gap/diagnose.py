@@ -347,9 +347,7 @@ def _concluded(
     # In gusts instruments tell the numbers, and a gap need not stand out.
     still = not any(flight.air.any() for flight in hypothesis.flights)
     taken = held_out.removed_by_numbers(NOISE if still else 0.0)
-    # Noise in the motion bounds what each number of the vehicle may be off by.
-    information = ((hypothesis.columns(hypothesis.free[0]) / floor[:, None]) ** 2).mean(axis=0).max(axis=0)
-    numbers = wrong_numbers(estimates, effects, taken, 1.0 / np.maximum(information, 1e-12))
+    numbers = wrong_numbers(estimates, effects, taken)
     effects += [numbers] if numbers is not None else []
     removed = held_out.shares()
     if not named:

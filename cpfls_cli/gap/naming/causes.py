@@ -21,7 +21,7 @@ from cpfls_cli.gap.naming.ranking import likely, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
 from cpfls_cli.gap.naming.scoring import Scored
 from cpfls_cli.gap.naming.search import alternatives, beside_its_like, chance_beside_its_like, in_place_of, odds
-from cpfls_cli.gap.settings import COUNTS, ERRORS, RARE, GapSettings
+from cpfls_cli.gap.settings import COUNTS, RARE, GapSettings
 from cpfls_cli.rounding import ascending, at_most
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -144,9 +144,7 @@ def _remaining(
     return hypothesis.left(np.concatenate([estimates.of_vehicle, *linear]))
 
 
-def wrong_numbers(
-    estimates: Estimates, effects: Sequence[NamedEffect], removed: Array, pull: Array
-) -> NamedEffect | None:
+def wrong_numbers(estimates: Estimates, effects: Sequence[NamedEffect], removed: Array) -> NamedEffect | None:
     """Name the numbers of the vehicle that are significantly wrong, relevant, and not explained by a named effect.
 
     Parameters
@@ -155,17 +153,10 @@ def wrong_numbers(
         Already named.
     removed : array, shape (6,)
         Part of each channel's gap on unseen flights that refitting the numbers takes off.
-    pull : array, shape (parameter,)
-        Error of each number that noise in the motion can make: a noisy acceleration asks for less inertia.
     """
     # Each shows in a channel of its own.
     shown = dict(zip(NUMBERS, (*removed[:3], removed[5]), strict=True))
-    pairs = zip(estimates.parameters, pull, strict=True)
-    wrong = [
-        number
-        for number, drawn in pairs
-        if abs(number.value) > ERRORS * drawn and _is_wrong(number, effects) and shown[number.name] >= COUNTS
-    ]
+    wrong = [number for number in estimates.parameters if _is_wrong(number, effects) and shown[number.name] >= COUNTS]
     if not wrong:
         return None
     share = float(max(shown[number.name] for number in wrong))

@@ -131,14 +131,10 @@ def grown_elsewhere(
 
 
 def _is_better(scored: Scored, own: Scored, step: RankedStep) -> bool:
-    """Tell whether a set leaves less than another one.
-
-    With more numbers it has to beat that one, by as much as is worth a name and by more than it leaves above the floor.
-    """
-    gain, off = scored.gain - own.gain, step.above_floor - scored.gain
+    """Tell whether a set leaves less than another one; with more numbers it has to beat that one."""
     if _numbers(scored.chosen) > _numbers(own.chosen):
-        return gain >= max(step.worth_a_name(own.gain), off) and not unbeaten(scored, [own], step.above_floor)
-    return bool(less(0.0, gain, step.above_floor))
+        return not unbeaten(scored, [own], step.above_floor)
+    return bool(less(0.0, scored.gain - own.gain, step.above_floor))
 
 
 def of_motion(gain: float, step: RankedStep, with_it: System) -> float:

@@ -15,7 +15,12 @@ simulation:
   closed_loop: {integration_rate_hz: 200.0, effects: {com_offset: [0.002, -0.0015]}}
 gap: {shifts: 39, ignore: [payload]}
 """
-NEXT = ("--duration", "12", "--set", "trajectory.next_flight.starts=6", "--set", "trajectory.next_flight.iterations=10")
+
+
+def searched(starts, iterations):
+    room = {"starts": starts, "iterations": iterations}
+    settings = [word for key, value in room.items() for word in ("--set", f"trajectory.next_flight.{key}={value}")]
+    return ("--duration", "12", *settings)
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +50,7 @@ def diagnosed(cpfls, folder, name, *training):
 
 @pytest.mark.decides
 def test_the_next_flight_settles_what_the_first_left_open(cpfls, folder):
-    planned = run(cpfls, folder, "trajectory", "--for", folder / "open.h5", *NEXT, "-o", folder / "next.h5")
+    planned = run(cpfls, folder, "trajectory", "--for", folder / "open.h5", *searched(6, 10), "-o", folder / "next.h5")
     rows = [row for row in planned["questions"] if {row["true"], row["rival"]} == {"com_offset", "torque_bias"}]
     assert len(rows) == 2
     for row in rows:
@@ -60,7 +65,7 @@ def test_the_next_flight_settles_what_the_first_left_open(cpfls, folder):
 
 
 def test_named_effects_come_before_what_the_diagnosis_leaves(cpfls, folder):
-    options = ("--for", folder / "open.h5", "--to-tell", "rotor_drag,linear_damping", *NEXT)
+    options = ("--for", folder / "open.h5", "--to-tell", "rotor_drag,linear_damping", *searched(1, 1))
     planned = run(cpfls, folder, "trajectory", *options, "-o", folder / "other.h5")
     assert [(row["true"], row["rival"]) for row in planned["questions"]] == [
         ("rotor_drag", "linear_damping"),

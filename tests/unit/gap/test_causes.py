@@ -24,8 +24,8 @@ def named(name, *coefficients):
 SURE = number("inertia_x", 0.15, 0.02)
 
 
-def told(*numbers, effects=(), share=0.5, pull=0.001):
-    effect = wrong_numbers(found(*numbers), effects, np.broadcast_to(share, 6), np.full(len(numbers), pull))
+def told(*numbers, effects=(), share=0.5):
+    effect = wrong_numbers(found(*numbers), effects, np.broadcast_to(share, 6))
     return () if effect is None else tuple(each.name for each in effect.coefficients)
 
 
@@ -58,13 +58,8 @@ def test_the_channel_of_the_number_has_to_shrink():
     assert told(SURE, share=there) == ("inertia_x",)
 
 
-def test_an_error_that_noise_in_the_motion_can_make_is_not_told():
-    assert told(SURE, pull=0.1) == ()
-    assert told(SURE, pull=0.05) == ("inertia_x",)
-
-
 def test_probability_is_that_of_a_normal_error_of_the_surest_number():
-    effect = wrong_numbers(found(SURE, number("inertia_y", 0.05, 0.02)), (), np.full(6, 0.5), np.zeros(2))
+    effect = wrong_numbers(found(SURE, number("inertia_y", 0.05, 0.02)), (), np.full(6, 0.5))
     assert effect.p_value == pytest.approx(2 * norm.sf(1.96 * 0.15 / 0.02))
     assert (effect.name, effect.share) == ("parameter_error", 0.5)
 
