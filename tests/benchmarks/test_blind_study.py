@@ -28,7 +28,7 @@ from benchmarks.blind_study.sets import Size, sets
 
 CASES = {
     "single-sixkg-com_offset-0",
-    "single-sixkg-rotor_drag-0",
+    "single-sixkg-motor_lag-0",
     "single-sixkg-parameter_error-0",
     "none-sixkg-0",
     "outside-sixkg-yaw_cogging-0",
@@ -47,7 +47,7 @@ def judged(tmp_path_factory):
     return found
 
 
-@pytest.mark.parametrize("effect", ["com_offset", "rotor_drag"])
+@pytest.mark.parametrize("effect", ["com_offset", "motor_lag"])
 def test_hidden_effect_is_named_alone_and_closes_the_gap(judged, effect):
     each = judged[f"single-sixkg-{effect}-0"]
     assert each.names == (effect,)
@@ -56,7 +56,7 @@ def test_hidden_effect_is_named_alone_and_closes_the_gap(judged, effect):
     assert each.floors("after") < 1.3
 
 
-@pytest.mark.parametrize(("effect", "error"), [("com_offset", 0.02), ("rotor_drag", 0.05)])
+@pytest.mark.parametrize(("effect", "error"), [("com_offset", 0.02), ("motor_lag", 0.05)])
 def test_coefficients_of_a_hidden_effect_come_back(judged, effect, error):
     found = numbers(judged[f"single-sixkg-{effect}-0"])
     assert found
