@@ -19,7 +19,7 @@ def judged(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bullet")
     hidden = ("quick_rotors", "bullet_damping", "bullet_drag")
     case = make("pybullet-cf2x-drag-0", "pybullet", "cf2x", hidden, np.random.default_rng(1))
-    [logs] = fly([[Set(case, "mid", "white", 3)]], folder, duration=12.0)
+    [logs] = fly([[Set(case, "mid", "white", 3)]], folder, duration=8.0)
     key = json.loads((folder / "keys" / logs.name / "key.json").read_text(encoding="ascii"))
     said = judge(logs)
     return Scored(key, said, outcome(key, said))
