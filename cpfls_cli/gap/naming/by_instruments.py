@@ -77,6 +77,20 @@ def by_instruments(found: NamedFit, given: Instruments, floor: Array, settings: 
     return NamedFit(there, found.block, _told(found, estimates_of(there, values, left_out), moving))
 
 
+def untold_axes(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> BoolArray:
+    """Mark the body axes of whose inertia instruments tell nothing, shape (3,): in gusts a fit shows that of the loop.
+
+    Parameters
+    ----------
+    found : NamedFit
+    given : Instruments
+        Of the same flights.
+    floor : array, shape (6,)
+    """
+    crossed, moving = _products(found, given, floor, settings)
+    return ~moving[found.hypothesis.places[0][1]][:3] | (len(crossed) < ENOUGH_BLOCKS)
+
+
 def may_be_nothing(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> list[str]:
     """Name the effects that may be 0 by what instruments tell.
 
