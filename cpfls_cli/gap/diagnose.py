@@ -314,8 +314,8 @@ def _doubts(
             yield f"{effect.name} is not certain: chance explains as much beside the others, p = {effect.p_value:.2g}"
         if effect.name in loose:
             yield (
-                f"instruments do not tell the numbers of {effect.name}: those of a fit to all motion stand, which the loop"
-                " mixes with its answer to gusts, and may be off by more than their intervals"
+                f"instruments do not tell the numbers of {effect.name}: those of a fit to all motion stand, in which"
+                " the loop answers gusts, so they may be off by more than their intervals"
             )
 
 
