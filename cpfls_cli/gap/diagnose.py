@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cpfls_cli.arrays import BoolArray
 from cpfls_cli.changes.judge import changed
 from cpfls_cli.changes.numbers import flight_numbers
 from cpfls_cli.consistency.audit import Audit, audit
@@ -20,7 +21,14 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, has_force
 from cpfls_cli.gap.balance.weak_flight import TURNING, Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
-from cpfls_cli.gap.naming.by_instruments import by_instruments, may_be_nothing, told_apart, untold_actuation
+from cpfls_cli.gap.naming.by_instruments import (
+    by_instruments,
+    may_be_nothing,
+    told_apart,
+    untold,
+    untold_actuation,
+    untold_axes,
+)
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     impossible_ratios,
@@ -114,7 +122,8 @@ def diagnose(
         # Beside what is named then, more channels may turn out to be nothing but gusts.
         while gusts is not None and gusts.split.any() and gusts.told.sum() > told:
             told, quiet = int(gusts.told.sum()), np.minimum(quiet, gusts.noise(windows))
-            flights = flights.in_air(gusts)
+            untold = untold_axes(named.judgement.found, given, named.judge.floor, settings)
+            flights = flights.in_air(gusts, untold)
             named, gusts = _beside_gusts(_named(flights, settings, rng, progress), given, told, settings, rng)
     weak, (hypothesis, _, estimates), held_out = flights.training, *named.judgement
     progress(0.75, "rivals")
@@ -127,7 +136,7 @@ def diagnose(
     progress(0.9, "sensor faults")
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
     torque_alone = _torque_alone(weak, settings, named.effects)
-    doubts = [*_doubts(unnamed, judged, settings), *(refused.sentence for refused in named.refusals)]
+    doubts = [*_doubts(unnamed, judged, named.untold, settings), *(refused.sentence for refused in named.refusals)]
     notes = [*not_judged(held_out), *([] if named.differ else doubts)]
     inertial = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
     # Above the floor of the sensors alone.
@@ -169,13 +178,18 @@ class _Flights(NamedTuple):
     logged: Sequence[WeakFlight]
     repaired: Sequence[WeakFlight]
 
-    def in_air(self, gusts: Air) -> _Flights:
-        """Give all of them the floor of their air."""
-        return _Flights(*(in_air(flights, gusts.floor(self.training, flights)) for flights in self))
+    def in_air(self, gusts: Air, untold: BoolArray) -> _Flights:
+        """Give all of them the floor of their air; what fits show of axes untold by instruments is the loop's."""
+        return _Flights(
+            *(
+                [flight.as_stated(untold) for flight in in_air(flights, gusts.floor(self.training, flights))]
+                for flights in self
+            )
+        )
 
 
 class _Named(NamedTuple):
-    """What was named, on which grounds, and what was refused."""
+    """What was named, on which grounds, what was refused, and what has numbers that instruments do not tell."""
 
     effects: list[Effect]
     steps: list[RankedStep]
@@ -184,6 +198,7 @@ class _Named(NamedTuple):
     refusals: list[Refusal]
     differ: tuple[str, ...]
     alike: tuple[Alternative, ...] = ()
+    untold: tuple[str, ...] = ()
 
 
 def _named(
@@ -263,11 +278,14 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings, *,
         names = {refused.name for refused in out}
         kept = [each for each in found.hypothesis.chosen if each.effect.name not in names]
         fit = fitted(judge.training, kept, judge.floor, settings)
+    loose = tuple(effect.name for effect in untold(fit, found))
     found, alike = told_apart(found, named.effects, given, judge.floor, settings)
-    return named._replace(judgement=judge.judge(found), refusals=refusals, alike=alike)
+    return named._replace(judgement=judge.judge(found), refusals=refusals, alike=alike, untold=loose)
 
 
-def _doubts(unnamed: Sequence[str], judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[str]:
+def _doubts(
+    unnamed: Sequence[str], judged: Sequence[JudgedEffect], loose: Sequence[str], settings: GapSettings
+) -> Iterator[str]:
     """Say what intervals leave room for, and which effects chance could stand for once the others did what they can."""
     if unnamed:
         yield (
@@ -277,6 +295,11 @@ def _doubts(unnamed: Sequence[str], judged: Sequence[JudgedEffect], settings: Ga
     for effect in (each.effect for each in judged):
         if effect.p_value > settings.significance:
             yield f"{effect.name} is not certain: chance explains as much beside the others, p = {effect.p_value:.2g}"
+        if effect.name in loose:
+            yield (
+                f"instruments do not tell the numbers of {effect.name}: those of a fit to all motion stand, in which"
+                " the loop answers gusts, so they may be off by more than their intervals"
+            )
 
 
 def not_judged(unseen: HeldOut) -> Iterator[str]:
