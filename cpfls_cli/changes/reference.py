@@ -15,7 +15,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 FEWEST = 3
 """Reference flights that tell their scatter; of fewer, what is usual has to stand for it."""
 
-_DAYS = 6.0
+_DAYS = 12.0
 """Reference flights that what is usual counts as."""
 
 _SCALE_ERROR = 0.8
