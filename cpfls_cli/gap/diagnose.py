@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.changes.judge import changed
 from cpfls_cli.changes.numbers import flight_numbers
 from cpfls_cli.consistency.audit import Audit, audit
@@ -22,7 +22,13 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, has_force
 from cpfls_cli.gap.balance.weak_flight import TURNING, Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
-from cpfls_cli.gap.naming.by_instruments import by_instruments, may_be_nothing, told_apart, untold_actuation
+from cpfls_cli.gap.naming.by_instruments import (
+    by_instruments,
+    may_be_nothing,
+    told_apart,
+    untold_actuation,
+    untold_axes,
+)
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     impossible_ratios,
@@ -120,7 +126,8 @@ def diagnose(
         # Beside what is named then, more channels may turn out to be nothing but gusts.
         while gusts is not None and gusts.split.any() and gusts.told.sum() > told:
             told, quiet = int(gusts.told.sum()), np.minimum(quiet, gusts.noise(windows))
-            flights = flights.in_air(gusts)
+            untold = untold_axes(named.judgement.found, given, named.judge.floor, settings)
+            flights = flights.in_air(gusts, untold)
             named, gusts = _beside_gusts(_named(flights, settings, rng, progress), given, told, settings, rng)
     weak, (effects, steps, judge, judgement, refusals, differ, alike) = flights.training, named
     hypothesis, _, estimates = judgement.found
@@ -180,9 +187,14 @@ class _Flights(NamedTuple):
     logged: Sequence[WeakFlight]
     repaired: Sequence[WeakFlight]
 
-    def in_air(self, gusts: Air) -> _Flights:
-        """Give all of them the floor of their air."""
-        return _Flights(*(in_air(flights, gusts.floor(self.training, flights)) for flights in self))
+    def in_air(self, gusts: Air, untold: BoolArray) -> _Flights:
+        """Give all of them the floor of their air; what fits show of axes untold by instruments is the loop's."""
+        return _Flights(
+            *(
+                [flight.as_stated(untold) for flight in in_air(flights, gusts.floor(self.training, flights))]
+                for flights in self
+            )
+        )
 
 
 class _Named(NamedTuple):

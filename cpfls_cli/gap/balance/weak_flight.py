@@ -149,6 +149,11 @@ class WeakFlight:
         seen = {key: rows * known[:, None] for key, rows in self.seen.items()}
         return replace(self, known=known, seen=seen)
 
+    def as_stated(self, axes: BoolArray) -> WeakFlight:
+        """Hold the inertia about some body axes, shape (3,), at what the config states."""
+        seen = {key: rows for key, rows in self.seen.items() if key != nuisance().key}
+        return replace(self, turns=self.turns * shown(~axes), seen=seen)
+
     def averaged(self, columns: Columns) -> Array:
         """Average columns, or a residual, over the windows, shape (window, 6, ...)."""
         rows = self.windows.average(columns.direct)

@@ -77,6 +77,20 @@ def by_instruments(found: NamedFit, given: Instruments, floor: Array, settings: 
     return NamedFit(there, found.block, _told(found, estimates_of(there, values, left_out), moving))
 
 
+def untold_axes(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> BoolArray:
+    """Mark the body axes of whose inertia instruments tell nothing, shape (3,): in gusts a fit shows that of the loop.
+
+    Parameters
+    ----------
+    found : NamedFit
+    given : Instruments
+        Of the same flights.
+    floor : array, shape (6,)
+    """
+    crossed, moving = _products(found, given, floor, settings)
+    return ~moving[found.hypothesis.places[0][1]][:3] | (len(crossed) < ENOUGH_BLOCKS)
+
+
 def may_be_nothing(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> list[str]:
     """Name the effects that may be 0 by what instruments tell.
 
@@ -138,10 +152,11 @@ def untold_actuation(before: NamedFit, after: NamedFit) -> list[str]:
 def told_apart(
     found: NamedFit, effects: Sequence[Effect], given: Instruments, floor: Array, settings: GapSettings
 ) -> tuple[NamedFit, tuple[Alternative, ...]]:
-    """Decide by instruments what lies between command and rotors, of effects with no more shapes than what was found.
+    """Decide by instruments what lies between command and rotors: what was found, or one effect of no more numbers.
 
     In gusts a fit of all motion takes the loop for the rotors, and a lag for a delay. What the right one leaves has
-    nothing that instruments know. Of those that they cannot tell apart the first of the catalogue is the usual one.
+    nothing that instruments know. Of those that they cannot tell apart the one with the fewest numbers is named, and of
+    as many the first of the catalogue, which is the usual one.
 
     Parameters
     ----------
@@ -158,27 +173,32 @@ def told_apart(
         Those that leave as little.
     """
     chosen, flights = found.hypothesis.chosen, found.hypothesis.flights
-    between = [each for each in chosen if each.effect.late]
-    if len(between) != 1:
+    between = [each.effect for each in chosen if each.effect.late]
+    if not between:
         return found, ()
-    own, others = between[0].effect, [each for each in chosen if each is not between[0]]
-    fits = {own.order: found}
+    most, _ = own = _usual_first(between)
+    others = [each for each in chosen if not each.effect.late]
+    fits = {own: (between, found)}
     for effect in effects:
-        if effect.late and effect is not own and len(effect.shapes) <= len(own.shapes):
+        if effect.late and len(effect.shapes) <= most and _usual_first([effect]) != own:
             for scored in rank_effects(flights, others, [effect], settings, None, floor=floor).ranking:
                 start = refined(flights, scored.chosen, floor).chosen
-                fits[effect.order] = by_instruments(fitted(flights, start, floor, settings), given, floor, settings)
-    left = {order: _reproduced(each, given, floor, settings) for order, each in sorted(fits.items())}
-    best, *_ = left
-    for order in left:
-        best = order if surely(more_left(left[best], left[order])) else best
-    named, alike = _between(fits[best]), [order for order in left if not surely(more_left(left[order], left[best]))]
-    return fits[best], tuple(alternative(named, _between(fits[order]), 1.0) for order in alike if order != best)
+                told = by_instruments(fitted(flights, start, floor, settings), given, floor, settings)
+                fits[_usual_first([effect])] = [effect], told
+    left = {place: _reproduced(fits[place][1], given, floor, settings) for place in sorted(fits)}
+    best, *further = left
+    for place in further:
+        best = place if surely(more_left(left[best], left[place])) else best
+    # With more numbers a rival would have to leave less.
+    alike = [place for place in left if place[0] <= best[0] and not surely(more_left(left[place], left[best]))]
+    (named, *_), told = fits[best]
+    rivals = [fits[place][0] for place in alike if place != best]
+    return told, tuple(alternative(named, other, 1.0, *(each.name for each in beside)) for *beside, other in rivals)
 
 
-def _between(found: NamedFit) -> Effect:
-    """Give the effect between command and rotors."""
-    return next(each.effect for each in found.hypothesis.chosen if each.effect.late)
+def _usual_first(between: Sequence[Effect]) -> tuple[int, tuple[int, ...]]:
+    """Order what lies between command and rotors: fewer numbers first, then as in the catalogue."""
+    return sum(len(each.shapes) for each in between), tuple(each.order for each in between)
 
 
 def _reproduced(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> Array:

@@ -11,7 +11,7 @@ from cpfls_cli.gap.naming.by_instruments import told_apart, untold_actuation
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import candidate
 
-LATE = ("motor_lag", "command_delay", "notch_filter")
+LATE = ("motor_lag", "command_delay", "low_pass_filter", "notch_filter")
 BLOCKS = 12
 LITTLE = np.tile([1.0, -1.0], BLOCKS // 2)
 
@@ -21,8 +21,8 @@ def found_with(*chosen):
     return SimpleNamespace(hypothesis=hypothesis, estimates=SimpleNamespace(effects=[object() for _ in chosen]))
 
 
-def apart(monkeypatch, own, beside=None, **left):
-    """Judge effects that leave so much, block by block, of what instruments know."""
+def apart(monkeypatch, *own, beside=None, **left):
+    """Judge effects that leave so much, block by block, of what instruments know; sets of them by all their names."""
     tried = []
 
     def rank(_flights, others, effects, *_args, **_kwargs):
@@ -37,11 +37,12 @@ def apart(monkeypatch, own, beside=None, **left):
     monkeypatch.setattr(by_instruments, "by_instruments", lambda found, *_: found)
     names = lambda found: {each.effect.name for each in found.hypothesis.chosen}  # noqa: E731
     monkeypatch.setattr(
-        by_instruments, "_reproduced", lambda found, *_: left[next(iter(names(found) & set(LATE)))] * np.ones(BLOCKS)
+        by_instruments,
+        "_reproduced",
+        lambda found, *_: left["_and_".join(each for each in LATE if each in names(found))] * np.ones(BLOCKS),
     )
-    start = found_with(
-        beside or candidate("com_offset"), candidate(own, **{s.name: s.grid[0] for s in CATALOGUE[own].shapes})
-    )
+    late = (candidate(name, **{s.name: s.grid[0] for s in CATALOGUE[name].shapes}) for name in own)
+    start = found_with(beside or candidate("com_offset"), *late)
     effects = [CATALOGUE[name] for name in (*LATE, "com_offset")]
     found, rivals = told_apart(start, effects, None, np.ones(6), GapSettings())
     return names(found) - {"com_offset"}, {(each.name, each.instead_of) for each in rivals}, tried
@@ -61,7 +62,21 @@ def test_what_leaves_nothing_that_instruments_know_is_named(own, lag, delay, nam
     found, alike, tried = apart(monkeypatch, own, motor_lag=lag, command_delay=delay)
     assert (found, alike) == ({name}, rivals)
     # A filter has a number more.
-    assert "notch_filter" not in tried
+    assert not {"low_pass_filter", "notch_filter"} & set(tried)
+
+
+@pytest.mark.parametrize(
+    ("both", "filtered", "names", "rivals"),
+    [
+        (LITTLE, LITTLE[::-1], {"low_pass_filter"}, set()),
+        (LITTLE, 9.0, {"command_delay", "notch_filter"}, set()),
+    ],
+    ids=["one does what both do", "both are needed"],
+)
+def test_one_effect_takes_the_place_of_two_that_leave_no_less(both, filtered, names, rivals, monkeypatch):
+    left = {"motor_lag": 9.0, "command_delay": 9.0, "notch_filter": 9.0, "low_pass_filter": filtered}
+    found, alike, _ = apart(monkeypatch, "notch_filter", "command_delay", **left, command_delay_and_notch_filter=both)
+    assert (found, alike) == (names, rivals)
 
 
 def test_an_effect_on_the_actuation_that_instruments_do_not_tell_is_what_a_loop_does_too():
@@ -74,6 +89,6 @@ def test_an_effect_on_the_actuation_that_instruments_do_not_tell_is_what_a_loop_
 def test_a_supply_that_sinks_is_no_loop_and_what_is_late_is_told_beside_it(monkeypatch):
     before = found_with(candidate("battery_sag", exponent=2.0), candidate("motor_lag", time_constant_s=0.03))
     assert untold_actuation(before, before) == ["motor_lag"]
-    late = {"own": "command_delay", "motor_lag": LITTLE, "command_delay": 9.0}
-    found, _, _ = apart(monkeypatch, **late, beside=candidate("battery_sag", exponent=2.0))
+    left = {"motor_lag": LITTLE, "command_delay": 9.0}
+    found, _, _ = apart(monkeypatch, "command_delay", **left, beside=candidate("battery_sag", exponent=2.0))
     assert found == {"battery_sag", "motor_lag"}
