@@ -26,6 +26,7 @@ from cpfls_cli.gap.naming.by_instruments import (
     by_instruments,
     may_be_nothing,
     told_apart,
+    untold,
     untold_actuation,
     untold_axes,
 )
@@ -129,7 +130,7 @@ def diagnose(
             untold = untold_axes(named.judgement.found, given, named.judge.floor, settings)
             flights = flights.in_air(gusts, untold)
             named, gusts = _beside_gusts(_named(flights, settings, rng, progress), given, told, settings, rng)
-    weak, (effects, steps, judge, judgement, refusals, differ, alike) = flights.training, named
+    weak, (effects, steps, judge, judgement, refusals, differ, alike, loose) = flights.training, named
     hypothesis, _, estimates = judgement.found
     progress(0.75, "rivals")
     effect_shares = shares(weak, hypothesis.chosen, estimates, judge.floor)
@@ -141,7 +142,8 @@ def diagnose(
     progress(0.9, "sensor faults")
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
     torque_alone = _torque_alone(weak, settings, effects)
-    notes = [] if differ else [*_doubts(unnamed, judged, settings), *(refused.sentence for refused in refusals)]
+    doubts = _doubts(unnamed, judged, loose, settings)
+    notes = [] if differ else [*doubts, *(refused.sentence for refused in refusals)]
     notes = [*not_judged(judgement.held_out), *notes]
     remainder = judge.remainder(judgement.found)
     excited = _excited(hypothesis, quiet)
@@ -198,7 +200,7 @@ class _Flights(NamedTuple):
 
 
 class _Named(NamedTuple):
-    """What was named, on which grounds, and what was refused."""
+    """What was named, on which grounds, what was refused, and what has numbers that instruments do not tell."""
 
     effects: list[Effect]
     steps: list[RankedStep]
@@ -207,6 +209,7 @@ class _Named(NamedTuple):
     refusals: list[Refusal]
     differ: tuple[str, ...]
     alike: tuple[Alternative, ...] = ()
+    untold: tuple[str, ...] = ()
 
 
 def _named(
@@ -286,8 +289,9 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings, *,
         names = {refused.name for refused in out}
         kept = [each for each in found.hypothesis.chosen if each.effect.name not in names]
         fit = fitted(judge.training, kept, judge.floor, settings)
+    loose = tuple(effect.name for effect in untold(fit, found))
     found, alike = told_apart(found, named.effects, given, judge.floor, settings)
-    return named._replace(judgement=judge.judge(found), refusals=refusals, alike=alike)
+    return named._replace(judgement=judge.judge(found), refusals=refusals, alike=alike, untold=loose)
 
 
 def _excited(hypothesis: System, floor: Array) -> bool:
@@ -296,7 +300,9 @@ def _excited(hypothesis: System, floor: Array) -> bool:
     return bool((inertial[:, :3].std(axis=0) > TURNING * floor[:3]).any())
 
 
-def _doubts(unnamed: Sequence[str], judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[str]:
+def _doubts(
+    unnamed: Sequence[str], judged: Sequence[JudgedEffect], loose: Sequence[str], settings: GapSettings
+) -> Iterator[str]:
     """Say what intervals leave room for, and which effects chance could stand for once the others did what they can."""
     if unnamed:
         yield (
@@ -306,6 +312,11 @@ def _doubts(unnamed: Sequence[str], judged: Sequence[JudgedEffect], settings: Ga
     for effect in (each.effect for each in judged):
         if effect.p_value > settings.significance:
             yield f"{effect.name} is not certain: chance explains as much beside the others, p = {effect.p_value:.2g}"
+        if effect.name in loose:
+            yield (
+                f"instruments do not tell the numbers of {effect.name}: those of a fit to all motion stand, in which"
+                " the loop answers gusts, so they may be off by more than their intervals"
+            )
 
 
 def not_judged(unseen: HeldOut) -> Iterator[str]:

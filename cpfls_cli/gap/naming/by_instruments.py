@@ -142,11 +142,16 @@ def _chance(crossed: Array, own: BoolArray, others: BoolArray, values: Array) ->
     return float(fdtrc(count, blocks - count, size * (blocks - count) / (count * (blocks - 1))))
 
 
-def untold_actuation(before: NamedFit, after: NamedFit) -> list[str]:
-    """Name effects on the actuation whose numbers instruments hardly tell, and left as they were."""
+def untold(before: NamedFit, after: NamedFit) -> list[Effect]:
+    """List effects whose numbers instruments hardly tell, and left as they were."""
     numbers = zip(after.hypothesis.chosen, before.estimates.effects, after.estimates.effects, strict=True)
-    left = [each.effect for each, was, now in numbers if each.effect.kind == "actuator" and was is now]
-    return [effect.name for effect in left if effect.actuation is None or effect.late]
+    return [each.effect for each, was, now in numbers if was is now]
+
+
+def untold_actuation(before: NamedFit, after: NamedFit) -> list[str]:
+    """Name those of them on the actuation that a loop is taken for."""
+    own = (effect for effect in untold(before, after) if effect.kind == "actuator")
+    return [effect.name for effect in own if effect.actuation is None or effect.late]
 
 
 def told_apart(

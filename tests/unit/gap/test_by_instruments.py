@@ -7,7 +7,7 @@ import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.naming import by_instruments
-from cpfls_cli.gap.naming.by_instruments import told_apart, untold_actuation
+from cpfls_cli.gap.naming.by_instruments import told_apart, untold, untold_actuation
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import candidate
 
@@ -82,8 +82,9 @@ def test_one_effect_takes_the_place_of_two_that_leave_no_less(both, filtered, na
 def test_an_effect_on_the_actuation_that_instruments_do_not_tell_is_what_a_loop_does_too():
     before = found_with(candidate("channel_delay", delay_s=0.03), candidate("com_offset"))
     assert untold_actuation(before, before) == ["channel_delay"]
+    assert [effect.name for effect in untold(before, before)] == ["channel_delay", "com_offset"]
     told = found_with(*before.hypothesis.chosen)
-    assert untold_actuation(before, told) == []
+    assert untold_actuation(before, told) == untold(before, told) == []
 
 
 def test_a_supply_that_sinks_is_no_loop_and_what_is_late_is_told_beside_it(monkeypatch):
