@@ -81,7 +81,7 @@ class Reference:
     def of(cls, flights: Sequence[FlightNumbers], names: Sequence[str], vehicle: VehicleSettings) -> Reference:
         """Learn from reference flights, at least one.
 
-        A conjugate prior (inverse Wishart, in blocks by kind) holds what is usual from day to day; it counts as three
+        A conjugate prior (inverse Wishart, in blocks by kind) holds what is usual from day to day; it counts as six
         flights. The covariance is that of the predictive distribution, a multivariate t. Numbers go with how agile
         flights are flown by a regression with a prior of its own: where the reference flights are all flown alike,
         flights that are not tell the less the more they differ.
@@ -162,7 +162,7 @@ def expected_covariance(flights: Sequence[FlightNumbers], names: Sequence[str], 
 def learned_covariance(apart: Array, freedom: float, expected: Array, names: Sequence[str]) -> tuple[Array, Array]:
     """Learn the covariance of flights from what is expected and what is seen, and degrees of freedom of each number.
 
-    What is expected of a kind counts as three flights, at a scale that the numbers of the kind tell together.
+    What is expected of a kind counts as six flights, at a scale that the numbers of the kind tell together.
 
     Parameters
     ----------

@@ -252,19 +252,22 @@ class Row:
         return np.ascontiguousarray(np.linalg.solve(root, values.T).T)
 
     def unchanged(self, rng: np.random.Generator, count: int) -> Iterator[Array]:
-        """Draw such rows of unchanged vehicles: of each its covariance (inverse Wishart), then its flights."""
-        covariance, each = self.covariance(self.values)
-        freedom = each.min()
+        """Draw such rows of unchanged vehicles: of each kind its covariance (inverse Wishart), then the flights."""
+        covariance, freedom = self.covariance(self.values)
         root, size = np.linalg.cholesky(covariance), len(covariance)
         kind = np.unique(kinds_of(self.names), return_inverse=True)[1]
         for _ in range(count):
-            # Bartlett's decomposition of a Wishart matrix.
-            lower = np.tril(rng.normal(size=(size, size)), -1)
-            lower += np.diag(np.sqrt(rng.chisquare(freedom + size - 1 - np.arange(size))))
-            drawn = np.linalg.solve(lower.T, rng.normal(size=(size, len(self.values))))
+            drawn = np.empty((size, len(self.values)))
+            for own in (kind == each for each in range(kind.max() + 1)):
+                # Bartlett's decomposition of a Wishart matrix.
+                many, left = own.sum(), freedom[own][0]
+                lower = np.tril(rng.normal(size=(many, many)), -1)
+                lower += np.diag(np.sqrt(rng.chisquare(left + many - 1 - np.arange(many))))
+                white = np.linalg.solve(lower.T, rng.normal(size=(many, len(self.values))))
+                drawn[own] = np.sqrt(left) * (root[np.ix_(own, own)] @ white)
             noise = rng.normal(size=self.noise.shape) * self.noise
             noise += np.sqrt(0.5) * (rng.normal(size=size) + rng.normal(size=size)[kind]) * self.agility
-            yield np.sqrt(freedom) * (root @ drawn).T + rng.normal(size=size)[kind] * self.voltage + noise
+            yield drawn.T + rng.normal(size=size)[kind] * self.voltage + noise
 
 
 def change_points(row: Row, rng: np.random.Generator) -> tuple[float, list[int]]:

@@ -34,7 +34,7 @@ _HEAVY = 1000.0
 """Grams that are told in kg."""
 
 _CHECKS = {
-    "rotor": "look at its propeller for a cut, a chip or a bend; change it for a new one; turn the motor by hand",
+    "rotor": "look at its propeller for cuts, chips, bends and what hangs near it; try a new one; turn the motor",
     "rotors": "look at both propellers for cuts, chips or bends; change them for new ones; turn the motors by hand",
     "weight": "see what is fixed there, and look at the propeller there: in hover both look nearly alike",
     "load": "see what hangs under it",

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import stdtrit
 
 from cpfls_cli.changes import trend as module
 from cpfls_cli.changes.judge import FALSE_ALARM
@@ -31,6 +32,19 @@ def test_rows_of_an_unchanged_vehicle_seldom_look_changed():
     # Two and more happen once in sixty times.
     assert (p <= FALSE_ALARM).sum() <= 1
     assert p.max() > 0.5
+
+
+def test_rows_that_are_drawn_scatter_by_the_freedom_of_each_kind():
+    """A lone number is off by a t of few degrees of freedom, loads beside it by one of more: ends of 2 % of each."""
+    rng = np.random.default_rng(2)
+    names, given = NAMES[:5], flights(8, rng)
+    row = module.Row.of(given, Reference.of(given, names, QUAD), QUAD)
+    covariance, freedom = row.covariance(row.values)
+    drawn = np.array([each[0] for each in row.unchanged(rng, 4000)]) / np.sqrt(np.diag(covariance))
+    beyond = np.abs(drawn) > stdtrit(freedom, 0.99)
+    assert freedom[0] > 1.3 * freedom[4]
+    # Four deviations of a count of 80.
+    assert np.abs(beyond.mean(axis=0) - 0.02).max() < 0.009
 
 
 def test_a_step_is_found_at_its_flight():
