@@ -160,9 +160,10 @@ def _changed_between(training: Sequence[Recording], held: Sequence[Recording]) -
     except InputError:
         # Torques are stated, or it hardly flies.
         return ()
-    if not change.found:
+    of_vehicle = [each for each in change.found if not each.cause.of_air]
+    if not of_vehicle:
         return ()
-    first, p_value = change.found[0], change.p_value
+    first, p_value = of_vehicle[0], change.p_value
     alike = ", ".join(f"{name} {100 * share:.0f} %" for name, share in first.alike)
     return (
         f"the vehicle of the held-out flights is not that of the training flights (p = {p_value:.2g}): "

@@ -9,36 +9,46 @@ from cpfls_cli.gap import diagnose
 from cpfls_cli.weak_form.windows import Recording
 from tests.builders.closed_loop_flights import flown, signals_of
 
-NAMES = [f"load M{index}" for index in range(1, 5)]
+LOADS = [f"load M{index}" for index in range(1, 5)]
+GUSTS = [f"gusts {axis}" for axis in ("roll", "pitch", "yaw")]
 
 
 @pytest.fixture
 def told(monkeypatch):
-    """Tell the loads of flights whose names say by how much M3 is asked for more."""
+    """Tell the loads of flights whose names say by how much M3 is asked for more, and the air is rougher."""
     rng = np.random.default_rng(1)
+    signals = signals_of(flown())
 
     def numbers(recording):
-        loads = 0.01 * rng.normal(size=4) + [0, 0, float(recording.name), 0]
+        load, rough = map(float, recording.name.split())
+        values = [*(0.01 * rng.normal(size=4) + [0, 0, load, 0]), *(0.1 * rng.normal(size=3) + rough)]
+        names = [*LOADS, *GUSTS]
         return FlightNumbers(
-            recording.name, dict(zip(NAMES, loads, strict=True)), dict.fromkeys(NAMES, 0.0), np.nan, 9.0, True
+            recording.name, dict(zip(names, values, strict=True)), dict.fromkeys(names, 0.0), np.nan, 9.0, True
         )
 
     monkeypatch.setattr(diagnose, "flight_numbers", numbers)
-    signals = signals_of(flown())
     return lambda *names: diagnose._changed_between(
         [Recording(name, signals) for name in names[:-1]], [Recording(names[-1], signals)]
     )
 
 
 def test_a_weak_rotor_in_the_held_out_flight(told):
-    (sentence,) = told("0", "0", "0.5")
+    (sentence,) = told("0 0", "0 0", "0.5 0")
     assert "is not that of the training flights" in sentence
     assert "rotor M3, sure to" in sentence
 
 
 def test_nothing_is_said_of_like_flights_or_of_one(told):
-    assert told("0", "0", "0") == ()
-    assert told("0", "0.5") == ()
+    assert told("0 0", "0 0", "0 0") == ()
+    assert told("0 0", "0.5 0") == ()
+
+
+def test_rougher_air_is_no_other_vehicle(told):
+    calm = ["0 0"] * 5
+    assert told(*calm, "0 2") == ()
+    (sentence,) = told(*calm, "0.5 2")
+    assert "rotor M3, sure to" in sentence
 
 
 def test_nothing_is_said_without_rotors(monkeypatch):
