@@ -18,6 +18,8 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 NEGLIGIBLE = 0.003
 """Share of the torque or force below which nobody could use a correction; sampling alone leaves about as much."""
+_QUIET_AXIS = 0.3
+"""Torque of the most active axis that counts on every axis: what is negligible about one is so about the others."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +186,7 @@ def floors(hypothesis: System, coefficients: Array) -> Array:
     noise = np.sqrt(square / np.maximum(count, 1))
     inertial = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
     torque, weight = np.sqrt(np.mean(inertial[:, :3] ** 2, axis=0)), np.sqrt(np.mean(inertial[:, 3:] ** 2))
-    moves = np.array([*torque, *[weight] * 3])
+    moves = np.array([*np.maximum(torque, _QUIET_AXIS * torque.max()), *[weight] * 3])
     return np.where(count > 0, np.maximum(noise, NEGLIGIBLE * moves), 1.0)
 
 
