@@ -1,0 +1,82 @@
+"""A load on a cable beside flights of the bare vehicle: ``python benchmarks/changed_cable.py FOLDER --gusts 1``.
+
+The vehicles, flights and hidden loads of the blind study: fast, near the ground, climbing and descending, under an
+autopilot, with noise of all sensors. Five flights without a load are the reference, one or three with it today's; what
+is left of the bare ones is judged as well, one by one.
+"""
+
+import argparse
+import json
+from collections import defaultdict
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.blind_study.fly import fly
+from benchmarks.blind_study.sets import Size, sets
+from cpfls_cli.changes.judge import changed
+from cpfls_cli.changes.numbers import flight_numbers
+from cpfls_cli.config.load import load_study
+from cpfls_cli.flights.recordings import read_flights
+
+REFERENCE = 5
+
+
+def flown(own, folder):
+    """Fly a set, and tell its flights in numbers, with what is hidden in them."""
+    (logs,) = fly([own], folder)
+    key = json.loads((Path(folder) / "keys" / logs.name / "key.json").read_text(encoding="ascii"))
+    files = [path for role in ("train", "held_out") for path in sorted(logs.glob(f"{role}_*.csv"))]
+    read = read_flights(files, load_study(logs / "study.yaml")).recordings
+    return key, [flight_numbers(each) for each in read], read[0].signals.vehicle
+
+
+def said(today, before, vehicle):
+    """Say what is judged, as cells of a table: names with belief, mass of the load beside the vehicle's, its cable."""
+    change = changed(today, before, vehicle, np.random.default_rng(0))
+    names = ", ".join(f"{each.cause.name} {100 * each.belief:.0f} %" for each in change.found) or "no change"
+    loads = [each.sizes[0] for each in change.found if each.cause.name == "load on a cable"]
+    mass = f"{loads[0].value:.3f} [{loads[0].low:.3f}, {loads[0].high:.3f}]" if loads else ""
+    cable = f"{np.median([flight.cable_m for flight in today]):.2f}" if loads else ""
+    return f"{names} | {mass} | {cable}", bool(change.found)
+
+
+def main():
+    """Fly, judge and print."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--seed", type=int, default=90555)
+    parser.add_argument("--draws", type=int, default=4, help="loads of the largest vehicle; the others have one each")
+    parser.add_argument("--gusts", type=int, default=1, choices=(0, 1, 2))
+    asked = parser.parse_args()
+    noise = {"levels": ("mid",), "kinds": ("white",)}
+    air = {"gusts": (asked.gusts,), "instruments": ("setpoints",)}
+    size = Size(seed=asked.seed, draws=asked.draws, groups=("single", "none"), none=12, **noise, **air)
+    own = [each for each in sets(size) if each[0].case.group == "none" or "-payload-" in each[0].case.name]
+    with ProcessPoolExecutor(2) as pool:
+        told = list(pool.map(partial(flown, folder=asked.folder), own))
+    bare = defaultdict(list)
+    for key, numbers, _ in told:
+        bare[key["vehicle"]] += numbers if key["group"] == "none" else []
+    print("| vehicle | load, cable | flights | found | mass of the load | cable, m |\n|---|---|---|---|---|---|")
+    for key, numbers, vehicle in told:
+        if key["group"] == "none":
+            continue
+        load = key["hidden"]["payload"]
+        for today in (1, 3):
+            cells, _ = said(numbers[:today], bare[key["vehicle"]][:REFERENCE], vehicle)
+            hidden = f"{load['mass'] / vehicle.mass_kg:.3f}, {load['length']:.2f}"
+            print(f"| {key['vehicle']} | {hidden} | {today} | {cells} |")
+    vehicles = {key["vehicle"]: vehicle for key, _, vehicle in told}
+    alarms = [
+        said([flight], flights[:REFERENCE], vehicles[name])[1]
+        for name, flights in bare.items()
+        for flight in flights[REFERENCE:]
+    ]
+    print(f"\nbare flights that are said to have changed: {sum(alarms)} of {len(alarms)}")
+
+
+if __name__ == "__main__":
+    main()
