@@ -23,7 +23,7 @@ from cpfls_cli.gap.balance.weak_flight import (
     WeakFlight,
     nuisance,
 )
-from cpfls_cli.gap.naming.by_instruments import by_instruments
+from cpfls_cli.gap.naming.by_instruments import by_instruments, untold_axes
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, fitted
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out
 from cpfls_cli.gap.naming.ranking import best_floor
@@ -169,7 +169,10 @@ def extend(
     floor = best_floor(start)
     found = fitted(flights, start.chosen, floor, settings)
     if gusty_floor is not None:
-        found = by_instruments(found, known_motion(training), floor, settings)
+        given = known_motion(training)
+        untold = untold_axes(found, given, floor, settings)
+        flights, logged, repaired = ([f.as_stated(untold) for f in each] for each in (flights, logged, repaired))
+        found = by_instruments(fitted(flights, start.chosen, floor, settings), given, floor, settings)
     hypothesis, _, estimates = found
     unseen = held_out(logged, repaired, hypothesis, estimates.linear, floor)
     _require_smaller(unseen)

@@ -7,7 +7,7 @@ import pytest
 
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.diagnose import diagnose
-from cpfls_cli.gap.extended import plain
+from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.residual.air import air, known_motion
@@ -73,6 +73,24 @@ def test_a_wrong_inertia_is_named_in_gusts_with_its_number(flown, kind, setpoint
     (number,) = effect.coefficients
     assert (effect.name, number.name) == ("parameter_error", "inertia_x")
     assert number.low < 1 / HEAVY - 1 < number.high < 0
+
+
+def test_an_inertia_that_instruments_do_not_tell_is_that_of_the_config(flown):
+    x, y, z = TRUE.vehicle.inertia_kg_m2[:3]
+    stated = replace(TRUE.vehicle, inertia_kg_m2=(x, HEAVY * y, z, *TRUE.vehicle.inertia_kg_m2[3:]))
+    # Nobody knows what was asked along y, so that nothing but the loop rolls.
+    along_x = [
+        replace(each, setpoints={name: asked * [1, 0, 1] for name, asked in each.setpoints.items()})
+        for each in flown["asked"]
+    ]
+    recordings = recorded(along_x, stated, setpoints=True)
+    run = diagnosed(recordings)
+    told = run.diagnosis
+    refit = extend(recordings[:3], recordings[3:], told.effects, run.audit, FEW, None, told.floor)
+    for estimates in (run.estimates, refit.estimates):
+        numbers = {each.name: each for each in estimates.parameters}
+        assert abs(numbers["inertia_x"].value) < 1e-9
+        assert numbers["inertia_y"].low < 1 / HEAVY - 1 < numbers["inertia_y"].high
 
 
 def test_gusts_alone_are_no_gap_where_instruments_tell_and_one_where_none_does(flown):
