@@ -122,8 +122,8 @@ def diagnose(
         # Beside what is named then, more channels may turn out to be nothing but gusts.
         while gusts is not None and gusts.split.any() and gusts.told.sum() > told:
             told, quiet = int(gusts.told.sum()), np.minimum(quiet, gusts.noise(windows))
-            untold = untold_axes(named.judgement.found, given, named.judge.floor, settings)
-            flights = flights.in_air(gusts, untold)
+            axes = untold_axes(named.judgement.found, given, named.judge.floor, settings)
+            flights = flights.in_air(gusts, axes)
             named, gusts = _beside_gusts(_named(flights, settings, rng, progress), given, told, settings, rng)
     weak, (hypothesis, _, estimates), held_out = flights.training, *named.judgement
     progress(0.75, "rivals")
@@ -179,14 +179,10 @@ class _Flights(NamedTuple):
     logged: Sequence[WeakFlight]
     repaired: Sequence[WeakFlight]
 
-    def in_air(self, gusts: Air, untold: BoolArray) -> _Flights:
+    def in_air(self, gusts: Air, axes: BoolArray) -> _Flights:
         """Give all of them the floor of their air; what fits show of axes untold by instruments is the loop's."""
-        return _Flights(
-            *(
-                [flight.as_stated(untold) for flight in in_air(flights, gusts.floor(self.training, flights))]
-                for flights in self
-            )
-        )
+        in_gusts = (in_air(flights, gusts.floor(self.training, flights)) for flights in self)
+        return _Flights(*([flight.as_stated(axes) for flight in flights] for flights in in_gusts))
 
 
 class _Named(NamedTuple):
