@@ -10,6 +10,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.channels import known_up_to
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.settings import ERRORS
 from cpfls_cli.weak_form.windows import Windows
 from cpfls_cli.weak_form.windows import windows as make_windows
 
@@ -25,8 +26,6 @@ _PASSED = 0.6
 _BAND = 1.5
 # From sample to sample; each halves the band of the one before about.
 CORRELATIONS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95)
-# Ratio of misfits from which on colour is believed: estimates of 16 powers scatter by less.
-_CLEARLY_BETTER = 1.5
 # Frequencies for each that a window resolves, so that a sum over them is an integral.
 _PADDED = 8
 
@@ -150,7 +149,9 @@ def _best_pair(relative: Array) -> int:
     alone = np.minimum(_left(flat * (flat_sum / flat_squared)), _left(rising * (rising_sum / rising_squared)))
     together = _left(much_flat * flat + much_rising * rising)
     misfit = np.where((much_flat >= 0) & (much_rising >= 0), together, alone)
-    return 0 if misfit[0, 0] <= _CLEARLY_BETTER * misfit.min() else int(np.argmin(misfit))
+    # Of so many powers a misfit is no surer than this ratio, and colour is believed beyond it.
+    unsure = 1 + ERRORS / np.sqrt(len(relative))
+    return 0 if misfit[0, 0] <= unsure * misfit.min() else int(np.argmin(misfit))
 
 
 def _left(fitted: Array) -> Array:

@@ -23,10 +23,6 @@ from cpfls_cli.gap.settings import CHANCE, COUNTS, NOISE, OFF, RARE, VISIBLE, Ga
 from cpfls_cli.rounding import tied
 from cpfls_cli.weak_form.resampling import blocks_of, folds, mirror_shifted
 
-_DRAWS = 10_000
-"""Of weights of blocks: a probability of a hundredth is known to a tenth of itself."""
-
-
 @dataclass(frozen=True)
 class RankedStep:
     """All candidates ranked beside a hypothesis.
@@ -191,7 +187,9 @@ def off_by(explained: float, left: float, above: float = 0.0) -> float:
 
 @cache
 def _weights(blocks: int) -> Array:
-    return np.asarray(blocks * np.random.default_rng(0).dirichlet(np.ones(blocks), _DRAWS))
+    """Draw weights of blocks, so many that a rare probability is known as well as formulas are."""
+    draws = round(1 / (RARE * OFF**2))
+    return np.asarray(blocks * np.random.default_rng(0).dirichlet(np.ones(blocks), draws))
 
 
 def log_odds(more: Array, off: float) -> Array:
