@@ -23,6 +23,7 @@ from cpfls_cli.gap.settings import CHANCE, COUNTS, NOISE, OFF, RARE, VISIBLE, Ga
 from cpfls_cli.rounding import tied
 from cpfls_cli.weak_form.resampling import blocks_of, folds, mirror_shifted
 
+
 @dataclass(frozen=True)
 class RankedStep:
     """All candidates ranked beside a hypothesis.
