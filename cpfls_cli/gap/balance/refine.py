@@ -192,10 +192,10 @@ def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = F
     while True:
         at, linear = _bounded(columns, right, change, out)
         leverless = _without_lever(hypothesis, linear, rows.errors)
-        lighter = least if least is None else least | too_light(linear)
-        if not leverless.any() and np.array_equal(lighter, least):
+        light = np.zeros(3, dtype=bool) if least is None else too_light(linear) & ~least
+        if not (leverless.any() or light.any()):
             return linear, out | _held(change, at, least)
-        out, least = out | leverless, lighter
+        out, least = out | leverless, None if least is None else least | light
         change = _change(hypothesis, length > 0, least)
 
 
