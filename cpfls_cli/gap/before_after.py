@@ -107,21 +107,20 @@ def left_out(
     InputError
         If a flight lacks a signal that an effect needs.
     """
-    return [_left_out(model, name, recordings, horizon_s) for name in names]
-
-
-def _left_out(model: VehicleModel, name: str, recordings: Sequence[Recording], horizon_s: float) -> LeftOut:
-    others = tuple(effect for effect in model.effects if effect.name != name)
-    squares, ends, runs, samples = np.zeros(6), np.zeros(4), 0, 0
-    for pair in played_pairs(recordings, model, replace(model, effects=others)):
-        difference = pair.model.wrench(pair.flight) - pair.stated.wrench(pair.logged)
-        squares, samples = squares + (difference**2).sum(axis=0), samples + len(difference)
-        horizon = min(max(1, round(horizon_s / pair.flight.motion.period)), len(pair.flight) - 1)
-        starts = pair.flight.starts(horizon, _EVERY)
-        both = [pair.runs(prediction, starts, horizon) for prediction in (MODEL, STATED)]
-        off = np.where(pair.flight.shown, apart(*both), np.nan)
-        ends, runs = ends + len(starts) * off, runs + len(starts)
-    return LeftOut(name, np.sqrt(squares / samples), ends / runs)
+    found = []
+    for name in names:
+        others = tuple(effect for effect in model.effects if effect.name != name)
+        squares, ends, runs, samples = np.zeros(6), np.zeros(4), 0, 0
+        for pair in played_pairs(recordings, model, replace(model, effects=others)):
+            difference = pair.model.wrench(pair.flight) - pair.stated.wrench(pair.logged)
+            squares, samples = squares + (difference**2).sum(axis=0), samples + len(difference)
+            horizon = min(max(1, round(horizon_s / pair.flight.motion.period)), len(pair.flight) - 1)
+            starts = pair.flight.starts(horizon, _EVERY)
+            both = [pair.runs(prediction, starts, horizon) for prediction in (MODEL, STATED)]
+            off = np.where(pair.flight.shown, apart(*both), np.nan)
+            ends, runs = ends + len(starts) * off, runs + len(starts)
+        found.append(LeftOut(name, np.sqrt(squares / samples), ends / runs))
+    return found
 
 
 def errors_by_horizon(pairs: Sequence[PlayedPair], horizon_s: float) -> Replay:

@@ -143,7 +143,17 @@ def of_vehicle(recordings: Sequence[Recording], model: VehicleModel) -> list[Rec
     InputError
         If a flight lacks a signal that the model needs.
     """
-    return [_of_vehicle(recording, model) for recording in recordings]
+    wind, given = np.array(model.wind) if any(model.wind) else None, []
+    for recording in recordings:
+        signals = recording.signals
+        missing = tuple(sorted(model.needs - signals.available))
+        if missing:
+            lacking = " and ".join(name.replace("_", " ") for name in missing)
+            raise InputError(f"{recording.name}: lacks {lacking}, which the model of the whole vehicle needs")
+        if signals.vehicle != model.vehicle or wind is not None:
+            signals = replace(signals, vehicle=model.vehicle, wind=wind)
+        given.append(replace(recording, signals=signals))
+    return given
 
 
 def has_effects(model: VehicleModel) -> bool:
@@ -189,17 +199,6 @@ def known_already(model: VehicleModel) -> tuple[str, ...]:
     """Name the effects that a model has: a search beside it does not look for them again."""
     late = [known.name for known, _ in late_effects(model.response)]
     return (*(effect.name for effect in model.effects if effect.known.kind != "parameter"), *late)
-
-
-def _of_vehicle(recording: Recording, model: VehicleModel) -> Recording:
-    missing = tuple(sorted(model.needs - recording.signals.available))
-    if missing:
-        lacking = " and ".join(name.replace("_", " ") for name in missing)
-        raise InputError(f"{recording.name}: lacks {lacking}, which the model of the whole vehicle needs")
-    if recording.signals.vehicle == model.vehicle and not any(model.wind):
-        return recording
-    wind = np.array(model.wind) if any(model.wind) else None
-    return replace(recording, signals=replace(recording.signals, vehicle=model.vehicle, wind=wind))
 
 
 def _beyond_rigid_body(model: VehicleModel) -> Effect:

@@ -159,6 +159,13 @@ def channel_size(rows: Array) -> Array:
     return np.where(rows.any(axis=0), np.sqrt(np.mean(rows**2, axis=0)), 1.0)
 
 
+def known_size(rows: Array, known: Array) -> Array:
+    """Compute the root mean square of each channel over the windows that know it, shape (6,); NaN where none does."""
+    count = known.sum(axis=0)
+    square = (rows**2 * known).sum(axis=0) / np.maximum(count, 1)
+    return np.asarray(np.sqrt(np.where(count > 0, square, np.nan)))
+
+
 def is_free(candidate: Candidate) -> bool:
     """Tell whether an effect has columns with free coefficients."""
     return candidate.effect.kind == "wrench" and not candidate.effect.unit_coefficient

@@ -9,7 +9,15 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.balance.balance_system import System, channel_size, floors, scatter_size, scatter_variance, system
+from cpfls_cli.gap.balance.balance_system import (
+    System,
+    channel_size,
+    floors,
+    known_size,
+    scatter_size,
+    scatter_variance,
+    system,
+)
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.naming.results import GapSize
@@ -53,11 +61,7 @@ class HeldOut:
         ----------
         residual : array, shape (window, 6)
         """
-        count = self.known.sum(axis=0)
-        square = (residual**2 * self.known).sum(axis=0)
-        value = np.sqrt(np.where(count > 0, square / np.maximum(count, 1), np.nan))
-        in_floors = ((residual / self.noise) ** 2 * self.known).sum(axis=0)
-        return GapSize(value, np.sqrt(np.where(count > 0, in_floors / np.maximum(count, 1), np.nan)))
+        return GapSize(known_size(residual, self.known), known_size(residual / self.noise, self.known))
 
     def shares(self, *, as_given: bool = False) -> dict[str, float]:
         """Compute the shares of the gap above the noise floor that the effects remove.

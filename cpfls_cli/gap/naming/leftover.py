@@ -82,7 +82,6 @@ def leftover(
     unexplained = [
         _unexplained(channel, float(size), dependence, band, direction, settings)
         for channel, size, direction in zip(CHANNELS, sizes, directions, strict=True)
-        if size > np.sqrt(NOISE)
     ]
     return Leftover(sizes, dependence, tuple(entry for entry in unexplained if entry is not None))
 
@@ -107,20 +106,22 @@ def _unexplained(
     energy: str,
     settings: GapSettings,
 ) -> Unexplained | None:
-    signal = next((d for d in dependence if d.channel == channel), None)
-    band = band if band is not None and band.channel == channel else None
-    follows = signal is not None and signal.p_value <= settings.significance and signal.r2 > COUNTS
-    rings = band is not None and band.p_value <= settings.significance and band.share > COUNTS
-    if not (size > CLEAR or follows or rings):
+    """Tell of a channel what its residual follows; None where it is noise."""
+
+    def counts(p_value: float, share: float) -> bool:
+        return p_value <= settings.significance and share > COUNTS
+
+    follows = next((d for d in dependence if d.channel == channel and counts(d.p_value, d.r2)), None)
+    rings = band if band and band.channel == channel and counts(band.p_value, band.share) else None
+    if size <= np.sqrt(NOISE) or not (size > CLEAR or follows or rings):
         return None
-    share = max(signal.r2 if follows and signal else 0.0, band.share if rings and band else 0.0)
     return Unexplained(
         channel,
         size,
-        signal.signal if follows and signal else None,
-        share,
-        band.frequency_hz if rings and band else None,
-        band.energy if rings and band else energy,
+        follows.signal if follows else None,
+        max(follows.r2 if follows else 0.0, rings.share if rings else 0.0),
+        rings.frequency_hz if rings else None,
+        rings.energy if rings else energy,
     )
 
 

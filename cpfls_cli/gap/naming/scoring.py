@@ -160,8 +160,6 @@ def _error(placed: PlacedCandidate, columns: IntArray, beside: Beside) -> Array:
 def _scored(placed: PlacedCandidate, error: Array, beside: Beside, vehicle: VehicleSettings) -> Scored:
     """Score a candidate that leaves `error` of the blocks with all its columns."""
     (candidate, columns, _), before = placed, beside.before[:, 0]
-    if len(columns) == 0:
-        return Scored(candidate, columns, -np.inf, before, np.zeros(0))
     if candidate.effect.unit_coefficient:
         return Scored(candidate, columns, float((before - error).sum()), error, np.ones(1))
     kept = np.ones(len(columns), dtype=bool)
