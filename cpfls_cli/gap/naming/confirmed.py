@@ -93,36 +93,27 @@ def on_bound(found: NamedFit, floor: Array) -> tuple[list[Candidate], Refusal] |
         if len(names) > 1 and all(ends):
             says = f"{' and '.join(names)} may all be at the bounds of what is possible"
             return [candidate], Refusal(candidate.effect.name, says, True)
-    reached = {
-        index: own
-        for index, candidate in enumerate(chosen)
-        if (own := _reached(sized(candidate.effect, found.estimates.effects[index])))
-    }
-    if not reached:
-        return None
-    free = free_estimates(found.hypothesis, floor, found.block)
-    for index, bounds in reached.items():
-        name = chosen[index].effect.name
+    free = None
+    for index, candidate in enumerate(chosen):
+        sizes = sized(candidate.effect, found.estimates.effects[index])
+        bounds = {
+            number.name: f"{bound:.3g} {number.unit}"
+            for number in sizes
+            for bound in number.plausible
+            if bound and tied(np.array(number.value), np.array(bound))
+        }
+        if not bounds:
+            continue
+        free = free or free_estimates(found.hypothesis, floor, found.block)
         beyond = [number.name for number in free.effects[index] if number.name in bounds and number.impossible]
         if beyond:
             says = f"its {beyond[0]} would surely be beyond what is possible, {bounds[beyond[0]]}"
-            return [chosen[index]], Refusal(name, says, True)
-        sizes = sized(chosen[index].effect, found.estimates.effects[index])
+            return [candidate], Refusal(candidate.effect.name, says, True)
         main = [number.name for number in _main(found, index, sizes, floor) if number.name in bounds]
         if main:
             says = f"its {main[0]} sits on the bound of what is possible, {bounds[main[0]]}"
-            return [chosen[index]], Refusal(name, says, True)
+            return [candidate], Refusal(candidate.effect.name, says, True)
     return None
-
-
-def _reached(numbers: Sequence[Estimate]) -> dict[str, str]:
-    """Name the numbers that sit on a bound other than zero, and the bound."""
-    found = {}
-    for number in numbers:
-        for bound in number.plausible:
-            if bound and tied(np.array(number.value), np.array(bound)):
-                found[number.name] = f"{bound:.3g} {number.unit}"
-    return found
 
 
 def _main(found: NamedFit, index: int, numbers: Sequence[Estimate], floor: Array) -> Sequence[Estimate]:

@@ -36,18 +36,8 @@ _USUAL_OF_BOUND = 0.2
 
 @dataclass(frozen=True)
 class Leftover:
-    """The residual of a fit and what it follows.
+    """Channels of which a fit leaves a gap."""
 
-    Attributes
-    ----------
-    floors : array, shape (6,)
-        Root mean square of each channel, in floors; 0 where unknown.
-    unexplained : tuple of Unexplained
-        Channels with a gap.
-    """
-
-    floors: Array
-    dependence: tuple[Dependence, ...]
     unexplained: tuple[Unexplained, ...]
 
 
@@ -83,7 +73,7 @@ def leftover(
         _unexplained(channel, float(size), dependence, band, direction, settings)
         for channel, size, direction in zip(CHANNELS, sizes, directions, strict=True)
     ]
-    return Leftover(sizes, dependence, tuple(entry for entry in unexplained if entry is not None))
+    return Leftover(tuple(entry for entry in unexplained if entry is not None))
 
 
 def _band(hypothesis: System, linear: Array, settings: GapSettings, rng: np.random.Generator) -> NarrowBand | None:

@@ -13,12 +13,7 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, channel_size, floors, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
-from cpfls_cli.gap.naming.scoring import (
-    Scored,
-    candidates_of,
-    score,
-    scoring_matrix,
-)
+from cpfls_cli.gap.naming.scoring import Scored, candidates_of, score, scoring_matrix
 from cpfls_cli.gap.settings import CHANCE, COUNTS, NOISE, OFF, RARE, VISIBLE, GapSettings
 from cpfls_cli.rounding import tied
 from cpfls_cli.weak_form.resampling import blocks_of, folds, mirror_shifted
@@ -37,7 +32,6 @@ class RankedStep:
         What the best candidate explains of shifted residuals.
     above_floor : float
         Sum of squares that the hypothesis leaves above the floor, in squared floors.
-    block : array of int, shape (window,)
     """
 
     hypothesis: System
@@ -45,7 +39,6 @@ class RankedStep:
     ranking: tuple[Scored, ...]
     chance: Array
     above_floor: float
-    block: IntArray
 
     def worth_a_name(self, explained: float = 0.0) -> float:
         """Compute what an effect has to explain of what a part explained leaves of the gap, in squared floors."""
@@ -96,19 +89,19 @@ def rank_effects(
     listed = [*candidates_of([effect for effect in effects if effect.name not in names]), *also]
     tried = [candidate for candidate in listed if hypothesis.can(candidate)]
     arranged = scoring_matrix(hypothesis, tried, floor)
-    block = block_index(hypothesis, settings)
     right = hypothesis.residual[..., None]
     if rng is not None:
         unexplained = hypothesis.left(fit(hypothesis, floor))
         shifted = mirror_shifted(unexplained, hypothesis.flight_index, settings.shifts, rng)
         right = np.concatenate([right, shifted], axis=2)
+    block = block_index(hypothesis, settings)
     beside = folds(arranged.matrix, right / floor[:, None], block, arranged.prior).beside(arranged.base)
     scored, chance = score(arranged, beside, hypothesis)
     above_floor = float(max(beside.before[:, 0].sum() - rows(hypothesis), 1e-9))
     once: dict[str, Scored] = {}
     for each in scored:
         once.setdefault(each.candidate.effect.name, replace(each, others=hypothesis.chosen))
-    return RankedStep(hypothesis, floor, tuple(once.values()), chance, above_floor, block)
+    return RankedStep(hypothesis, floor, tuple(once.values()), chance, above_floor)
 
 
 def best_floor(hypothesis: System) -> Array:

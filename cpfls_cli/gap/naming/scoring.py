@@ -26,8 +26,6 @@ class Scored:
 
     Attributes
     ----------
-    columns : array of int
-        Of the matrix; without those that a bound at 0 took out.
     gain : float
         Sum of squares taken off the blocks that the fits did not see, in squared floors; minus infinity where refused.
     block_error : array, shape (block,)
@@ -39,7 +37,6 @@ class Scored:
     """
 
     candidate: Candidate
-    columns: IntArray
     gain: float
     block_error: Array
     coefficients: Array
@@ -161,21 +158,20 @@ def _scored(placed: PlacedCandidate, error: Array, beside: Beside, vehicle: Vehi
     """Score a candidate that leaves `error` of the blocks with all its columns."""
     (candidate, columns, _), before = placed, beside.before[:, 0]
     if candidate.effect.unit_coefficient:
-        return Scored(candidate, columns, float((before - error).sum()), error, np.ones(1))
+        return Scored(candidate, float((before - error).sum()), error, np.ones(1))
     kept = np.ones(len(columns), dtype=bool)
     for _ in range(len(columns)):
         fitted, unsure = np.zeros(len(columns)), np.zeros(len(columns))
         fitted[kept], unsure[kept] = beside.fit(columns[kept])
         keep, admissible = within_bounds(candidate.effect, fitted, unsure, vehicle)
         if not admissible or not (kept & keep).any():
-            return Scored(candidate, columns, -np.inf, before, fitted)
+            return Scored(candidate, -np.inf, before, fitted)
         if (kept & keep == kept).all():
             break
         kept &= keep
-    used = columns[kept]
-    if len(used) < len(columns):
-        error = _error(placed, used, beside)[:, 0]
-    return Scored(candidate, used, float((before - error).sum()), error, fitted)
+    if not kept.all():
+        error = _error(placed, columns[kept], beside)[:, 0]
+    return Scored(candidate, float((before - error).sum()), error, fitted)
 
 
 def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleSettings) -> tuple[BoolArray, bool]:

@@ -216,7 +216,7 @@ def rescored(hypothesis: System, step: RankedStep, settings: GapSettings) -> Sco
     error = _unseen(hypothesis, step.floor * compensation(plain, own), settings, moving=moving)
     gain = step.above_floor + rows(hypothesis) - error.sum()
     *others, newest = hypothesis.chosen
-    return Scored(newest, np.zeros(0, dtype=int), float(gain), error, np.zeros(0), tuple(others))
+    return Scored(newest, float(gain), error, np.zeros(0), tuple(others))
 
 
 def _unseen(hypothesis: System, floor: Array, settings: GapSettings, *, moving: bool = True) -> Array:
