@@ -46,11 +46,6 @@ class PlayedPair(Played):
             return free_runs(self.stated, self.logged, starts, horizon)
         return super().runs(prediction, starts, horizon)
 
-    @property
-    def as_given(self) -> Played:
-        """The flight as logged and the model as given."""
-        return Played(self.logged, self.stated, self.stated)
-
 
 def rates_fade(training: Sequence[Recording], horizon_s: float) -> float:
     """Fit the time constant with which body rates of training flights fade, s."""
@@ -183,7 +178,7 @@ def worst_stretch(pairs: Sequence[PlayedPair], horizon_s: float, shown_s: float)
 
 def _worst(index: int, pair: PlayedPair, samples: int, most: int) -> WorstStretch:
     starts = pair.flight.starts(samples - 1, samples)
-    before = drawn_runs(pair.as_given, starts, samples - 1).model
+    before = drawn_runs(Played(pair.logged, pair.stated, pair.stated), starts, samples - 1).model
     after = drawn_runs(pair, starts, samples - 1)
     square = ((before - after.measured) ** 2).sum(axis=1)
     joined = min(len(starts), most)

@@ -24,6 +24,9 @@ _LOBE_CYCLES = 2
 _FINER = 4
 """Frequencies for each reciprocal of the flight: between two, a line loses 2 % of its power."""
 
+LOWEST = _FINER * _LOBE_CYCLES
+"""First bin above those that the mean leaks into."""
+
 _MEDIAN_CYCLES = 24
 """Width of the running median, six times a line's."""
 
@@ -113,7 +116,7 @@ def narrow_band(
         drawn += 1
     channel, frequency = int(channels[strongest]), _between_bins(power[strongest], peak, on)
     mean, error = _mean_power(channel, frequency, hop_s, flights, rates)
-    lobe = slice(max(0, peak - _LOBE_CYCLES * on.resolution), peak + _LOBE_CYCLES * on.resolution + 1)
+    lobe = slice(max(0, peak - LOWEST), peak + LOWEST + 1)
     return NarrowBand(
         channel=CHANNELS[channel],
         frequency_hz=frequency,
@@ -128,7 +131,7 @@ def narrow_band(
 def _prominence(power: Array, on: Grid) -> Array:
     """Divide by the background; 0 at frequencies that are part of the mean."""
     ratio = power / background(power, on)
-    ratio[:, : on.lowest] = 0
+    ratio[:, :LOWEST] = 0
     return np.asarray(ratio)
 
 
@@ -176,16 +179,10 @@ class Grid:
     samples : int
         To which series are filled up with zeros.
     frequency : array, shape (frequency,), Hz
-    resolution : int
-        Bins in the reciprocal of the longest flight.
-    lowest : int
-        First bin above those that the mean leaks into.
     """
 
     samples: int
     frequency: Array
-    resolution: int = _FINER
-    lowest: int = _FINER * _LOBE_CYCLES
 
 
 def grid(lengths: Sequence[int], period: float) -> Grid:
@@ -243,18 +240,18 @@ def background(power: Array, on: Grid) -> Array:
     # A background is no steeper, or it would be taken for a line at 0.
     correlation = np.clip(correlation, -CORRELATIONS[-1], CORRELATIONS[-1])
     shape = 1 / (1 - 2 * correlation * np.cos(turn) + correlation**2)
-    return np.asarray(shape * _running_median(power / shape, on))
+    return np.asarray(shape * _running_median(power / shape))
 
 
-def _running_median(power: Array, on: Grid) -> Array:
-    used = power[..., on.lowest :]
-    half = min(_MEDIAN_CYCLES * on.resolution // 2, used.shape[-1] - 1)
+def _running_median(power: Array) -> Array:
+    used = power[..., LOWEST:]
+    half = min(_MEDIAN_CYCLES * _FINER // 2, used.shape[-1] - 1)
     padded = np.pad(used, [(0, 0)] * (used.ndim - 1) + [(half, half)], mode="reflect")
     # Neighbouring bins are alike, and so are neighbouring medians: a part of them is enough.
-    step = 2 * on.resolution
+    step = 2 * _FINER
     values = np.median(sliding_window_view(padded, 2 * half + 1, axis=-1)[..., ::step, ::2], axis=-1)
     # In straight lines between them, constant beyond the ends.
-    inside = np.clip((np.arange(power.shape[-1]) - on.lowest) / step, 0, values.shape[-1] - 1)
+    inside = np.clip((np.arange(power.shape[-1]) - LOWEST) / step, 0, values.shape[-1] - 1)
     left = np.minimum(inside.astype(int), max(0, values.shape[-1] - 2))
     right = np.minimum(left + 1, values.shape[-1] - 1)
     share = inside - left
