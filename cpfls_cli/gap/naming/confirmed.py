@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -50,16 +51,14 @@ def earned(
     """
     found, refusals = fitted(flights, chosen, floor, settings), []
     while found.hypothesis.chosen:
-        nothing = nothing_by_size(found)
-        out = [candidate for candidate in found.hypothesis.chosen if candidate.effect.name in nothing]
+        out = nothing_by_size(found)
         if not out:
-            refused = on_bound(found, floor)
-            if refused is None:
+            refusal = on_bound(found, floor)
+            if refusal is None:
                 break
-            out, refusal = refused
             refusals.append(refusal)
-        kept = [candidate for candidate in found.hypothesis.chosen if candidate not in out]
-        found = fitted(flights, kept, floor, settings)
+            out = [refusal.name]
+        found = found.without(out, floor, settings)
     return found, refusals
 
 
@@ -73,7 +72,7 @@ def nothing_by_size(found: NamedFit) -> list[str]:
     return names
 
 
-def on_bound(found: NamedFit, floor: Array) -> tuple[list[Candidate], Refusal] | None:
+def on_bound(found: NamedFit, floor: Array) -> Refusal | None:
     """Find an effect whose main number sits on a bound, or any number that is surely asked for beyond one.
 
     Zero is not such a bound: many coefficients cannot be less.
@@ -92,7 +91,7 @@ def on_bound(found: NamedFit, floor: Array) -> tuple[list[Candidate], Refusal] |
         )
         if len(names) > 1 and all(ends):
             says = f"{' and '.join(names)} may all be at the bounds of what is possible"
-            return [candidate], Refusal(candidate.effect.name, says, True)
+            return Refusal(candidate.effect.name, says, True)
     free = None
     for index, candidate in enumerate(chosen):
         sizes = sized(candidate.effect, found.estimates.effects[index])
@@ -108,11 +107,11 @@ def on_bound(found: NamedFit, floor: Array) -> tuple[list[Candidate], Refusal] |
         beyond = [number.name for number in free.effects[index] if number.name in bounds and number.impossible]
         if beyond:
             says = f"its {beyond[0]} would surely be beyond what is possible, {bounds[beyond[0]]}"
-            return [candidate], Refusal(candidate.effect.name, says, True)
+            return Refusal(candidate.effect.name, says, True)
         main = [number.name for number in _main(found, index, sizes, floor) if number.name in bounds]
         if main:
             says = f"its {main[0]} sits on the bound of what is possible, {bounds[main[0]]}"
-            return [candidate], Refusal(candidate.effect.name, says, True)
+            return Refusal(candidate.effect.name, says, True)
     return None
 
 
@@ -172,19 +171,16 @@ class Judge:
         judgement, refusals = first, []
         while (refusal := self._refused(judgement)) is not None:
             refusals.append(refusal)
-            kept = [each for each in judgement.found.hypothesis.chosen if each.effect.name != refusal.name]
-            judgement = self.judge(fitted(self.training, kept, self.floor, self.settings))
+            judgement = self.judge(judgement.found.without([refusal.name], self.floor, self.settings))
         return judgement, refusals
 
     def _refused(self, judgement: Judgement) -> Refusal | None:
-        chosen = judgement.found.hypothesis.chosen
         # What was dropped may have held another effect within what is possible.
         beyond = on_bound(judgement.found, self.floor)
-        if beyond is not None:
-            return beyond[1]
-        compared = {each.effect.name: self._without(judgement, each.effect.name) for each in chosen}
-        if not compared:
-            return None
+        names = [each.effect.name for each in judgement.found.hypothesis.chosen]
+        if beyond is not None or not names:
+            return beyond
+        compared = {name: self._without(judgement, name) for name in names}
         after = judgement.held_out.size(judgement.held_out.after).floors
         harm = {name: one.worsened(after) for name, one in compared.items()}
         worst = largest(harm, lambda name: float(harm[name].max()))
@@ -202,8 +198,7 @@ class Judge:
 
     def _without(self, judgement: Judgement, name: str) -> Without:
         """Leave an effect out and refit the others."""
-        kept = [each for each in judgement.found.hypothesis.chosen if each.effect.name != name]
-        without = fitted(self.training, kept, self.floor, self.settings)
+        without = judgement.found.without([name], self.floor, self.settings)
         there = system(self.repaired, without.hypothesis.chosen)
         residual, unseen = there.left(without.estimates.linear), judgement.held_out
         squares = [((each / unseen.noise) ** 2) * unseen.known for each in (residual, unseen.after)]
@@ -332,16 +327,13 @@ def _other_numbers(first: Judgement, judge: Judge, settings: GapSettings) -> tup
         return ()
     if _size(after * unseen.known, unseen.floor).max() > CLEAR:
         return ()
-    sentences = []
-    for there, here in zip(first.found.estimates.effects, own.effects, strict=True):
-        for number, other in zip(there, here, strict=False):
-            apart = number.name == other.name and (number.high < other.low or other.high < number.low)
-            if apart:
-                sentences.append(
-                    f"{number.name} is {number.value:.3g} [{number.low:.3g}, {number.high:.3g}] {number.unit} in the"
-                    f" training flights and {other.value:.3g} [{other.low:.3g}, {other.high:.3g}] in the held-out ones"
-                )
-    return tuple(sentences)
+    effects = zip(first.found.estimates.effects, own.effects, strict=True)
+    return tuple(
+        f"{number.name} is {number.value:.3g} [{number.low:.3g}, {number.high:.3g}] {number.unit} in the"
+        f" training flights and {other.value:.3g} [{other.low:.3g}, {other.high:.3g}] in the held-out ones"
+        for number, other in chain.from_iterable(zip(there, here, strict=False) for there, here in effects)
+        if number.name == other.name and (number.high < other.low or other.high < number.low)
+    )
 
 
 def _size(residual: Array, floor: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -70,6 +70,11 @@ class NamedFit(NamedTuple):
     hypothesis: System
     block: IntArray
     estimates: Estimates
+
+    def without(self, names: Collection[str], floor: Array, settings: GapSettings) -> NamedFit:
+        """Leave effects out and refit the others."""
+        kept = [each for each in self.hypothesis.chosen if each.effect.name not in names]
+        return fitted(self.hypothesis.flights, kept, floor, settings)
 
 
 def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
