@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.consistency.audit import Audit, audit
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, known_size
@@ -132,7 +132,7 @@ def compare(
     centres = np.concatenate([windows.centres(flight.signals.time) for flight in flights])
     index = hypothesis.flight_index
     dependence = rank_dependence(residual / floor, index, block, states, settings.shifts, rng)
-    known = np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in flights])
+    known = hypothesis.known
     rms = known_size(residual, known)
     effects = [effect for name, effect in CATALOGUE.items() if name not in settings.ignore]
     repairing = replace(model, repairs=audited)
@@ -157,7 +157,7 @@ def compare(
     )
 
 
-def _activity(hypothesis: System, known: Array) -> Array:
+def _activity(hypothesis: System, known: BoolArray) -> Array:
     """Compute the root mean square of inertial or rotor wrench, whichever is larger."""
     taken = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
     given = hypothesis.by_flight(lambda flight, signals: flight.windows.average(signals.wrench))

@@ -97,7 +97,7 @@ def rank_effects(
     block = block_index(hypothesis, settings)
     beside = folds(arranged.matrix, right / floor[:, None], block, arranged.prior).beside(arranged.base)
     scored, chance = score(arranged, beside, hypothesis)
-    above_floor = float(max(beside.before[:, 0].sum() - rows(hypothesis), 1e-9))
+    above_floor = float(max(beside.before[:, 0].sum() - hypothesis.known.sum(), 1e-9))
     once: dict[str, Scored] = {}
     for each in scored:
         once.setdefault(each.candidate.effect.name, replace(each, others=hypothesis.chosen))
@@ -128,11 +128,6 @@ def block_index(hypothesis: System, settings: GapSettings) -> IntArray:
     """Assign each window to a block of the cross-validation, shape (window,)."""
     centres = np.concatenate([f.windows.centres(f.signals.time) for f in hypothesis.flights])
     return blocks_of(hypothesis.flight_index, centres, settings.block_s)
-
-
-def rows(hypothesis: System) -> int:
-    """Count the residuals of a hypothesis, over windows and known channels."""
-    return sum(len(flight) * int(flight.known.sum()) for flight in hypothesis.flights)
 
 
 def surely(margin: Array) -> bool:
