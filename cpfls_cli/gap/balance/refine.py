@@ -273,25 +273,30 @@ def refitted(hypothesis: System, weight: Array) -> System:
     rotor_wrench = system(hypothesis.flights).rotor_wrench
     low, high = np.array([shape.bounds(hypothesis.vehicle) for shape in hypothesis.shapes]).T
 
-    def fitted(there: System) -> tuple[float, tuple[System, Array, Array, BoolArray]]:
-        """Compute the squares that are left, and what a step is computed from."""
+    def fitted(there: System) -> tuple[float, tuple[Array, Array, BoolArray]]:
+        """Compute the squares that are left, and weights, coefficients and those on bounds."""
         own = weight / compensation(rotor_wrench, there.rotor_wrench)
         linear, held = fit_within_bounds(there, own)
-        return float(((there.left(linear) / own) ** 2).sum()), (there, own, linear, held)
+        return float(((there.left(linear) / own) ** 2).sum()), (own, linear, held)
 
-    error, point = fitted(hypothesis)
+    error, (own, linear, held) = fitted(hypothesis)
     while True:
-        step, gain = _newton_step(*point, rotor_wrench)
+        # The change of the shapes beside the coefficients that no bound holds, and what it takes off the squares where
+        # the residual is linear in them.
+        moving = shape_columns(hypothesis, linear, rotor_wrench)
+        rows = equations(hypothesis, own).around(linear, ~held, moving / own[..., None])
+        step, (columns, right) = rows.solve(), rows.root
+        step, gain = step[-moving.shape[2] :], float(right @ columns @ step)
         # Half of a step that goes too far.
         while gain >= _SETTLED:
-            left, ahead = fitted(hypothesis.with_shapes(np.clip(hypothesis.shape_values + step, low, high)))
+            ahead = hypothesis.with_shapes(np.clip(hypothesis.shape_values + step, low, high))
+            left, there = fitted(ahead)
             if error - left >= _SETTLED:
                 break
             step, gain = step / 2, gain / 2
         else:
             return hypothesis
-        error, point = left, ahead
-        hypothesis = point[0]
+        hypothesis, error, (own, linear, held) = ahead, left, there
 
 
 def _exact(hypothesis: System, weight: Array) -> System:
@@ -307,19 +312,6 @@ def _exact(hypothesis: System, weight: Array) -> System:
             chosen[effect.name] = Candidate(exact, shapes)
     listed = tuple(chosen.values())
     return hypothesis if listed == hypothesis.chosen else system(hypothesis.flights, listed)
-
-
-def _newton_step(
-    hypothesis: System, weight: Array, linear: Array, held: BoolArray, rotor_wrench: Array
-) -> tuple[Array, float]:
-    """Solve for the change of the shapes, with the coefficients that no bound holds beside them, shape (shape,).
-
-    With it what it takes off the squares where the residual is linear in them.
-    """
-    shapes = shape_columns(hypothesis, linear, rotor_wrench)
-    rows = equations(hypothesis, weight).around(linear, ~held, shapes / weight[..., None])
-    step, (columns, right) = rows.solve(), rows.root
-    return step[-shapes.shape[2] :], float(right @ columns @ step)
 
 
 def _improved(

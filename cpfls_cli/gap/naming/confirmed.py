@@ -236,11 +236,6 @@ class Without(NamedTuple):
         """By how much the gap is larger without it, squared floors."""
         return float(self.seen.max())
 
-    @property
-    def channel(self) -> int:
-        """Channel in which it shows most."""
-        return int(np.argmax(levelled(self.seen)))
-
     def worsened(self, after: Array) -> Array:
         """Compute how much worse the effect makes channels that it leaves `after` floors in, as ratios; 0 if unsure."""
         surely = -self.raised > ERRORS * self.error
@@ -257,7 +252,7 @@ def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | No
     floors = judgement.held_out.size(judgement.held_out.after).floors
     beyond = OFF**2 * max((one.visibly for one in compared.values()), default=0.0)
     for name in ascending(compared, lambda each: compared[each].visibly):
-        channel, off = compared[name].channel, compared[name].visibly
+        channel, off = int(np.argmax(levelled(compared[name].seen))), compared[name].visibly
         left = float(floors[channel])
         beside = max(beyond, *(one.seen[channel] for one in compared.values()))
         if off < OFF**2 * beside and (left > CLEAR or off < ERRORS * (NOISE - 1)):

@@ -19,7 +19,6 @@ from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect, NotExcited, Unexplained
 from cpfls_cli.gap.naming.search import of_motion
 from cpfls_cli.gap.residual.dependence import (
-    Dependence,
     joined_states,
     rank_dependence,
     state_signals,
@@ -65,54 +64,32 @@ def leftover(
     dependence = rank_dependence(
         in_floors, hypothesis.flight_index, block, without_actuation(states), settings.shifts, rng
     )
+    # The largest of each channel.
+    told = {d.channel: d for d in reversed(dependence) if d.p_value <= settings.significance and d.r2 > COUNTS}
     band = _band(hypothesis, linear, settings, rng)
     rates = hypothesis.by_flight(lambda flight, _: flight.windows.average(flight.signals.body_rate))
     # A force turns nothing.
     directions = [*energy_directions(residual[:, :3], rates, block), *["neither"] * 3]
-    unexplained = [
-        _unexplained(channel, float(size), dependence, band, direction, settings)
-        for channel, size, direction in zip(CHANNELS, sizes, directions, strict=True)
-    ]
-    return Leftover(tuple(entry for entry in unexplained if entry is not None))
+    unexplained = []
+    for channel, size, direction in zip(CHANNELS, sizes.tolist(), directions, strict=True):
+        follows, rings = told.get(channel), band if band and band.channel == channel else None
+        if size > CLEAR or (size > np.sqrt(NOISE) and (follows or rings)):
+            signal, r2 = (follows.signal, follows.r2) if follows else (None, 0.0)
+            share, frequency, energy = 0.0, None, direction
+            if rings:
+                share, frequency, energy = rings.share, rings.frequency_hz, rings.energy
+            unexplained.append(Unexplained(channel, size, signal, max(r2, share), frequency, energy))
+    return Leftover(tuple(unexplained))
 
 
 def _band(hypothesis: System, linear: Array, settings: GapSettings, rng: np.random.Generator) -> NarrowBand | None:
-    """Search for a narrow band with windows dense enough to exclude aliases."""
-    rows, rates = [], []
+    """Search for a narrow band that counts, with windows dense enough to exclude aliases."""
+    windows, rows, rates = dense(hypothesis.flights[0].windows), [], []
     for number, flight in enumerate(hypothesis.flights):
-        windows, remainder = dense(flight.windows), left_over(hypothesis, number, linear)
-        direct = windows.average(remainder.direct)
-        rows.append(direct if remainder.momentum is None else direct + windows.derivative(remainder.momentum))
+        rows.append(replace(flight, windows=windows).averaged(left_over(hypothesis, number, linear)))
         rates.append(windows.average(flight.signals.body_rate))
-    hop_s = dense(hypothesis.flights[0].windows).hop * hypothesis.flights[0].windows.period
-    return narrow_band(rows, rates, hop_s, settings.shifts, rng, settings.significance)
-
-
-def _unexplained(
-    channel: str,
-    size: float,
-    dependence: Sequence[Dependence],
-    band: NarrowBand | None,
-    energy: str,
-    settings: GapSettings,
-) -> Unexplained | None:
-    """Tell of a channel what its residual follows; None where it is noise."""
-
-    def counts(p_value: float, share: float) -> bool:
-        return p_value <= settings.significance and share > COUNTS
-
-    follows = next((d for d in dependence if d.channel == channel and counts(d.p_value, d.r2)), None)
-    rings = band if band and band.channel == channel and counts(band.p_value, band.share) else None
-    if size <= np.sqrt(NOISE) or not (size > CLEAR or follows or rings):
-        return None
-    return Unexplained(
-        channel,
-        size,
-        follows.signal if follows else None,
-        max(follows.r2 if follows else 0.0, rings.share if rings else 0.0),
-        rings.frequency_hz if rings else None,
-        rings.energy if rings else energy,
-    )
+    band = narrow_band(rows, rates, windows.hop * windows.period, settings.shifts, rng, settings.significance)
+    return band if band and band.p_value <= settings.significance and band.share > COUNTS else None
 
 
 def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[str]:

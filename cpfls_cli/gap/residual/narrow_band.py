@@ -152,22 +152,19 @@ def _mean_power(
     if channel >= body_rate[0].shape[1]:
         return 0.0, 0.0
     length = int(np.ceil(2 * _LOBE_CYCLES / (frequency * hop_s)))
-    pairs = zip(residual, body_rate, strict=True)
-    products = np.concatenate(
-        [_products(rows[:, channel], rate[:, channel], length, frequency * hop_s) for rows, rate in pairs]
-    )
+    taper = np.hanning(length + 2)[1:-1]
+    wave = np.exp(-2j * np.pi * frequency * hop_s * np.arange(length)) * taper * 2 / taper.sum()
+    found = []
+    for rows, rate in zip(residual, body_rate, strict=True):
+        both = np.stack([rows[:, channel], rate[:, channel]])
+        segments = both[:, : len(rate) // length * length].reshape(2, -1, length)
+        # Complex amplitudes in the band.
+        first, second = (segments - segments.mean(axis=2, keepdims=True)) @ wave
+        found.append((first * second.conj()).real / 2)
+    products = np.concatenate(found)
     if len(products) < 2:
         return float(products.mean()) if len(products) else 0.0, float(np.inf)
     return float(products.mean()), float(mean_error(products))
-
-
-def _products(residual: Array, rate: Array, length: int, cycles_per_row: float) -> Array:
-    """Average the product of two signals in a band, from their complex amplitudes, shape (segment,)."""
-    taper = np.hanning(length + 2)[1:-1]
-    wave = np.exp(-2j * np.pi * cycles_per_row * np.arange(length)) * taper * 2 / taper.sum()
-    segments = np.stack([residual, rate])[:, : len(rate) // length * length].reshape(2, -1, length)
-    first, second = (segments - segments.mean(axis=2, keepdims=True)) @ wave
-    return np.asarray((first * second.conj()).real / 2)
 
 
 @dataclass(frozen=True)
