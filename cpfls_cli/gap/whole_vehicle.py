@@ -25,27 +25,23 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
 
 
-def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings, inertia: Array | None = None) -> VehicleModel:
+def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings) -> VehicleModel:
     """Turn a model with effects into that of a whole vehicle.
 
     Parameters
     ----------
     vehicle : VehicleSettings
         That the effects were fitted with.
-    inertia : array, shape (3, 3), kg m^2, or None
-        Of the base, where it does not depend on the attitude; None for that of the vehicle, or a base that does.
 
     Returns
     -------
     VehicleModel
         With the inertia of before where the one that comes with the effects is that of no body.
     """
-    constant = extended.base is None or inertia is not None
-    given = inertia_tensor(vehicle) if inertia is None else inertia
+    given, fuzzy = inertia_tensor(vehicle), extended.base
     parts, times = _parts(extended, vehicle)
     corrected = given + inertia_correction(extended.parameters, vehicle)
     effects = (*_numbers(extended.parameters, vehicle, corrected), *(ModelEffect(*each) for each in parts.effects))
-    fuzzy = extended.base if not constant else None
     return VehicleModel(
         vehicle=_with_inertia(parts.vehicle, given + parts.inertia),
         response=RotorResponse(**times),
