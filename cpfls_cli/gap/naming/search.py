@@ -70,10 +70,8 @@ def forward_selection(
         number = float(np.log(step.hypothesis.known.sum()))
         best = simplest(ascending(grown, lambda scored: -scored.gain), step.above_floor, number)
         refitted = refined(flights, best.chosen, step.floor)
-        if of_motion(best.gain, step, refitted) < step.worth_a_name():
-            return chosen, steps
         # A set that was there before would come round again for ever.
-        if _names(refitted.chosen) in tried:
+        if of_motion(best.gain, step, refitted) < step.worth_a_name() or _names(refitted.chosen) in tried:
             return chosen, steps
         tried.add(_names(refitted.chosen))
         step.hypothesis.cache.clear()
@@ -97,8 +95,7 @@ def _moved(flights: Sequence[WeakFlight], step: RankedStep, settings: GapSetting
     beside_late = any(each.effect.actuation is not None for each in best.others)
     if best not in alike or not (beside_late or len(alike) > 1):
         return near
-    moved = [rescored(refined(flights, scored.chosen, step.floor), step, settings) for scored in alike]
-    return ascending(moved, lambda scored: -scored.gain)
+    return [rescored(refined(flights, scored.chosen, step.floor), step, settings) for scored in alike]
 
 
 def grown_elsewhere(
