@@ -100,10 +100,8 @@ def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: A
             weight = compensation(hypothesis.rotor_wrench, hypothesis.rotor_wrench + columns[..., 0])
         placed.append((candidate, indices, weight))
         first += columns.shape[2]
-    free = [information(each.effect, place.stop - place.start, hypothesis.vehicle) for each, place in hypothesis.places]
-    shapes = np.array([1.0 / np.ptp(shape.grid) ** 2 for shape in hypothesis.shapes])
     offered = [information(candidate.effect, len(own), hypothesis.vehicle) for candidate, own, _ in placed]
-    prior = np.concatenate([*free, shapes, *offered])
+    prior = np.concatenate([known_before(hypothesis), *offered])
     return ScoringMatrix(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(placed), prior)
 
 
@@ -197,6 +195,13 @@ def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleS
     if effect.lever is not None and len(linear) == len(effect.coefficients) and not at_zero.any():
         at_zero |= ~effect.lever(np.where(at_zero, 0.0, linear), error, vehicle)
     return ~at_zero, bool(not np.any(beyond & ~at_zero))
+
+
+def known_before(hypothesis: System) -> Array:
+    """Compute the prior information of the coefficients of a base and of the shapes behind them, shape (number,)."""
+    vehicle, places = hypothesis.vehicle, hypothesis.places
+    free = [information(candidate.effect, place.stop - place.start, vehicle) for candidate, place in places]
+    return np.concatenate([*free, [1.0 / np.ptp(shape.grid) ** 2 for shape in hypothesis.shapes]])
 
 
 def information(effect: Effect, columns: int, vehicle: VehicleSettings) -> Array:

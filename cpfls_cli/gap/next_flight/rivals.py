@@ -16,7 +16,7 @@ from cpfls_cli.gap.balance.refine import fit, least_squares, refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.leftover import usual_size
 from cpfls_cli.gap.naming.results import Alternative, NamedEffect
-from cpfls_cli.gap.naming.scoring import candidates_of, information
+from cpfls_cli.gap.naming.scoring import candidates_of, known_before
 from cpfls_cli.gap.next_flight.separation import Question, SizedEffect, answered, gathered, shared_noise
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rounding import smallest
@@ -144,8 +144,7 @@ def fitted_effects(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], f
     """
     balance = system(flights, chosen)
     matrix = (balance.base / floor[:, None]).reshape(-1, balance.base.shape[2])
-    widths = [(each, place.stop - place.start) for each, place in balance.places]
-    prior = np.concatenate([information(each.effect, width, balance.vehicle) for each, width in widths])
+    prior = known_before(balance)[: balance.base.shape[2]]
     # Rows of the prior beside those of the flights.
     matrix = np.concatenate([matrix, np.diag(np.sqrt(prior))])
     linear = least_squares(matrix, np.concatenate([(balance.residual / floor).reshape(-1), np.zeros(len(prior))]))
