@@ -13,6 +13,7 @@ from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import System, left_over, system, window_noise
+from cpfls_cli.gap.balance.refine import least_squares
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight, dense
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
@@ -26,7 +27,6 @@ from cpfls_cli.gap.residual.dependence import (
 )
 from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
 from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, NOISE, RARE, VISIBLE, GapSettings
-from cpfls_cli.rounding import ROUNDING
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _USUAL_OF_BOUND = 0.2
@@ -245,14 +245,9 @@ def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
     if effect.columns is None:
         return ""
     shape = {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes}
-    columns = hypothesis.columns(Candidate(effect, shape)) / floor[:, None]
-    flat, tested = (
-        (hypothesis.base / floor[:, None]).reshape(-1, hypothesis.base.shape[2]),
-        columns.reshape(-1, columns.shape[2]),
-    )
-    length = np.linalg.norm(flat, axis=0)
-    scaled = flat / np.where(length > 0, length, 1.0)
-    beyond = (tested - scaled @ np.linalg.lstsq(scaled, tested, rcond=ROUNDING)[0]).reshape(columns.shape)
+    columns = hypothesis.columns(Candidate(effect, shape))
+    base, tested = ((rows / floor[:, None]).reshape(-1, rows.shape[2]) for rows in (hypothesis.base, columns))
+    beyond = (tested - base @ least_squares(base, tested)).reshape(columns.shape)
     new = beyond * usual_size(effect, hypothesis.vehicle, columns.shape[2])
     # The best channel of the best coefficient decides.
     if np.sqrt((new**2).mean(axis=0)).max(initial=0.0) >= VISIBLE:
