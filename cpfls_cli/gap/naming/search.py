@@ -95,7 +95,8 @@ def _moved(flights: Sequence[WeakFlight], step: RankedStep, settings: GapSetting
     beside_late = any(each.effect.actuation is not None for each in best.others)
     if best not in alike or not (beside_late or len(alike) > 1):
         return near
-    return [rescored(refined(flights, scored.chosen, step.floor), step, settings) for scored in alike]
+    moved = [rescored(refined(flights, scored.chosen, step.floor), step, settings) for scored in alike]
+    return ascending(moved, lambda scored: -scored.gain)
 
 
 def grown_elsewhere(
