@@ -131,7 +131,12 @@ def diagnose(
     weak, (hypothesis, _, estimates), held_out = flights.training, *named.judgement
     progress(0.75, "rivals")
     effect_shares = shares(weak, hypothesis.chosen, estimates, named.judge.floor)
-    estimates, unnamed = beside_the_unnamed(named.judgement.found, named.steps[-1], named.effects, settings, rng)
+    # What makes rotors late in gusts instruments have decided.
+    tried = [each for each in named.effects if gusts is None or not each.late]
+    wider, unnamed = beside_the_unnamed(named.judgement.found, named.steps[-1], tried, settings, rng)
+    pairs = zip(hypothesis.chosen, estimates.effects, wider.effects, strict=True)
+    held_by = tuple(own if each.effect.name in named.sure else with_it for each, own, with_it in pairs)
+    estimates = replace(wider, effects=held_by)
     judged = [
         named.in_gusts(
             judge_effect(weak, hypothesis.chosen, index, estimates, float(share), named.effects, settings, rng)

@@ -63,10 +63,13 @@ class _Told(NamedTuple):
         Of what is known of each number, and of what is left, with what they move.
     numbers : array of bool, shape (number,)
         Those that are free, that it tells, and that no source before it does.
+    outside : bool
+        Whether it is what was asked from outside, and not what was before.
     """
 
     products: Array
     numbers: BoolArray
+    outside: bool
 
 
 def by_instruments(found: NamedFit, given: Known, floor: Array, settings: GapSettings) -> NamedFit:
@@ -101,7 +104,7 @@ def by_instruments(found: NamedFit, given: Known, floor: Array, settings: GapSet
         shapes = slice(len(at.estimates.linear), None)
         step, error = np.abs(values - _numbers(at))[shapes], jackknife_error(left_out)[shapes]
         hypothesis = at.hypothesis.with_shapes(values[shapes]) if len(step) else at.hypothesis
-        moved = np.any([numbers for _, numbers in sources], axis=0)
+        moved = np.any([numbers for _, numbers, _ in sources], axis=0)
         at = NamedFit(hypothesis, found.block, estimates_of(hypothesis, values, left_out))
         if np.all(10 * step <= error):
             break
@@ -117,7 +120,7 @@ def _stepped(found: NamedFit, sources: Sequence[_Told]) -> tuple[Array, Array]:
     """Move numbers to where what is left has nothing of what is known of them; and with each block left out."""
     values, prior = _numbers(found), _prior(found.hypothesis)
     change, without = np.zeros(len(values)), np.zeros((len(sources[0].products), len(values)))
-    for products, numbers in sources:
+    for products, numbers, _ in sources:
         kept = products[:, np.append(numbers, False)]
         # What those before it have moved is no longer left.
         right = kept[:, :, -1] - kept[:, :, :-1] @ change
@@ -146,7 +149,7 @@ def untold_axes(found: NamedFit, given: Known, floor: Array, settings: GapSettin
     floor : array, shape (6,)
     """
     told, vehicle = np.zeros(3, dtype=bool), found.hypothesis.places[0][1]
-    for _, numbers in _sources(found, given, floor, settings):
+    for _, numbers, _ in _sources(found, given, floor, settings):
         told |= numbers[vehicle][:3]
     return ~told
 
@@ -179,11 +182,11 @@ def may_be_nothing(found: NamedFit, given: Known, floor: Array, settings: GapSet
         own = np.zeros(len(values), dtype=bool)
         own[places.get(candidate.key, slice(0))] = True
         absent = candidate.effect.name in nothing
-        for products, numbers in sources:
+        for products, numbers, outside in sources:
             others = numbers & ~own
             others[shapes] = False
             flown = products[products.any(axis=(1, 2))]
-            if (own & numbers).any() and len(flown) >= ENOUGH_BLOCKS + (own & numbers).sum():
+            if outside and (own & numbers).any() and len(flown) >= ENOUGH_BLOCKS + (own & numbers).sum():
                 absent = _chance(flown, own & numbers, others, values) > CHANCE
                 break
         names += [candidate.effect.name] if absent else []
@@ -224,20 +227,26 @@ def foretold_of_left(found: NamedFit, given: Known, floor: Array, settings: GapS
 
 
 def _sources(found: NamedFit, given: Known, floor: Array, settings: GapSettings) -> list[_Told]:
-    """List what tells numbers: what was asked, and of those that this does not tell what was before; of 8 s or more."""
+    """List what tells numbers: what was asked; and what was before those that this does not tell, and what is late.
+
+    A linear answer to setpoints tells lateness by far worse.
+    """
     hypothesis = found.hypothesis
     left, prior, sources = _movable(hypothesis, floor), _prior(hypothesis), list[_Told]()
+    late = [each.effect.late for each in hypothesis.chosen for _ in each.effect.shapes]
+    early = np.append(np.ones(len(left) - len(late), dtype=bool), np.logical_not(late))
     of_source = [list(runs) for runs in _runs(hypothesis, found.estimates.linear, given, floor, settings)]
     blocks = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(run.block for run in chain(*of_source))]))
-    for runs in of_source:
+    for place, runs in enumerate(of_source):
         products = np.zeros((len(blocks), len(left) + 1, len(left) + 1))
-        for place, block in enumerate(blocks):
-            products[place] = sum(_crossed(run, run.block == block) for run in runs)
+        for row, block in enumerate(blocks):
+            products[row] = sum(_crossed(run, run.block == block) for run in runs)
         flown = products[products.any(axis=(1, 2))]
         if len(flown) >= ENOUGH_BLOCKS:
             # What a bound tells better than these flights is not told by them.
             numbers = left & (_strength(flown) > STRONG) & (np.diagonal(flown.sum(axis=0))[:-1] > prior)
-            sources.append(_Told(products, numbers))
+            numbers &= early | (place > 0)
+            sources.append(_Told(products, numbers, place == 0))
             left = left & ~numbers
     return sources
 
@@ -289,10 +298,15 @@ def _told(before: NamedFit, after: Estimates, moved: BoolArray) -> Estimates:
     hypothesis = before.hypothesis
     places = {candidate.key: place for candidate, place in hypothesis.places}
     first, effects = hypothesis.base.shape[2], []
-    for candidate, *both in zip(hypothesis.chosen, before.estimates.effects, after.effects, strict=True):
-        shapes = slice(first, first := first + len(candidate.effect.shapes))
-        own = moved[places.get(candidate.key, slice(0))], moved[shapes]
-        effects.append(both[bool(np.concatenate(own).any())])
+    for candidate, was, now in zip(hypothesis.chosen, before.estimates.effects, after.effects, strict=True):
+        effect, shapes = candidate.effect, slice(first, first := first + len(candidate.effect.shapes))
+        own = [*moved[places.get(candidate.key, slice(0))], *moved[shapes]]
+        if not any(own):
+            effects.append(was)
+            continue
+        told = {number.name for number, there in zip(effect.numbers, own, strict=False) if there}
+        stood = {} if effect.physical else {each.name: each for each in was if each.name not in told}
+        effects.append(tuple(stood.get(number.name, number) for number in now))
     names = [each.name for each in hypothesis.free[0].effect.coefficients]
     told = {name for name, there in zip(names, moved, strict=False) if there}
     own_numbers = {each.name: each for each in before.estimates.parameters}
@@ -352,7 +366,9 @@ def _after(rows: Sequence[Array], gusts: Gusts, period: float) -> tuple[list[Arr
     """
     ahead = PER_WINDOW // 4
     before = range(PER_WINDOW, 2 * PER_WINDOW, ahead)
-    fades = np.where(gusts.size > 0, np.exp(-ahead * period / gusts.memory), 0.0)[:, None]
+    fades = np.exp(-ahead * period / gusts.memory)[:, None]
+    # Nobody knows how what is left of other channels fades.
+    rows = [own * (gusts.size > 0)[:, None] for own in rows]
     new = [own[ahead + before[-1] :] - fades * own[before[-1] : len(own) - ahead] for own in rows]
     past = [
         np.concatenate([own[before[-1] - lag :][: len(each), :, :-1] for lag in before], axis=2)

@@ -96,6 +96,11 @@ def test_what_was_before_knows_nothing_of_what_is_new_in_a_gust():
 
 
 def test_runs_that_are_too_short_tell_nothing_of_what_was_before():
-    new, known = _after([np.ones((5, 6, 3)), np.ones((40, 6, 3))], Gusts(np.zeros(6), np.ones(6)), 0.05)
+    new, known = _after(
+        [np.ones((5, 6, 3)), np.ones((40, 6, 3))], Gusts(np.array([1.0, 0, 0, 0, 0, 0]), np.ones(6)), 0.05
+    )
     assert [len(each) for each in new] == [len(each) for each in known]
     assert len(new[0]) == 0 < len(new[1])
+    # Nor does a channel whose gusts nobody knows.
+    assert new[1][:, 0].all()
+    assert not new[1][:, 1:].any()
