@@ -120,9 +120,12 @@ class _Sets:
         return sum(len(self.effects[name].shapes) for name in names)
 
     def usual(self) -> tuple[_Names, list[_Names]]:
-        """Choose among effects of one number; all of them where one alone leaves something, and each is needed."""
+        """Choose among effects of one number, none where nothing is left without; all where one leaves something yet."""
+        self.tell([()])
+        if not self.leaves(()):
+            return (), []
         plain = [names for names in self.all if self.count(names) == len(names)]
-        told = [names for names in self.tell([(), *plain]) if names and set(names) == self._needed(names)]
+        told = [names for names in self.tell(plain) if set(names) == self._needed(names)]
         together = [names for names in told if len(names) > 1]
         # What is needed beside the others does without them.
         beside = {name for names in self.fits if len(names) > 1 for name in self._needed(names)}
