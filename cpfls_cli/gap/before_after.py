@@ -46,11 +46,6 @@ class PlayedPair(Played):
             return free_runs(self.stated, self.logged, starts, horizon)
         return super().runs(prediction, starts, horizon)
 
-    @property
-    def as_given(self) -> Played:
-        """The flight as logged and the model as given."""
-        return Played(self.logged, self.stated, self.stated)
-
 
 def rates_fade(training: Sequence[Recording], horizon_s: float) -> float:
     """Fit the time constant with which body rates of training flights fade, s."""
@@ -107,21 +102,20 @@ def left_out(
     InputError
         If a flight lacks a signal that an effect needs.
     """
-    return [_left_out(model, name, recordings, horizon_s) for name in names]
-
-
-def _left_out(model: VehicleModel, name: str, recordings: Sequence[Recording], horizon_s: float) -> LeftOut:
-    others = tuple(effect for effect in model.effects if effect.name != name)
-    squares, ends, runs, samples = np.zeros(6), np.zeros(4), 0, 0
-    for pair in played_pairs(recordings, model, replace(model, effects=others)):
-        difference = pair.model.wrench(pair.flight) - pair.stated.wrench(pair.logged)
-        squares, samples = squares + (difference**2).sum(axis=0), samples + len(difference)
-        horizon = min(max(1, round(horizon_s / pair.flight.motion.period)), len(pair.flight) - 1)
-        starts = pair.flight.starts(horizon, _EVERY)
-        both = [pair.runs(prediction, starts, horizon) for prediction in (MODEL, STATED)]
-        off = np.where(pair.flight.shown, apart(*both), np.nan)
-        ends, runs = ends + len(starts) * off, runs + len(starts)
-    return LeftOut(name, np.sqrt(squares / samples), ends / runs)
+    found = []
+    for name in names:
+        others = tuple(effect for effect in model.effects if effect.name != name)
+        squares, ends, runs, samples = np.zeros(6), np.zeros(4), 0, 0
+        for pair in played_pairs(recordings, model, replace(model, effects=others)):
+            difference = pair.model.wrench(pair.flight) - pair.stated.wrench(pair.logged)
+            squares, samples = squares + (difference**2).sum(axis=0), samples + len(difference)
+            horizon = min(max(1, round(horizon_s / pair.flight.motion.period)), len(pair.flight) - 1)
+            starts = pair.flight.starts(horizon, _EVERY)
+            both = [pair.runs(prediction, starts, horizon) for prediction in (MODEL, STATED)]
+            off = np.where(pair.flight.shown, apart(*both), np.nan)
+            ends, runs = ends + len(starts) * off, runs + len(starts)
+        found.append(LeftOut(name, np.sqrt(squares / samples), ends / runs))
+    return found
 
 
 def errors_by_horizon(pairs: Sequence[PlayedPair], horizon_s: float) -> Replay:
@@ -184,7 +178,7 @@ def worst_stretch(pairs: Sequence[PlayedPair], horizon_s: float, shown_s: float)
 
 def _worst(index: int, pair: PlayedPair, samples: int, most: int) -> WorstStretch:
     starts = pair.flight.starts(samples - 1, samples)
-    before = drawn_runs(pair.as_given, starts, samples - 1).model
+    before = drawn_runs(Played(pair.logged, pair.stated, pair.stated), starts, samples - 1).model
     after = drawn_runs(pair, starts, samples - 1)
     square = ((before - after.measured) ** 2).sum(axis=1)
     joined = min(len(starts), most)

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.consistency.audit import Audit, audit
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance.balance_system import System
+from cpfls_cli.gap.balance.balance_system import System, known_size
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
 from cpfls_cli.gap.before_after import PlayedPair, errors_by_horizon, played_pairs
 from cpfls_cli.gap.naming.leftover import not_excited
@@ -125,15 +125,15 @@ def compare(
     progress(0.3, "noise floor")
     hypothesis = extended.system(flights)
     floor = best_floor(hypothesis)
-    residual = extended.residual(flights)
+    residual = hypothesis.left(extended.linear)
     progress(0.5, "what the gap depends on")
     states = joined_states([state_signals(f, s) for f, s in zip(flights, hypothesis.signals, strict=True)])
     block = block_index(hypothesis, settings)
     centres = np.concatenate([windows.centres(flight.signals.time) for flight in flights])
     index = hypothesis.flight_index
     dependence = rank_dependence(residual / floor, index, block, states, settings.shifts, rng)
-    known = np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in flights])
-    rms = _rms(residual, known)
+    known = hypothesis.known
+    rms = known_size(residual, known)
     effects = [effect for name, effect in CATALOGUE.items() if name not in settings.ignore]
     repairing = replace(model, repairs=audited)
     played = played_pairs(recordings, repairing, repairing)
@@ -157,17 +157,11 @@ def compare(
     )
 
 
-def _rms(rows: Array, known: Array) -> Array:
-    count = known.sum(axis=0)
-    square = (rows**2 * known).sum(axis=0) / np.maximum(count, 1)
-    return np.asarray(np.sqrt(np.where(count > 0, square, np.nan)))
-
-
-def _activity(hypothesis: System, known: Array) -> Array:
+def _activity(hypothesis: System, known: BoolArray) -> Array:
     """Compute the root mean square of inertial or rotor wrench, whichever is larger."""
     taken = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
     given = hypothesis.by_flight(lambda flight, signals: flight.windows.average(signals.wrench))
-    size = np.maximum(_rms(taken, known), _rms(given, known))
+    size = np.maximum(known_size(taken, known), known_size(given, known))
     # Sideways, too, a vehicle is moved by its thrust.
     return np.concatenate([size[:3], np.full(3, np.sqrt((size[3:] ** 2).sum()))])
 

@@ -25,27 +25,23 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
 
 
-def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings, inertia: Array | None = None) -> VehicleModel:
+def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings) -> VehicleModel:
     """Turn a model with effects into that of a whole vehicle.
 
     Parameters
     ----------
     vehicle : VehicleSettings
         That the effects were fitted with.
-    inertia : array, shape (3, 3), kg m^2, or None
-        Of the base, where it does not depend on the attitude; None for that of the vehicle, or a base that does.
 
     Returns
     -------
     VehicleModel
         With the inertia of before where the one that comes with the effects is that of no body.
     """
-    constant = extended.base is None or inertia is not None
-    given = inertia_tensor(vehicle) if inertia is None else inertia
+    given, fuzzy = inertia_tensor(vehicle), extended.base
     parts, times = _parts(extended, vehicle)
     corrected = given + inertia_correction(extended.parameters, vehicle)
     effects = (*_numbers(extended.parameters, vehicle, corrected), *(ModelEffect(*each) for each in parts.effects))
-    fuzzy = extended.base if not constant else None
     return VehicleModel(
         vehicle=_with_inertia(parts.vehicle, given + parts.inertia),
         response=RotorResponse(**times),
@@ -143,7 +139,17 @@ def of_vehicle(recordings: Sequence[Recording], model: VehicleModel) -> list[Rec
     InputError
         If a flight lacks a signal that the model needs.
     """
-    return [_of_vehicle(recording, model) for recording in recordings]
+    wind, given = np.array(model.wind) if any(model.wind) else None, []
+    for recording in recordings:
+        signals = recording.signals
+        missing = tuple(sorted(model.needs - signals.available))
+        if missing:
+            lacking = " and ".join(name.replace("_", " ") for name in missing)
+            raise InputError(f"{recording.name}: lacks {lacking}, which the model of the whole vehicle needs")
+        if signals.vehicle != model.vehicle or wind is not None:
+            signals = replace(signals, vehicle=model.vehicle, wind=wind)
+        given.append(replace(recording, signals=signals))
+    return given
 
 
 def has_effects(model: VehicleModel) -> bool:
@@ -189,17 +195,6 @@ def known_already(model: VehicleModel) -> tuple[str, ...]:
     """Name the effects that a model has: a search beside it does not look for them again."""
     late = [known.name for known, _ in late_effects(model.response)]
     return (*(effect.name for effect in model.effects if effect.known.kind != "parameter"), *late)
-
-
-def _of_vehicle(recording: Recording, model: VehicleModel) -> Recording:
-    missing = tuple(sorted(model.needs - recording.signals.available))
-    if missing:
-        lacking = " and ".join(name.replace("_", " ") for name in missing)
-        raise InputError(f"{recording.name}: lacks {lacking}, which the model of the whole vehicle needs")
-    if recording.signals.vehicle == model.vehicle and not any(model.wind):
-        return recording
-    wind = np.array(model.wind) if any(model.wind) else None
-    return replace(recording, signals=replace(recording.signals, vehicle=model.vehicle, wind=wind))
 
 
 def _beyond_rigid_body(model: VehicleModel) -> Effect:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.effect import Columns, Shape
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.noise_floor import noise_floor
@@ -138,6 +138,11 @@ class System:
         """Number of the flight of each window, shape (window,)."""
         return np.repeat(np.arange(len(self.flights)), [len(flight) for flight in self.flights])
 
+    @cached_property
+    def known(self) -> BoolArray:
+        """Which channels each window has, shape (window, 6)."""
+        return np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in self.flights])
+
     def can(self, candidate: Candidate) -> bool:
         """Tell whether any flight has the signals that a candidate needs."""
         return any(not candidate.effect.missing(signals) for signals in self.signals)
@@ -157,6 +162,13 @@ def has_force(flights: Sequence[WeakFlight]) -> bool:
 def channel_size(rows: Array) -> Array:
     """Compute the root mean square of each channel, shape (6,); 1 for channels that no flight has."""
     return np.where(rows.any(axis=0), np.sqrt(np.mean(rows**2, axis=0)), 1.0)
+
+
+def known_size(rows: Array, known: BoolArray) -> Array:
+    """Compute the root mean square of each channel over the windows that know it, shape (6,); NaN where none does."""
+    count = known.sum(axis=0)
+    square = (rows**2 * known).sum(axis=0) / np.maximum(count, 1)
+    return np.asarray(np.sqrt(np.where(count > 0, square, np.nan)))
 
 
 def is_free(candidate: Candidate) -> bool:

@@ -10,6 +10,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.channels import known_up_to
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.settings import ERRORS
 from cpfls_cli.weak_form.windows import Windows
 from cpfls_cli.weak_form.windows import windows as make_windows
 
@@ -25,8 +26,6 @@ _PASSED = 0.6
 _BAND = 1.5
 # From sample to sample; each halves the band of the one before about.
 CORRELATIONS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95)
-# Ratio of misfits from which on colour is believed: estimates of 16 powers scatter by less.
-_CLEARLY_BETTER = 1.5
 # Frequencies for each that a window resolves, so that a sum over them is an integral.
 _PADDED = 8
 
@@ -86,7 +85,12 @@ def channel_cut_offs(signals: Signals, euler: bool) -> Array:
 
 
 def _below(residual: Columns, windows: Windows, cut_off: float) -> Array:
-    """Estimate the floor of all channels from what lies between the motion and a cut-off."""
+    """Estimate the floor of all channels from what lies between the motion and a cut-off.
+
+    A flat and a rising spectrum are fitted, white unless coloured ones fit clearly better, and evaluated for a window.
+    """
+    from scipy.optimize import nnls
+
     length = len(windows.weight) * windows.period
     highest = min(_HIGHEST_OF_RATE / windows.period, _PASSED * cut_off)
     wanted = max(_LONGER * length, _BAND * _LOWEST_PER_WINDOW / highest)
@@ -104,7 +108,15 @@ def _below(residual: Columns, windows: Windows, cut_off: float) -> Array:
         power[number] = np.median(np.abs(rows) ** 2, axis=0) / np.log(2) / (longer.weight**2).sum()
     terms = np.array([_terms(longer.weight.tobytes(), longer.period, frequency) for frequency in frequencies])
     window_terms = _terms(windows.weight.tobytes(), windows.period, 0.0) * (windows.weight**2).sum()
-    return np.array([_extrapolated(terms, channel, window_terms) for channel in power.T])
+    floor = np.zeros(6)
+    for channel, own in enumerate(power.T):
+        if own.min() > 0:
+            # Dividing by the power makes relative errors of equal weight.
+            relative = terms / own[:, None]
+            flat, rising = np.unravel_index(_best_pair(relative), (len(CORRELATIONS),) * 2)
+            pair = [2 * flat, 2 * rising + 1]
+            floor[channel] = np.sqrt(nnls(relative[:, pair], np.ones(len(own)))[0] @ window_terms[pair])
+    return floor
 
 
 @lru_cache(maxsize=512)
@@ -122,19 +134,6 @@ def _terms(weights: bytes, period: float, centre: float) -> Array:
     return np.asarray(spectra @ share / share.sum())
 
 
-def _extrapolated(terms: Array, power: Array, window_terms: Array) -> float:
-    """Fit a flat and a rising spectrum, white unless coloured ones fit clearly better; evaluate them for a window."""
-    from scipy.optimize import nnls
-
-    if not power.min() > 0:
-        return 0.0
-    # Dividing by the power makes relative errors of equal weight.
-    relative = terms / power[:, None]
-    flat, rising = np.unravel_index(_best_pair(relative), (len(CORRELATIONS),) * 2)
-    found, _ = nnls(relative[:, [2 * flat, 2 * rising + 1]], np.ones(len(power)))
-    return float(np.sqrt(found @ window_terms[[2 * flat, 2 * rising + 1]]))
-
-
 def _best_pair(relative: Array) -> int:
     """Choose a flat and a rising spectrum, neither negative, that leave least of one, of all pairs by formula."""
     # What is left does not depend on the unit, and fourth powers stay within range.
@@ -147,14 +146,15 @@ def _best_pair(relative: Array) -> int:
     with np.errstate(divide="ignore", invalid="ignore"):
         much_flat = (rising_squared * flat_sum - both * rising_sum) / determinant
         much_rising = (flat_squared * rising_sum - both * flat_sum) / determinant
-    alone = np.minimum(_left(flat * (flat_sum / flat_squared)), _left(rising * (rising_sum / rising_squared)))
-    together = _left(much_flat * flat + much_rising * rising)
+    fits = flat * (flat_sum / flat_squared), rising * (rising_sum / rising_squared)
+    of_flat, of_rising, together = (
+        ((1 - fitted) ** 2).sum(axis=0) for fitted in (*fits, much_flat * flat + much_rising * rising)
+    )
+    alone = np.minimum(of_flat, of_rising)
     misfit = np.where((much_flat >= 0) & (much_rising >= 0), together, alone)
-    return 0 if misfit[0, 0] <= _CLEARLY_BETTER * misfit.min() else int(np.argmin(misfit))
-
-
-def _left(fitted: Array) -> Array:
-    return np.asarray(np.sum((1 - fitted) ** 2, axis=0))
+    # Of so many powers a misfit is no surer than this ratio, and colour is believed beyond it.
+    unsure = 1 + ERRORS / np.sqrt(len(relative))
+    return 0 if misfit[0, 0] <= unsure * misfit.min() else int(np.argmin(misfit))
 
 
 def modulated(windows: Windows, frequency: float) -> Windows:

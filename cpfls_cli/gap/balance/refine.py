@@ -124,7 +124,7 @@ class Equations:
 
     def solve(self) -> Array:
         """Fit all columns, shape (column,)."""
-        return _least_squares(*self.root)
+        return least_squares(*self.root)
 
 
 def equations(hypothesis: System, weight: Array) -> Equations:
@@ -152,14 +152,14 @@ def fit(hypothesis: System, floor: Array) -> Array:
     array, shape (column,)
     """
     matrix = (hypothesis.base / floor[..., None]).reshape(-1, hypothesis.base.shape[2])
-    return _least_squares(matrix, (hypothesis.residual / floor).reshape(-1))
+    return least_squares(matrix, (hypothesis.residual / floor).reshape(-1))
 
 
-def _least_squares(matrix: Array, right: Array) -> Array:
-    """Solve with columns brought to one length; a column of zeros gets the coefficient 0."""
+def least_squares(matrix: Array, right: Array) -> Array:
+    """Solve for one or several right sides; columns are brought to one length, and one of zeros gets 0."""
     length = np.linalg.norm(matrix, axis=0)
     scale = 1.0 / np.where(length > 0, length, 1.0)
-    return np.asarray(np.linalg.lstsq(matrix * scale, right, rcond=ROUNDING)[0] * scale)
+    return np.asarray((np.linalg.lstsq(matrix * scale, right, rcond=ROUNDING)[0].T * scale).T)
 
 
 def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = False) -> tuple[Array, BoolArray]:
@@ -181,23 +181,22 @@ def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = F
     rows = equations(hypothesis, weight)
     linear = rows.solve()
     length = np.linalg.norm(rows.columns, axis=0)
-    least = np.zeros(3, dtype=bool)
-    change = _change(hypothesis, length > 0, least if of_vehicle else None)
+    least = np.zeros(3, dtype=bool) if of_vehicle else None
+    change = _change(hypothesis, length > 0, least)
     at = np.linalg.lstsq(change.matrix, linear - change.offset, rcond=None)[0]
     out = _unseen(hypothesis, change, length)
     within = ((at >= change.low) & (at <= change.high)).all()
-    if within and not out.any() and _without_lever(hypothesis, linear, rows.errors) is None:
+    if within and not out.any() and not _without_lever(hypothesis, linear, rows.errors).any():
         return linear, np.zeros(len(linear), dtype=bool)
     columns, right = rows.root
     while True:
         at, linear = _bounded(columns, right, change, out)
         leverless = _without_lever(hypothesis, linear, rows.errors)
-        light = too_light(linear) & ~least if of_vehicle else least
-        if leverless is None and not light.any():
-            return linear, out | _held(change, at, least if of_vehicle else None)
-        out |= leverless if leverless is not None else False
-        least = least | light
-        change = _change(hypothesis, length > 0, least if of_vehicle else None)
+        light = np.zeros(3, dtype=bool) if least is None else too_light(linear) & ~least
+        if not (leverless.any() or light.any()):
+            return linear, out | _held(change, at, least)
+        out, least = out | leverless, None if least is None else least | light
+        change = _change(hypothesis, length > 0, least)
 
 
 def _unseen(hypothesis: System, change: Change, length: Array) -> BoolArray:
@@ -246,34 +245,15 @@ def _change(hypothesis: System, shown: BoolArray, least: BoolArray | None) -> Ch
     return change
 
 
-def _without_lever(hypothesis: System, linear: Array, errors: Array) -> BoolArray | None:
-    """Mark torques that are surely impossible beside the force of their effect; None if all are possible."""
+def _without_lever(hypothesis: System, linear: Array, errors: Array) -> BoolArray:
+    """Mark torques that are surely impossible beside the force of their effect."""
     out = np.zeros(len(linear), dtype=bool)
-    if not has_force(hypothesis.flights):
-        return None
-    for candidate, place in hypothesis.places:
+    for candidate, place in hypothesis.places if has_force(hypothesis.flights) else ():
         if candidate.effect.lever is not None:
             own, of_force = linear[place], hypothesis.columns(candidate)[:, 3:].any(axis=(0, 1))
             error = np.where(of_force, 0.0, errors[place])
             out[place] = ~candidate.effect.lever(own, error, hypothesis.vehicle) & (own != 0)
-    return out if out.any() else None
-
-
-def weighted_residual(hypothesis: System, floor: Array, rotor_wrench: Array) -> Array:
-    """Compute the residual of a fit in floors, compensated for a change of the rotor torque.
-
-    Parameters
-    ----------
-    floor : array, shape (6,)
-    rotor_wrench : array, shape (window, 6), N m and N
-        Wrench of the rotors without effects on the actuation.
-
-    Returns
-    -------
-    array, shape (window, 6)
-    """
-    weight = compensation(rotor_wrench, hypothesis.rotor_wrench) / floor
-    return np.asarray(hypothesis.left(fit(hypothesis, floor)) * weight)
+    return out
 
 
 def refitted(hypothesis: System, weight: Array) -> System:
@@ -291,20 +271,32 @@ def refitted(hypothesis: System, weight: Array) -> System:
     if not hypothesis.shapes:
         return hypothesis
     rotor_wrench = system(hypothesis.flights).rotor_wrench
-    error = _squares(hypothesis, weight, rotor_wrench)
     low, high = np.array([shape.bounds(hypothesis.vehicle) for shape in hypothesis.shapes]).T
+
+    def fitted(there: System) -> tuple[float, tuple[Array, Array, BoolArray]]:
+        """Compute the squares that are left, and weights, coefficients and those on bounds."""
+        own = weight / compensation(rotor_wrench, there.rotor_wrench)
+        linear, held = fit_within_bounds(there, own)
+        return float(((there.left(linear) / own) ** 2).sum()), (own, linear, held)
+
+    error, (own, linear, held) = fitted(hypothesis)
     while True:
-        step, gain = _newton_step(hypothesis, weight, rotor_wrench)
+        # The change of the shapes beside the coefficients that no bound holds, and what it takes off the squares where
+        # the residual is linear in them.
+        moving = shape_columns(hypothesis, linear, rotor_wrench)
+        rows = equations(hypothesis, own).around(linear, ~held, moving / own[..., None])
+        step, (columns, right) = rows.solve(), rows.root
+        step, gain = step[-moving.shape[2] :], float(right @ columns @ step)
         # Half of a step that goes too far.
         while gain >= _SETTLED:
             ahead = hypothesis.with_shapes(np.clip(hypothesis.shape_values + step, low, high))
-            left = _squares(ahead, weight, rotor_wrench)
+            left, there = fitted(ahead)
             if error - left >= _SETTLED:
                 break
             step, gain = step / 2, gain / 2
         else:
             return hypothesis
-        hypothesis, error = ahead, left
+        hypothesis, error, (own, linear, held) = ahead, left, there
 
 
 def _exact(hypothesis: System, weight: Array) -> System:
@@ -322,25 +314,6 @@ def _exact(hypothesis: System, weight: Array) -> System:
     return hypothesis if listed == hypothesis.chosen else system(hypothesis.flights, listed)
 
 
-def _squares(hypothesis: System, weight: Array, rotor_wrench: Array) -> float:
-    weight = weight / compensation(rotor_wrench, hypothesis.rotor_wrench)
-    left = hypothesis.left(fit_within_bounds(hypothesis, weight)[0])
-    return float(((left / weight) ** 2).sum())
-
-
-def _newton_step(hypothesis: System, weight: Array, rotor_wrench: Array) -> tuple[Array, float]:
-    """Solve for the change of the shapes, with the coefficients that no bound holds beside them, shape (shape,).
-
-    With it what it takes off the squares where the residual is linear in them.
-    """
-    weight = weight / compensation(rotor_wrench, hypothesis.rotor_wrench)
-    linear, held = fit_within_bounds(hypothesis, weight)
-    shapes = shape_columns(hypothesis, linear, rotor_wrench)
-    rows = equations(hypothesis, weight).around(linear, ~held, shapes / weight[..., None])
-    step, (columns, right) = rows.solve(), rows.root
-    return step[-shapes.shape[2] :], float(right @ columns @ step)
-
-
 def _improved(
     flights: Sequence[WeakFlight],
     chosen: Sequence[Candidate],
@@ -353,7 +326,8 @@ def _improved(
 
     def error(value: float) -> float:
         hypothesis = system(flights, [*chosen[:index], candidate.at({shape.name: float(value)}), *chosen[index + 1 :]])
-        return float((weighted_residual(hypothesis, floor, rotor_wrench) ** 2).sum())
+        weight = compensation(rotor_wrench, hypothesis.rotor_wrench) / floor
+        return float(((hypothesis.left(fit(hypothesis, floor)) * weight) ** 2).sum())
 
     value = candidate.shape[shape.name]
     bracket = _bracket(_steps(shape, value), value)

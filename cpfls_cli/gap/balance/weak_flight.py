@@ -19,13 +19,13 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.noise_floor import channel_cut_offs, noise_floor
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.weak_form.windows import Recording, Windows
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Recording, Windows
 
 TURNING = 4.0
 """Inertial torque in floors from which on noise shrinks an inertia by less than a sixteenth."""
 
-PER_WINDOW = 8
-"""Windows that begin within one where what they see is followed in time: more than twice the fastest wave they pass."""
+PER_WINDOW = FEWEST_SAMPLES
+"""Windows that begin within one where what they see is followed in time: as many as samples follow its curve."""
 
 CHANNELS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
 """Rows of the balance in each window, body axes, N m and N."""
@@ -113,20 +113,15 @@ class WeakFlight:
         -------
         array, shape (window, 6, coefficient)
         """
-        of_vehicle = candidate.effect.kind == "parameter"
-        if signals is not self.signals and not of_vehicle:
-            return self._rows(candidate, signals)
+        of_vehicle, as_logged = candidate.effect.kind == "parameter", signals is self.signals
+        if not (as_logged or of_vehicle):
+            return self.averaged(columns_of(candidate, signals))
         if candidate.key not in self.seen:
-            self.seen[candidate.key] = self._rows(candidate, self.signals)
+            rows = self.averaged(columns_of(candidate, self.signals))
+            self.seen[candidate.key] = rows * self.turns if of_vehicle else rows
         rows = self.seen[candidate.key]
-        if signals is self.signals:
-            return rows
         # Of the vehicle's numbers only the scale of the thrust meets what the rotors do; the motion stays.
-        return with_thrust(rows, self.windows.average(signals.wrench[:, 5]) * self.known[5])
-
-    def _rows(self, candidate: Candidate, signals: Signals) -> Array:
-        rows = self.averaged(columns_of(candidate, signals))
-        return rows * self.turns if candidate.effect.kind == "parameter" else rows
+        return rows if as_logged else with_thrust(rows, self.windows.average(signals.wrench[:, 5]) * self.known[5])
 
     def noise(self, columns: Columns) -> Array:
         """Give noise as large as that in the rows of columns, or of a residual, and without their motion.

@@ -23,7 +23,6 @@ from cpfls_cli.gap.naming.scoring import Scored
 from cpfls_cli.gap.naming.search import alternatives, beside_its_like, chance_beside_its_like, in_place_of, odds
 from cpfls_cli.gap.settings import COUNTS, RARE, GapSettings
 from cpfls_cli.rounding import ascending, at_most
-from cpfls_cli.vehicle.settings import VehicleSettings
 
 _MATTERS = 0.02
 """Relative error of a moment of inertia or of the thrust from which on it is told."""
@@ -125,23 +124,19 @@ def shares(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], estimates
     -------
     array, shape (effect,)
     """
-    everything = _remaining(flights, chosen, estimates, range(len(chosen)))
-    total = (_remaining(flights, chosen, estimates, ()) - everything) / floor
-    parts = [
-        (_remaining(flights, chosen, estimates, [p for p in range(len(chosen)) if p != index]) - everything) / floor
-        for index in range(len(chosen))
-    ]
+
+    def remaining(kept: Sequence[int]) -> Array:
+        """Compute the residual with some of the effects only, at the coefficients of all of them."""
+        linear = [estimates.of_effect[index] for index in kept if is_free(chosen[index])]
+        hypothesis = system(flights, [chosen[index] for index in kept])
+        return hypothesis.left(np.concatenate([estimates.of_vehicle, *linear]))
+
+    indices = range(len(chosen))
+    everything = remaining(indices)
+    total = (remaining(()) - everything) / floor
+    parts = ((remaining([p for p in indices if p != index]) - everything) / floor for index in indices)
     along = np.array([(part * total).sum() for part in parts])
     return np.asarray(along / max(abs(along.sum()), 1e-12) if len(along) else along)
-
-
-def _remaining(
-    flights: Sequence[WeakFlight], chosen: Sequence[Candidate], estimates: Estimates, kept: Sequence[int] | range
-) -> Array:
-    """Compute the residual with some of the effects only, at the coefficients of all of them."""
-    hypothesis = system(flights, [chosen[index] for index in kept])
-    linear = [estimates.of_effect[index] for index in kept if is_free(chosen[index])]
-    return hypothesis.left(np.concatenate([estimates.of_vehicle, *linear]))
 
 
 def wrong_numbers(estimates: Estimates, effects: Sequence[NamedEffect], removed: Array) -> NamedEffect | None:
@@ -209,17 +204,12 @@ def sensor_fault(
     weight = np.sqrt(np.mean(repaired.residual**2, axis=0)) + 1e-12
     before, after = (s.left(fit(s, weight)) / weight for s in (logged, repaired))
     share = float(np.clip(1 - (after**2).sum() / max((before**2).sum(), 1e-12), 0, 1))
-    coefficients = _sensor_estimates(finding, as_repaired[0].signals.vehicle)
-    return NamedEffect(finding.name, None, np.zeros(0), coefficients, finding.p_value, share, 1.0, finding.sentence)
-
-
-def _sensor_estimates(finding: AuditFinding, vehicle: VehicleSettings) -> tuple[Estimate, ...]:
-    """Convert the named numbers of a sensor fault to estimates."""
     effect = CATALOGUE[finding.name]
     assert effect.test is not None, "the audit tests what has a test"
     by_label = dict(zip(effect.test.labels, effect.numbers, strict=True))
-    return tuple(
-        Estimate(known.name, known.unit, number.value, number.low, number.high, known.bounds(vehicle))
+    numbers = tuple(
+        Estimate(known.name, known.unit, number.value, number.low, number.high, known.bounds(repaired.vehicle))
         for number in finding.coefficients
         if number.named and (known := by_label[number.name])
     )
+    return NamedEffect(finding.name, None, np.zeros(0), numbers, finding.p_value, share, 1.0, finding.sentence)

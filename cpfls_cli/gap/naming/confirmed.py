@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -50,16 +51,14 @@ def earned(
     """
     found, refusals = fitted(flights, chosen, floor, settings), []
     while found.hypothesis.chosen:
-        nothing = nothing_by_size(found)
-        out = [candidate for candidate in found.hypothesis.chosen if candidate.effect.name in nothing]
+        out = nothing_by_size(found)
         if not out:
-            refused = on_bound(found, floor)
-            if refused is None:
+            refusal = on_bound(found, floor)
+            if refusal is None:
                 break
-            out, refusal = refused
             refusals.append(refusal)
-        kept = [candidate for candidate in found.hypothesis.chosen if candidate not in out]
-        found = fitted(flights, kept, floor, settings)
+            out = [refusal.name]
+        found = found.without(out, floor, settings)
     return found, refusals
 
 
@@ -73,7 +72,7 @@ def nothing_by_size(found: NamedFit) -> list[str]:
     return names
 
 
-def on_bound(found: NamedFit, floor: Array) -> tuple[list[Candidate], Refusal] | None:
+def on_bound(found: NamedFit, floor: Array) -> Refusal | None:
     """Find an effect whose main number sits on a bound, or any number that is surely asked for beyond one.
 
     Zero is not such a bound: many coefficients cannot be less.
@@ -92,37 +91,28 @@ def on_bound(found: NamedFit, floor: Array) -> tuple[list[Candidate], Refusal] |
         )
         if len(names) > 1 and all(ends):
             says = f"{' and '.join(names)} may all be at the bounds of what is possible"
-            return [candidate], Refusal(candidate.effect.name, says, True)
-    reached = {
-        index: own
-        for index, candidate in enumerate(chosen)
-        if (own := _reached(sized(candidate.effect, found.estimates.effects[index])))
-    }
-    if not reached:
-        return None
-    free = free_estimates(found.hypothesis, floor, found.block)
-    for index, bounds in reached.items():
-        name = chosen[index].effect.name
+            return Refusal(candidate.effect.name, says, True)
+    free = None
+    for index, candidate in enumerate(chosen):
+        sizes = sized(candidate.effect, found.estimates.effects[index])
+        bounds = {
+            number.name: f"{bound:.3g} {number.unit}"
+            for number in sizes
+            for bound in number.plausible
+            if bound and tied(np.array(number.value), np.array(bound))
+        }
+        if not bounds:
+            continue
+        free = free or free_estimates(found.hypothesis, floor, found.block)
         beyond = [number.name for number in free.effects[index] if number.name in bounds and number.impossible]
         if beyond:
             says = f"its {beyond[0]} would surely be beyond what is possible, {bounds[beyond[0]]}"
-            return [chosen[index]], Refusal(name, says, True)
-        sizes = sized(chosen[index].effect, found.estimates.effects[index])
+            return Refusal(candidate.effect.name, says, True)
         main = [number.name for number in _main(found, index, sizes, floor) if number.name in bounds]
         if main:
             says = f"its {main[0]} sits on the bound of what is possible, {bounds[main[0]]}"
-            return [chosen[index]], Refusal(name, says, True)
+            return Refusal(candidate.effect.name, says, True)
     return None
-
-
-def _reached(numbers: Sequence[Estimate]) -> dict[str, str]:
-    """Name the numbers that sit on a bound other than zero, and the bound."""
-    found = {}
-    for number in numbers:
-        for bound in number.plausible:
-            if bound and tied(np.array(number.value), np.array(bound)):
-                found[number.name] = f"{bound:.3g} {number.unit}"
-    return found
 
 
 def _main(found: NamedFit, index: int, numbers: Sequence[Estimate], floor: Array) -> Sequence[Estimate]:
@@ -181,19 +171,16 @@ class Judge:
         judgement, refusals = first, []
         while (refusal := self._refused(judgement)) is not None:
             refusals.append(refusal)
-            kept = [each for each in judgement.found.hypothesis.chosen if each.effect.name != refusal.name]
-            judgement = self.judge(fitted(self.training, kept, self.floor, self.settings))
+            judgement = self.judge(judgement.found.without([refusal.name], self.floor, self.settings))
         return judgement, refusals
 
     def _refused(self, judgement: Judgement) -> Refusal | None:
-        chosen = judgement.found.hypothesis.chosen
         # What was dropped may have held another effect within what is possible.
         beyond = on_bound(judgement.found, self.floor)
-        if beyond is not None:
-            return beyond[1]
-        compared = {each.effect.name: self._without(judgement, each.effect.name) for each in chosen}
-        if not compared:
-            return None
+        names = [each.effect.name for each in judgement.found.hypothesis.chosen]
+        if beyond is not None or not names:
+            return beyond
+        compared = {name: self._without(judgement, name) for name in names}
         after = judgement.held_out.size(judgement.held_out.after).floors
         harm = {name: one.worsened(after) for name, one in compared.items()}
         worst = largest(harm, lambda name: float(harm[name].max()))
@@ -211,8 +198,7 @@ class Judge:
 
     def _without(self, judgement: Judgement, name: str) -> Without:
         """Leave an effect out and refit the others."""
-        kept = [each for each in judgement.found.hypothesis.chosen if each.effect.name != name]
-        without = fitted(self.training, kept, self.floor, self.settings)
+        without = judgement.found.without([name], self.floor, self.settings)
         there = system(self.repaired, without.hypothesis.chosen)
         residual, unseen = there.left(without.estimates.linear), judgement.held_out
         squares = [((each / unseen.noise) ** 2) * unseen.known for each in (residual, unseen.after)]
@@ -250,11 +236,6 @@ class Without(NamedTuple):
         """By how much the gap is larger without it, squared floors."""
         return float(self.seen.max())
 
-    @property
-    def channel(self) -> int:
-        """Channel in which it shows most."""
-        return int(np.argmax(levelled(self.seen)))
-
     def worsened(self, after: Array) -> Array:
         """Compute how much worse the effect makes channels that it leaves `after` floors in, as ratios; 0 if unsure."""
         surely = -self.raised > ERRORS * self.error
@@ -271,7 +252,7 @@ def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | No
     floors = judgement.held_out.size(judgement.held_out.after).floors
     beyond = OFF**2 * max((one.visibly for one in compared.values()), default=0.0)
     for name in ascending(compared, lambda each: compared[each].visibly):
-        channel, off = compared[name].channel, compared[name].visibly
+        channel, off = int(np.argmax(levelled(compared[name].seen))), compared[name].visibly
         left = float(floors[channel])
         beside = max(beyond, *(one.seen[channel] for one in compared.values()))
         if off < OFF**2 * beside and (left > CLEAR or off < ERRORS * (NOISE - 1)):
@@ -341,16 +322,13 @@ def _other_numbers(first: Judgement, judge: Judge, settings: GapSettings) -> tup
         return ()
     if _size(after * unseen.known, unseen.floor).max() > CLEAR:
         return ()
-    sentences = []
-    for there, here in zip(first.found.estimates.effects, own.effects, strict=True):
-        for number, other in zip(there, here, strict=False):
-            apart = number.name == other.name and (number.high < other.low or other.high < number.low)
-            if apart:
-                sentences.append(
-                    f"{number.name} is {number.value:.3g} [{number.low:.3g}, {number.high:.3g}] {number.unit} in the"
-                    f" training flights and {other.value:.3g} [{other.low:.3g}, {other.high:.3g}] in the held-out ones"
-                )
-    return tuple(sentences)
+    effects = zip(first.found.estimates.effects, own.effects, strict=True)
+    return tuple(
+        f"{number.name} is {number.value:.3g} [{number.low:.3g}, {number.high:.3g}] {number.unit} in the"
+        f" training flights and {other.value:.3g} [{other.low:.3g}, {other.high:.3g}] in the held-out ones"
+        for number, other in chain.from_iterable(zip(there, here, strict=False) for there, here in effects)
+        if number.name == other.name and (number.high < other.low or other.high < number.low)
+    )
 
 
 def _size(residual: Array, floor: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
-from cpfls_cli.effects.effect import Effect
+from cpfls_cli.effects.effect import Coefficient, Effect, Shape
 from cpfls_cli.gap.balance.balance_system import System, system, window_noise
 from cpfls_cli.gap.balance.refine import (
     Equations,
@@ -70,6 +70,11 @@ class NamedFit(NamedTuple):
     hypothesis: System
     block: IntArray
     estimates: Estimates
+
+    def without(self, names: Collection[str], floor: Array, settings: GapSettings) -> NamedFit:
+        """Leave effects out and refit the others."""
+        kept = [each for each in self.hypothesis.chosen if each.effect.name not in names]
+        return fitted(self.hypothesis.flights, kept, floor, settings)
 
 
 def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
@@ -205,32 +210,21 @@ def sized(effect: Effect, numbers: Sequence[Estimate]) -> list[Estimate]:
 def _of(
     candidate: Candidate, hypothesis: System, linear: Array, linear_out: Array, shape: Array, shape_out: Array
 ) -> tuple[Estimate, ...]:
+    """Tell the numbers of an effect with 95 % confidence intervals: by the jackknife, and what no flight tells."""
     effect = candidate.effect
-    vehicle = hypothesis.vehicle
-    estimates = []
-    if len(linear):
-        to_physical = effect.physical.of if effect.physical else lambda values: values
-        value = to_physical(linear)
-        scatter = _interval(value, np.array([to_physical(row) for row in linear_out]))
-        estimates += [
-            Estimate(c.name, c.unit, float(v), float(v - s), float(v + s), c.bounds(vehicle))
-            for c, v, s in zip(effect.coefficients, value, scatter, strict=False)
-            # A column of zeros leaves its coefficient open: an offset along x, say, where only x is compared.
-            if np.isfinite(v) and (v != 0 or s != 0 or effect.kind == "parameter")
-        ]
-    scatter = _interval(shape, shape_out)
-    estimates += [
-        Estimate(s.name, s.unit, float(v), float(v - d), float(v + d), (s.grid[0], s.grid[-1]))
-        for s, v, d in zip(effect.shapes, shape, scatter, strict=False)
-    ]
-    return tuple(estimates)
-
-
-def _interval(value: Array, left_out: Array) -> Array:
-    """Compute half the width of the 95 % confidence interval: by the jackknife, and what no flight tells."""
-    if len(left_out) < 2:
-        return np.full(len(value), np.inf)
-    return np.asarray(np.hypot(half_width(jackknife_error(left_out), len(left_out)), _KNOWN_TO * value))
+    if effect.physical and len(linear):
+        linear, linear_out = effect.physical.of(linear), np.array([effect.physical.of(row) for row in linear_out])
+    known: tuple[Coefficient | Shape, ...] = (*effect.coefficients[: len(linear)], *effect.shapes)
+    value, left_out = np.concatenate([linear, shape]), np.concatenate([linear_out, shape_out], axis=1)
+    half = np.full(len(value), np.inf)
+    if len(left_out) > 1:
+        half = np.hypot(half_width(jackknife_error(left_out), len(left_out)), _KNOWN_TO * value)
+    return tuple(
+        Estimate(one.name, one.unit, float(v), float(v - h), float(v + h), one.bounds(hypothesis.vehicle))
+        for one, v, h in zip(known, value, half, strict=True)
+        # A column of zeros leaves its coefficient open: an offset along x, say, where only x is compared.
+        if one in effect.shapes or (np.isfinite(v) and (v != 0 or h != 0 or effect.kind == "parameter"))
+    )
 
 
 def _one_step(rows: Equations, block: IntArray) -> Array:

@@ -7,9 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.balance.balance_system import System, channel_size, floors, scatter_size, scatter_variance, system
+from cpfls_cli.gap.balance.balance_system import (
+    System,
+    channel_size,
+    floors,
+    known_size,
+    scatter_size,
+    scatter_variance,
+    system,
+)
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.naming.results import GapSize
@@ -42,7 +50,7 @@ class HeldOut:
     parameters: Array
     after: Array
     floor: Array
-    known: Array
+    known: BoolArray
     noise: Array
     unlearned: Mapping[str, float]
 
@@ -53,11 +61,7 @@ class HeldOut:
         ----------
         residual : array, shape (window, 6)
         """
-        count = self.known.sum(axis=0)
-        square = (residual**2 * self.known).sum(axis=0)
-        value = np.sqrt(np.where(count > 0, square / np.maximum(count, 1), np.nan))
-        in_floors = ((residual / self.noise) ** 2 * self.known).sum(axis=0)
-        return GapSize(value, np.sqrt(np.where(count > 0, in_floors / np.maximum(count, 1), np.nan)))
+        return GapSize(known_size(residual, self.known), known_size(residual / self.noise, self.known))
 
     def shares(self, *, as_given: bool = False) -> dict[str, float]:
         """Compute the shares of the gap above the noise floor that the effects remove.
@@ -106,7 +110,7 @@ class HeldOut:
         return np.where(gap & (gone > VISIBLE**2), each, 0.0)
 
 
-def share_removed(before: Array, after: Array, known: Array) -> float:
+def share_removed(before: Array, after: Array, known: BoolArray) -> float:
     """Compute the share of a gap above the noise floor that was removed.
 
     Parameters
@@ -124,7 +128,7 @@ def share_removed(before: Array, after: Array, known: Array) -> float:
     return max(0.0, gone / (gone + remaining)) if gone > 0 else 0.0
 
 
-def _above(residual: Array, known: Array) -> float:
+def _above(residual: Array, known: BoolArray) -> float:
     """Sum the mean squares of the channels above the floor, in squared floors."""
     return float(np.maximum((residual**2 * known).sum(axis=0) - NOISE * known.sum(axis=0), 0.0).sum())
 
@@ -161,8 +165,7 @@ def held_out(
         each.effect.name: (full.columns(each)[..., ~fitted.columns(each).any(axis=(0, 1))] != 0).any(axis=2)
         for each in full.chosen
     }
-    known = np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in repaired])
-    known &= ~np.any(list(beyond.values()) or np.zeros((1, *known.shape), dtype=bool), axis=0)
+    known = full.known & ~np.any([np.zeros_like(full.known), *beyond.values()], axis=0)
     here, own = floors(full, linear), system(fitted.flights)
     scatter = scatter_size(scatter_variance(fitted), fitted.left(linear), floor)
     return HeldOut(

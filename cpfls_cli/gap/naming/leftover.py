@@ -13,13 +13,13 @@ from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import System, left_over, system, window_noise
+from cpfls_cli.gap.balance.refine import least_squares
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight, dense
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect, NotExcited, Unexplained
 from cpfls_cli.gap.naming.search import of_motion
 from cpfls_cli.gap.residual.dependence import (
-    Dependence,
     joined_states,
     rank_dependence,
     state_signals,
@@ -27,7 +27,6 @@ from cpfls_cli.gap.residual.dependence import (
 )
 from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
 from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, NOISE, RARE, VISIBLE, GapSettings
-from cpfls_cli.rounding import ROUNDING
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _USUAL_OF_BOUND = 0.2
@@ -36,18 +35,8 @@ _USUAL_OF_BOUND = 0.2
 
 @dataclass(frozen=True)
 class Leftover:
-    """The residual of a fit and what it follows.
+    """Channels of which a fit leaves a gap."""
 
-    Attributes
-    ----------
-    floors : array, shape (6,)
-        Root mean square of each channel, in floors; 0 where unknown.
-    unexplained : tuple of Unexplained
-        Channels with a gap.
-    """
-
-    floors: Array
-    dependence: tuple[Dependence, ...]
     unexplained: tuple[Unexplained, ...]
 
 
@@ -75,53 +64,32 @@ def leftover(
     dependence = rank_dependence(
         in_floors, hypothesis.flight_index, block, without_actuation(states), settings.shifts, rng
     )
+    # The largest of each channel.
+    told = {d.channel: d for d in reversed(dependence) if d.p_value <= settings.significance and d.r2 > COUNTS}
     band = _band(hypothesis, linear, settings, rng)
     rates = hypothesis.by_flight(lambda flight, _: flight.windows.average(flight.signals.body_rate))
     # A force turns nothing.
     directions = [*energy_directions(residual[:, :3], rates, block), *["neither"] * 3]
-    unexplained = [
-        _unexplained(channel, float(size), dependence, band, direction, settings)
-        for channel, size, direction in zip(CHANNELS, sizes, directions, strict=True)
-        if size > np.sqrt(NOISE)
-    ]
-    return Leftover(sizes, dependence, tuple(entry for entry in unexplained if entry is not None))
+    unexplained = []
+    for channel, size, direction in zip(CHANNELS, sizes.tolist(), directions, strict=True):
+        follows, rings = told.get(channel), band if band and band.channel == channel else None
+        if size > CLEAR or (size > np.sqrt(NOISE) and (follows or rings)):
+            signal, r2 = (follows.signal, follows.r2) if follows else (None, 0.0)
+            share, frequency, energy = 0.0, None, direction
+            if rings:
+                share, frequency, energy = rings.share, rings.frequency_hz, rings.energy
+            unexplained.append(Unexplained(channel, size, signal, max(r2, share), frequency, energy))
+    return Leftover(tuple(unexplained))
 
 
 def _band(hypothesis: System, linear: Array, settings: GapSettings, rng: np.random.Generator) -> NarrowBand | None:
-    """Search for a narrow band with windows dense enough to exclude aliases."""
-    rows, rates = [], []
+    """Search for a narrow band that counts, with windows dense enough to exclude aliases."""
+    windows, rows, rates = dense(hypothesis.flights[0].windows), [], []
     for number, flight in enumerate(hypothesis.flights):
-        windows, remainder = dense(flight.windows), left_over(hypothesis, number, linear)
-        direct = windows.average(remainder.direct)
-        rows.append(direct if remainder.momentum is None else direct + windows.derivative(remainder.momentum))
+        rows.append(replace(flight, windows=windows).averaged(left_over(hypothesis, number, linear)))
         rates.append(windows.average(flight.signals.body_rate))
-    hop_s = dense(hypothesis.flights[0].windows).hop * hypothesis.flights[0].windows.period
-    return narrow_band(rows, rates, hop_s, settings.shifts, rng, settings.significance)
-
-
-def _unexplained(
-    channel: str,
-    size: float,
-    dependence: Sequence[Dependence],
-    band: NarrowBand | None,
-    energy: str,
-    settings: GapSettings,
-) -> Unexplained | None:
-    signal = next((d for d in dependence if d.channel == channel), None)
-    band = band if band is not None and band.channel == channel else None
-    follows = signal is not None and signal.p_value <= settings.significance and signal.r2 > COUNTS
-    rings = band is not None and band.p_value <= settings.significance and band.share > COUNTS
-    if not (size > CLEAR or follows or rings):
-        return None
-    share = max(signal.r2 if follows and signal else 0.0, band.share if rings and band else 0.0)
-    return Unexplained(
-        channel,
-        size,
-        signal.signal if follows and signal else None,
-        share,
-        band.frequency_hz if rings and band else None,
-        band.energy if rings and band else energy,
-    )
+    band = narrow_band(rows, rates, windows.hop * windows.period, settings.shifts, rng, settings.significance)
+    return band if band and band.p_value <= settings.significance and band.share > COUNTS else None
 
 
 def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[str]:
@@ -278,14 +246,9 @@ def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
     if effect.columns is None:
         return ""
     shape = {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes}
-    columns = hypothesis.columns(Candidate(effect, shape)) / floor[:, None]
-    flat, tested = (
-        (hypothesis.base / floor[:, None]).reshape(-1, hypothesis.base.shape[2]),
-        columns.reshape(-1, columns.shape[2]),
-    )
-    length = np.linalg.norm(flat, axis=0)
-    scaled = flat / np.where(length > 0, length, 1.0)
-    beyond = (tested - scaled @ np.linalg.lstsq(scaled, tested, rcond=ROUNDING)[0]).reshape(columns.shape)
+    columns = hypothesis.columns(Candidate(effect, shape))
+    base, tested = ((rows / floor[:, None]).reshape(-1, rows.shape[2]) for rows in (hypothesis.base, columns))
+    beyond = (tested - base @ least_squares(base, tested)).reshape(columns.shape)
     new = beyond * usual_size(effect, hypothesis.vehicle, columns.shape[2])
     # The best channel of the best coefficient decides.
     if np.sqrt((new**2).mean(axis=0)).max(initial=0.0) >= VISIBLE:

@@ -13,18 +13,10 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, channel_size, floors, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
-from cpfls_cli.gap.naming.scoring import (
-    Scored,
-    candidates_of,
-    score,
-    scoring_matrix,
-)
+from cpfls_cli.gap.naming.scoring import Scored, candidates_of, score, scoring_matrix
 from cpfls_cli.gap.settings import CHANCE, COUNTS, NOISE, OFF, RARE, VISIBLE, GapSettings
 from cpfls_cli.rounding import tied
 from cpfls_cli.weak_form.resampling import blocks_of, folds, mirror_shifted
-
-_DRAWS = 10_000
-"""Of weights of blocks: a probability of a hundredth is known to a tenth of itself."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +32,6 @@ class RankedStep:
         What the best candidate explains of shifted residuals.
     above_floor : float
         Sum of squares that the hypothesis leaves above the floor, in squared floors.
-    block : array of int, shape (window,)
     """
 
     hypothesis: System
@@ -48,7 +39,6 @@ class RankedStep:
     ranking: tuple[Scored, ...]
     chance: Array
     above_floor: float
-    block: IntArray
 
     def worth_a_name(self, explained: float = 0.0) -> float:
         """Compute what an effect has to explain of what a part explained leaves of the gap, in squared floors."""
@@ -99,19 +89,19 @@ def rank_effects(
     listed = [*candidates_of([effect for effect in effects if effect.name not in names]), *also]
     tried = [candidate for candidate in listed if hypothesis.can(candidate)]
     arranged = scoring_matrix(hypothesis, tried, floor)
-    block = block_index(hypothesis, settings)
     right = hypothesis.residual[..., None]
     if rng is not None:
         unexplained = hypothesis.left(fit(hypothesis, floor))
         shifted = mirror_shifted(unexplained, hypothesis.flight_index, settings.shifts, rng)
         right = np.concatenate([right, shifted], axis=2)
+    block = block_index(hypothesis, settings)
     beside = folds(arranged.matrix, right / floor[:, None], block, arranged.prior).beside(arranged.base)
     scored, chance = score(arranged, beside, hypothesis)
-    above_floor = float(max(beside.before[:, 0].sum() - rows(hypothesis), 1e-9))
+    above_floor = float(max(beside.before[:, 0].sum() - hypothesis.known.sum(), 1e-9))
     once: dict[str, Scored] = {}
     for each in scored:
         once.setdefault(each.candidate.effect.name, replace(each, others=hypothesis.chosen))
-    return RankedStep(hypothesis, floor, tuple(once.values()), chance, above_floor, block)
+    return RankedStep(hypothesis, floor, tuple(once.values()), chance, above_floor)
 
 
 def best_floor(hypothesis: System) -> Array:
@@ -138,11 +128,6 @@ def block_index(hypothesis: System, settings: GapSettings) -> IntArray:
     """Assign each window to a block of the cross-validation, shape (window,)."""
     centres = np.concatenate([f.windows.centres(f.signals.time) for f in hypothesis.flights])
     return blocks_of(hypothesis.flight_index, centres, settings.block_s)
-
-
-def rows(hypothesis: System) -> int:
-    """Count the residuals of a hypothesis, over windows and known channels."""
-    return sum(len(flight) * int(flight.known.sum()) for flight in hypothesis.flights)
 
 
 def surely(margin: Array) -> bool:
@@ -191,7 +176,9 @@ def off_by(explained: float, left: float, above: float = 0.0) -> float:
 
 @cache
 def _weights(blocks: int) -> Array:
-    return np.asarray(blocks * np.random.default_rng(0).dirichlet(np.ones(blocks), _DRAWS))
+    """Draw weights of blocks, so many that a rare probability is known as well as formulas are."""
+    draws = round(1 / (RARE * OFF**2))
+    return np.asarray(blocks * np.random.default_rng(0).dirichlet(np.ones(blocks), draws))
 
 
 def log_odds(more: Array, off: float) -> Array:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 
@@ -26,8 +25,6 @@ class Scored:
 
     Attributes
     ----------
-    columns : array of int
-        Of the matrix; without those that a bound at 0 took out.
     gain : float
         Sum of squares taken off the blocks that the fits did not see, in squared floors; minus infinity where refused.
     block_error : array, shape (block,)
@@ -39,7 +36,6 @@ class Scored:
     """
 
     candidate: Candidate
-    columns: IntArray
     gain: float
     block_error: Array
     coefficients: Array
@@ -51,20 +47,6 @@ class Scored:
         return (*self.others, self.candidate)
 
 
-class PlacedCandidate(NamedTuple):
-    """Where a candidate stands in the matrix.
-
-    Attributes
-    ----------
-    weight : array, shape (6,)
-        On the residuals of the channels where the candidate acts on the actuation.
-    """
-
-    candidate: Candidate
-    columns: IntArray
-    weight: Array
-
-
 @dataclass(frozen=True)
 class ScoringMatrix:
     """Base columns and candidates side by side.
@@ -73,13 +55,15 @@ class ScoringMatrix:
     ----------
     matrix : array, shape (window, 6, column)
         Weighted.
+    candidates : tuple of (Candidate, array of int, array)
+        Each with its columns of the matrix, and a weight on the residual of each channel, shape (6,).
     prior : array, shape (column,)
         What bounds say of the coefficients before any data.
     """
 
     matrix: Array
     base: IntArray
-    candidates: tuple[PlacedCandidate, ...]
+    candidates: tuple[tuple[Candidate, IntArray, Array], ...]
     prior: Array
 
 
@@ -104,7 +88,7 @@ def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: A
     """
     moving = shape_columns(hypothesis, fit(hypothesis, floor))
     parts: list[Array] = [hypothesis.base, moving]
-    placed: list[PlacedCandidate] = []
+    placed: list[tuple[Candidate, IntArray, Array]] = []
     first = hypothesis.base.shape[2] + moving.shape[2]
     base = np.arange(first)
     for candidate in candidates:
@@ -114,12 +98,10 @@ def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: A
         weight = np.ones(6)
         if candidate.effect.kind == "actuator":
             weight = compensation(hypothesis.rotor_wrench, hypothesis.rotor_wrench + columns[..., 0])
-        placed.append(PlacedCandidate(candidate, indices, weight))
+        placed.append((candidate, indices, weight))
         first += columns.shape[2]
-    free = [information(each.effect, place.stop - place.start, hypothesis.vehicle) for each, place in hypothesis.places]
-    shapes = np.array([1.0 / np.ptp(shape.grid) ** 2 for shape in hypothesis.shapes])
-    offered = [information(one.candidate.effect, len(one.columns), hypothesis.vehicle) for one in placed]
-    prior = np.concatenate([*free, shapes, *offered])
+    offered = [information(candidate.effect, len(own), hypothesis.vehicle) for candidate, own, _ in placed]
+    prior = np.concatenate([known_before(hypothesis), *offered])
     return ScoringMatrix(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(placed), prior)
 
 
@@ -142,42 +124,41 @@ def score(arranged: ScoringMatrix, beside: Beside, hypothesis: System) -> tuple[
     """
     scored = []
     chance = np.full(beside.before.shape[1] - 1, -np.inf)
-    for placed in arranged.candidates:
-        error = _error(placed, placed.columns, beside)
+    for candidate, columns, weight in arranged.candidates:
+        error = _error(candidate, columns, weight, beside)
         chance = np.maximum(chance, (beside.before - error)[:, 1:].sum(axis=0))
-        scored.append(_scored(placed, error[:, 0], beside, hypothesis.vehicle))
+        scored.append(_scored(candidate, columns, weight, error[:, 0], beside, hypothesis.vehicle))
     return ascending(scored, lambda candidate: -candidate.gain), chance
 
 
-def _error(placed: PlacedCandidate, columns: IntArray, beside: Beside) -> Array:
+def _error(candidate: Candidate, columns: IntArray, weight: Array, beside: Beside) -> Array:
     """Compute what a candidate leaves of each block; a block that alone shows it does not count against it."""
-    if placed.candidate.effect.unit_coefficient:
-        return beside.subtracted(int(columns[0]), placed.weight)
+    if candidate.effect.unit_coefficient:
+        return beside.subtracted(int(columns[0]), weight)
     error = beside.unseen(columns)
     return np.where(beside.normal.alone(columns)[:, None], np.minimum(beside.before, error), error)
 
 
-def _scored(placed: PlacedCandidate, error: Array, beside: Beside, vehicle: VehicleSettings) -> Scored:
+def _scored(
+    candidate: Candidate, columns: IntArray, weight: Array, error: Array, beside: Beside, vehicle: VehicleSettings
+) -> Scored:
     """Score a candidate that leaves `error` of the blocks with all its columns."""
-    (candidate, columns, _), before = placed, beside.before[:, 0]
-    if len(columns) == 0:
-        return Scored(candidate, columns, -np.inf, before, np.zeros(0))
+    before = beside.before[:, 0]
     if candidate.effect.unit_coefficient:
-        return Scored(candidate, columns, float((before - error).sum()), error, np.ones(1))
+        return Scored(candidate, float((before - error).sum()), error, np.ones(1))
     kept = np.ones(len(columns), dtype=bool)
     for _ in range(len(columns)):
         fitted, unsure = np.zeros(len(columns)), np.zeros(len(columns))
         fitted[kept], unsure[kept] = beside.fit(columns[kept])
         keep, admissible = within_bounds(candidate.effect, fitted, unsure, vehicle)
         if not admissible or not (kept & keep).any():
-            return Scored(candidate, columns, -np.inf, before, fitted)
+            return Scored(candidate, -np.inf, before, fitted)
         if (kept & keep == kept).all():
             break
         kept &= keep
-    used = columns[kept]
-    if len(used) < len(columns):
-        error = _error(placed, used, beside)[:, 0]
-    return Scored(candidate, used, float((before - error).sum()), error, fitted)
+    if not kept.all():
+        error = _error(candidate, columns[kept], weight, beside)[:, 0]
+    return Scored(candidate, float((before - error).sum()), error, fitted)
 
 
 def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleSettings) -> tuple[BoolArray, bool]:
@@ -214,6 +195,13 @@ def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleS
     if effect.lever is not None and len(linear) == len(effect.coefficients) and not at_zero.any():
         at_zero |= ~effect.lever(np.where(at_zero, 0.0, linear), error, vehicle)
     return ~at_zero, bool(not np.any(beyond & ~at_zero))
+
+
+def known_before(hypothesis: System) -> Array:
+    """Compute the prior information of the coefficients of a base and of the shapes behind them, shape (number,)."""
+    vehicle, places = hypothesis.vehicle, hypothesis.places
+    free = [information(candidate.effect, place.stop - place.start, vehicle) for candidate, place in places]
+    return np.concatenate([*free, [1.0 / np.ptp(shape.grid) ** 2 for shape in hypothesis.shapes]])
 
 
 def information(effect: Effect, columns: int, vehicle: VehicleSettings) -> Array:

@@ -22,7 +22,6 @@ from cpfls_cli.gap.naming.ranking import (
     more_left,
     off_by,
     rank_effects,
-    rows,
 )
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import Scored, scoring_matrix
@@ -68,13 +67,11 @@ def forward_selection(
         grown += grown_elsewhere(flights, beam[1:], step, effects, settings)
         if not grown:
             return chosen, steps
-        number = float(np.log(rows(step.hypothesis)))
+        number = float(np.log(step.hypothesis.known.sum()))
         best = simplest(ascending(grown, lambda scored: -scored.gain), step.above_floor, number)
         refitted = refined(flights, best.chosen, step.floor)
-        if of_motion(best.gain, step, refitted) < step.worth_a_name():
-            return chosen, steps
         # A set that was there before would come round again for ever.
-        if _names(refitted.chosen) in tried:
+        if of_motion(best.gain, step, refitted) < step.worth_a_name() or _names(refitted.chosen) in tried:
             return chosen, steps
         tried.add(_names(refitted.chosen))
         step.hypothesis.cache.clear()
@@ -98,8 +95,7 @@ def _moved(flights: Sequence[WeakFlight], step: RankedStep, settings: GapSetting
     beside_late = any(each.effect.actuation is not None for each in best.others)
     if best not in alike or not (beside_late or len(alike) > 1):
         return near
-    moved = [rescored(refined(flights, scored.chosen, step.floor), step, settings) for scored in alike]
-    return ascending(moved, lambda scored: -scored.gain)
+    return [rescored(refined(flights, scored.chosen, step.floor), step, settings) for scored in alike]
 
 
 def grown_elsewhere(
@@ -147,8 +143,7 @@ def of_motion(gain: float, step: RankedStep, with_it: System) -> float:
     if not with_it.chosen[-1].effect.rate_derivative:
         return gain
     after = floors(with_it, fit(with_it, step.floor))
-    rows = np.sum([len(flight) * flight.known for flight in with_it.flights], axis=0)
-    return gain - float((rows * np.maximum(1 - (after / step.floor) ** 2, 0.0)).sum())
+    return gain - float((with_it.known.sum(axis=0) * np.maximum(1 - (after / step.floor) ** 2, 0.0)).sum())
 
 
 def in_place_of(
@@ -214,9 +209,9 @@ def rescored(hypothesis: System, step: RankedStep, settings: GapSettings) -> Sco
     # Beside the best set, whose rotor torque is what it is in the look. Shapes that are refined stay.
     moving = all(each.effect.actuation is None for each in hypothesis.chosen)
     error = _unseen(hypothesis, step.floor * compensation(plain, own), settings, moving=moving)
-    gain = step.above_floor + rows(hypothesis) - error.sum()
+    gain = step.above_floor + hypothesis.known.sum() - error.sum()
     *others, newest = hypothesis.chosen
-    return Scored(newest, np.zeros(0, dtype=int), float(gain), error, np.zeros(0), tuple(others))
+    return Scored(newest, float(gain), error, np.zeros(0), tuple(others))
 
 
 def _unseen(hypothesis: System, floor: Array, settings: GapSettings, *, moving: bool = True) -> Array:

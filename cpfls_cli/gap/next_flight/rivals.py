@@ -12,14 +12,14 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.balance.refine import fit, refined
+from cpfls_cli.gap.balance.refine import fit, least_squares, refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.leftover import usual_size
 from cpfls_cli.gap.naming.results import Alternative, NamedEffect
-from cpfls_cli.gap.naming.scoring import candidates_of, information
+from cpfls_cli.gap.naming.scoring import candidates_of, known_before
 from cpfls_cli.gap.next_flight.separation import Question, SizedEffect, answered, gathered, shared_noise
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.rounding import ROUNDING, smallest
+from cpfls_cli.rounding import smallest
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -144,14 +144,10 @@ def fitted_effects(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], f
     """
     balance = system(flights, chosen)
     matrix = (balance.base / floor[:, None]).reshape(-1, balance.base.shape[2])
-    widths = [(each, place.stop - place.start) for each, place in balance.places]
-    prior = np.concatenate([information(each.effect, width, balance.vehicle) for each, width in widths])
-    # Rows of the prior beside those of the flights; lengths of columns differ by decades.
+    prior = known_before(balance)[: balance.base.shape[2]]
+    # Rows of the prior beside those of the flights.
     matrix = np.concatenate([matrix, np.diag(np.sqrt(prior))])
-    right = np.concatenate([(balance.residual / floor).reshape(-1), np.zeros(len(prior))])
-    length = np.linalg.norm(matrix, axis=0)
-    scale = 1.0 / np.where(length > 0, length, 1.0)
-    linear = np.linalg.lstsq(matrix * scale, right, rcond=ROUNDING)[0] * scale
+    linear = least_squares(matrix, np.concatenate([(balance.residual / floor).reshape(-1), np.zeros(len(prior))]))
     by_name = {each.effect.name: linear[place] for each, place in balance.places}
     return tuple(SizedEffect(each, by_name.get(each.effect.name, np.ones(1))) for each in chosen)
 

@@ -77,15 +77,6 @@ class HarmonicPath:
         by_axis = np.broadcast_to(factor, (4,))[:, None]
         return replace(self, centre=self.centre * factor, cosine=self.cosine * by_axis, sine=self.sine * by_axis)
 
-    def moved(self, cosine: Array, sine: Array) -> HarmonicPath:
-        """Change the amplitudes, less what would leave the ends not at rest.
-
-        Parameters
-        ----------
-        cosine, sine : array, shape (4, harmonic), m and rad
-        """
-        return replace(self, cosine=self.cosine + cosine, sine=self.sine + sine).resting()
-
     def resting(self) -> HarmonicPath:
         """Take off what would leave velocity, acceleration, jerk, snap and the turning of yaw at the ends."""
         cosine, sine = np.empty_like(self.cosine), np.empty_like(self.sine)
@@ -180,15 +171,11 @@ class Room:
         settings = self.settings
         assert settings.duration_s is not None, "settings of this path have a duration"
         path = random_path(settings.duration_s, settings.next_flight.frequency_max_hz, _HARMONICS, rng)
-        share = rng.random(4)
-        for axis in range(4):
-            alone = self.fitted(path.scaled(np.arange(4) == axis))
-            path = replace(
-                path,
-                cosine=np.where(np.arange(4)[:, None] == axis, alone.cosine, path.cosine),
-                sine=np.where(np.arange(4)[:, None] == axis, alone.sine, path.sine),
-            )
-        return self.fitted(path.scaled(share))
+        share, alone = rng.random(4), [self.fitted(path.scaled(own)) for own in np.eye(4)]
+        cosine, sine = (
+            np.stack([getattr(own, name)[axis] for axis, own in enumerate(alone)]) for name in ("cosine", "sine")
+        )
+        return self.fitted(replace(path, cosine=cosine, sine=sine).scaled(share))
 
     def fitted(self, path: HarmonicPath) -> HarmonicPath:
         """Scale a path until it reaches a limit, and put its middle into that of the room; it starts at yaw 0."""

@@ -63,16 +63,6 @@ class Goal:
         effects = {question.true.candidate.effect.name for question in self.questions}
         return float(np.log(len(effects) / sum(answer.likely for answer in answers)))
 
-    def known_from(self, question: Question, flights: Sequence[WeakFlight]) -> Evidence:
-        """Gather what the flights already flown say; nothing where they lack a signal of an effect in question."""
-        if not flights:
-            return Evidence.none(0)
-        rival = [] if question.rival is None else [question.rival]
-        effects = [question.true.candidate.effect, *rival, *(each.candidate.effect for each in question.besides)]
-        if all(any(not effect.missing(flight.signals) for flight in flights) for effect in effects):
-            return self.logging.gathered(question, flights)
-        return Evidence.none(1 + int(block_index(system(flights), self.logging.settings).max()))
-
 
 def goal(questions: Sequence[Question], flights: Sequence[WeakFlight], room: Room, logging: Logging) -> Goal:
     """Set up what the next flight has to tell.
@@ -82,9 +72,17 @@ def goal(questions: Sequence[Question], flights: Sequence[WeakFlight], room: Roo
     flights : sequence of WeakFlight
         That are there already.
     """
+
+    def known(question: Question) -> Evidence:
+        """Gather what the flights already flown say; nothing where they lack a signal of an effect in question."""
+        rival = [] if question.rival is None else [question.rival]
+        effects = [question.true.candidate.effect, *rival, *(each.candidate.effect for each in question.besides)]
+        if flights and all(any(not effect.missing(flight.signals) for flight in flights) for effect in effects):
+            return logging.gathered(question, flights)
+        return Evidence.none(1 + int(block_index(system(flights), logging.settings).max()) if flights else 0)
+
     shared = windows(room.period, logging.settings.window_s, logging.settings.overlap)
-    blank = Goal(tuple(questions), (), room, logging, shared_noise(shared))
-    return replace(blank, known=tuple(blank.known_from(question, flights) for question in questions))
+    return Goal(tuple(questions), tuple(known(each) for each in questions), room, logging, shared_noise(shared))
 
 
 @dataclass(frozen=True)
@@ -153,4 +151,5 @@ def _changed(path: HarmonicPath, step: float, room: Room, rng: np.random.Generat
         return replace(path, order=order, cosine=cosine, sine=sine)
     speed = np.sqrt(((path.cosine**2 + path.sine**2) * path.order**2).mean(axis=1, keepdims=True))
     cosine, sine = step * rng.standard_normal((2, *path.cosine.shape)) * speed / path.order * chosen
-    return path.moved(cosine, sine).scaled(np.exp(step * rng.standard_normal(4) * chosen[:, 0]))
+    moved = replace(path, cosine=path.cosine + cosine, sine=path.sine + sine).resting()
+    return moved.scaled(np.exp(step * rng.standard_normal(4) * chosen[:, 0]))

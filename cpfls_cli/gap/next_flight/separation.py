@@ -14,7 +14,7 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, nuisance
-from cpfls_cli.gap.naming.ranking import block_index, likely, log_odds, rows
+from cpfls_cli.gap.naming.ranking import block_index, likely, log_odds
 from cpfls_cli.gap.naming.scoring import candidates_of
 from cpfls_cli.gap.settings import OFF, RARE, GapSettings
 from cpfls_cli.rounding import ROUNDING
@@ -151,7 +151,7 @@ def formulas_off(hypothesis: System, floor: Array) -> float:
     """
     plain = system(hypothesis.flights)
     before, left = (float(((each.left(fit(each, floor)) / floor) ** 2).sum()) for each in (plain, hypothesis))
-    return float(np.clip((left - rows(hypothesis)) / max(before - left, ROUNDING), 0.0, OFF**2))
+    return float(np.clip((left - hypothesis.known.sum()) / max(before - left, ROUNDING), 0.0, OFF**2))
 
 
 def gathered(

@@ -88,7 +88,10 @@ def rank_dependence(
             curve = _curve(name, signal[rows])
             if curve.size and len(np.unique(block[rows])) >= FEWEST_BLOCKS:
                 curve = about_flight_mean(curve, flight_index[rows])
-                share = _explained(curve, draws[np.ix_(rows, channels)], block[rows])
+                drawn = draws[np.ix_(rows, channels)]
+                normal = folds(curve[:, None], drawn.reshape(len(rows), 1, -1), block[rows])
+                left, total = normal.solve(np.arange(curve.shape[1]))[1].sum(axis=0), normal.square.sum(axis=0)
+                share = (1 - left / np.maximum(total, np.finfo(float).tiny)).reshape(drawn.shape[1:])
                 shares += [(int(channel), name, by_draw) for channel, by_draw in zip(channels, share, strict=True)]
     if not shares:
         return ()
@@ -121,14 +124,6 @@ def _curve(name: str, signal: Array) -> Array:
     # Beyond the outer percents the curve stays constant, or a few windows would decide a quartic.
     scaled = np.clip(2 * (signal - low) / (high - low) - 1, -1, 1)
     return np.asarray(chebyshev.chebvander(scaled, _DEGREE)[:, 1:])
-
-
-def _explained(curve: Array, draws: Array, block: IntArray) -> Array:
-    """Give the share explained of unseen blocks, shape (channel, draw)."""
-    normal = folds(curve[:, None], draws.reshape(len(draws), 1, -1), block)
-    _, error = normal.solve(np.arange(curve.shape[1]))
-    total = np.maximum(normal.square.sum(axis=0), np.finfo(float).tiny)
-    return np.asarray((1 - error.sum(axis=0) / total).reshape(draws.shape[1:]))
 
 
 def state_signals(flight: WeakFlight, signals: Signals) -> dict[str, Array]:

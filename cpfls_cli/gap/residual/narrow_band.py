@@ -24,6 +24,9 @@ _LOBE_CYCLES = 2
 _FINER = 4
 """Frequencies for each reciprocal of the flight: between two, a line loses 2 % of its power."""
 
+LOWEST = _FINER * _LOBE_CYCLES
+"""First bin above those that the mean leaks into."""
+
 _MEDIAN_CYCLES = 24
 """Width of the running median, six times a line's."""
 
@@ -113,7 +116,7 @@ def narrow_band(
         drawn += 1
     channel, frequency = int(channels[strongest]), _between_bins(power[strongest], peak, on)
     mean, error = _mean_power(channel, frequency, hop_s, flights, rates)
-    lobe = slice(max(0, peak - _LOBE_CYCLES * on.resolution), peak + _LOBE_CYCLES * on.resolution + 1)
+    lobe = slice(max(0, peak - LOWEST), peak + LOWEST + 1)
     return NarrowBand(
         channel=CHANNELS[channel],
         frequency_hz=frequency,
@@ -128,7 +131,7 @@ def narrow_band(
 def _prominence(power: Array, on: Grid) -> Array:
     """Divide by the background; 0 at frequencies that are part of the mean."""
     ratio = power / background(power, on)
-    ratio[:, : on.lowest] = 0
+    ratio[:, :LOWEST] = 0
     return np.asarray(ratio)
 
 
@@ -149,22 +152,19 @@ def _mean_power(
     if channel >= body_rate[0].shape[1]:
         return 0.0, 0.0
     length = int(np.ceil(2 * _LOBE_CYCLES / (frequency * hop_s)))
-    pairs = zip(residual, body_rate, strict=True)
-    products = np.concatenate(
-        [_products(rows[:, channel], rate[:, channel], length, frequency * hop_s) for rows, rate in pairs]
-    )
+    taper = np.hanning(length + 2)[1:-1]
+    wave = np.exp(-2j * np.pi * frequency * hop_s * np.arange(length)) * taper * 2 / taper.sum()
+    found = []
+    for rows, rate in zip(residual, body_rate, strict=True):
+        both = np.stack([rows[:, channel], rate[:, channel]])
+        segments = both[:, : len(rate) // length * length].reshape(2, -1, length)
+        # Complex amplitudes in the band.
+        first, second = (segments - segments.mean(axis=2, keepdims=True)) @ wave
+        found.append((first * second.conj()).real / 2)
+    products = np.concatenate(found)
     if len(products) < 2:
         return float(products.mean()) if len(products) else 0.0, float(np.inf)
     return float(products.mean()), float(mean_error(products))
-
-
-def _products(residual: Array, rate: Array, length: int, cycles_per_row: float) -> Array:
-    """Average the product of two signals in a band, from their complex amplitudes, shape (segment,)."""
-    taper = np.hanning(length + 2)[1:-1]
-    wave = np.exp(-2j * np.pi * cycles_per_row * np.arange(length)) * taper * 2 / taper.sum()
-    segments = np.stack([residual, rate])[:, : len(rate) // length * length].reshape(2, -1, length)
-    first, second = (segments - segments.mean(axis=2, keepdims=True)) @ wave
-    return np.asarray((first * second.conj()).real / 2)
 
 
 @dataclass(frozen=True)
@@ -176,16 +176,10 @@ class Grid:
     samples : int
         To which series are filled up with zeros.
     frequency : array, shape (frequency,), Hz
-    resolution : int
-        Bins in the reciprocal of the longest flight.
-    lowest : int
-        First bin above those that the mean leaks into.
     """
 
     samples: int
     frequency: Array
-    resolution: int = _FINER
-    lowest: int = _FINER * _LOBE_CYCLES
 
 
 def grid(lengths: Sequence[int], period: float) -> Grid:
@@ -243,18 +237,18 @@ def background(power: Array, on: Grid) -> Array:
     # A background is no steeper, or it would be taken for a line at 0.
     correlation = np.clip(correlation, -CORRELATIONS[-1], CORRELATIONS[-1])
     shape = 1 / (1 - 2 * correlation * np.cos(turn) + correlation**2)
-    return np.asarray(shape * _running_median(power / shape, on))
+    return np.asarray(shape * _running_median(power / shape))
 
 
-def _running_median(power: Array, on: Grid) -> Array:
-    used = power[..., on.lowest :]
-    half = min(_MEDIAN_CYCLES * on.resolution // 2, used.shape[-1] - 1)
+def _running_median(power: Array) -> Array:
+    used = power[..., LOWEST:]
+    half = min(_MEDIAN_CYCLES * _FINER // 2, used.shape[-1] - 1)
     padded = np.pad(used, [(0, 0)] * (used.ndim - 1) + [(half, half)], mode="reflect")
     # Neighbouring bins are alike, and so are neighbouring medians: a part of them is enough.
-    step = 2 * on.resolution
+    step = 2 * _FINER
     values = np.median(sliding_window_view(padded, 2 * half + 1, axis=-1)[..., ::step, ::2], axis=-1)
     # In straight lines between them, constant beyond the ends.
-    inside = np.clip((np.arange(power.shape[-1]) - on.lowest) / step, 0, values.shape[-1] - 1)
+    inside = np.clip((np.arange(power.shape[-1]) - LOWEST) / step, 0, values.shape[-1] - 1)
     left = np.minimum(inside.astype(int), max(0, values.shape[-1] - 2))
     right = np.minimum(left + 1, values.shape[-1] - 1)
     share = inside - left

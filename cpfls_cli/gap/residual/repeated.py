@@ -171,15 +171,12 @@ class RepeatedRuns:
         """Numbers of the runs that are held against others."""
         return tuple(sorted({number for pair in self.pairs for number in pair}))
 
-    def _block_samples(self, band: Windows) -> float:
-        """Length of the blocks of all paths in samples, no shorter than the windows."""
-        lengths = {path[0]: len(self.given.flown[path[0]]) for path in self.given.repeats.paths()}
-        return max(block_length(sum(lengths.values()) * band.period) / band.period, float(len(band.weight)))
-
     def _of_band(self, band: Windows, sides: Sequence[Array]) -> Array:
         """Sum products over the windows of all pairs, by block of the paths, shape (block, 4, 6)."""
         repeats, cut = self.given.repeats, [sides[run.flight][run.part] for run in self.given.runs]
-        length = self._block_samples(band)
+        # Blocks of all paths are no shorter than the windows.
+        samples = sum(len(self.given.flown[path[0]]) for path in repeats.paths())
+        length = max(block_length(samples * band.period) / band.period, float(len(band.weight)))
         found: dict[tuple[int, int], Array] = {}
         for number, other in self.pairs:
             middles = np.arange(band.count(len(cut[number]))) * band.hop + len(band.weight) // 2

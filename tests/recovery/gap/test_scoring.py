@@ -30,7 +30,6 @@ def test_a_damping_that_drives_is_set_to_zero_and_the_others_stay():
     known = flights((candidate("linear_damping"), [0.2, -0.1, 0.1]))
     found = scored(known, CATALOGUE["linear_damping"])
     np.testing.assert_allclose(found.coefficients, [0.2, 0.0, 0.1], atol=0.02)
-    assert len(found.columns) == 2
     assert found.gain > 1000
 
 

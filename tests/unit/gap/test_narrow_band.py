@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from cpfls_cli.gap.residual.narrow_band import background, grid, narrow_band, noise_like, pooled_power
+from cpfls_cli.gap.residual.narrow_band import LOWEST, background, grid, narrow_band, noise_like, pooled_power
 
 LENGTHS = [2000, 1500]
 
@@ -22,11 +22,11 @@ def test_the_background_is_that_of_the_process_and_does_not_see_a_line():
     smooth = background(pooled_power(series, on), on)[0]
     # Two flights: half the sum of two squared amplitudes, each exponential, has its median at 0.839.
     exact = 2 * 0.839 / np.abs(1 - 0.8 * np.exp(-2j * np.pi * on.frequency * 0.2)) ** 2
-    away = np.log(smooth / exact)[on.lowest :]
+    away = np.log(smooth / exact)[LOWEST:]
     assert abs(away.mean()) < 0.1
     assert np.sqrt(np.mean(away**2)) < 0.35
     # The power of the line itself is a thousand times the background.
-    line = np.argmin(np.abs(on.frequency - 1.0)) - on.lowest
+    line = np.argmin(np.abs(on.frequency - 1.0)) - LOWEST
     assert np.abs(away[line - 20 : line + 20]).max() < 0.5
 
 
@@ -36,7 +36,7 @@ def test_drawn_noise_has_the_background_it_was_drawn_from():
     smooth = 1 / np.abs(1 - 0.8 * np.exp(-2j * np.pi * on.frequency * 0.2))[None] ** 2
     present = np.ones((2, 1), dtype=bool)
     drawn = np.mean([noise_like(smooth, LENGTHS, present, on, rng) for _ in range(200)], axis=0)
-    ratio = (drawn / (2 * smooth))[0, on.lowest :]
+    ratio = (drawn / (2 * smooth))[0, LOWEST:]
     assert ratio.mean() == pytest.approx(1, abs=0.05)
 
 
