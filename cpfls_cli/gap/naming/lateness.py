@@ -120,7 +120,7 @@ class _Sets:
         return sum(len(self.effects[name].shapes) for name in names)
 
     def usual(self) -> tuple[_Names, list[_Names]]:
-        """Choose among effects of one number, none where nothing is left without; all where one leaves something yet."""
+        """Choose among effects of one number: none where nothing is left without, all where one leaves something."""
         self.tell([()])
         if not self.leaves(()):
             return (), []
