@@ -93,14 +93,13 @@ def extended(
     base: VehicleModel,
 ) -> ExtendedRecord:
     """Put the effects that a diagnosis names into a model; refused where the held-out gap does not shrink."""
-    gusts = diagnosis.disturbance.gusts if diagnosis.disturbance is not None and diagnosis.gusts else None
-    gusty_floor = None if gusts is None else diagnosis.gap.floor
+    gusty_floor = diagnosis.gap.floor if diagnosis.gusts else None
     named = named_effects(diagnosis), audit(diagnosis.audit)
-    extension = extend(training, held, *named, study.gap, base.fuzzy, gusty_floor, gusts)
+    extension = extend(training, held, *named, study.gap, base.fuzzy, gusty_floor)
     stated = base.vehicle if has_effects(base) else study.vehicle
     whole, given = (on_top_of(base, whole_vehicle(each, stated)) for each in (extension.model, plain(base.fuzzy)))
-    if gusts is not None:
-        whole = replace(whole, gusts=gusts)
+    if diagnosis.disturbance is not None and diagnosis.gusts:
+        whole = replace(whole, gusts=diagnosis.disturbance.gusts)
     require_body(extension.model, stated)
     played = played_pairs(held, whole, given, rates_fade(training, study.gap.horizon_s))
     playback = PlaybackChangeGroup.of_pairs(played, errors_by_horizon(played, study.gap.horizon_s))

@@ -23,7 +23,6 @@ from cpfls_cli.gap.balance.balance_system import System, has_force
 from cpfls_cli.gap.balance.weak_flight import TURNING, Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.by_instruments import (
-    Known,
     by_instruments,
     may_be_nothing,
     untold,
@@ -123,10 +122,9 @@ def diagnose(
         # Beside what is named then, more channels may turn out to be nothing but gusts.
         while gusts is not None and gusts.split.any() and gusts.told.sum() > told:
             told, quiet = int(gusts.told.sum()), np.minimum(quiet, gusts.noise(windows))
-            known = Known(given, gusts.known)
-            axes = untold_axes(named.judgement.found, known, named.judge.floor, settings)
+            axes = untold_axes(named.judgement.found, given, named.judge.floor, settings)
             flights = flights.in_air(gusts, axes)
-            named = _by_instruments(_named(flights, settings, rng, progress), known, settings)
+            named = _by_instruments(_named(flights, settings, rng, progress), given, settings)
             gusts = _gusts(named, given, settings, rng)
     weak, (hypothesis, _, estimates), held_out = flights.training, *named.judgement
     progress(0.75, "rivals")
@@ -234,22 +232,22 @@ def _gusts(named: _Named, given: Instruments, settings: GapSettings, rng: np.ran
     return air(hypothesis, estimates.linear, block, given, settings, rng)
 
 
-def _by_instruments(named: _Named, known: Known, settings: GapSettings) -> _Named:
+def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) -> _Named:
     """Judge what was named with the numbers that instruments tell, without what is 0 by them.
 
     A loop that answers gusts looks as late: what makes the rotors late stands where instruments tell that it does.
     """
     judge, refusals, fit = named.judge, list(named.refusals), named.judgement.found
     while True:
-        found = by_instruments(fit, known, judge.floor, settings)
-        out = may_be_nothing(found, known, judge.floor, settings)
+        found = by_instruments(fit, given, judge.floor, settings)
+        out = may_be_nothing(found, given, judge.floor, settings)
         if not out:
             break
         refusals += [Refusal(name, "judged by what instruments tell, it may be 0") for name in out]
         kept = [each for each in found.hypothesis.chosen if each.effect.name not in out]
         fit = fitted(judge.training, kept, judge.floor, settings)
     loose = tuple(effect.name for effect in untold(fit, found))
-    late = told_apart(found, named.effects, known, judge.floor, settings)
+    late = told_apart(found, named.effects, given, judge.floor, settings)
     judgement, without = judge.judge(late.found), judge.judge(late.without)
     left, more = (each.held_out.size(each.held_out.after).floors for each in (judgement, without))
     if not late.chances or np.nanmax(more**2 - left**2) < VISIBLE**2:

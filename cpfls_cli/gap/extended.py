@@ -23,14 +23,13 @@ from cpfls_cli.gap.balance.weak_flight import (
     WeakFlight,
     nuisance,
 )
-from cpfls_cli.gap.naming.by_instruments import Known, by_instruments, untold_axes
+from cpfls_cli.gap.naming.by_instruments import by_instruments, untold_axes
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, fitted
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out
 from cpfls_cli.gap.naming.ranking import best_floor
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.residual.air import in_air, known_motion
 from cpfls_cli.gap.settings import VISIBLE, GapSettings
-from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.weak_form.windows import Recording, common_windows
 
 
@@ -142,7 +141,6 @@ def extend(
     settings: GapSettings,
     base: InertiaModel | None,
     gusty_floor: Array | None = None,
-    gusts: Gusts | None = None,
 ) -> Refit:
     """Refit a model together with effects and evaluate it on held-out flights.
 
@@ -156,8 +154,6 @@ def extend(
         None for the rigid body of the vehicle.
     gusty_floor : array, shape (6,), N m and N, or None
         Noise floor with the gusts of the flights, beside which the numbers come by instruments; None for no gusts.
-    gusts : Gusts or None
-        Those that were found in the training flights.
 
     Raises
     ------
@@ -172,8 +168,8 @@ def extend(
     start = refined(flights, chosen, best_floor(system(flights, chosen)))
     floor = best_floor(start)
     found = fitted(flights, start.chosen, floor, settings)
-    if gusty_floor is not None and gusts is not None:
-        given = Known(known_motion(training), gusts)
+    if gusty_floor is not None:
+        given = known_motion(training)
         untold = untold_axes(found, given, floor, settings)
         flights, logged, repaired = ([f.as_stated(untold) for f in each] for each in (flights, logged, repaired))
         found = by_instruments(fitted(flights, start.chosen, floor, settings), given, floor, settings)

@@ -22,22 +22,7 @@ from cpfls_cli.gap.naming.scoring import information
 from cpfls_cli.gap.residual.air import foretold_rows
 from cpfls_cli.gap.settings import CHANCE, GapSettings
 from cpfls_cli.playback.constants import ENOUGH_BLOCKS, STRONG
-from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.instruments import Instruments, foretold_by_run
-
-
-class Known(NamedTuple):
-    """What knows nothing of the gusts of flights: what was asked from outside of their loops, and what was before.
-
-    Attributes
-    ----------
-    outside : Instruments
-    gusts : Gusts
-        That were found in these flights.
-    """
-
-    outside: Instruments
-    gusts: Gusts
 
 
 class _Run(NamedTuple):
@@ -72,7 +57,7 @@ class _Told(NamedTuple):
     outside: bool
 
 
-def by_instruments(found: NamedFit, given: Known, floor: Array, settings: GapSettings) -> NamedFit:
+def by_instruments(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> NamedFit:
     """Fit a hypothesis anew to what instruments know of its flights.
 
     With X what each number moves along a run, r what is left, and Z what instruments know of X, the numbers change by d
@@ -81,7 +66,7 @@ def by_instruments(found: NamedFit, given: Known, floor: Array, settings: GapSet
 
     Parameters
     ----------
-    given : Known
+    given : Instruments
         Of the same flights.
     floor : array, shape (6,)
 
@@ -138,13 +123,13 @@ def _stepped(found: NamedFit, sources: Sequence[_Told]) -> tuple[Array, Array]:
     return np.clip(values + change, *ends.T), np.clip(values + without, *ends.T)
 
 
-def untold_axes(found: NamedFit, given: Known, floor: Array, settings: GapSettings) -> BoolArray:
+def untold_axes(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> BoolArray:
     """Mark the body axes of whose inertia instruments tell nothing, shape (3,): in gusts a fit shows that of the loop.
 
     Parameters
     ----------
     found : NamedFit
-    given : Known
+    given : Instruments
         Of the same flights.
     floor : array, shape (6,)
     """
@@ -154,7 +139,7 @@ def untold_axes(found: NamedFit, given: Known, floor: Array, settings: GapSettin
     return ~told
 
 
-def may_be_nothing(found: NamedFit, given: Known, floor: Array, settings: GapSettings) -> list[str]:
+def may_be_nothing(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> list[str]:
     """Name the effects that may be 0 by what instruments tell.
 
     Where an effect is 0, what is left without it does not go with what instruments know of it. That is asked at its
@@ -165,7 +150,7 @@ def may_be_nothing(found: NamedFit, given: Known, floor: Array, settings: GapSet
     ----------
     found : NamedFit
         By instruments.
-    given : Known
+    given : Instruments
         Of the same flights.
     floor : array, shape (6,)
 
@@ -215,7 +200,7 @@ def untold(before: NamedFit, after: NamedFit) -> list[Effect]:
     return [each.effect for each, was, now in numbers if was is now]
 
 
-def foretold_of_left(found: NamedFit, given: Known, floor: Array, settings: GapSettings) -> Array:
+def foretold_of_left(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> Array:
     """Multiply what is left with what instruments know of it, by block: 0 but for chance where nothing is missing."""
     total: dict[int, float] = {}
     _, after = _runs(found.hypothesis, found.estimates.linear, given, floor, settings)
@@ -226,7 +211,7 @@ def foretold_of_left(found: NamedFit, given: Known, floor: Array, settings: GapS
     return np.array([total[block] for block in sorted(total)])
 
 
-def _sources(found: NamedFit, given: Known, floor: Array, settings: GapSettings) -> list[_Told]:
+def _sources(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> list[_Told]:
     """List what tells numbers: what was asked; and what was before those that this does not tell, and what is late.
 
     A linear answer to setpoints tells lateness by far worse.
@@ -315,29 +300,26 @@ def _told(before: NamedFit, after: Estimates, moved: BoolArray) -> Estimates:
 
 
 def _runs(
-    hypothesis: System, linear: Array, given: Known, floor: Array, settings: GapSettings
+    hypothesis: System, linear: Array, given: Instruments, floor: Array, settings: GapSettings
 ) -> tuple[Iterator[_Run], Iterator[_Run]]:
     """Lay windows over runs, and beside them what instruments know; and what was before."""
-    windows, outside = dense(hypothesis.flights[0].windows), given.outside
+    windows = dense(hypothesis.flights[0].windows)
     there = system([replace(flight, windows=windows, seen={}) for flight in hypothesis.flights], hypothesis.chosen)
     columns = [there.base, shape_columns(there, linear), there.left(linear)[..., None]]
     rows = np.concatenate(columns, axis=2) / floor[:, None]
     own, middles, of_path, of_run = [], [], [], []
     length = settings.block_s / windows.period
-    for number, run in enumerate(outside.runs):
+    for number, run in enumerate(given.runs):
         begins = windows.hop * np.arange((there.flight_index == run.flight).sum())
         inside = (begins >= run.part.start) & (begins + len(windows.weight) <= run.part.stop)
         own.append(rows[there.flight_index == run.flight][inside])
         middles.append(begins[inside] - run.part.start + len(windows.weight) // 2)
-        path, place = outside.repeats.path(number, len(outside.flown[number]))
+        path, place = given.repeats.path(number, len(given.flown[number]))
         # Runs of one path know of each other, but not of what was before.
-        of_path.append(path + len(outside.runs) * (place[middles[-1]] // length))
-        of_run.append(-1.0 - number - len(outside.runs) * (middles[-1] // length))
-    known = (
-        foretold_rows(outside, windows, own) if outside.kind == "setpoints" else _in_other_runs(outside, own, middles)
-    )
-    period = windows.hop * windows.period
-    return _of_blocks(own, known, of_path), _of_blocks(*_after(own, given.gusts, period), of_run)
+        of_path.append(path + len(given.runs) * (place[middles[-1]] // length))
+        of_run.append(-1.0 - number - len(given.runs) * (middles[-1] // length))
+    known = foretold_rows(given, windows, own) if given.kind == "setpoints" else _in_other_runs(given, own, middles)
+    return _of_blocks(own, known, of_path), _of_blocks(*_after(own), of_run)
 
 
 def _of_blocks(rows: Sequence[Array], known: Iterable[Array], blocks: Sequence[Array]) -> Iterator[_Run]:
@@ -348,17 +330,16 @@ def _of_blocks(rows: Sequence[Array], known: Iterable[Array], blocks: Sequence[A
         yield _Run(mine[told], theirs[told], last[told].astype(np.int64))
 
 
-def _after(rows: Sequence[Array], gusts: Gusts, period: float) -> tuple[list[Array], list[Array]]:
+def _after(rows: Sequence[Array]) -> tuple[list[Array], list[Array]]:
     """Give what comes newly after each window, and what windows that ended before it tell of that.
 
-    A gust of memory m fades by ``exp(-t / m)``; what is new in it, nobody knew before, nor any loop.
+    What lasts of a gust, as long as its memory is, shows in what is left; what is new in it nobody knew before, nor any
+    loop.
 
     Parameters
     ----------
     rows : sequence of array, shape (window, 6, number + 1)
         Of each run, in floors; windows a `PER_WINDOW`-th of one apart.
-    period : float
-        From window to window, s.
 
     References
     ----------
@@ -366,15 +347,20 @@ def _after(rows: Sequence[Array], gusts: Gusts, period: float) -> tuple[list[Arr
     """
     ahead = PER_WINDOW // 4
     before = range(PER_WINDOW, 2 * PER_WINDOW, ahead)
-    fades = np.exp(-ahead * period / gusts.memory)[:, None]
-    # Nobody knows how what is left of other channels fades.
-    rows = [own * (gusts.size > 0)[:, None] for own in rows]
-    new = [own[ahead + before[-1] :] - fades * own[before[-1] : len(own) - ahead] for own in rows]
-    past = [
-        np.concatenate([own[before[-1] - lag :][: len(each), :, :-1] for lag in before], axis=2)
-        for own, each in zip(rows, new, strict=True)
-    ]
-    asked = {number: each.reshape(-1, each.shape[2]) for number, each in enumerate(past) if len(new[number])}
+    then, now = (
+        [own[before[-1] + late :][: max(0, len(own) - before[-1] - ahead)] for own in rows] for late in (ahead, 0)
+    )
+    past = [[own[before[-1] - lag :][: len(each)] for lag in before] for own, each in zip(rows, now, strict=True)]
+    # What a channel keeps of what it was, by what it was before both, which the noise of neither has a part in.
+    was = [np.sum([each[..., -1] for each in own], axis=0) for own in past]
+    kept, left = (sum((x[..., -1] * y).sum(axis=0) for x, y in zip(each, was, strict=True)) for each in (then, now))
+    lasts = np.clip(kept / np.where(left > 0, left, np.inf), 0.0, 1.0)[:, None]
+    new = [one - lasts * other for one, other in zip(then, now, strict=True)]
+    asked = {
+        number: np.concatenate([each[..., :-1] for each in own], axis=2).reshape(-1, len(own) * (own[0].shape[2] - 1))
+        for number, own in enumerate(past)
+        if len(new[number])
+    }
     told = foretold_by_run(asked, [each.reshape(-1, each.shape[2]) for each in new])
     return new, [told[number].reshape(each.shape) if number in told else each for number, each in enumerate(new)]
 

@@ -14,13 +14,14 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming.by_instruments import Known, by_instruments, foretold_of_left, untold
+from cpfls_cli.gap.naming.by_instruments import by_instruments, foretold_of_left, untold
 from cpfls_cli.gap.naming.estimate import NamedFit, fitted
 from cpfls_cli.gap.naming.ranking import chance_of_ranks, more_left, rank_effects, surely
 from cpfls_cli.gap.naming.results import Alternative, Estimate
 from cpfls_cli.gap.naming.scoring import candidates_of
 from cpfls_cli.gap.naming.search import alternative
 from cpfls_cli.gap.settings import ERRORS, OFF, GapSettings
+from cpfls_cli.playback.instruments import Instruments
 
 _Names = tuple[str, ...]
 
@@ -45,7 +46,7 @@ class Lateness(NamedTuple):
 
 
 def told_apart(
-    found: NamedFit, effects: Sequence[Effect], given: Known, floor: Array, settings: GapSettings
+    found: NamedFit, effects: Sequence[Effect], given: Instruments, floor: Array, settings: GapSettings
 ) -> Lateness:
     """Decide by instruments what lies between command and rotors.
 
@@ -103,7 +104,7 @@ class _Sets:
 
     found: NamedFit
     effects: Mapping[str, Effect]
-    given: Known
+    given: Instruments
     floor: Array
     settings: GapSettings
     fits: dict[_Names, NamedFit] = field(default_factory=dict)

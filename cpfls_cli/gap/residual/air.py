@@ -16,7 +16,7 @@ from cpfls_cli.gap.residual.repeated import without_copies
 from cpfls_cli.gap.settings import COUNTS, ERRORS, RARE, GapSettings
 from cpfls_cli.playback.disturbance import FoundGusts, gusts_in
 from cpfls_cli.playback.flight import LoggedFlight
-from cpfls_cli.playback.gusts import RANGES, Gusts
+from cpfls_cli.playback.gusts import RANGES
 from cpfls_cli.playback.instruments import Instruments, Repeats, foretold_by_run, held, instruments, late, late_by
 from cpfls_cli.rounding import levelled
 from cpfls_cli.weak_form.resampling import about_flight_mean
@@ -44,11 +44,6 @@ class Air:
     found: FoundGusts
     told: BoolArray
     split: BoolArray
-
-    @property
-    def known(self) -> Gusts:
-        """The gusts that are told; none in other channels."""
-        return Gusts.known(self.found.size, self.found.memory)
 
     def floor(self, learned: Sequence[WeakFlight], flights: Sequence[WeakFlight]) -> Array:
         """Compute what gusts and noise do to averages over windows: standard deviation, 0 where none are split off.
