@@ -40,12 +40,13 @@ SIZE, MEMORY = 0.3, 2.0
 
 
 class Hidden(NamedTuple):
-    """What a config misses: what flies, what the config says, the name, and its numbers."""
+    """What a config misses: what flies, what the config says, the name, its numbers; commands alone may be logged."""
 
     truth: Truth
     vehicle: VehicleSettings
     name: str
     numbers: dict[str, float]
+    commands: bool = False
 
 
 def _hidden() -> Iterator[Hidden]:
@@ -59,6 +60,7 @@ def _hidden() -> Iterator[Hidden]:
     yield Hidden(TRUE, heavy, "parameter_error", {"inertia_x": 1 / 1.15 - 1})
     damped = {"d_x": 6e-5, "d_y": 6e-5}
     yield Hidden(TRUE._replace(damping=6e-5), vehicle, "linear_damping", damped)
+    yield Hidden(TRUE._replace(lag_s=0.03), vehicle, "motor_lag", {"time_constant_s": 0.03}, commands=True)
 
 
 def main(draws: int) -> None:
@@ -68,8 +70,7 @@ def main(draws: int) -> None:
             found: list[tuple[Hidden, list[DiagnosisRun]]] = []
             for hidden in _hidden():
                 runs = [
-                    _diagnosed(hidden, _flown(hidden.truth, gusts, instrument, draw), instrument)
-                    for draw in range(draws)
+                    _diagnosed(hidden, _flown(hidden, gusts, instrument, draw), instrument) for draw in range(draws)
                 ]
                 found.append((hidden, runs))
                 rows.append([level, instrument, hidden.name or "nothing", *_names(hidden, runs)])
@@ -81,15 +82,20 @@ def main(draws: int) -> None:
     table("gusts_in_gap", header, told)
 
 
-def _flown(truth: Truth, gusts: tuple[float, float, float], instrument: str, draw: int) -> list[PlaybackFlight]:
+def _flown(hidden: Hidden, gusts: tuple[float, float, float], instrument: str, draw: int) -> list[PlaybackFlight]:
     paths = [FLIGHTS * draw + (0 if instrument == "repeats" else run) for run in range(FLIGHTS)]
-    asked = [Flight(truth, gusts, path, FLIGHTS * draw + run, reach=REACH_HZ) for run, path in enumerate(paths)]
+    asked = [
+        Flight(hidden.truth, gusts, path, FLIGHTS * draw + run, reach=REACH_HZ, commands=hidden.commands)
+        for run, path in enumerate(paths)
+    ]
     return list(gusty_flights(asked, SECONDS))
 
 
 def _diagnosed(hidden: Hidden, flown: Sequence[PlaybackFlight], instrument: str) -> DiagnosisRun:
     kept = flown if instrument == "setpoints" else [replace(flight, setpoints={}) for flight in flown]
-    recordings = [Recording(flight.name, logged(flight, hidden.vehicle).parts[0]) for flight in kept]
+    recordings = [
+        Recording(flight.name, logged(flight, hidden.vehicle, commanded=hidden.commands).parts[0]) for flight in kept
+    ]
     return diagnose(recordings[:-1], recordings[-1:], GapSettings(), np.random.default_rng(1))
 
 

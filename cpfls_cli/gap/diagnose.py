@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -24,9 +25,7 @@ from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.by_instruments import (
     by_instruments,
     may_be_nothing,
-    told_apart,
     untold,
-    untold_actuation,
     untold_axes,
 )
 from cpfls_cli.gap.naming.causes import (
@@ -41,12 +40,13 @@ from cpfls_cli.gap.naming.causes import (
 from cpfls_cli.gap.naming.confirmed import Judge, Judgement, Refusal, differences, earned
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted
 from cpfls_cli.gap.naming.held_out import HeldOut
+from cpfls_cli.gap.naming.lateness import told_apart
 from cpfls_cli.gap.naming.leftover import beside_the_unnamed, not_excited, untried
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.residual.air import Air, air, in_air, known_motion
-from cpfls_cli.gap.settings import CHANCE, NOISE, RARE, GapSettings
+from cpfls_cli.gap.settings import NOISE, VISIBLE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.windows import Recording, common_windows
@@ -124,13 +124,21 @@ def diagnose(
             told, quiet = int(gusts.told.sum()), np.minimum(quiet, gusts.noise(windows))
             axes = untold_axes(named.judgement.found, given, named.judge.floor, settings)
             flights = flights.in_air(gusts, axes)
-            named, gusts = _beside_gusts(_named(flights, settings, rng, progress), given, told, settings, rng)
+            named = _by_instruments(_named(flights, settings, rng, progress), given, settings)
+            gusts = _gusts(named, given, settings, rng)
     weak, (hypothesis, _, estimates), held_out = flights.training, *named.judgement
     progress(0.75, "rivals")
     effect_shares = shares(weak, hypothesis.chosen, estimates, named.judge.floor)
-    estimates, unnamed = beside_the_unnamed(named.judgement.found, named.steps[-1], named.effects, settings, rng)
+    # What makes rotors late in gusts instruments have decided.
+    tried = [each for each in named.effects if gusts is None or not each.late]
+    wider, unnamed = beside_the_unnamed(named.judgement.found, named.steps[-1], tried, settings, rng)
+    pairs = zip(hypothesis.chosen, estimates.effects, wider.effects, strict=True)
+    held_by = tuple(own if each.effect.name in named.sure else with_it for each, own, with_it in pairs)
+    estimates = replace(wider, effects=held_by)
     judged = [
-        judge_effect(weak, hypothesis.chosen, index, estimates, float(share), named.effects, settings, rng)
+        named.in_gusts(
+            judge_effect(weak, hypothesis.chosen, index, estimates, float(share), named.effects, settings, rng)
+        )
         for index, share in enumerate(effect_shares)
     ]
     progress(0.9, "sensor faults")
@@ -195,7 +203,14 @@ class _Named(NamedTuple):
     refusals: list[Refusal]
     differ: tuple[str, ...]
     alike: tuple[Alternative, ...] = ()
+    sure: Mapping[str, float] = MappingProxyType({})
     untold: tuple[str, ...] = ()
+
+    def in_gusts(self, judged: JudgedEffect) -> JudgedEffect:
+        """Take what instruments tell of an effect between command and rotors: a fit of all motion sees the loop."""
+        if judged.effect.name not in self.sure:
+            return judged
+        return replace(judged, effect=replace(judged.effect, p_value=self.sure[judged.effect.name]), alternatives=())
 
 
 def _named(
@@ -211,73 +226,38 @@ def _named(
     return _Named(effects, steps, judge, first if differ else judgement, [*refusals, *unconfirmed], differ)
 
 
-def _gusts(
-    named: _Named, given: Instruments, settings: GapSettings, rng: np.random.Generator, doubt: float = RARE
-) -> Air | None:
+def _gusts(named: _Named, given: Instruments, settings: GapSettings, rng: np.random.Generator) -> Air | None:
     """Find gusts in what is left of the training flights."""
     hypothesis, block, estimates = named.judgement.found
-    return air(hypothesis, estimates.linear, block, given, settings, rng, doubt)
+    return air(hypothesis, estimates.linear, block, given, settings, rng)
 
 
-def _beside_gusts(
-    named: _Named, given: Instruments, told: int, settings: GapSettings, rng: np.random.Generator
-) -> tuple[_Named, Air | None]:
-    """Judge what was named beside gusts by what instruments tell, and find the gusts beside it.
-
-    A loop that answers gusts looks as late. Where instruments do not tell which it is, a name of what is late stands
-    only if without it what is left is no longer the air.
-
-    Parameters
-    ----------
-    told : int
-        How many channels had nothing but gusts before.
-    """
-    without = _by_instruments(named, given, settings, late=False)
-    gusts = _gusts(without, given, settings, rng)
-    if _names(without) == _names(named):
-        return without, gusts
-    doubted = _gusts(without, given, settings, rng, CHANCE)
-    if doubted is None or doubted.told.sum() >= told:
-        return without, gusts
-    late = _by_instruments(named, given, settings, late=True)
-    beside = _gusts(late, given, settings, rng)
-    # Where nothing is the air without it, some of it is enough.
-    enough = told if doubted.told.any() else 1
-    return (late, beside) if beside is not None and beside.told.sum() >= enough else (without, gusts)
-
-
-def _names(named: _Named) -> list[str]:
-    return [each.effect.name for each in named.judgement.found.hypothesis.chosen]
-
-
-def _by_instruments(named: _Named, given: Instruments, settings: GapSettings, *, late: bool) -> _Named:
+def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) -> _Named:
     """Judge what was named with the numbers that instruments tell, without what is 0 by them.
 
-    Parameters
-    ----------
-    late : bool
-        Keep what is late though instruments do not tell it from the loop.
+    A loop that answers gusts looks as late: what makes the rotors late stands where instruments tell that it does.
     """
     judge, refusals, fit = named.judge, list(named.refusals), named.judgement.found
     while True:
         found = by_instruments(fit, given, judge.floor, settings)
-        out = [
-            Refusal(name, "judged by what instruments tell, it may be 0")
-            for name in may_be_nothing(found, given, judge.floor, settings)
-        ]
-        out += [
-            Refusal(name, "a loop that answers gusts looks as late, and instruments do not tell which it is")
-            for name in ([] if late else untold_actuation(fit, found))
-        ]
+        out = may_be_nothing(found, given, judge.floor, settings)
         if not out:
             break
-        refusals += out
-        names = {refused.name for refused in out}
-        kept = [each for each in found.hypothesis.chosen if each.effect.name not in names]
+        refusals += [Refusal(name, "judged by what instruments tell, it may be 0") for name in out]
+        kept = [each for each in found.hypothesis.chosen if each.effect.name not in out]
         fit = fitted(judge.training, kept, judge.floor, settings)
     loose = tuple(effect.name for effect in untold(fit, found))
-    found, alike = told_apart(found, named.effects, given, judge.floor, settings)
-    return named._replace(judgement=judge.judge(found), refusals=refusals, alike=alike, untold=loose)
+    late = told_apart(found, named.effects, given, judge.floor, settings)
+    judgement, without = judge.judge(late.found), judge.judge(late.without)
+    left, more = (each.held_out.size(each.held_out.after).floors for each in (judgement, without))
+    if not late.chances or np.nanmax(more**2 - left**2) < VISIBLE**2:
+        late, judgement = late._replace(chances={}, alike=()), without
+        refusals += [
+            Refusal(each.effect.name, "a loop that answers gusts looks as late, and instruments tell no more of it")
+            for each in found.hypothesis.chosen
+            if each.effect.late
+        ]
+    return named._replace(judgement=judgement, refusals=refusals, alike=late.alike, sure=late.chances, untold=loose)
 
 
 def _doubts(

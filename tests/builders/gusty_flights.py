@@ -73,7 +73,7 @@ class Flight(NamedTuple):
     """What is flown: a vehicle in gusts on a path; each number of a path, and of a draw of gusts, is another one.
 
     A path has frequencies of 0.8 Hz at most, and if asked for a shake of its acceleration up to `reach`, and a heading
-    that swings by about `swing` in rad.
+    that swings by about `swing` in rad. Of the rotors their speeds are logged, or the commands alone.
     """
 
     truth: Truth
@@ -83,6 +83,7 @@ class Flight(NamedTuple):
     bandwidth: float = 12.0
     reach: float = 0.0
     swing: float = 0.0
+    commands: bool = False
 
 
 def gusty_flights(flights, seconds=30.0):
@@ -95,14 +96,14 @@ def gusty_flights(flights, seconds=30.0):
     noise = [f.truth.gyro_noise * rng.standard_normal((samples, 3)) for rng, f in zip(rngs, flights, strict=True)]
     logs = _flown(flights, path, *(np.stack(each, axis=1) for each in (pushes, shoves, noise)))
     for number, (rng, flight) in enumerate(zip(rngs, flights, strict=True)):
-        *motion, speed, up = (np.ascontiguousarray(log[:, number]) for log in logs)
-        speed += flight.truth.speed_noise * speed.mean() * rng.standard_normal(speed.shape)
+        *motion, speed, command, up = (np.ascontiguousarray(log[:, number]) for log in logs)
+        noisy = speed + flight.truth.speed_noise * speed.mean() * rng.standard_normal(speed.shape)
         yield PlaybackFlight(
             name=f"gusty-{number}",
             motion=MeasuredMotion(*motion, STEP_S * EVERY),
-            speed=speed,
+            speed=command if flight.commands else noisy,
             hold="linear",
-            stretches=(slice(0, len(speed)),),
+            stretches=(slice(0, len(noisy)),),
             setpoints={
                 "position": path[::EVERY, number, :3],
                 "velocity": path[::EVERY, number, 3:6],
@@ -159,7 +160,7 @@ def _clipped(values, low, high):
 
 
 def _flown(flights, path, pushes, shoves, noise):
-    """Integrate all flights side by side; give position, velocity, rotation, measured rate, speed and wanted up."""
+    """Integrate all flights side by side; give motion with the measured rate, speed, command and wanted up."""
     truths, bandwidth = [flight.truth for flight in flights], np.array([[flight.bandwidth] for flight in flights])
     mass, lag, damping, drag = (
         np.array([[getattr(truth, name)] for truth in truths]) for name in ("mass", "lag_s", "damping", "drag")
@@ -184,9 +185,10 @@ def _flown(flights, path, pushes, shoves, noise):
         torque = inertia * (stiff * error - damped * measured)
         thrust = mass * (wanted * turn[:, :, 2]).sum(axis=1, keepdims=True)
         squared = (unmix @ np.concatenate([thrust, torque], axis=1)[:, :, None])[:, :, 0]
+        command = np.sqrt(_clipped(squared, least, most))
         if now % EVERY == 0:
-            logs.append([position, velocity, turn, measured, speed, up])
-        before, speed = speed, speed + towards * (np.sqrt(_clipped(squared, least, most)) - speed)
+            logs.append([position, velocity, turn, measured, speed, command, up])
+        before, speed = speed, speed + towards * (command - speed)
         wrench = (mixer @ (0.5 * (before**2 + speed**2))[:, :, None])[:, :, 0]
         across = _skew(rate)
         gyroscopic = (across @ (inertia * rate)[:, :, None])[:, :, 0]
@@ -204,8 +206,8 @@ def _flown(flights, path, pushes, shoves, noise):
     return [np.array(each) for each in zip(*logs, strict=True)]
 
 
-def logged(flight, vehicle):
-    """Give a flight as one that was read, of a vehicle that a config states."""
+def logged(flight, vehicle, *, commanded=False):
+    """Give a flight as one that was read, of a vehicle that a config states; of the rotors commands alone are known."""
     motion, samples = flight.motion, len(flight)
     signals = Signals(
         time=motion.period * np.arange(samples),
@@ -215,6 +217,7 @@ def logged(flight, vehicle):
         velocity=motion.velocity,
         position=motion.position,
         rotor_speed=flight.speed,
+        commanded=commanded,
         setpoints=flight.setpoints,
     )
     return LoggedFlight(flight.name, (signals,), flight.hold, "measured rotor speeds", ())

@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, system
-from cpfls_cli.gap.balance.refine import fit_within_bounds, refined, shape_columns
+from cpfls_cli.gap.balance.refine import fit_within_bounds, shape_columns
 from cpfls_cli.gap.balance.weak_flight import PER_WINDOW, dense
 from cpfls_cli.gap.naming.confirmed import nothing_by_size
-from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of, fitted
-from cpfls_cli.gap.naming.ranking import more_left, rank_effects, surely
-from cpfls_cli.gap.naming.results import Alternative
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of
 from cpfls_cli.gap.naming.scoring import information
-from cpfls_cli.gap.naming.search import alternative
 from cpfls_cli.gap.residual.air import foretold_rows
 from cpfls_cli.gap.settings import CHANCE, GapSettings
 from cpfls_cli.playback.constants import ENOUGH_BLOCKS, STRONG
-from cpfls_cli.playback.instruments import Instruments
+from cpfls_cli.playback.instruments import Instruments, foretold_by_run
 
 
 class _Run(NamedTuple):
@@ -38,6 +37,24 @@ class _Run(NamedTuple):
     rows: Array
     known: Array
     block: IntArray
+
+
+class _Told(NamedTuple):
+    """What a source of knowledge tells of numbers.
+
+    Attributes
+    ----------
+    products : array, shape (block, number + 1, number + 1)
+        Of what is known of each number, and of what is left, with what they move.
+    numbers : array of bool, shape (number,)
+        Those that are free, that it tells, and that no source before it does.
+    outside : bool
+        Whether it is what was asked from outside, and not what was before.
+    """
+
+    products: Array
+    numbers: BoolArray
+    outside: bool
 
 
 def by_instruments(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> NamedFit:
@@ -62,19 +79,48 @@ def by_instruments(found: NamedFit, given: Instruments, floor: Array, settings: 
     ----------
     Söderström and Stoica 2002 (instrumental variables in closed loop); Staiger and Stock 1997 (weak instruments).
     """
-    hypothesis, linear = found.hypothesis, found.estimates.linear
-    crossed, moving = _products(found, given, floor, settings)
-    if len(crossed) < ENOUGH_BLOCKS:
-        return found
-    kept = crossed[:, np.append(moving, False)][:, :, np.append(moving, True)]
-    values, prior = np.concatenate([linear, hypothesis.shape_values]), _prior(hypothesis)[moving]
-    whole = kept.sum(axis=0)
-    change, *without = (_solved(sums, values[moving], prior) for sums in (whole, *(whole - kept)))
-    left_out = np.tile(values, (len(crossed), 1))
-    left_out[:, moving] += without
-    values[moving] += change
-    there = hypothesis.with_shapes(values[len(linear) :]) if len(hypothesis.shapes) else hypothesis
-    return NamedFit(there, found.block, _told(found, estimates_of(there, values, left_out), moving))
+    at, moved = found, np.zeros(len(_numbers(found)), dtype=bool)
+    # Shapes are followed where they go; a few steps are enough, and one where there are none.
+    for _ in range(PER_WINDOW):
+        sources = _sources(at, given, floor, settings)
+        if not sources:
+            break
+        values, left_out = _stepped(at, sources)
+        shapes = slice(len(at.estimates.linear), None)
+        step, error = np.abs(values - _numbers(at))[shapes], jackknife_error(left_out)[shapes]
+        hypothesis = at.hypothesis.with_shapes(values[shapes]) if len(step) else at.hypothesis
+        moved = np.any([numbers for _, numbers, _ in sources], axis=0)
+        at = NamedFit(hypothesis, found.block, estimates_of(hypothesis, values, left_out))
+        if np.all(10 * step <= error):
+            break
+    return at._replace(estimates=_told(found, at.estimates, moved))
+
+
+def _numbers(found: NamedFit) -> Array:
+    """Give coefficients of the base, then shapes."""
+    return np.concatenate([found.estimates.linear, found.hypothesis.shape_values])
+
+
+def _stepped(found: NamedFit, sources: Sequence[_Told]) -> tuple[Array, Array]:
+    """Move numbers to where what is left has nothing of what is known of them; and with each block left out."""
+    values, prior = _numbers(found), _prior(found.hypothesis)
+    change, without = np.zeros(len(values)), np.zeros((len(sources[0].products), len(values)))
+    for products, numbers, _ in sources:
+        kept = products[:, np.append(numbers, False)]
+        # What those before it have moved is no longer left.
+        right = kept[:, :, -1] - kept[:, :, :-1] @ change
+        kept = np.concatenate([kept[:, :, np.append(numbers, False)], right[..., None]], axis=2)
+        whole = kept.sum(axis=0)
+        change[numbers] = _solved(whole, values[numbers], prior[numbers])
+        without[:, numbers] = [_solved(sums, values[numbers], prior[numbers]) for sums in whole - kept]
+    # The only number of an effect may be 0: then there is none.
+    shapes = [
+        (0.0 if len(each.effect.shapes) == 1 else s.grid[0], s.grid[-1])
+        for each in found.hypothesis.chosen
+        for s in each.effect.shapes
+    ]
+    ends = np.array([(-np.inf, np.inf)] * len(found.estimates.linear) + shapes)
+    return np.clip(values + change, *ends.T), np.clip(values + without, *ends.T)
 
 
 def untold_axes(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> BoolArray:
@@ -87,8 +133,10 @@ def untold_axes(found: NamedFit, given: Instruments, floor: Array, settings: Gap
         Of the same flights.
     floor : array, shape (6,)
     """
-    crossed, moving = _products(found, given, floor, settings)
-    return ~moving[found.hypothesis.places[0][1]][:3] | (len(crossed) < ENOUGH_BLOCKS)
+    told, vehicle = np.zeros(3, dtype=bool), found.hypothesis.places[0][1]
+    for _, numbers, _ in _sources(found, given, floor, settings):
+        told |= numbers[vehicle][:3]
+    return ~told
 
 
 def may_be_nothing(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> list[str]:
@@ -110,18 +158,22 @@ def may_be_nothing(found: NamedFit, given: Instruments, floor: Array, settings: 
     ----------
     Anderson and Rubin 1949 (a test that weak instruments do not mislead); Hotelling 1931.
     """
-    crossed, moving = _products(found, given, floor, settings)
+    sources = _sources(found, given, floor, settings)
     nothing, places = nothing_by_size(found), {candidate.key: place for candidate, place in found.hypothesis.places}
     values = np.append(found.estimates.linear, found.hypothesis.shape_values)
     first, names = len(found.estimates.linear), []
     for candidate in found.hypothesis.chosen:
         shapes = slice(first, first := first + len(candidate.effect.shapes))
-        own = np.zeros_like(moving)
+        own = np.zeros(len(values), dtype=bool)
         own[places.get(candidate.key, slice(0))] = True
-        own, others = own & moving, ~own & moving
-        others[shapes] = False
-        told = own.any() and len(crossed) >= ENOUGH_BLOCKS + own.sum()
-        absent = _chance(crossed, own, others, values) > CHANCE if told else candidate.effect.name in nothing
+        absent = candidate.effect.name in nothing
+        for products, numbers, outside in sources:
+            others = numbers & ~own
+            others[shapes] = False
+            flown = products[products.any(axis=(1, 2))]
+            if outside and (own & numbers).any() and len(flown) >= ENOUGH_BLOCKS + (own & numbers).sum():
+                absent = _chance(flown, own & numbers, others, values) > CHANCE
+                break
         names += [candidate.effect.name] if absent else []
     return names
 
@@ -148,90 +200,40 @@ def untold(before: NamedFit, after: NamedFit) -> list[Effect]:
     return [each.effect for each, was, now in numbers if was is now]
 
 
-def untold_actuation(before: NamedFit, after: NamedFit) -> list[str]:
-    """Name those of them on the actuation that a loop is taken for."""
-    own = (effect for effect in untold(before, after) if effect.kind == "actuator")
-    return [effect.name for effect in own if effect.actuation is None or effect.late]
-
-
-def told_apart(
-    found: NamedFit, effects: Sequence[Effect], given: Instruments, floor: Array, settings: GapSettings
-) -> tuple[NamedFit, tuple[Alternative, ...]]:
-    """Decide by instruments what lies between command and rotors: what was found, or one effect of no more numbers.
-
-    In gusts a fit of all motion takes the loop for the rotors, and a lag for a delay. What the right one leaves has
-    nothing that instruments know. Of those that they cannot tell apart the one with the fewest numbers is named, and of
-    as many the first of the catalogue, which is the usual one.
-
-    Parameters
-    ----------
-    found : NamedFit
-        By instruments.
-    effects : sequence of Effect
-        That the search tried.
-
-    Returns
-    -------
-    NamedFit
-        With the effect that leaves least.
-    tuple of Alternative
-        Those that leave as little.
-    """
-    chosen, flights = found.hypothesis.chosen, found.hypothesis.flights
-    between = [each.effect for each in chosen if each.effect.late]
-    if not between:
-        return found, ()
-    most, _ = own = _usual_first(between)
-    others = [each for each in chosen if not each.effect.late]
-    fits = {own: (between, found)}
-    for effect in effects:
-        if effect.late and len(effect.shapes) <= most and _usual_first([effect]) != own:
-            for scored in rank_effects(flights, others, [effect], settings, None, floor=floor).ranking:
-                start = refined(flights, scored.chosen, floor).chosen
-                told = by_instruments(fitted(flights, start, floor, settings), given, floor, settings)
-                fits[_usual_first([effect])] = [effect], told
-    left = {place: _reproduced(fits[place][1], given, floor, settings) for place in sorted(fits)}
-    best, *further = left
-    for place in further:
-        best = place if surely(more_left(left[best], left[place])) else best
-    # With more numbers a rival would have to leave less.
-    alike = [place for place in left if place[0] <= best[0] and not surely(more_left(left[place], left[best]))]
-    (named, *_), told = fits[best]
-    rivals = [fits[place][0] for place in alike if place != best]
-    return told, tuple(alternative(named, other, 1.0, *(each.name for each in beside)) for *beside, other in rivals)
-
-
-def _usual_first(between: Sequence[Effect]) -> tuple[int, tuple[int, ...]]:
-    """Order what lies between command and rotors: fewer numbers first, then as in the catalogue."""
-    return sum(len(each.shapes) for each in between), tuple(each.order for each in between)
-
-
-def _reproduced(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> Array:
+def foretold_of_left(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> Array:
     """Multiply what is left with what instruments know of it, by block: 0 but for chance where nothing is missing."""
     total: dict[int, float] = {}
-    for run in _runs(found.hypothesis, found.estimates.linear, given, floor, settings):
+    _, after = _runs(found.hypothesis, found.estimates.linear, given, floor, settings)
+    for run in after:
         for block in np.unique(run.block):
             own = run.block == block
             total[block] = total.get(block, 0.0) + float((run.rows[own, :, -1] * run.known[own, :, -1]).sum())
     return np.array([total[block] for block in sorted(total)])
 
 
-def _products(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> tuple[Array, BoolArray]:
-    """Multiply what instruments know of each number, and of what is left, with what they move, by block.
+def _sources(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> list[_Told]:
+    """List what tells numbers: what was asked; and what was before those that this does not tell, and what is late.
 
-    Returns
-    -------
-    array, shape (block, number + 1, number + 1)
-    array of bool, shape (number,)
-        Of numbers that are free, and that instruments tell.
+    A linear answer to setpoints tells lateness by far worse.
     """
-    moving = _movable(found.hypothesis, floor)
-    runs = list(_runs(found.hypothesis, found.estimates.linear, given, floor, settings))
-    blocks = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(run.block for run in runs)]))
-    if len(blocks) < ENOUGH_BLOCKS:
-        return np.zeros((len(blocks), len(moving) + 1, len(moving) + 1)), moving
-    crossed = np.array([sum(_crossed(run, run.block == block) for run in runs) for block in blocks])
-    return crossed, moving & (_strength(crossed) > STRONG)
+    hypothesis = found.hypothesis
+    left, prior, sources = _movable(hypothesis, floor), _prior(hypothesis), list[_Told]()
+    late = [each.effect.late for each in hypothesis.chosen for _ in each.effect.shapes]
+    early = np.append(np.ones(len(left) - len(late), dtype=bool), np.logical_not(late))
+    of_source = [list(runs) for runs in _runs(hypothesis, found.estimates.linear, given, floor, settings)]
+    blocks = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(run.block for run in chain(*of_source))]))
+    for place, runs in enumerate(of_source):
+        products = np.zeros((len(blocks), len(left) + 1, len(left) + 1))
+        for row, block in enumerate(blocks):
+            products[row] = sum(_crossed(run, run.block == block) for run in runs)
+        flown = products[products.any(axis=(1, 2))]
+        if len(flown) >= ENOUGH_BLOCKS:
+            # What a bound tells better than these flights is not told by them.
+            numbers = left & (_strength(flown) > STRONG) & (np.diagonal(flown.sum(axis=0))[:-1] > prior)
+            numbers &= early | (place > 0)
+            sources.append(_Told(products, numbers, place == 0))
+            left = left & ~numbers
+    return sources
 
 
 def _movable(hypothesis: System, floor: Array) -> BoolArray:
@@ -281,10 +283,15 @@ def _told(before: NamedFit, after: Estimates, moved: BoolArray) -> Estimates:
     hypothesis = before.hypothesis
     places = {candidate.key: place for candidate, place in hypothesis.places}
     first, effects = hypothesis.base.shape[2], []
-    for candidate, *both in zip(hypothesis.chosen, before.estimates.effects, after.effects, strict=True):
-        shapes = slice(first, first := first + len(candidate.effect.shapes))
-        own = moved[places.get(candidate.key, slice(0))], moved[shapes]
-        effects.append(both[bool(np.concatenate(own).any())])
+    for candidate, was, now in zip(hypothesis.chosen, before.estimates.effects, after.effects, strict=True):
+        effect, shapes = candidate.effect, slice(first, first := first + len(candidate.effect.shapes))
+        own = [*moved[places.get(candidate.key, slice(0))], *moved[shapes]]
+        if not any(own):
+            effects.append(was)
+            continue
+        told = {number.name for number, there in zip(effect.numbers, own, strict=False) if there}
+        stood = {} if effect.physical else {each.name: each for each in was if each.name not in told}
+        effects.append(tuple(stood.get(number.name, number) for number in now))
     names = [each.name for each in hypothesis.free[0].effect.coefficients]
     told = {name for name, there in zip(names, moved, strict=False) if there}
     own_numbers = {each.name: each for each in before.estimates.parameters}
@@ -292,28 +299,73 @@ def _told(before: NamedFit, after: Estimates, moved: BoolArray) -> Estimates:
     return replace(after, effects=tuple(effects), parameters=parameters)
 
 
-def _runs(hypothesis: System, linear: Array, given: Instruments, floor: Array, settings: GapSettings) -> Iterator[_Run]:
-    """Lay windows over runs, and beside them what instruments know."""
+def _runs(
+    hypothesis: System, linear: Array, given: Instruments, floor: Array, settings: GapSettings
+) -> tuple[Iterator[_Run], Iterator[_Run]]:
+    """Lay windows over runs, and beside them what instruments know; and what was before."""
     windows = dense(hypothesis.flights[0].windows)
     there = system([replace(flight, windows=windows, seen={}) for flight in hypothesis.flights], hypothesis.chosen)
     columns = [there.base, shape_columns(there, linear), there.left(linear)[..., None]]
     rows = np.concatenate(columns, axis=2) / floor[:, None]
-    own, middles = [], []
-    for run in given.runs:
+    own, middles, of_path, of_run = [], [], [], []
+    length = settings.block_s / windows.period
+    for number, run in enumerate(given.runs):
         begins = windows.hop * np.arange((there.flight_index == run.flight).sum())
         inside = (begins >= run.part.start) & (begins + len(windows.weight) <= run.part.stop)
         own.append(rows[there.flight_index == run.flight][inside])
         middles.append(begins[inside] - run.part.start + len(windows.weight) // 2)
-    known = foretold_rows(given, windows, own) if given.kind == "setpoints" else _beside(given, own, middles)
-    length = settings.block_s / windows.period
-    for number, (mine, theirs, middle) in enumerate(zip(own, known, middles, strict=True)):
         path, place = given.repeats.path(number, len(given.flown[number]))
-        told = np.isfinite(theirs).all(axis=(1, 2)) & np.isfinite(place[middle])
-        along = (place[middle[told]] // length).astype(np.int64)
-        yield _Run(mine[told], theirs[told], path + len(given.runs) * along)
+        # Runs of one path know of each other, but not of what was before.
+        of_path.append(path + len(given.runs) * (place[middles[-1]] // length))
+        of_run.append(-1.0 - number - len(given.runs) * (middles[-1] // length))
+    known = foretold_rows(given, windows, own) if given.kind == "setpoints" else _in_other_runs(given, own, middles)
+    return _of_blocks(own, known, of_path), _of_blocks(*_after(own), of_run)
 
 
-def _beside(given: Instruments, rows: Sequence[Array], middles: Sequence[IntArray]) -> Iterator[Array]:
+def _of_blocks(rows: Sequence[Array], known: Iterable[Array], blocks: Sequence[Array]) -> Iterator[_Run]:
+    """Take windows of which something is known, and their blocks; of a shorter list of windows these are the last."""
+    for mine, theirs, block in zip(rows, known, blocks, strict=True):
+        last = block[len(block) - len(mine) :]
+        told = np.isfinite(theirs).all(axis=(1, 2)) & np.isfinite(last)
+        yield _Run(mine[told], theirs[told], last[told].astype(np.int64))
+
+
+def _after(rows: Sequence[Array]) -> tuple[list[Array], list[Array]]:
+    """Give what comes newly after each window, and what windows that ended before it tell of that.
+
+    What lasts of a gust, as long as its memory is, shows in what is left; what is new in it nobody knew before, nor any
+    loop.
+
+    Parameters
+    ----------
+    rows : sequence of array, shape (window, 6, number + 1)
+        Of each run, in floors; windows a `PER_WINDOW`-th of one apart.
+
+    References
+    ----------
+    Holtz-Eakin, Newey and Rosen 1988 (quasi-differences, with the past as instrument); Söderström and Stoica 2002.
+    """
+    ahead = PER_WINDOW // 4
+    before = range(PER_WINDOW, 2 * PER_WINDOW, ahead)
+    then, now = (
+        [own[before[-1] + late :][: max(0, len(own) - before[-1] - ahead)] for own in rows] for late in (ahead, 0)
+    )
+    past = [[own[before[-1] - lag :][: len(each)] for lag in before] for own, each in zip(rows, now, strict=True)]
+    # What a channel keeps of what it was, by what it was before both, which the noise of neither has a part in.
+    was = [np.sum([each[..., -1] for each in own], axis=0) for own in past]
+    kept, left = (sum((x[..., -1] * y).sum(axis=0) for x, y in zip(each, was, strict=True)) for each in (then, now))
+    lasts = np.clip(kept / np.where(left > 0, left, np.inf), 0.0, 1.0)[:, None]
+    new = [one - lasts * other for one, other in zip(then, now, strict=True)]
+    asked = {
+        number: np.concatenate([each[..., :-1] for each in own], axis=2).reshape(-1, len(own) * (own[0].shape[2] - 1))
+        for number, own in enumerate(past)
+        if len(new[number])
+    }
+    told = foretold_by_run(asked, [each.reshape(-1, each.shape[2]) for each in new])
+    return new, [told[number].reshape(each.shape) if number in told else each for number, each in enumerate(new)]
+
+
+def _in_other_runs(given: Instruments, rows: Sequence[Array], middles: Sequence[IntArray]) -> Iterator[Array]:
     """Average what the other runs have at the same places of the path, shape (window, ...); NaN where there is none."""
     for number, (own, middle) in enumerate(zip(rows, middles, strict=True)):
         total, count = np.zeros_like(own), np.zeros(len(own))

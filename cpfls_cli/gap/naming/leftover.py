@@ -188,7 +188,8 @@ def _beyond_chance(
     """Add effects to the chosen ones as long as one explains more than chance, and more than noise."""
     flights, chosen = step.hypothesis.flights, list(step.hypothesis.chosen)
     for _ in range(settings.effects_max):
-        more = (each for each in step.ranking if step.p_value(each.gain) <= CHANCE)
+        listed = (each for each in step.ranking if each.candidate.effect in effects)
+        more = (each for each in listed if step.p_value(each.gain) <= CHANCE)
         moving = ((each, of_motion(each.gain, step, system(flights, each.chosen))) for each in more)
         added = next((each.candidate for each, gain in moving if step.p_value(gain) <= CHANCE), None)
         if added is None:

@@ -104,7 +104,6 @@ def air(
     given: Instruments,
     settings: GapSettings,
     rng: np.random.Generator,
-    doubt: float = RARE,
 ) -> Air | None:
     """Find gusts in what a hypothesis leaves of flights.
 
@@ -118,8 +117,6 @@ def air(
     block : array of int, shape (window,)
     given : Instruments
         Of the same flights.
-    doubt : float
-        Probability of chance up to which what grows with the motion is no air.
 
     Returns
     -------
@@ -144,7 +141,7 @@ def air(
         turned, pushed = np.split(residual.any(axis=0), 2)
         turning, pushing = np.split(np.isfinite(found.size), 2)
         blows = turning[turned].all() and (pushing.any() or not pushed.any())
-        told &= bool(blows) & _like_air(hypothesis, residual, block, given, settings, rng, doubt)
+        told &= bool(blows) & _like_air(hypothesis, residual, block, given, settings, rng)
     # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
     sized = told | (given.kind == "repeats")
     parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in RANGES}
@@ -192,7 +189,8 @@ def foretold_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) -
     """
     lags = late_by(windows.period, max(1, windows.hop // 2))
     asked = {
-        number: windows.average(np.hstack([late(setpoint, lag) for lag in lags]))
+        # What drifts, such as the charge of a battery, goes with the time, which knows nothing of gusts either.
+        number: windows.average(np.hstack([*(late(setpoint, lag) for lag in lags), np.c_[np.arange(len(setpoint))]]))
         for number, setpoint in enumerate(given.setpoints)
         if setpoint is not None and len(rows[number])
     }
@@ -207,7 +205,6 @@ def _like_air(
     given: Instruments,
     settings: GapSettings,
     rng: np.random.Generator,
-    doubt: float,
 ) -> BoolArray:
     """Mark channels of which the air is believed where setpoints do not foretell them.
 
@@ -225,7 +222,7 @@ def _like_air(
     index = hypothesis.flight_index
     ranked = rank_dependence(residual, index, block, state, settings.shifts, rng)
     follows = [each.channel for each in ranked if each.p_value <= settings.significance and each.r2 > COUNTS]
-    return ~np.isin(CHANNELS, follows) & ~_growing(residual, asked, index, block, settings.shifts, rng, doubt)
+    return ~np.isin(CHANNELS, follows) & ~_growing(residual, asked, index, block, settings.shifts, rng)
 
 
 def _growing(
@@ -235,7 +232,6 @@ def _growing(
     block: IntArray,
     shifts: int,
     rng: np.random.Generator,
-    doubt: float = RARE,
 ) -> BoolArray:
     """Mark channels of which what is left surely grows with how much a signal moves, by ranks over blocks of time.
 
@@ -247,7 +243,7 @@ def _growing(
     sizes, moves = (_ranks(np.array([each[block == own].mean(axis=0) for own in np.unique(block)])) for each in rows)
     alike = (moves.T @ sizes).max(axis=0, initial=0.0)
     chance = np.array([(moves.T @ rng.permutation(sizes)).max(initial=0.0) for _ in range(shifts)])
-    return np.asarray((chance[:, None] >= alike).sum(axis=0) <= max(doubt * (1 + shifts) - 1, 0))
+    return np.asarray((chance[:, None] >= alike).sum(axis=0) <= max(RARE * (1 + shifts) - 1, 0))
 
 
 def _ranks(values: Array) -> Array:

@@ -13,7 +13,7 @@ from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.residual.air import air, known_motion
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.weak_form.windows import Recording, common_windows
-from tests.builders.gusty_flights import CALM, GUSTS, MEMORY_S, SMALL, Flight, gusty_flights, logged
+from tests.builders.gusty_flights import CALM, GUSTS, MEMORY_S, SMALL, STORM, Flight, gusty_flights, logged
 
 HEAVY = 1.15
 """What the config takes the inertia about x for, over the true one."""
@@ -26,16 +26,21 @@ FEW = GapSettings(shifts=39)
 
 @pytest.fixture(scope="module")
 def flown():
-    """Four flights of as many paths, and four of one, in gusts; three in which damping is missed, in both airs."""
+    """Four flights of as many paths, and four of one, in gusts; three in which damping is missed, in both airs.
+
+    And four that log commands, in a storm.
+    """
     asked = [Flight(TRUE, GUSTS, path, path, reach=3.0) for path in range(4)]
     again = [Flight(TRUE, GUSTS, 9, run, reach=3.0) for run in range(4)]
+    late = [Flight(TRUE, STORM, path, path, reach=3.0, commands=True) for path in range(4)]
     damped = [Flight(DAMPED, gusts, path, path, reach=3.0) for gusts in (CALM, GUSTS) for path in range(3)]
-    each = list(gusty_flights([*asked, *again, *damped], 30.0))
-    return {"asked": each[:4], "again": each[4:8], "calm": each[8:11], "damped": each[11:]}
+    each = list(gusty_flights([*asked, *again, *damped, *late], 30.0))
+    return {"asked": each[:4], "again": each[4:8], "calm": each[8:11], "damped": each[11:14], "late": each[14:]}
 
 
-def recorded(flights, vehicle, *, setpoints):
-    parts = [logged(each if setpoints else replace(each, setpoints={}), vehicle).parts[0] for each in flights]
+def recorded(flights, vehicle, *, setpoints, commanded=False):
+    known = [each if setpoints else replace(each, setpoints={}) for each in flights]
+    parts = [logged(each, vehicle, commanded=commanded).parts[0] for each in known]
     return [Recording(flight.name, signals) for flight, signals in zip(flights, parts, strict=True)]
 
 
@@ -75,7 +80,7 @@ def test_a_wrong_inertia_is_named_in_gusts_with_its_number(flown, kind, setpoint
     assert number.low < 1 / HEAVY - 1 < number.high < 0
 
 
-def test_an_inertia_that_instruments_do_not_tell_is_that_of_the_config(flown):
+def test_an_inertia_that_nothing_was_asked_of_is_told_by_what_was_before(flown):
     x, y, z = TRUE.vehicle.inertia_kg_m2[:3]
     stated = replace(TRUE.vehicle, inertia_kg_m2=(x, HEAVY * y, z, *TRUE.vehicle.inertia_kg_m2[3:]))
     # Nobody knows what was asked along y, so that nothing but the loop rolls.
@@ -89,8 +94,20 @@ def test_an_inertia_that_instruments_do_not_tell_is_that_of_the_config(flown):
     refit = extend(recordings[:3], recordings[3:], told.effects, run.audit, FEW, None, told.floor)
     for estimates in (run.estimates, refit.estimates):
         numbers = {each.name: each for each in estimates.parameters}
-        assert abs(numbers["inertia_x"].value) < 1e-9
+        assert -0.1 < numbers["inertia_x"].low < 0 < numbers["inertia_x"].high < 0.1
         assert numbers["inertia_y"].low < 1 / HEAVY - 1 < numbers["inertia_y"].high
+
+
+def test_a_lag_is_told_from_a_delay_and_from_the_loop_by_what_was_before(flown):
+    recordings = recorded(flown["late"], TRUE.vehicle, setpoints=True, commanded=True)
+    run = diagnosed(recordings)
+    assert run.diagnosis.verdict is GapVerdict.NAMED
+    assert not run.diagnosis.alternatives
+    (effect,) = run.diagnosis.effects
+    (number,) = effect.coefficients
+    assert effect.name == "motor_lag"
+    # The gyroscope's noise is inside of the loop.
+    assert number.low < TRUE.lag_s < number.high < 1.25 * TRUE.lag_s
 
 
 def test_gusts_alone_are_no_gap_where_instruments_tell_and_one_where_none_does(flown):

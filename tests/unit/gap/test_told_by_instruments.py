@@ -4,10 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from scipy.stats import ttest_1samp
 
 from cpfls_cli.blocks import jackknife_error
-from cpfls_cli.gap.naming.by_instruments import _chance
+from cpfls_cli.gap.naming.by_instruments import _after, _chance
 from cpfls_cli.gap.residual.air import _growing, _gusty
 from cpfls_cli.playback.instruments import held as stays
 
@@ -80,3 +81,20 @@ def test_who_is_asked_to_stay_and_does_is_asked_for_nothing(asked, reach, held):
     setpoints = {} if asked is None else {"position": np.tile(asked, (200, 1))}
     flight = SimpleNamespace(setpoints=setpoints, has_position=True, motion=SimpleNamespace(position=flown))
     assert stays(flight) is held
+
+
+def test_what_was_before_knows_nothing_of_what_is_new_in_a_gust():
+    rng, fades = np.random.default_rng(3), 0.9
+    gust = lfilter([1.0], [1.0, -fades], rng.standard_normal((30000, 6)), axis=0)
+    # A loop that answers gusts, and what is asked of it. Its number is right: what is left is the gust alone.
+    moved = lfilter([1.0], [1.0, -0.9], rng.standard_normal(gust.shape) - 0.5 * gust, axis=0)
+    (new,), (known,) = _after([np.stack([moved, gust], axis=2)])
+    assert (moved * gust).sum() / (moved**2).sum() < -0.15
+    assert abs((known[..., 0] * new[..., 1]).sum() / (known[..., 0] * new[..., 0]).sum()) < 0.05
+
+
+def test_runs_that_are_too_short_tell_nothing_of_what_was_before():
+    rng = np.random.default_rng(4)
+    new, known = _after([rng.standard_normal((5, 6, 3)), rng.standard_normal((40, 6, 3))])
+    assert [len(each) for each in new] == [len(each) for each in known]
+    assert len(new[0]) == 0 < len(new[1])

@@ -1,0 +1,194 @@
+"""What lies between command and rotors in gusts: a loop that answers them looks as late."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain, combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.gap.balance.balance_system import System
+from cpfls_cli.gap.balance.refine import refined
+from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.naming.by_instruments import by_instruments, foretold_of_left, untold
+from cpfls_cli.gap.naming.estimate import NamedFit, fitted
+from cpfls_cli.gap.naming.ranking import chance_of_ranks, more_left, rank_effects, surely
+from cpfls_cli.gap.naming.results import Alternative, Estimate
+from cpfls_cli.gap.naming.scoring import candidates_of
+from cpfls_cli.gap.naming.search import alternative
+from cpfls_cli.gap.settings import ERRORS, OFF, GapSettings
+from cpfls_cli.playback.instruments import Instruments
+
+_Names = tuple[str, ...]
+
+
+class Lateness(NamedTuple):
+    """What lies between command and rotors.
+
+    Attributes
+    ----------
+    found, without : NamedFit
+        With the set that leaves least, and with none.
+    chances : dict of str to float
+        How likely chance makes each of its effects.
+    alike : tuple of Alternative
+        Sets that leave as little.
+    """
+
+    found: NamedFit
+    without: NamedFit
+    chances: dict[str, float]
+    alike: tuple[Alternative, ...]
+
+
+def told_apart(
+    found: NamedFit, effects: Sequence[Effect], given: Instruments, floor: Array, settings: GapSettings
+) -> Lateness:
+    """Decide by instruments what lies between command and rotors.
+
+    In gusts a fit of all motion takes the loop for the rotors, and a lag for a delay. Effects of one number are tried
+    alone and together: each stands that is surely not 0, beside the other too. Where these leave something that was
+    known before, more numbers are tried: the right set leaves nothing. Of those that cannot be told apart the one with
+    the fewest numbers is named, and of as many the first of the catalogue, which is the usual one.
+
+    Parameters
+    ----------
+    found : NamedFit
+        By instruments.
+    effects : sequence of Effect
+        That the search tried.
+    """
+    tried = {each.effect.name: each.effect for each in candidates_of(effects) if _acts(each, found.hypothesis)}
+    if not tried:
+        return Lateness(found, found, {}, ())
+    sets = _Sets(found, tried, given, floor, settings)
+    best, rivals = sets.usual()
+    more = sum(len(each.effect.shapes) for each in found.hypothesis.chosen if each.effect.late)
+    for count in range(2, max(2, more) + 1):
+        if best and (sets.count(best) == count or sets.leaves(best)):
+            rivals += sets.tell([names for names in sets.all if sets.count(names) == count and names not in sets.left])
+            best = sets.least([best, *(names for names in rivals if sets.count(names) == count)])
+    # One with more numbers would have to leave less.
+    alike = [names for names in rivals if names != best and sets.count(names) <= sets.count(best)]
+    told = [sets.instead(best, names) for names in alike if not sets.surely_more(names, best)]
+    return Lateness(sets.fits[best], sets.fits[()], sets.chances(best), tuple(chain(*told)))
+
+
+def _acts(candidate: Candidate, hypothesis: System) -> bool:
+    """Tell whether a candidate makes rotors late of which flights know the commands alone."""
+    return candidate.effect.late and hypothesis.can(candidate)
+
+
+def _chance_of(number: Estimate) -> float:
+    """Compute how likely chance makes a number of its size if it is 0, by its interval."""
+    from scipy.special import erfc
+
+    return float(erfc(ERRORS * number.value / max(number.high - number.value, np.finfo(float).tiny) / np.sqrt(2)))
+
+
+@dataclass
+class _Sets:
+    """Sets of effects between command and rotors by their names, each fitted by instruments beside all other effects.
+
+    Attributes
+    ----------
+    fits : dict of tuple of str to NamedFit
+        Of the sets that were tried, and whose numbers instruments tell.
+    left : dict of tuple of str to array, shape (block,)
+        What of what each leaves was known before.
+    """
+
+    found: NamedFit
+    effects: Mapping[str, Effect]
+    given: Instruments
+    floor: Array
+    settings: GapSettings
+    fits: dict[_Names, NamedFit] = field(default_factory=dict)
+    left: dict[_Names, Array] = field(default_factory=dict)
+
+    @property
+    def all(self) -> list[_Names]:
+        """One effect or two, as in the catalogue."""
+        every = (names for count in (1, 2) for names in combinations(self.effects, count))
+        return sorted(every, key=lambda names: [self.effects[name].order for name in names])
+
+    def count(self, names: _Names) -> int:
+        """Count the numbers of a set."""
+        return sum(len(self.effects[name].shapes) for name in names)
+
+    def usual(self) -> tuple[_Names, list[_Names]]:
+        """Choose among effects of one number: none where nothing is left without, all where one leaves something."""
+        self.tell([()])
+        if not self.leaves(()):
+            return (), []
+        plain = [names for names in self.all if self.count(names) == len(names)]
+        told = [names for names in self.tell(plain) if set(names) == self._needed(names)]
+        together = [names for names in told if len(names) > 1]
+        # What is needed beside the others does without them.
+        beside = {name for names in self.fits if len(names) > 1 for name in self._needed(names)}
+        alone: list[_Names] = [names for names in told if len(names) == 1]
+        rivals = [names for names in alone if beside.issuperset(names)] or alone or together
+        best = self.least(rivals or [()])
+        return (together[0], together) if together and self.leaves(best) else (best, rivals)
+
+    def tell(self, tried: Sequence[_Names]) -> list[_Names]:
+        """Fit sets; of those whose numbers instruments tell the names come back."""
+        for names in tried:
+            if (fit := self._fit(names)) is not None:
+                self.fits[names] = fit
+                self.left[names] = foretold_of_left(fit, self.given, self.floor, self.settings)
+        return [names for names in tried if names in self.fits]
+
+    def leaves(self, names: _Names) -> bool:
+        """Tell whether a set surely leaves something that was known before."""
+        return surely(self.left[names])
+
+    def surely_more(self, one: _Names, other: _Names) -> bool:
+        """Tell whether one leaves surely more than another, beyond what formulas are off by."""
+        margin = more_left(self.left[one], self.left[other])
+        return surely(margin) and bool(margin.sum() > OFF**2 * self.left[()].sum())
+
+    def least(self, tried: Sequence[_Names]) -> _Names:
+        """Choose the first that no later one leaves surely less than."""
+        first, *further = tried
+        for names in further:
+            first = names if self.surely_more(first, names) else first
+        return first
+
+    def chances(self, best: _Names) -> dict[str, float]:
+        """Compute how likely chance makes each effect: its number, or of several that so much less is left."""
+        less = chance_of_ranks(more_left(self.left[()], self.left[best]))
+        return {name: _chance_of(own[0]) if len(own) == 1 else less for name, own in self._numbers(best).items()}
+
+    def instead(self, best: _Names, names: _Names) -> Iterator[Alternative]:
+        """Say what stands for what of a set."""
+        gone, new = [name for name in best if name not in names], [name for name in names if name not in best]
+        for *beside, last in [new] if gone and new else []:
+            yield alternative(self.effects[gone[0]], self.effects[last], 1.0, *beside)
+
+    def _numbers(self, names: _Names) -> dict[str, tuple[Estimate, ...]]:
+        fit = self.fits[names]
+        told = zip(fit.hypothesis.chosen, fit.estimates.effects, strict=True)
+        return {candidate.effect.name: numbers for candidate, numbers in told if candidate.effect.name in names}
+
+    def _needed(self, names: _Names) -> set[str]:
+        """Name the effects whose only number is surely not 0, and within its bounds."""
+        return {
+            name
+            for name, (number, *_) in self._numbers(names).items()
+            if _chance_of(number) <= self.settings.significance and number.value < number.plausible[1]
+        }
+
+    def _fit(self, names: _Names) -> NamedFit | None:
+        flights = self.found.hypothesis.flights
+        chosen = [each for each in self.found.hypothesis.chosen if not each.effect.late]
+        for effect in (self.effects[name] for name in names):
+            (scored,) = rank_effects(flights, chosen, [effect], self.settings, None, floor=self.floor).ranking
+            chosen = list(refined(flights, scored.chosen, self.floor).chosen)
+        before = fitted(flights, chosen, self.floor, self.settings)
+        after = by_instruments(before, self.given, self.floor, self.settings)
+        return None if any(each.late for each in untold(before, after)) else after

@@ -1,0 +1,124 @@
+"""What lies between command and rotors in gusts is what instruments say, and no name where they say nothing."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.gap.naming import lateness
+from cpfls_cli.gap.naming.by_instruments import untold
+from cpfls_cli.gap.naming.lateness import told_apart
+from cpfls_cli.gap.naming.results import Estimate
+from cpfls_cli.gap.settings import GapSettings
+from tests.builders.gap_flights import candidate
+
+LATE = ("motor_lag", "command_delay", "low_pass_filter", "notch_filter")
+LAG, DELAY, BOTH = ("motor_lag",), ("command_delay",), ("motor_lag", "command_delay")
+BLOCKS = 12
+LITTLE = np.tile([1.0, -1.0], BLOCKS // 2)
+SURE, ABSENT = (0.03, 0.001), (0.001, 0.002)
+
+
+def found_with(names, sizes):
+    chosen = [candidate(name, **{shape.name: shape.grid[0] for shape in CATALOGUE[name].shapes}) for name in names]
+    numbers = [
+        tuple(
+            Estimate(shape.name, shape.unit, value, value - half, value + half, (shape.grid[0], shape.grid[-1]))
+            for shape in each.effect.shapes
+        )
+        for each, (value, half) in zip(chosen, sizes, strict=True)
+    ]
+    hypothesis = SimpleNamespace(chosen=tuple(chosen), flights=(), can=lambda _candidate: True)
+    return SimpleNamespace(hypothesis=hypothesis, estimates=SimpleNamespace(effects=numbers))
+
+
+def apart(monkeypatch, own, left, sizes=None):
+    """Judge sets that leave so much by block of what was known before, of numbers with half an interval."""
+    tried = []
+
+    def fit(_self, names):
+        tried.append(names)
+        return found_with(names, (sizes or {}).get(names, [SURE] * len(names))) if names in left else None
+
+    monkeypatch.setattr(lateness._Sets, "_fit", fit)
+    monkeypatch.setattr(
+        lateness,
+        "foretold_of_left",
+        lambda found, *_: left[tuple(each.effect.name for each in found.hypothesis.chosen)] * np.ones(BLOCKS),
+    )
+    start = found_with(own, [SURE] * len(own))
+    told = told_apart(start, [CATALOGUE[name] for name in (*LATE, "com_offset")], None, np.ones(6), GapSettings())
+    names = tuple(each.effect.name for each in told.found.hypothesis.chosen)
+    return names, {(each.name, each.instead_of, each.beside) for each in told.alike}, told, tried
+
+
+@pytest.mark.parametrize("own", [LAG, DELAY, ()], ids=["lag", "delay", "nothing"])
+@pytest.mark.parametrize(
+    ("together", "names", "rivals"),
+    [
+        ([SURE, ABSENT], LAG, set()),
+        ([ABSENT, SURE], DELAY, set()),
+        ([ABSENT, ABSENT], LAG, {("command_delay", "motor_lag", "")}),
+        ([SURE, SURE], LAG, {("command_delay", "motor_lag", "")}),
+    ],
+    ids=["it is the lag", "it is the delay", "the usual one of two", "one alone leaves nothing"],
+)
+def test_what_is_needed_beside_the_other_is_named_whatever_was_found(own, together, names, rivals, monkeypatch):
+    left = {(): 90.0, LAG: LITTLE, DELAY: LITTLE[::-1], BOTH: LITTLE}
+    found, alike, told, tried = apart(monkeypatch, own, left, {BOTH: together})
+    assert (found, alike) == (names, rivals)
+    assert told.chances[names[0]] < 1e-6
+    # A filter has a number more, and nothing is left for it.
+    assert not {"low_pass_filter", "notch_filter"} & {*sum(tried, ())}
+
+
+def test_the_one_that_leaves_more_is_no_rival(monkeypatch):
+    left = {(): 90.0, LAG: 9.0, DELAY: LITTLE, BOTH: LITTLE}
+    assert apart(monkeypatch, LAG, left, {BOTH: [ABSENT, ABSENT]})[:2] == (DELAY, set())
+
+
+def test_what_formulas_are_off_by_tells_nothing(monkeypatch):
+    left = {(): 9000.0, LAG: 9.0, DELAY: 1.0, BOTH: LITTLE}
+    names, rivals, *_ = apart(monkeypatch, LAG, left, {BOTH: [ABSENT, ABSENT]})
+    assert (names, rivals) == (LAG, {("command_delay", "motor_lag", "")})
+
+
+@pytest.mark.parametrize(
+    ("together", "filtered", "names", "rivals"),
+    [
+        (SURE, LITTLE, BOTH, {("low_pass_filter", "motor_lag", "")}),
+        (SURE, 30.0, BOTH, set()),
+        (ABSENT, LITTLE, ("low_pass_filter",), set()),
+    ],
+    ids=["a filter does what both do", "both", "a filter does what neither does"],
+)
+def test_more_numbers_are_tried_where_one_leaves_something(together, filtered, names, rivals, monkeypatch):
+    left = {(): 90.0, LAG: 30.0, DELAY: 31.0, BOTH: LITTLE, ("low_pass_filter",): filtered, ("notch_filter",): 30.0}
+    assert apart(monkeypatch, LAG, left, {BOTH: [together, together]})[:2] == (names, rivals)
+
+
+def test_where_instruments_tell_nothing_or_the_number_may_be_0_nothing_is_named(monkeypatch):
+    for left, sizes in (({(): 90.0}, {}), ({(): 90.0, LAG: LITTLE}, {LAG: [ABSENT]})):
+        names, rivals, told, _ = apart(monkeypatch, LAG, left, sizes)
+        assert (names, rivals, told.chances) == ((), set(), {})
+
+
+def test_a_lateness_at_the_end_of_what_is_possible_is_none(monkeypatch):
+    end = CATALOGUE["motor_lag"].shapes[0].grid[-1]
+    assert apart(monkeypatch, LAG, {(): 90.0, LAG: LITTLE}, {LAG: [(end, 0.001)]})[0] == ()
+
+
+def test_rotors_that_are_measured_are_never_late():
+    found = found_with((), [])
+    found.hypothesis.can = lambda _candidate: False
+    told = told_apart(found, [CATALOGUE["motor_lag"]], None, np.ones(6), GapSettings())
+    assert told.found is told.without is found
+
+
+def test_numbers_that_instruments_do_not_tell_are_listed():
+    before = found_with(("motor_lag", "command_delay"), [SURE, SURE])
+    after = SimpleNamespace(
+        hypothesis=before.hypothesis, estimates=SimpleNamespace(effects=[(), *before.estimates.effects[1:]])
+    )
+    assert [effect.name for effect in untold(before, after)] == ["command_delay"]
