@@ -18,7 +18,7 @@ from cpfls_cli.gap.balance.refine import fit_within_bounds, shape_columns
 from cpfls_cli.gap.balance.weak_flight import PER_WINDOW, dense
 from cpfls_cli.gap.naming.confirmed import nothing_by_size
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of
-from cpfls_cli.gap.naming.scoring import information
+from cpfls_cli.gap.naming.scoring import known_before
 from cpfls_cli.gap.residual.air import foretold_rows
 from cpfls_cli.gap.settings import CHANCE, GapSettings
 from cpfls_cli.playback.constants import ENOUGH_BLOCKS, STRONG
@@ -103,7 +103,7 @@ def _numbers(found: NamedFit) -> Array:
 
 def _stepped(found: NamedFit, sources: Sequence[_Told]) -> tuple[Array, Array]:
     """Move numbers to where what is left has nothing of what is known of them; and with each block left out."""
-    values, prior = _numbers(found), _prior(found.hypothesis)
+    values, prior = _numbers(found), known_before(found.hypothesis)
     change, without = np.zeros(len(values)), np.zeros((len(sources[0].products), len(values)))
     for products, numbers, _ in sources:
         kept = products[:, np.append(numbers, False)]
@@ -217,7 +217,7 @@ def _sources(found: NamedFit, given: Instruments, floor: Array, settings: GapSet
     A linear answer to setpoints tells lateness by far worse.
     """
     hypothesis = found.hypothesis
-    left, prior, sources = _movable(hypothesis, floor), _prior(hypothesis), list[_Told]()
+    left, prior, sources = _movable(hypothesis, floor), known_before(hypothesis), list[_Told]()
     late = [each.effect.late for each in hypothesis.chosen for _ in each.effect.shapes]
     early = np.append(np.ones(len(left) - len(late), dtype=bool), np.logical_not(late))
     of_source = [list(runs) for runs in _runs(hypothesis, found.estimates.linear, given, floor, settings)]
@@ -254,15 +254,6 @@ def _strength(crossed: Array) -> Array:
     each = np.diagonal(crossed[:, :-1, :-1], axis1=1, axis2=2)
     error = np.sqrt(len(each)) * each.std(axis=0, ddof=1)
     return np.asarray(np.square(np.maximum(each.sum(axis=0), 0.0) / np.where(error > 0, error, np.inf)))
-
-
-def _prior(hypothesis: System) -> Array:
-    """Give the information that bounds are, shape (number,)."""
-    places = [
-        information(candidate.effect, place.stop - place.start, hypothesis.vehicle)
-        for candidate, place in hypothesis.places
-    ]
-    return np.array([*np.concatenate(places), *(1.0 / np.ptp(shape.grid) ** 2 for shape in hypothesis.shapes)])
 
 
 def _solved(sums: Array, values: Array, prior: Array) -> Array:
