@@ -342,9 +342,14 @@ def _after(rows: Sequence[Array]) -> tuple[list[Array], list[Array]]:
         [own[before[-1] + late :][: max(0, len(own) - before[-1] - ahead)] for own in rows] for late in (ahead, 0)
     )
     past = [[own[before[-1] - lag :][: len(each)] for lag in before] for own, each in zip(rows, now, strict=True)]
-    # What a channel keeps of what it was, by what it was before both, which the noise of neither has a part in.
-    was = [np.sum([each[..., -1] for each in own], axis=0) for own in past]
-    kept, left = (sum((x[..., -1] * y).sum(axis=0) for x, y in zip(each, was, strict=True)) for each in (then, now))
+    # What a channel keeps of what it was, by what it was before both, which the noise of neither has a part in. What a
+    # run is off by throughout is no gust.
+    means = [own[..., -1].mean(axis=0) if len(own) else np.zeros(6) for own in rows]
+    was = [np.sum([each[..., -1] - mean for each in own], axis=0) for own, mean in zip(past, means, strict=True)]
+    kept, left = (
+        sum(((each[..., -1] - mean) * own).sum(axis=0) for each, mean, own in zip(of, means, was, strict=True))
+        for of in (then, now)
+    )
     lasts = np.clip(kept / np.where(left > 0, left, np.inf), 0.0, 1.0)[:, None]
     new = [one - lasts * other for one, other in zip(then, now, strict=True)]
     asked = {
