@@ -38,7 +38,8 @@ def flown(mission, flights):
     shoves = [memory(rng, samples, np.ones(3)) * 0.06 * max(e.gusts) for rng, e in zip(rngs, flights, strict=True)]
     noise = [e.truth.gyro_noise * rng.standard_normal((samples, 3)) for rng, e in zip(rngs, flights, strict=True)]
     paths = np.repeat(path[:, None], len(flights), axis=1)
-    *_, rate, speed, _ = gusty_flights._flown(flights, paths, *(np.stack(e, axis=1) for e in (pushes, shoves, noise)))
+    air = (np.stack(each, axis=1) for each in (pushes, shoves, noise))
+    *_, rate, speed, _, _ = gusty_flights._flown(flights, paths, *air)
     for number, (rng, each) in enumerate(zip(rngs, flights, strict=True)):
         measured = each.truth.speed_noise * speed[:, number].mean() * rng.standard_normal(speed[:, number].shape)
         yield rate[:, number], speed[:, number] + measured
