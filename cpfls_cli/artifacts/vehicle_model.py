@@ -122,9 +122,9 @@ class LoopGroup:
 
 @record
 class InstrumentsGroup:
-    """What told how the flights were moved, apart from gusts: other runs of their paths, or setpoints."""
+    """What told how the flights were moved, apart from gusts: other runs of a path, setpoints, or what was before."""
 
-    kind: str = dataset("repeats or setpoints")
+    kind: str = dataset("repeats, setpoints, or past, which is what was before")
     setpoint: tuple[str, ...] = dataset("signals asked for from outside of the loop", "setpoint")
     first: IntArray = dataset(
         "a run that repeats another: a flight, or a part of one, counted from 0", "repeat", least=0
@@ -143,15 +143,17 @@ class InstrumentsGroup:
     @classmethod
     def of(cls, given: Instruments, constants: Constants) -> Self:
         """Arrange instruments, and what they say of the constants."""
-        pairs, ends = list(given.repeats.likeness), np.array(constants.explained.bands_hz)
+        past, ends = constants.told_by == "past", np.array(constants.explained.bands_hz)
+        likeness = {} if past else given.repeats.likeness
+        pairs = list(likeness)
         return group_of(
             cls,
             constants.explained,
-            kind=given.kind,
-            setpoint=given.names,
+            kind=constants.told_by,
+            setpoint=() if past else given.names,
             first=np.array([first for first, _ in pairs], dtype=np.int64),
             second=np.array([second for _, second in pairs], dtype=np.int64),
-            likeness=np.array(list(given.repeats.likeness.values()), dtype=float),
+            likeness=np.array(list(likeness.values()), dtype=float),
             low=ends[:, 0],
             high=ends[:, 1],
             explained=constants.explained.share,

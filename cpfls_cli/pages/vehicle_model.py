@@ -98,6 +98,9 @@ _FLIGHTS = {
 FASTER = "LOG_BITMASK of ArduPilot (fast attitude and IMU), SDLOG_PROFILE of PX4 (high rate)"
 """What makes autopilots log faster."""
 
+_OF_IT = {"repeats": "comes again", "setpoints": "follows them", "past": "was foretold"}
+"""Rotation that instruments know of, by their kind."""
+
 _FAR = 3.0
 """Factor from the stated number from which on a found one is called effective, and no property of a part."""
 
@@ -276,18 +279,22 @@ def worth(record: VehicleRecord) -> Iterator[str]:
 
 def instrument_words(record: VehicleRecord, given: InstrumentsGroup) -> Iterator[str]:
     """Say what the constants rest on, how much of what comes again they explain, and where they lack something."""
+    of_it = _OF_IT[given.kind]
     if given.kind == "repeats":
         alike = f"{number(float(given.likeness.min()), 2)} to {number(float(given.likeness.max()), 2)}"
         told = (
             f"{given.runs} runs that repeat each other (correlation {alike}): gusts do not come again, what the vehicle"
+            " does comes again"
         )
-        told += " does comes again"
-        of_it = "comes again"
-    else:
+    elif given.kind == "setpoints":
         told = (
             f"logged setpoints ({joined(given.setpoint)}): gusts do not follow them, what the vehicle does follows them"
         )
-        of_it = "follows them"
+    else:
+        told = (
+            "what was before: the flights show the loop, but nothing foretells what is new in a gust, and no loop "
+            "answers it before it comes; what the vehicle does is foretold"
+        )
     yield (
         f"The constants rest on {told}. From "
         f"{number(float(given.low[given.used].min()), 2)} to {number(float(given.high[given.used].max()), 2)} Hz they "
@@ -304,6 +311,11 @@ def instrument_words(record: VehicleRecord, given: InstrumentsGroup) -> Iterator
     if not record.tells_turning:
         open_ = [name_of(FOUND_AS[key]) for key in INERTIA[:2] if FOUND_AS[key] in record.untold]
         yield f"Other values of {joined(open_)} would explain about as much: fly more runs, or larger ones."
+    elif record.trust == Trust.NOT_JUDGED and given.kind == "past":
+        yield (
+            "Frequency responses do not judge the model, for these flights show those of the loop: fly in still air, or"
+            f" the same path several times, as {WHAT_TO_FLY} plans it."
+        )
     elif record.trust == Trust.NOT_JUDGED:
         yield (
             "The flights do not show the frequency responses of roll and pitch clearly enough to judge the model by "

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -116,15 +116,54 @@ class _Factors(NamedTuple):
         return torque, force
 
 
-class _Signals(NamedTuple):
+class Signals(NamedTuple):
     """What is balanced along a flight: what changes, shape (time, changing), and what acts, shape (time, acting)."""
 
     changing: Array
     acting: Array
 
 
-_Laid = Callable[[Array, Array], Array]
-"""From averages of changes and of what acts, shapes (window, column), to columns by axis (window, axis, column)."""
+class Laid(NamedTuple):
+    """How columns are laid.
+
+    Attributes
+    ----------
+    arranged : callable
+        From averages of changes and of what acts, shapes (window, column), to columns by axis (window, axis, column).
+    left : array, shape (axis, column)
+        Weights of columns that give what is left.
+    """
+
+    arranged: Callable[[Array, Array], Array]
+    left: Array
+
+    def __call__(self, band: Windows, flight: PlaybackFlight, signals: Signals) -> Array:
+        """Lay windows over what is balanced, shape (window, axis, column)."""
+        changed = [band.derivative(signals.changing[part]) for part in _long(band, flight)]
+        acted = [band.average(signals.acting[part]) for part in _long(band, flight)]
+        none = (np.zeros((0, each.shape[1])) for each in signals)
+        return self.arranged(
+            *(np.concatenate([empty, *parts]) for empty, parts in zip(none, (changed, acted), strict=True))
+        )
+
+
+class Rows(NamedTuple):
+    """Balances of a flight in windows.
+
+    Attributes
+    ----------
+    number : int
+        Of the flight.
+    own, known : array, shape (window, axis, column)
+        Its columns, and what of them is known from outside of its loop; NaN where nothing is.
+    middles : array, shape (window,)
+        The sample in the middle of each window.
+    """
+
+    number: int
+    own: Array
+    known: Array
+    middles: IntArray
 
 
 @dataclass
@@ -138,6 +177,8 @@ class Balances:
     flights: Sequence[PlaybackFlight]
     given: Instruments
     _last: tuple[RotorResponse, _Factors, Sums, Sums] | None = field(default=None, init=False)
+    of_past: ClassVar[bool] = False
+    """Whether they are of what is new, which is another thing at other values."""
 
     @cached_property
     def bands_hz(self) -> tuple[tuple[float, float], ...]:
@@ -203,7 +244,7 @@ class Balances:
         """
         evaluated = Evaluated.of(free, values)
         wanted, response = _Factors.of(evaluated), evaluated.at.response
-        if self._last is None or self._last[0] != response or not self._last[1].hold(wanted):
+        if self.of_past or self._last is None or self._last[0] != response or not self._last[1].hold(wanted):
             self._last = response, wanted, *self._summed(evaluated, wanted)
         _, factors, *sums = self._last
         turned, pushed = (
@@ -214,17 +255,18 @@ class Balances:
     def _summed(self, evaluated: Evaluated, factors: _Factors) -> tuple[Sums, Sums]:
         """Sum products of all columns of torque, and of force."""
         rotors = {number: _rotor_terms_by(evaluated, self.flights[number]) for number in self.path}
+        left_of_torque, left_of_force = (columns[..., 0] for columns in factors.columns(evaluated))
 
         def along(number: int, listed: Sequence[tuple[str, int, int]]) -> Array:
             terms = self.terms[number]
             return np.stack([terms[:, motion] * rotors[number][by][:, spun] for by, motion, spun in listed], axis=1)
 
-        turning = self._products(
+        turning = self.products(
             self.bands[: len(self.bands_hz)],
             {number: _of_torque(self.flights[number], along(number, factors.torque)) for number in self.path},
-            _turned,
+            Laid(_turned, left_of_torque),
         )
-        pushing: list[_ByBand] = []
+        pushing: list[ByBand] = []
         for axis in range(3 if self.translates else 0):
             listed, axes = [each[:3] for each in factors.force], [each[3] for each in factors.force]
             signals = {}
@@ -232,49 +274,59 @@ class Balances:
                 flight = self.flights[number]
                 pushes = flight.motion.rotation[:, axis, axes] * along(number, listed)
                 signals[number] = _of_force(flight, axis, evaluated.at.free.vehicle.gravity_m_s2, pushes)
-            pushing.append(self._products(self.bands[len(self.bands_hz) :], signals, _pushed))
+            pushing.append(self.products(self.bands[len(self.bands_hz) :], signals, Laid(_pushed, left_of_force)))
         names = sorted(set().union(*turning, *(each for by_band in pushing for each in by_band)))
         size = len(INERTIA_ENTRIES) + len(factors.torque), 1 + len(factors.force)
         return _arranged([turning], names, size[0]), _arranged(pushing, names, size[1])
 
-    def _products(self, bands: Sequence[Windows], signals: Mapping[int, _Signals], laid: _Laid) -> _ByBand:
+    def products(self, bands: Sequence[Windows], signals: Mapping[int, Signals], laid: Laid) -> ByBand:
         """Sum products by band, path and block."""
-        whole = [
-            np.hstack(signals[number]) if number in signals else np.zeros((len(flight), 0))
-            for number, flight in enumerate(self.flights)
-        ]
-        changing = next(iter(signals.values())).changing.shape[1]
-        beside = {}
-        for number in self.path:
-            if number not in self.asked:
-                others = self.given.repeats.others(number, whole)
-                beside[number] = _Signals(others[:, :changing], others[:, changing:])
-        return [self._of_band(band, signals, beside, laid) for band in bands]
+        beside = self._beside(signals)
+        return [self.of_band(self._rows(band, signals, beside, laid)) for band in bands]
 
-    def _of_band(
-        self, band: Windows, signals: Mapping[int, _Signals], others: Mapping[int, _Signals], laid: _Laid
-    ) -> dict[tuple[int, int], _Products]:
-        own = {number: _laid(band, self.flights[number], each, laid) for number, each in signals.items()}
-        there = {number: _laid(band, self.flights[number], each, laid) for number, each in others.items()}
-        there |= self._expected(band, {number: own[number] for number in self.asked})
+    def of_band(self, rows: Iterable[Rows]) -> Mapping[tuple[int, int], _Products]:
+        """Sum products of rows of a band."""
         found: dict[tuple[int, int], _Products] = {}
-        for number, (first, path) in self.path.items():
-            flight, here, beside = self.flights[number], own[number], there[number]
-            place = path[_middles(band, flight)]
-            known = np.isfinite(beside).all(axis=(1, 2)) & np.isfinite(place)
-            block = np.where(known, place * flight.motion.period // self.block_s, -1)
-            for each in np.unique(block[known]):
-                mine, theirs = here[block == each], beside[block == each]
+        for number, own, known, middles in rows:
+            first, path = self.path[number]
+            place = path[middles]
+            there = np.isfinite(known).all(axis=(1, 2)) & np.isfinite(place)
+            block = np.where(there, place * self.flights[number].motion.period // self.block_s, -1)
+            for each in np.unique(block[there]):
+                mine, theirs = own[block == each], known[block == each]
                 sums = _Products(_product(theirs, mine), _product(mine, mine), _product(theirs, theirs), len(mine))
                 before = found.get((first, int(each)))
                 found[first, int(each)] = sums if before is None else before.plus(sums)
         return found
 
+    def _beside(self, signals: Mapping[int, Signals]) -> dict[int, Signals]:
+        """Average what the other runs of its path have beside each flight."""
+        whole = [
+            np.hstack(signals[number]) if number in signals else np.zeros((len(flight), 0))
+            for number, flight in enumerate(self.flights)
+        ]
+        changing = next(iter(signals.values())).changing.shape[1]
+        found = {}
+        for number in self.path:
+            if number not in self.asked:
+                others = self.given.repeats.others(number, whole)
+                found[number] = Signals(others[:, :changing], others[:, changing:])
+        return found
+
+    def _rows(
+        self, band: Windows, signals: Mapping[int, Signals], others: Mapping[int, Signals], laid: Laid
+    ) -> Iterator[Rows]:
+        own = {number: laid(band, self.flights[number], each) for number, each in signals.items()}
+        known = {number: laid(band, self.flights[number], each) for number, each in others.items()}
+        known |= self._expected(band, {number: own[number] for number in self.asked})
+        for number in self.path:
+            yield Rows(number, own[number], known[number], middles_of(band, self.flights[number]))
+
     def _expected(self, band: Windows, own: dict[int, Array]) -> dict[int, Array]:
         """Predict balances from what was asked for; see `foretold`."""
         lags = late_by(band.period, round(_OF_WINDOW * band.hop / (1 - OVERLAP)))
         asked = {
-            number: _averaged(band, self.flights[number], np.hstack([late(self.asked[number], lag) for lag in lags]))
+            number: averaged(band, self.flights[number], np.hstack([late(self.asked[number], lag) for lag in lags]))
             for number in own
         }
         return foretold_by_run(asked, own)
@@ -298,11 +350,11 @@ class _Products(NamedTuple):
         )
 
 
-_ByBand = Sequence[Mapping[tuple[int, int], _Products]]
+ByBand = Sequence[Mapping[tuple[int, int], _Products]]
 """By band: products by path and block."""
 
 
-def _arranged(axes: Sequence[_ByBand], names: Sequence[tuple[int, int]], size: int) -> Sums:
+def _arranged(axes: Sequence[ByBand], names: Sequence[tuple[int, int]], size: int) -> Sums:
     """Arrange products of all axes at once, or of one after the other; 0 where there are none."""
     bands = len(axes[0]) if axes else 0
     crossed, own, others = (np.zeros((len(names), bands, 3, size, size)) for _ in range(3))
@@ -333,7 +385,7 @@ def band_windows(period: float, short_s: float, long_s: float | None) -> Windows
     return short if long_s is None else short.less(windows(period, long_s, OVERLAP))
 
 
-def _middles(band: Windows, flight: PlaybackFlight) -> IntArray:
+def middles_of(band: Windows, flight: PlaybackFlight) -> IntArray:
     """Give the sample in the middle of each window, shape (window,)."""
     half = len(band.weight) // 2
     return np.concatenate(
@@ -342,14 +394,6 @@ def _middles(band: Windows, flight: PlaybackFlight) -> IntArray:
             for stretch in flight.stretches
         ]
     )
-
-
-def _laid(band: Windows, flight: PlaybackFlight, signals: _Signals, laid: _Laid) -> Array:
-    """Lay windows over what is balanced, shape (window, axis, column)."""
-    changed = [band.derivative(signals.changing[part]) for part in _long(band, flight)]
-    acted = [band.average(signals.acting[part]) for part in _long(band, flight)]
-    none = (np.zeros((0, each.shape[1])) for each in signals)
-    return laid(*(np.concatenate([empty, *parts]) for empty, parts in zip(none, (changed, acted), strict=True)))
 
 
 def _long(band: Windows, flight: PlaybackFlight) -> list[slice]:
@@ -369,20 +413,20 @@ def _pushed(changed: Array, acted: Array) -> Array:
     return np.concatenate([changed + acted[:, :1], -acted[:, 1:]], axis=1)[:, None]
 
 
-def _of_torque(flight: PlaybackFlight, turns: Array) -> _Signals:
+def _of_torque(flight: PlaybackFlight, turns: Array) -> Signals:
     """Arrange rates, the gyroscopic torque of each entry of the inertia, and what turns."""
     rate = flight.motion.rate
     gyroscopic = np.cross(rate[:, :, None], symmetric_columns(rate), axis=1)
-    return _Signals(rate, np.hstack([gyroscopic.reshape(len(rate), -1), turns]))
+    return Signals(rate, np.hstack([gyroscopic.reshape(len(rate), -1), turns]))
 
 
-def _of_force(flight: PlaybackFlight, axis: int, gravity: float, pushes: Array) -> _Signals:
+def _of_force(flight: PlaybackFlight, axis: int, gravity: float, pushes: Array) -> Signals:
     """Arrange velocity along an axis of the world, gravity along it, and what pushes."""
     weight = np.full((len(flight), 1), gravity if axis == 2 else 0.0)
-    return _Signals(flight.motion.velocity[:, [axis]], np.hstack([weight, pushes]))
+    return Signals(flight.motion.velocity[:, [axis]], np.hstack([weight, pushes]))
 
 
-def _averaged(band: Windows, flight: PlaybackFlight, values: Array) -> Array:
+def averaged(band: Windows, flight: PlaybackFlight, values: Array) -> Array:
     """Lay windows over signals, shape (window, column)."""
     return np.concatenate(
         [np.zeros((0, values.shape[1])), *(band.average(values[part]) for part in _long(band, flight))]

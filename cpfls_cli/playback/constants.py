@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -22,10 +22,13 @@ from cpfls_cli.playback.balances import BANDS, OVERLAP, Balances, Sums, fitting_
 from cpfls_cli.playback.fit import Fitted, Uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers
-from cpfls_cli.playback.instruments import FOLDS, Instruments
+from cpfls_cli.playback.instruments import FOLDS, Instruments, Told
 from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.parameters import DRAG, INERTIA, LEARNED, LOG_INERTIA, FreeNumbers, blocks_of, needs_velocity
+from cpfls_cli.playback.past import PastBalances
 from cpfls_cli.vehicle.settings import VehicleSettings
+
+ToldBy = Literal[Told, "past"]
 
 ENOUGH_BLOCKS = 8
 """Whose scatter tells an error by instruments."""
@@ -80,11 +83,14 @@ class Constants:
     fitted : Fitted
     spread : Uncertainty
     explained : Explained
+    told_by : str
+        "repeats", "setpoints", or "past", which is what was before.
     """
 
     fitted: Fitted
     spread: Uncertainty
     explained: Explained
+    told_by: ToldBy
 
     @cached_property
     def _half(self) -> Array:
@@ -204,13 +210,38 @@ def find_constants(
     ----------
     Söderström and Stoica 2002 (instrumental variables in closed loop); Pintelon and Schoukens 2012 (repeats).
     """
-    periods = {flight.motion.period for flight in given.flown}
+    return _found(vehicle, Balances(given.flown, given), _tried(vehicle, flights, leave_out))
+
+
+def constants_of_past(
+    vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], given: Instruments, leave_out: Sequence[str] = ()
+) -> Constants | None:
+    """Estimate the constants of a vehicle from flights that show its loop, by what was before.
+
+    As `find_constants`, in what is new along the flights, and in what of that was foretold fast and slowly. What is
+    slow goes wherever it disagrees or is not explained, and a moment is told only where it is known to a tenth how much
+    of the rotation that was foretold is explained: nothing from outside of the loop stands for it.
+
+    Parameters
+    ----------
+    vehicle, flights, given, leave_out
+        As of `find_constants`; the flights need no instruments.
+
+    References
+    ----------
+    Holtz-Eakin, Newey and Rosen 1988 (quasi-differences, with the past as instrument).
+    """
+    return _found(vehicle, PastBalances(given.flown, given), _tried(vehicle, flights, leave_out))
+
+
+def _found(vehicle: VehicleSettings, balances: Balances, tried: Sequence[str]) -> Constants | None:
+    """Estimate the constants by what some balances know."""
+    periods = {flight.motion.period for flight in balances.flights}
     if len(periods) > 1 or len(fitting_bands(max(periods))) < len(BANDS) - 1:
         return None
-    tried = _tried(vehicle, flights, leave_out)
     blocks = [block for block in (*vehicle.unknown, *tried) if block == INERTIA or block in vehicle.unknown]
-    setting = _Setting(vehicle, Balances(given.flown, given))
-    balances, free = setting.balances, setting.free(blocks)
+    setting = _Setting(vehicle, balances)
+    free = setting.free(blocks)
     if not balances.path or LOG_INERTIA[0] not in free.index or balances.longest_s < _LONGEST_S:
         return None
     # Of drag factor and moment of inertia about yaw only the ratio is known: both would drift along it.
@@ -222,10 +253,11 @@ def find_constants(
         faster = problem.bands.copy()
         faster[slowest] = False
         fast = _problem(setting, faster, blocks, tried, held)
-        if not _tells(fast) or (_agree(fast, problem) and _explains(problem, slowest)):
+        alike = _agree(fast, problem) and _explains(problem, slowest)
+        if alike or not (balances.of_past or _tells(fast)):
             break
         problem = fast
-    return _constants(problem)
+    return _constants(problem, "past" if balances.of_past else balances.given.kind)
 
 
 def _problem(
@@ -379,7 +411,7 @@ def _shares(crossed: Array) -> tuple[Array, Array]:
     return share(crossed.sum(axis=0)), jackknife_error(share(crossed.sum(axis=0) - crossed))
 
 
-def _constants(problem: _Problem) -> Constants:
+def _constants(problem: _Problem, told_by: ToldBy) -> Constants:
     """Gather the numbers of a solved problem, and how far they scatter over the blocks of the path.
 
     What instruments hardly tell scatters by what was believed before, however it scatters over the blocks.
@@ -390,7 +422,9 @@ def _constants(problem: _Problem) -> Constants:
     if DRAG in problem.held and (yaw := free.index.get(LOG_INERTIA[2])) is not None:
         told[yaw] = False
     explained, error = _explained_in_all(problem)
-    for name, enough in zip(LOG_INERTIA, explained + error >= EXPLAINED, strict=True):
+    # What was before has to show that the model explains it: nothing else does.
+    seen = (error <= 1 - EXPLAINED) | (told_by != "past")
+    for name, enough in zip(LOG_INERTIA, seen & (explained + error >= EXPLAINED), strict=True):
         # Where much comes again that is not explained, a moment may stand for what is missing.
         if name in free.index and not enough:
             told[free.index[name]] = False
@@ -400,7 +434,7 @@ def _constants(problem: _Problem) -> Constants:
     fitted = Fitted(free, problem.values, float(1 - share[0, :2].mean()), problem.information(total))
     spread = Uncertainty(covariance * np.outer(free.scales, free.scales), len(without), told)
     used = problem.bands[: len(problem.bands_hz)]
-    return Constants(fitted, spread, Explained(share, used, explained, error, problem.bands_hz))
+    return Constants(fitted, spread, Explained(share, used, explained, error, problem.bands_hz), told_by)
 
 
 def _explained_in_all(problem: _Problem) -> tuple[Array, Array]:

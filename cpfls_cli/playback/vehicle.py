@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS
 from cpfls_cli.inertia import INERTIA_PARAMETERS, KNOWN, MEASURED, beyond_any_body, more_than_others
-from cpfls_cli.playback.constants import Constants, find_constants
+from cpfls_cli.playback.constants import Constants, constants_of_past, find_constants
 from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
 from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -173,6 +173,8 @@ def find_vehicle(
     fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fit, groups)
     loop, given = loop_bounds(fitted.model, own), instruments(own)
     constants = find_constants(begun, own, given, settings.leave_out)
+    if loop.shows_loop and (constants is None or not constants.tells):
+        constants = constants_of_past(begun, own, given, settings.leave_out) or constants
     # Where instruments find the same body the fit is the vehicle's, and takes more from the flights.
     if constants is not None and not (loop.shows_loop or constants.contradict(fitted.model.body.inertia)):
         constants = None

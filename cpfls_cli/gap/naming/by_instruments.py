@@ -22,7 +22,8 @@ from cpfls_cli.gap.naming.scoring import known_before
 from cpfls_cli.gap.residual.air import foretold_rows
 from cpfls_cli.gap.settings import CHANCE, GapSettings
 from cpfls_cli.playback.constants import ENOUGH_BLOCKS, STRONG
-from cpfls_cli.playback.instruments import Instruments, foretold_by_run
+from cpfls_cli.playback.instruments import Instruments
+from cpfls_cli.playback.past import what_is_new
 
 
 class _Run(NamedTuple):
@@ -324,41 +325,14 @@ def _of_blocks(rows: Sequence[Array], known: Iterable[Array], blocks: Sequence[A
 def _after(rows: Sequence[Array]) -> tuple[list[Array], list[Array]]:
     """Give what comes newly after each window, and what windows that ended before it tell of that.
 
-    What lasts of a gust, as long as its memory is, shows in what is left; what is new in it nobody knew before, nor any
-    loop.
-
     Parameters
     ----------
     rows : sequence of array, shape (window, 6, number + 1)
         Of each run, in floors; windows a `PER_WINDOW`-th of one apart.
-
-    References
-    ----------
-    Holtz-Eakin, Newey and Rosen 1988 (quasi-differences, with the past as instrument); Söderström and Stoica 2002.
     """
     ahead = PER_WINDOW // 4
-    before = range(PER_WINDOW, 2 * PER_WINDOW, ahead)
-    then, now = (
-        [own[before[-1] + late :][: max(0, len(own) - before[-1] - ahead)] for own in rows] for late in (ahead, 0)
-    )
-    past = [[own[before[-1] - lag :][: len(each)] for lag in before] for own, each in zip(rows, now, strict=True)]
-    # What a channel keeps of what it was, by what it was before both, which the noise of neither has a part in. What a
-    # run is off by throughout is no gust.
-    means = [own[..., -1].mean(axis=0) if len(own) else np.zeros(6) for own in rows]
-    was = [np.sum([each[..., -1] - mean for each in own], axis=0) for own, mean in zip(past, means, strict=True)]
-    kept, left = (
-        sum(((each[..., -1] - mean) * own).sum(axis=0) for each, mean, own in zip(of, means, was, strict=True))
-        for of in (then, now)
-    )
-    lasts = np.clip(kept / np.where(left > 0, left, np.inf), 0.0, 1.0)[:, None]
-    new = [one - lasts * other for one, other in zip(then, now, strict=True)]
-    asked = {
-        number: np.concatenate([each[..., :-1] for each in own], axis=2).reshape(-1, len(own) * (own[0].shape[2] - 1))
-        for number, own in enumerate(past)
-        if len(new[number])
-    }
-    told = foretold_by_run(asked, [each.reshape(-1, each.shape[2]) for each in new])
-    return new, [told[number].reshape(each.shape) if number in told else each for number, each in enumerate(new)]
+    told, left = [own[..., :-1] for own in rows], [own[..., -1] for own in rows]
+    return what_is_new(rows, left, told, ahead, range(PER_WINDOW, 2 * PER_WINDOW, ahead))
 
 
 def _in_other_runs(given: Instruments, rows: Sequence[Array], middles: Sequence[IntArray]) -> Iterator[Array]:

@@ -8,11 +8,12 @@ from scipy.linalg import eigh
 from scipy.signal import lfilter
 
 from cpfls_cli.blocks import half_width
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.playback.balances import band_windows
-from cpfls_cli.playback.constants import find_constants
+from cpfls_cli.playback.constants import constants_of_past, find_constants
 from cpfls_cli.playback.instruments import instruments
 from cpfls_cli.playback.parameters import LOG_INERTIA
-from tests.builders.gusty_flights import CALM, GUSTS, MEMORY_S, SMALL, Flight, gusty_flights
+from tests.builders.gusty_flights import CALM, GUSTS, LARGE, MEMORY_S, SMALL, Flight, gusty_flights
 
 SETS = {"calm": (CALM, 1), "repeats": (GUSTS, 4), "setpoints": (GUSTS, 1)}
 """Gusts, and how often each of two paths is flown."""
@@ -65,6 +66,33 @@ def test_what_instruments_do_not_tell_is_not_determined(constants):
     found = constants["setpoints"]
     yaw = found.fitted.free.index[LOG_INERTIA[2]]
     assert not found.spread.determined[yaw]
+
+
+def _by_what_was_before(truth, leave_out=()):
+    """What flights of three paths in gusts tell without repeats or setpoints, from moments twice too large."""
+    flown = gusty_flights([Flight(truth, GUSTS, path, 100 + path, reach=3.0) for path in range(3)], 30.0)
+    alone = [replace(flight, setpoints={}) for flight in flown]
+    twice = (*(2 * moment for moment in truth.inertia), 0.0, 0.0, 0.0)
+    begun = replace(truth.vehicle, inertia_kg_m2=twice, unknown=("inertia",))
+    return constants_of_past(begun, alone, instruments(alone), leave_out)
+
+
+@pytest.mark.parametrize("truth", [SMALL, LARGE], ids=["45 g", "1.5 kg"])
+def test_in_gusts_what_was_before_tells_the_body(truth):
+    """Least squares finds twice the true moments and more."""
+    found = _by_what_was_before(truth)
+    off, half = _moments(found)
+    assert found.tells
+    assert found.told_by == "past"
+    assert np.abs(off).max() < 0.06
+    assert (np.abs(off) < 2 * half).all()
+
+
+def test_what_was_before_tells_no_body_whose_damping_is_missing():
+    """At 1 Hz the damping takes as much as the rotation; without it no moment about roll explains what was foretold."""
+    damped = SMALL._replace(damping=2e-4)
+    assert not _by_what_was_before(damped, tuple(CATALOGUE)).tells
+    assert _by_what_was_before(damped).tells
 
 
 def test_flights_without_instruments_have_no_constants(flights):

@@ -158,7 +158,7 @@ def test_a_vehicle_simulated_in_its_own_gusts_shows_the_same(flights):
 
 @pytest.mark.parametrize("runs", ["repeats", "alone"])
 def test_a_vehicle_holds_gusts_where_runs_tell_its_body(flights, runs):
-    """Two runs of two paths tell nothing: they show the loop, and no size is said. All but the inertia is known."""
+    """Two runs of two paths tell the body by what was before, and of gusts a bound. All but the inertia is known."""
     flown = [replace(flight, setpoints={}) for flight in flights["1.5 kg", "repeats"].flown]
     vehicle = replace(LARGE.vehicle, unknown=("inertia",))
     settings = PlaybackSettings(
@@ -168,7 +168,10 @@ def test_a_vehicle_holds_gusts_where_runs_tell_its_body(flights, runs):
     found = find_vehicle(vehicle, known, settings, np.random.default_rng(1), lambda *_: None)
     assert found.loop.shows_loop
     if runs == "alone":
-        assert found.gusts is None
+        assert found.constants.told_by == "past"
+        assert np.diag(found.model.body.inertia)[:2] == pytest.approx(LARGE.inertia[:2], rel=0.15)
+        assert np.isnan(found.gusts.size).all()
+        assert (found.gusts.high[:2] / LARGE.inertia[:2] > GUSTS[:2]).all()
         assert found.model.gusts is None
     else:
         assert found.gusts.told_by == "repeats"
