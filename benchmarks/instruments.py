@@ -3,8 +3,9 @@
     python benchmarks/instruments.py [DRAWS]
 
 Two vehicles of 45 g and 1.5 kg in three levels of gusts, 40 s a flight: two paths flown four times each without
-setpoints in the log, or three paths once with the position that was asked for; paths of 0.8 Hz at most, and with sines
-of up to 5 Hz. The search begins at moments twice too large. Nothing of the package flies them.
+setpoints in the log, or three paths once, with the position that was asked for or without, so that what was before has
+to tell; paths of 0.8 Hz at most, and with sines of up to 5 Hz. The search begins at moments twice too large. Nothing of
+the package flies them.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.blocks import half_width
-from cpfls_cli.playback.constants import find_constants
+from cpfls_cli.playback.constants import constants_of_past, find_constants
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.instruments import Repeats, instruments
 from cpfls_cli.playback.parameters import LOG_INERTIA
@@ -36,7 +37,7 @@ DRAWS = 20
 VEHICLES = {"45 g": SMALL, "1.5 kg": LARGE}
 RUNS, REPEATED, PATHS, SECONDS = 4, 2, 3, 40.0
 REACHES_HZ = (0.0, 5.0)
-KINDS = ("repeats", "setpoints")
+KINDS = ("repeats", "setpoints", "past")
 
 
 def main(draws: int) -> None:
@@ -86,13 +87,13 @@ def found_moments(vehicle: VehicleSettings, kind: str, flights: list[PlaybackFli
     """Give moments about roll and pitch over the true ones, half of their intervals, and whether they are told."""
     moments = tuple(2 * moment for moment in vehicle.inertia_kg_m2[:3])
     begun = replace(vehicle, inertia_kg_m2=(*moments, 0.0, 0.0, 0.0), unknown=("inertia",))
-    if kind == "repeats":
+    if kind != "setpoints":
         flights = [replace(flight, setpoints={}) for flight in flights]
     given = instruments(flights)
-    if kind == "setpoints":
-        # Paths of the same frequencies may come near each other; here only what was asked for is to tell.
+    if kind != "repeats":
+        # Paths of the same frequencies may come near each other; here they are not to tell.
         given = replace(given, repeats=Repeats(tuple({} for _ in given.runs), {}))
-    found = find_constants(begun, flights, given)
+    found = (constants_of_past if kind == "past" else find_constants)(begun, flights, given)
     if found is None:
         return np.ones(2), np.ones(2), np.zeros(2, dtype=bool)
     places = [found.fitted.free.index[name] for name in LOG_INERTIA[:2]]

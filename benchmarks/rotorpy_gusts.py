@@ -3,10 +3,11 @@
     python benchmarks/rotorpy_gusts.py [DRAWS]
 
 RotorPy's Crazyflie and Hummingbird on two paths with sines of up to 5 Hz, each flown four times for 40 s, or three
-paths once with the position that was asked for, at 250 Hz, in wind that wanders by 1.5 m/s. The Crazyflie has flapping
-rotors here, for the wind turns no other; noise is in what the controller sees of the rates and in the logged speeds.
-Equations, rotors and controller are RotorPy's. Beside what instruments tell stands what the loop leaves open: bounds by
-regression both ways with the true model of the body. The search begins at moments twice too large. Needs rotorpy.
+paths once, with the position that was asked for or without, at 250 Hz, in wind that wanders by 1.5 m/s. The Crazyflie
+has flapping rotors here, for the wind turns no other; noise is in what the controller sees of the rates and in the
+logged speeds. Equations, rotors and controller are RotorPy's. Beside what instruments tell stands what the loop leaves
+open: bounds by regression both ways with the true model of the body. The search begins at moments twice too large.
+Needs rotorpy.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ def main(draws: int) -> None:
     rows = []
     with ProcessPoolExecutor(2) as pool:
         for vehicle in ("Crazyflie", "Hummingbird"):
-            for kind, paths, runs in (("repeats", REPEATED, RUNS), ("setpoints", PATHS, 1)):
+            for kind, paths, runs in (("repeats", REPEATED, RUNS), ("setpoints", PATHS, 1), ("past", PATHS, 1)):
                 asked = [
                     Asked(vehicle, paths * draw + path, runs * draw + run)
                     for draw in range(draws)
@@ -98,7 +99,7 @@ class _Asks:
 
     def update(self, time: float) -> dict[str, Any]:
         """Give what is asked for at a time."""
-        position, velocity, acceleration = np.split(self.path[min(round(time / STEP_S), len(self.path) - 1)], 3)
+        position, velocity, acceleration = np.split(self.path[min(round(time / STEP_S), len(self.path) - 1), :9], 3)
         none = dict.fromkeys(("x_dddot", "x_ddddot"), np.zeros(3))
         return {"x": position, "x_dot": velocity, "x_ddot": acceleration, "yaw": 0.0, "yaw_dot": 0.0, **none}
 

@@ -83,11 +83,15 @@ def _acts(candidate: Candidate, hypothesis: System) -> bool:
     return candidate.effect.late and hypothesis.can(candidate)
 
 
-def _chance_of(number: Estimate) -> float:
-    """Compute how likely chance makes a number of its size if it is 0, by its interval."""
+def _chance_of(number: Estimate, period: float) -> float:
+    """Compute how likely chance makes a time of its size if it is 0, by its interval and what a log is off by.
+
+    When a sample was taken is known to one sampling period, and where in it is anybody's guess.
+    """
     from scipy.special import erfc
 
-    return float(erfc(ERRORS * number.value / max(number.high - number.value, np.finfo(float).tiny) / np.sqrt(2)))
+    error = np.hypot((number.high - number.value) / ERRORS, period / np.sqrt(12))
+    return float(erfc(number.value / error / np.sqrt(2)))
 
 
 @dataclass
@@ -162,7 +166,8 @@ class _Sets:
     def chances(self, best: _Names) -> dict[str, float]:
         """Compute how likely chance makes each effect: its number, or of several that so much less is left."""
         less = chance_of_ranks(more_left(self.left[()], self.left[best]))
-        return {name: _chance_of(own[0]) if len(own) == 1 else less for name, own in self._numbers(best).items()}
+        numbers = self._numbers(best).items()
+        return {name: _chance_of(own[0], self._period) if len(own) == 1 else less for name, own in numbers}
 
     def instead(self, best: _Names, names: _Names) -> Iterator[Alternative]:
         """Say what stands for what of a set."""
@@ -180,8 +185,12 @@ class _Sets:
         return {
             name
             for name, (number, *_) in self._numbers(names).items()
-            if _chance_of(number) <= self.settings.significance and number.value < number.plausible[1]
+            if _chance_of(number, self._period) <= self.settings.significance and number.value < number.plausible[1]
         }
+
+    @property
+    def _period(self) -> float:
+        return self.given.flown[0].motion.period
 
     def _fit(self, names: _Names) -> NamedFit | None:
         flights = self.found.hypothesis.flights
