@@ -4,8 +4,9 @@
 
 Two vehicles of 45 g and 1.5 kg in three levels of gusts, 40 s a flight: two paths flown four times each without
 setpoints in the log, or three paths once, with the position that was asked for or without, so that what was before has
-to tell; paths of 0.8 Hz at most, and with sines of up to 5 Hz. The search begins at moments twice too large. Nothing of
-the package flies them.
+to tell; paths of 0.8 Hz at most, and with sines of up to 5 Hz. Gusts fade by one memory, by three of 0.15, 1 and 5
+times that (mixed), or have a rate (smooth). The search begins at moments twice too large. Nothing of the package flies
+them.
 """
 
 from __future__ import annotations
@@ -31,27 +32,27 @@ from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.instruments import Repeats, instruments
 from cpfls_cli.playback.parameters import LOG_INERTIA
 from cpfls_cli.vehicle.settings import VehicleSettings
-from tests.builders.gusty_flights import CALM, GUSTS, LARGE, SMALL, STORM, Flight, Truth, gusty_flights
+from tests.builders.gusty_flights import CALM, GUSTS, LARGE, MIXED, SMALL, STORM, Flight, Truth, gusty_flights
 
 DRAWS = 20
 VEHICLES = {"45 g": SMALL, "1.5 kg": LARGE}
 RUNS, REPEATED, PATHS, SECONDS = 4, 2, 3, 40.0
 REACHES_HZ = (0.0, 5.0)
 KINDS = ("repeats", "setpoints", "past")
+SMOOTH_S = 0.1
+"""Time constant that takes the edge off gusts, so that they have a rate."""
 
 
 def main(draws: int) -> None:
     rows = []
     for name, truth in VEHICLES.items():
-        for gusts in (CALM, GUSTS, STORM):
-            for reach in REACHES_HZ:
-                for kind in KINDS:
-                    found = [
-                        found_moments(truth.vehicle, kind, flown) for flown in _flown(truth, gusts, kind, draws, reach)
-                    ]
-                    rows.append([name, ", ".join(f"{gust:g}" for gust in gusts), f"{reach or 0.8:g}", kind])
-                    rows[-1] += _cells(*(np.array([each[part] for each in found]) for part in range(3)))
-                    print(" | ".join(rows[-1]), file=sys.stderr, flush=True)
+        for flown in _asked(truth):
+            for kind in KINDS:
+                found = [found_moments(truth.vehicle, kind, flights) for flights in _sets(flown, kind, draws)]
+                gusts = ", ".join(f"{gust:g}" for gust in flown.gusts) + _process(flown)
+                rows.append([name, gusts, f"{flown.reach or 0.8:g}", kind])
+                rows[-1] += _cells(*(np.array([each[part] for each in found]) for part in range(3)))
+                print(" | ".join(rows[-1]), file=sys.stderr, flush=True)
     header = ["vehicle", "gusts, rad/s²", "path up to, Hz", "instrument", "Ixx", "Iyy", "interval ±, %"]
     table("instruments", [*header, "holds the truth", "determined"], rows)
 
@@ -66,21 +67,31 @@ def _cells(ratio: Array, half: Array, told: BoolArray) -> list[str]:
     ]
 
 
-def _flown(
-    truth: Truth, gusts: tuple[float, float, float], kind: str, draws: int, reach: float
-) -> Iterator[list[PlaybackFlight]]:
+def _asked(truth: Truth) -> Iterator[Flight]:
+    """List the gusts and paths that a vehicle flies in; gusts of several memories, and smooth ones, in one size."""
+    for gusts in (CALM, GUSTS, STORM):
+        yield from (Flight(truth, gusts, reach=reach) for reach in REACHES_HZ)
+    for reach in REACHES_HZ:
+        yield Flight(truth, GUSTS, reach=reach, memories=MIXED)
+        yield Flight(truth, GUSTS, reach=reach, smooth_s=SMOOTH_S)
+
+
+def _process(flown: Flight) -> str:
+    return ", mixed" if flown.memories == MIXED else ", smooth" if flown.smooth_s else ""
+
+
+def _sets(flown: Flight, kind: str, draws: int) -> Iterator[list[PlaybackFlight]]:
     """Fly paths again and again, or several once; another set of paths and gusts for each draw."""
     paths, runs = (REPEATED, RUNS) if kind == "repeats" else (PATHS, 1)
     asked = [
-        Flight(truth, gusts, paths * draw + path, runs * draw + run, reach=reach)
+        flown._replace(path=paths * draw + path, draw=runs * draw + run)
         for draw in range(draws)
         for path in range(paths)
         for run in range(runs)
     ]
-    flown = gusty_flights(asked, SECONDS)
+    flights = gusty_flights(asked, SECONDS)
     for _ in range(draws):
-        own = list(islice(flown, paths * runs))
-        yield own
+        yield list(islice(flights, paths * runs))
 
 
 def found_moments(vehicle: VehicleSettings, kind: str, flights: list[PlaybackFlight]) -> tuple[Array, Array, BoolArray]:

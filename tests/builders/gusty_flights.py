@@ -20,6 +20,8 @@ CALM, GUSTS, STORM = (0.0, 0.0, 0.0), (3.4, 5.1, 2.0), (8.0, 8.0, 4.0)
 """Angular acceleration by gusts, rad/s^2: none, what real flights of a nano-drone show, and twice that."""
 
 MEMORY_S = np.array([0.31, 1.18, 0.5])
+ONE, MIXED = ((1.0, 1.0),), ((0.3, 0.15), (0.4, 1.0), (0.3, 5.0))
+"""Of the torque of gusts: shares of their variance, and factors on the memory of each."""
 SPINS = np.array([-1, 1, -1, 1])
 
 
@@ -73,7 +75,8 @@ class Flight(NamedTuple):
     """What is flown: a vehicle in gusts on a path; each number of a path, and of a draw of gusts, is another one.
 
     A path has frequencies of 0.8 Hz at most, and if asked for a shake of its acceleration up to `reach`, and a heading
-    that swings by about `swing` in rad. Of the rotors their speeds are logged, or the commands alone.
+    that swings by about `swing` in rad. Of the rotors their speeds are logged, or the commands alone. Gusts have one
+    memory, or several, and may be smoothed over some seconds.
     """
 
     truth: Truth
@@ -84,6 +87,8 @@ class Flight(NamedTuple):
     reach: float = 0.0
     swing: float = 0.0
     commands: bool = False
+    memories: tuple[tuple[float, float], ...] = ONE
+    smooth_s: float = 0.0
 
 
 def gusty_flights(flights, seconds=30.0):
@@ -91,7 +96,7 @@ def gusty_flights(flights, seconds=30.0):
     samples = round(seconds / STEP_S)
     rngs = [np.random.default_rng([flight.path, flight.draw]) for flight in flights]
     path = np.stack([path_of(flight, samples) for flight in flights], axis=1)
-    pushes = [_memory(rng, samples, MEMORY_S) * flight.gusts for rng, flight in zip(rngs, flights, strict=True)]
+    pushes = [_pushes(rng, samples, flight) * flight.gusts for rng, flight in zip(rngs, flights, strict=True)]
     shoves = [_memory(rng, samples, np.ones(3)) * 0.06 * max(f.gusts) for rng, f in zip(rngs, flights, strict=True)]
     noise = [f.truth.gyro_noise * rng.standard_normal((samples, 3)) for rng, f in zip(rngs, flights, strict=True)]
     logs = _flown(flights, path, *(np.stack(each, axis=1) for each in (pushes, shoves, noise)))
@@ -112,6 +117,16 @@ def gusty_flights(flights, seconds=30.0):
                 ),
             },
         )
+
+
+def _pushes(rng, samples, flight):
+    """Draw gusts of unit size about the axes, shape (samples, 3)."""
+    total = sum(np.sqrt(share) * _memory(rng, samples, factor * MEMORY_S) for share, factor in flight.memories)
+    if not flight.smooth_s:
+        return total
+    keep = np.exp(-STEP_S / flight.smooth_s)
+    smooth = lfilter([1 - keep], [1, -keep], total, axis=0)
+    return smooth / smooth.std(axis=0)
 
 
 def _memory(rng, samples, memory_s):

@@ -137,7 +137,9 @@ class _Sets:
         alone: list[_Names] = [names for names in told if len(names) == 1]
         rivals = [names for names in alone if beside.issuperset(names)] or alone or together
         best = self.least(rivals or [()])
-        return (together[0], together) if together and self.leaves(best) else (best, rivals)
+        # No rotor is where it is commanded to be at once: what does without the usual effect has to show that.
+        lacking = best and next(iter(self.effects)) not in best
+        return (together[0], together) if together and (lacking or self.leaves(best)) else (best, rivals)
 
     def tell(self, tried: Sequence[_Names]) -> list[_Names]:
         """Fit sets; of those whose numbers instruments tell the names come back."""
@@ -181,12 +183,19 @@ class _Sets:
         return {candidate.effect.name: numbers for candidate, numbers in told if candidate.effect.name in names}
 
     def _needed(self, names: _Names) -> set[str]:
-        """Name the effects whose only number is surely not 0, and within its bounds."""
-        return {
-            name
-            for name, (number, *_) in self._numbers(names).items()
-            if _chance_of(number, self._period) <= self.settings.significance and number.value < number.plausible[1]
-        }
+        """Name the effects whose only number is surely not 0, and within its bounds.
+
+        Beside others it is enough of the usual effect that it is not less than anybody has.
+        """
+        usual = next(iter(self.effects)) if len(names) > 1 else ""
+
+        def stands(name: str, number: Estimate) -> bool:
+            if name == usual:
+                return number.value >= self.effects[name].shapes[0].grid[0]
+            return _chance_of(number, self._period) <= self.settings.significance
+
+        told = {name: number for name, (number, *_) in self._numbers(names).items()}
+        return {name for name, each in told.items() if stands(name, each) and each.value < each.plausible[1]}
 
     @property
     def _period(self) -> float:

@@ -17,7 +17,8 @@ LATE = ("motor_lag", "command_delay", "low_pass_filter", "notch_filter")
 LAG, DELAY, BOTH = ("motor_lag",), ("command_delay",), ("motor_lag", "command_delay")
 BLOCKS = 12
 LITTLE = np.tile([1.0, -1.0], BLOCKS // 2)
-SURE, ABSENT = (0.03, 0.001), (0.001, 0.002)
+SURE, ABSENT, OPEN = (0.03, 0.001), (0.001, 0.002), (0.03, 0.04)
+GIVEN = SimpleNamespace(flown=[SimpleNamespace(motion=SimpleNamespace(period=0.01))])
 
 
 def found_with(names, sizes):
@@ -48,7 +49,7 @@ def apart(monkeypatch, own, left, sizes=None):
         lambda found, *_: left[tuple(each.effect.name for each in found.hypothesis.chosen)] * np.ones(BLOCKS),
     )
     start = found_with(own, [SURE] * len(own))
-    told = told_apart(start, [CATALOGUE[name] for name in (*LATE, "com_offset")], None, np.ones(6), GapSettings())
+    told = told_apart(start, [CATALOGUE[name] for name in (*LATE, "com_offset")], GIVEN, np.ones(6), GapSettings())
     names = tuple(each.effect.name for each in told.found.hypothesis.chosen)
     return names, {(each.name, each.instead_of, each.beside) for each in told.alike}, told, tried
 
@@ -76,6 +77,21 @@ def test_what_is_needed_beside_the_other_is_named_whatever_was_found(own, togeth
 def test_the_one_that_leaves_more_is_no_rival(monkeypatch):
     left = {(): 90.0, LAG: 9.0, DELAY: LITTLE, BOTH: LITTLE}
     assert apart(monkeypatch, LAG, left, {BOTH: [ABSENT, ABSENT]})[:2] == (DELAY, set())
+
+
+@pytest.mark.parametrize(
+    ("together", "names"),
+    [([OPEN, SURE], BOTH), ([ABSENT, SURE], DELAY)],
+    ids=["a lag that nothing excludes", "no lag that anybody has"],
+)
+def test_a_delay_alone_has_to_show_that_rotors_do_not_lag(together, names, monkeypatch):
+    left = {(): 90.0, LAG: 9.0, DELAY: LITTLE, BOTH: LITTLE}
+    assert apart(monkeypatch, DELAY, left, {BOTH: together})[0] == names
+
+
+def test_a_delay_of_a_third_of_a_sample_is_none(monkeypatch):
+    left = {(): 90.0, LAG: 9.0, DELAY: 9.0, BOTH: LITTLE}
+    assert apart(monkeypatch, LAG, left, {BOTH: [SURE, (0.0035, 0.001)]})[0] == LAG
 
 
 def test_what_formulas_are_off_by_tells_nothing(monkeypatch):
