@@ -125,10 +125,8 @@ class _Sets:
         return sum(len(self.effects[name].shapes) for name in names)
 
     def usual(self) -> tuple[_Names, list[_Names]]:
-        """Choose among effects of one number: none where nothing is left without, all where one leaves something."""
+        """Choose among effects of one number: none where none is surely not 0, all where one leaves something."""
         self.tell([()])
-        if not self.leaves(()):
-            return (), []
         plain = [names for names in self.all if self.count(names) == len(names)]
         told = [names for names in self.tell(plain) if set(names) == self._needed(names)]
         together = [names for names in told if len(names) > 1]
@@ -154,8 +152,11 @@ class _Sets:
         return surely(self.left[names])
 
     def surely_more(self, one: _Names, other: _Names) -> bool:
-        """Tell whether one leaves surely more than another, beyond what formulas are off by."""
-        margin = more_left(self.left[one], self.left[other])
+        """Tell whether one leaves surely more than another, beyond what formulas are off by.
+
+        The right one leaves 0 but for chance; what is too much is left as well.
+        """
+        margin = more_left(*(np.sign(left.sum()) * left for left in (self.left[one], self.left[other])))
         return surely(margin) and bool(margin.sum() > OFF**2 * self.left[()].sum())
 
     def least(self, tried: Sequence[_Names]) -> _Names:
