@@ -32,8 +32,8 @@ from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows
 _WINDOW_S, _SLOW_S = 0.08, 0.25
 """Windows, as short as samples allow: nothing within one is known when it begins. What was foretold is averaged over
 the second, which leaves what is slow of it: most effects that a model lacks are in it."""
-_HZ = ((2.0, 12.0), (0.0, 2.0))
-"""What was foretold fast, and slowly, by frequency, about."""
+_PARTED_HZ = 2.0
+"""Above what was foretold is fast, about."""
 _PER_WINDOW = round(1 / (1 - OVERLAP))
 _BEFORE = range(2 * _PER_WINDOW, 4 * _PER_WINDOW, _PER_WINDOW // 2)
 """What was before ended a whole window before another begins: gusts that remember in more ways than one forget all but
@@ -101,14 +101,15 @@ class PastBalances(Balances):
     @cached_property
     def bands_hz(self) -> tuple[tuple[float, float], ...]:
         """Bands of torque by frequency, about."""
-        return _HZ
+        (band, *_) = self.bands
+        return (_PARTED_HZ, 1 / (len(band.weight) * band.period)), (0.0, _PARTED_HZ)
 
     @cached_property
     def bands(self) -> tuple[Windows, ...]:
         """Windows of torque, then of force; in all bands the same."""
         period = self.flights[0].motion.period
         one = band_windows(period, max(_WINDOW_S, FEWEST_SAMPLES * period), None)
-        return (one,) * len(_HZ) * (2 if self.translates else 1)
+        return (one, one) * (2 if self.translates else 1)
 
     @cached_property
     def path(self) -> dict[int, tuple[int, Array]]:
