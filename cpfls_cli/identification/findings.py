@@ -175,8 +175,8 @@ def loop_in_words(loop: LoopBounds) -> str:
         f"the flights show the loop: torque explains {shares} in some band of 0.5 to 6 Hz. An autopilot that reacts to "
         "gusts, or an effect missing here, makes a body look heavier or lighter than it is; true moments over "
         f"those found: {bounds}. Fly each path at least three times, one log each, and give all flights (cpfls "
-        "trajectory --repeat plans them), or log the setpoint of position or velocity, or the sticks; cpfls vehicle may "
-        "tell the body of these flights by what was before"
+        "trajectory --repeat plans them), or log the setpoint of position or velocity, or the sticks; cpfls vehicle "
+        "may tell the body of these flights by what was before"
     )
 
 
