@@ -162,7 +162,9 @@ def _gusty(found: FoundGusts, moved: Array, most: float) -> BoolArray:
     """
     own = found.foretold + ERRORS * found.foretold_error < most
     for kind in (slice(3), slice(3, 6)):
-        weight = np.where(np.isfinite(found.foretold[kind]), np.maximum(moved[kind] - 1, 0.0), 0.0)
+        # By what they tell; of a channel that moves no more than its sensors, nothing.
+        told = np.isfinite(found.foretold[kind]) & (moved[kind] > 1)
+        weight = np.where(told, 1 / np.maximum(found.foretold_error[kind], np.finfo(float).tiny) ** 2, 0.0)
         weight /= max(weight.sum(), np.finfo(float).tiny)
         share, without = (np.nan_to_num(each[..., kind]) @ weight for each in (found.foretold, found.foretold_without))
         if weight.any() and share + ERRORS * jackknife_error(without) < most:
