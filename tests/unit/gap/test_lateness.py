@@ -89,6 +89,15 @@ def test_a_delay_alone_has_to_show_that_rotors_do_not_lag(together, names, monke
     assert apart(monkeypatch, DELAY, left, {BOTH: together})[0] == names
 
 
+def test_a_lag_that_is_surely_not_0_stands_however_little_what_is_left_without_it_tells(monkeypatch):
+    assert apart(monkeypatch, LAG, {(): LITTLE, LAG: LITTLE[::-1]})[0] == LAG
+
+
+def test_what_a_set_takes_too_much_of_is_left_as_well(monkeypatch):
+    left = {(): 90.0, LAG: 30.0, DELAY: 31.0, BOTH: LITTLE, ("notch_filter",): -30.0}
+    assert apart(monkeypatch, LAG, left, {BOTH: [SURE, SURE]})[:2] == (BOTH, set())
+
+
 def test_a_delay_of_a_third_of_a_sample_is_none(monkeypatch):
     left = {(): 90.0, LAG: 9.0, DELAY: 9.0, BOTH: LITTLE}
     assert apart(monkeypatch, LAG, left, {BOTH: [SURE, (0.0035, 0.001)]})[0] == LAG

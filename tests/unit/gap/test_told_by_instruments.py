@@ -46,8 +46,8 @@ def test_alone_it_is_a_test_of_means():
 def shares(*foretold, scatter=0.0):
     """Shares that are foretold of six channels, errors of one channel apart from those of others."""
     without = np.tile(foretold, (18, 1))
-    for channel, each in enumerate(foretold):
-        without[3 * channel : 3 * channel + 3, channel] = each + scatter * np.array([-1.0, 1.0, 0.0])
+    for channel, (each, own) in enumerate(zip(foretold, np.broadcast_to(scatter, 6), strict=True)):
+        without[3 * channel : 3 * channel + 3, channel] = each + own * np.array([-1.0, 1.0, 0.0])
     return SimpleNamespace(
         foretold=np.array(foretold), foretold_without=without, foretold_error=jackknife_error(without)
     )
@@ -57,8 +57,16 @@ def test_what_is_sure_of_all_torques_is_believed_of_each():
     found = shares(0.0, 0.1, 0.2, 0.0, 0.4, 0.4, scatter=0.1)
     assert not (found.foretold + 2 * found.foretold_error < 1 / 3)[2]
     assert _gusty(found, np.full(6, 9.0), 1 / 3).tolist() == [True, True, True, True, False, False]
-    # The more of what is left lies where it is foretold, the less is believed of the others.
+    # A channel that shows no more than its sensors speaks for no other.
     assert not _gusty(found, np.array([1.0, 1.0, 9.0, 1.0, 1.0, 1.0]), 1 / 3)[2]
+
+
+def test_a_large_slow_gust_of_which_little_is_known_is_believed_beside_those_that_are():
+    found = shares(0.0, 0.05, 0.0, 0.0, 0.4, 0.4, scatter=np.array([0.01, 0.2, 0.01, 0.01, 0.01, 0.01]))
+    assert not (found.foretold + 2 * found.foretold_error < 1 / 3)[1]
+    assert _gusty(found, np.array([2.0, 30.0, 2.0, 2.0, 2.0, 2.0]), 1 / 3).tolist() == [True, True, True, True] + 2 * [
+        False
+    ]
 
 
 def test_what_grows_with_the_motion_is_no_air_in_its_own_channel():
