@@ -1,4 +1,4 @@
-"""Whether what is left of a gap is the air: gusts that nothing foretells that was asked, their size and memory."""
+"""Whether what is left of a gap is the air: gusts that nothing asked and nothing before foretells; size and memory."""
 
 from __future__ import annotations
 
@@ -12,19 +12,29 @@ from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.gap.balance.balance_system import System, floors, left_over
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.residual.dependence import rank_dependence, state_signals, without_actuation
+from cpfls_cli.gap.residual.newness import newly_left, ranks
 from cpfls_cli.gap.residual.repeated import without_copies
 from cpfls_cli.gap.settings import COUNTS, ERRORS, RARE, GapSettings
 from cpfls_cli.playback.disturbance import FoundGusts, gusts_in
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.gusts import RANGES
-from cpfls_cli.playback.instruments import Instruments, Repeats, foretold_by_run, held, instruments, late, late_by
-from cpfls_cli.rounding import levelled
+from cpfls_cli.playback.instruments import (
+    Instruments,
+    Repeats,
+    ToldBy,
+    foretold_by_run,
+    held,
+    instruments,
+    late,
+    late_by,
+)
 from cpfls_cli.weak_form.resampling import about_flight_mean
 from cpfls_cli.weak_form.windows import Recording, Windows
 
-_FORETOLD = {"repeats": 1 / 2, "setpoints": 1 / 3, "none": 0.0}
+_FORETOLD = {"repeats": 1 / 2, "setpoints": 1 / 3, "past": 1 / 5}
 """Share of what is left that instruments may foretell, at 95 %, where it is called the air: the smaller part of it.
-Other runs show all that the vehicle does again, and a linear answer to setpoints about two thirds of it."""
+Other runs show all that the vehicle does again, a linear answer to setpoints about two thirds of it, and what was
+before two fifths of what of it is new."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +118,8 @@ def air(
     """Find gusts in what a hypothesis leaves of flights.
 
     What the vehicle does goes with what was asked of it, and comes again where that does; a gust does neither. Without
-    instruments nothing tells them apart: a rotor answers every torque, and the noise of its gyroscope too.
+    either, what is new of a gust goes with nothing that was before, nor does its size; what is new of an effect goes
+    with the motion that it comes from.
 
     Parameters
     ----------
@@ -129,19 +140,28 @@ def air(
         momentum, direct = left[run.flight].momentum, left[run.flight].direct
         assert momentum is not None, "a balance has both"
         sides.append(np.stack([momentum[run.part], -direct[run.part]], axis=1))
-    found, bound = gusts_in(sides, given, given.kind), gusts_in(sides, given, "none")
+    told_by: ToldBy = "past" if given.kind == "none" else given.kind
+    found, bound = gusts_in(sides, given, told_by), gusts_in(sides, given, "none")
     if found is None or bound is None:
         return None
+    steady = np.ones(6, dtype=bool)
+    if told_by == "past":
+        newly = newly_left(hypothesis, linear, found.noise, settings)
+        foretold, without = newly.shares
+        found = replace(found, foretold=foretold, foretold_without=without)
+        steady = ~newly.grows(settings.shifts, rng)
     known = np.all([flight.known for flight in hypothesis.flights], axis=0)
     residual = hypothesis.left(linear)
     sensors = floors(replace(hypothesis, flights=tuple(in_air(hypothesis.flights, np.zeros(6)))), linear)
     moved = np.mean(about_flight_mean(residual, hypothesis.flight_index) ** 2, axis=0) / sensors**2
-    told = known & np.isfinite(found.size) & _gusty(found, np.where(known, moved, 0.0), _FORETOLD[given.kind])
-    if given.kind == "setpoints" and told.any():
+    told = known & np.isfinite(found.size) & _gusty(found, np.where(known, moved, 0.0), _FORETOLD[told_by])
+    if told_by != "repeats" and told.any():
+        like = steady if told_by == "past" else _like_air(hypothesis, residual, block, given, settings, rng)
+        # Air turns a vehicle about every axis and pushes it; nothing else shows it where nothing was asked.
+        blown = told & like if told_by == "past" else np.isfinite(found.size)
         turned, pushed = np.split(residual.any(axis=0), 2)
-        turning, pushing = np.split(np.isfinite(found.size), 2)
-        blows = turning[turned].all() and (pushing.any() or not pushed.any())
-        told &= bool(blows) & _like_air(hypothesis, residual, block, given, settings, rng)
+        turning, pushing = np.split(blown, 2)
+        told &= like & bool(turning[turned].all() and (pushing.any() or not pushed.any()))
     # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
     sized = told | (given.kind == "repeats")
     parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in RANGES}
@@ -242,13 +262,7 @@ def _growing(
     Winkler et al. 2014, permutation inference with the largest statistic.
     """
     rows = [about_flight_mean(values, flight_index) ** 2 for values in (residual, asked)]
-    sizes, moves = (_ranks(np.array([each[block == own].mean(axis=0) for own in np.unique(block)])) for each in rows)
+    sizes, moves = (ranks(np.array([each[block == own].mean(axis=0) for own in np.unique(block)])) for each in rows)
     alike = (moves.T @ sizes).max(axis=0, initial=0.0)
     chance = np.array([(moves.T @ rng.permutation(sizes)).max(initial=0.0) for _ in range(shifts)])
     return np.asarray((chance[:, None] >= alike).sum(axis=0) <= max(RARE * (1 + shifts) - 1, 0))
-
-
-def _ranks(values: Array) -> Array:
-    """Rank the rows of each column, equal ones alike, doubled and about their mean, so that products are exact."""
-    ranks = [np.unique(levelled(column), return_inverse=True)[1] for column in values.T]
-    return np.array([2.0 * each - each.max(initial=0) for each in ranks]).T
