@@ -36,7 +36,7 @@ from cpfls_cli.weak_form.windows import Recording, Windows
 _FORETOLD = {"repeats": 1 / 2, "setpoints": 1 / 3, "past": 1 / 5}
 """Share of what is left that instruments may foretell, at 95 %, where it is called the air: the smaller part of it.
 Other runs show all that the vehicle does again, a linear answer to setpoints about two thirds of it, and what was
-before two fifths of what of it is new."""
+before a third of what of it is new."""
 
 _WITNESSES: dict[Told, tuple[ToldBy, ...]] = {
     "repeats": ("repeats",),
