@@ -141,7 +141,7 @@ def air(
     Returns
     -------
     Air or None
-        None for flights that are too short or of several rates.
+        None for flights that are too short or of several rates, and for too few of them that instruments know.
     """
     residual, known = hypothesis.left(linear), np.all([flight.known for flight in hypothesis.flights], axis=0)
     sensors = floors(replace(hypothesis, flights=tuple(in_air(hypothesis.flights, np.zeros(6)))), linear)
@@ -152,13 +152,18 @@ def air(
         return None
     found, told, refuted = bound, np.zeros(6, dtype=bool), np.zeros(6, dtype=bool)
     for told_by in _WITNESSES[given.kind]:
-        own, like = left.told_by(told_by, rng)
+        own = gusts_in(left.sides, given, told_by)
+        if own is None:
+            continue
+        own, like = left.told_by(own, rng)
         like &= known & ~refuted
         refuted = own.foretold - ERRORS * own.foretold_error > _FORETOLD[told_by]
         if found is bound or like.sum() > told.sum():
             found, told = own, like
         if told[known].all():
             break
+    if found is bound:
+        return None
     # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
     sized = told | (given.kind == "repeats")
     parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in RANGES}
@@ -197,11 +202,9 @@ class _Left:
             sides.append(np.stack([momentum[run.part], -direct[run.part]], axis=1))
         return sides
 
-    def told_by(self, told_by: ToldBy, rng: np.random.Generator) -> tuple[FoundGusts, BoolArray]:
-        """Find gusts by one kind of instruments, and mark the channels of which they tell that this is all."""
-        found = gusts_in(self.sides, self.given, told_by)
-        assert found is not None, "these flights are long enough, and of one rate"
-        steady = np.ones(6, dtype=bool)
+    def told_by(self, found: FoundGusts, rng: np.random.Generator) -> tuple[FoundGusts, BoolArray]:
+        """Mark the channels of which the instruments that found gusts tell that this is all, with what is foretold."""
+        told_by, steady = found.told_by, np.ones(6, dtype=bool)
         if told_by == "past":
             newly = newly_left(self.hypothesis, self.linear, found.noise, self.settings)
             foretold, without = newly.shares

@@ -130,6 +130,12 @@ def test_gusts_about_axes_are_told_of_flights_without_velocity(flown, kind, setp
     assert np.isnan(found.found.size[3:]).all()
 
 
+def test_gusts_of_flights_of_which_instruments_know_too_little_are_not_sought(flown, monkeypatch):
+    monkeypatch.setattr("cpfls_cli.gap.residual.air._WITNESSES", {"setpoints": ("repeats",)})
+    recordings = recorded(flown["asked"], TRUE.vehicle, setpoints=True)
+    assert diagnosed(recordings).air is None
+
+
 def test_what_does_not_come_again_is_noise_beside_what_does(flown):
     # Half of the inertia is missed about x, which comes again; nothing is about the other axes.
     vehicle = replace(TRUE.vehicle, inertia_kg_m2=(2 * INERTIA[0], *INERTIA[1:]))
