@@ -39,11 +39,12 @@ Other runs show all that the vehicle does again, a linear answer to setpoints ab
 before a third of what of it is new."""
 
 _WITNESSES: dict[Told, tuple[ToldBy, ...]] = {
-    "repeats": ("repeats",),
+    "repeats": ("repeats", "past"),
     "setpoints": ("setpoints", "past"),
     "none": ("past",),
 }
-"""What tells gusts where that is known of flights; a later one tells what the one before neither tells nor refutes."""
+"""What tells gusts where that is known of flights: the next where one knows too little of them, or, of setpoints, what
+they neither tell nor refute."""
 
 
 @dataclass(frozen=True)
@@ -160,12 +161,12 @@ def air(
         refuted = own.foretold - ERRORS * own.foretold_error > _FORETOLD[told_by]
         if found is bound or like.sum() > told.sum():
             found, told = own, like
-        if told[known].all():
+        if told_by == "repeats" or told[known].all():
             break
     if found is bound:
         return None
     # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
-    sized = told | (given.kind == "repeats")
+    sized = told | (found.told_by == "repeats")
     parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in RANGES}
     parts = {name: np.where(known, values, np.nan) for name, values in parts.items()}
     return Air(replace(found, **parts), told, known & np.isfinite(found.size) & sized)

@@ -130,9 +130,14 @@ def test_gusts_about_axes_are_told_of_flights_without_velocity(flown, kind, setp
     assert np.isnan(found.found.size[3:]).all()
 
 
-def test_gusts_of_flights_of_which_instruments_know_too_little_are_not_sought(flown, monkeypatch):
-    monkeypatch.setattr("cpfls_cli.gap.residual.air._WITNESSES", {"setpoints": ("repeats",)})
-    recordings = recorded(flown["asked"], TRUE.vehicle, setpoints=True)
+def test_where_instruments_know_too_little_what_was_before_tells(flown, monkeypatch):
+    recordings = recorded(flown["asked"], TRUE.vehicle, setpoints=False)
+    # No path comes again.
+    monkeypatch.setattr("cpfls_cli.gap.residual.air._WITNESSES", {"none": ("repeats", "past")})
+    found = in_what_is_left(recordings)
+    assert found.found.told_by == "past"
+    assert found.told.all()
+    monkeypatch.setattr("cpfls_cli.gap.residual.air._WITNESSES", {"none": ("repeats",)})
     assert diagnosed(recordings).air is None
 
 
