@@ -210,7 +210,7 @@ class _Left:
             newly = newly_left(self.hypothesis, self.linear, found.noise, self.settings)
             foretold, without = newly.shares
             found = replace(found, foretold=foretold, foretold_without=without)
-            steady = ~newly.grows(self.settings.shifts, rng)
+            steady = ~newly.grows(self.settings.shifts)
         told = np.isfinite(found.size) & _gusty(found, self.moved, _FORETOLD[told_by])
         if told_by == "repeats" or not told.any():
             return found, told

@@ -56,7 +56,7 @@ class NewlyLeft:
         without = (told.sum(axis=0) - told) / (whole - size)
         return told.sum(axis=0) / whole, without
 
-    def grows(self, shifts: int, rng: np.random.Generator) -> BoolArray:
+    def grows(self, shifts: int) -> BoolArray:
         """Mark channels whose new part is surely the larger, or the smaller, the more a signal moved before.
 
         By ranks; what chance has to offer, over all channels and signals, have blocks whose signs are drawn.
@@ -69,7 +69,8 @@ class NewlyLeft:
         products = _by_block(rows.reshape(len(rows), -1), self.block)
         scale = np.sqrt(np.maximum((products**2).sum(axis=0), 1.0))
         alike = np.abs(products.sum(axis=0) / scale).reshape(rows.shape[1:]).max(axis=0)
-        signs = rng.choice([-1.0, 1.0], size=(shifts, len(products)))
+        # The same draws each time that it is asked of flights, beside other names too.
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(shifts, len(products)))
         chance = np.abs(signs @ products / scale).max(axis=1)
         return np.asarray((chance[:, None] >= alike).sum(axis=0) <= max(RARE * (1 + shifts) - 1, 0))
 
