@@ -66,7 +66,8 @@ def gust_words(axes: list[GustAxis], told_by: str) -> str:
     if open_:
         said.append(f"Gusts {joined(open_)} are not known, because what they move is not.")
     if known:
-        said.append("Standard deviations of what does not come again; `cpfls simulate --model --gusts` plays them.")
+        what = "what nothing before foretells" if told_by == "past" else "what does not come again"
+        said.append(f"Standard deviations of {what}; `cpfls simulate --model --gusts` plays them.")
     return " ".join(said)
 
 

@@ -27,7 +27,8 @@ from cpfls_cli.playback.instruments import Instruments, ToldBy
 from cpfls_cli.playback.lack import AxisLack, Lack, Rest, lack_of
 from cpfls_cli.playback.loop import wrench_during
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.weak_form.windows import Windows, windows
+from cpfls_cli.playback.newness import MOST_FORETOLD, PER_WINDOW, newly_left
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
 
 _Complex = npt.NDArray[np.complex128]
 
@@ -50,6 +51,8 @@ _KNOWN, _SEEN = 3.0, 0.1
 """Ratio of the ends of an interval up to which a size is known, and the least share of what is left that it has."""
 _LAG_S, _LAGS, _FOLDS, _RIDGE = 0.1, 5, 5, 1e-6
 """What was asked for is answered within half a second; parts that are predicted by the others."""
+_NEW_S, _DRAWS, _RARE = 0.4, 199, 0.01
+"""Windows in which what was before is asked, and how surely what is new may grow with it."""
 _FAR, _NOISE, _AT_END = 12.0, 3.0, 1e-3
 """Logarithms: of factors by which powers may be off where they begin, noise upwards, and what is near a bound."""
 
@@ -202,9 +205,13 @@ def find_gusts(
         name: [_wrench_of_part(model, weights, flight)[:, :rows] for flight in given.flown]
         for name, weights in model.parts.items()
     }
-    found = gusts_in(sides, given, given.kind if told else "none", parts)
+    by_past = given.kind == "none" and told
+    found = gusts_in(sides, given, "past" if by_past else given.kind if told else "none", parts)
     if found is None:
         return None
+    bound = gusts_in(sides, given, "none") if by_past else None
+    if bound is not None:
+        found = _by_past(found, bound, given, sides)
     bodies = [f"inertia.{name}" for name in INERTIA_PARAMETERS[:3]] + ["thrust_factor"] * 3
     open_ = [not determined.get(name, True) for name in bodies[:rows]]
     for name in (*RANGES, "white"):
@@ -213,6 +220,35 @@ def find_gusts(
         for columns in (found.lack.share, found.lack.rest, found.lack.memory):
             columns[open_] = np.nan
     return found
+
+
+def _by_past(found: FoundGusts, bound: FoundGusts, given: Instruments, sides: Sequence[Array]) -> FoundGusts:
+    """Give gusts where what is new in what is left was not foretold by what was before, nor its size; else the bound.
+
+    Air turns a vehicle about every axis, and pushes it where flights know their velocity.
+    """
+    period = given.flown[0].motion.period
+    seen = windows(period, max(_NEW_S, FEWEST_SAMPLES * period), 1 - 1 / PER_WINDOW)
+    left, told = [], []
+    for flight, own in zip(given.flown, sides, strict=True):
+        motion = flight.motion
+        moves = [motion.rate, motion.rotation[:, 2], *([motion.velocity] if flight.translates else [])]
+        signals = np.hstack([flight.speed**2, *moves])
+        for part in (part for part in flight.stretches if seen.count(part.stop - part.start)):
+            left.append(seen.derivative(own[part, 0]) - seen.average(own[part, 1]))
+            told.append(seen.average(signals[part]))
+    if not left:
+        return bound
+    moving = np.arange(told[0].shape[1]) >= given.flown[0].speed.shape[1]
+    newly = newly_left(seen, left, told, moving, found.noise)
+    foretold, without = newly.shares
+    foretells_little = foretold + half_width(jackknife_error(without), len(without)) < MOST_FORETOLD
+    gusty = np.isfinite(found.size) & foretells_little & ~newly.grows(_DRAWS, _RARE)
+    if not (gusty[:3].all() and (gusty[3:].any() or len(gusty) == 3)):
+        return bound
+    ends = {name: np.where(gusty, getattr(found, name), getattr(bound, name)) for name in RANGES}
+    white = None if found.white is None else np.where(gusty, found.white, np.nan)
+    return replace(replace(found, **ends), foretold=foretold, foretold_without=without, white=white)
 
 
 def _wrench_of_part(model: VehicleModel, weights: Array, flight: PlaybackFlight) -> Array:
@@ -269,7 +305,7 @@ def gusts_in(
     columns = np.array([axis.bound() if told_by == "none" else axis.found(shared) for axis in axes])
     white = np.array([np.nan if told_by == "none" else axis.white for axis in axes])
     lack = None
-    if parts and told_by != "none":
+    if parts and told_by in ("repeats", "setpoints"):
         rows = zip(axes, powers.left.swapaxes(0, 1), _foretold_parts(parts, given, band, told_by), strict=True)
         lack = Lack.of(tuple(parts), [axis.lack(power, own) for axis, power, own in rows])
     foretold, without = _share_foretold(powers)

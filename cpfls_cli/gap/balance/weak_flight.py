@@ -19,13 +19,11 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.noise_floor import channel_cut_offs, noise_floor
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Recording, Windows
+from cpfls_cli.playback.newness import PER_WINDOW
+from cpfls_cli.weak_form.windows import Recording, Windows
 
 TURNING = 4.0
 """Inertial torque in floors from which on noise shrinks an inertia by less than a sixteenth."""
-
-PER_WINDOW = FEWEST_SAMPLES
-"""Windows that begin within one where what they see is followed in time: as many as samples follow its curve."""
 
 CHANNELS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
 """Rows of the balance in each window, body axes, N m and N."""

@@ -15,15 +15,15 @@ from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.refine import fit_within_bounds, shape_columns
-from cpfls_cli.gap.balance.weak_flight import PER_WINDOW, dense
+from cpfls_cli.gap.balance.weak_flight import dense
 from cpfls_cli.gap.naming.confirmed import nothing_by_size
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of
 from cpfls_cli.gap.naming.scoring import known_before
 from cpfls_cli.gap.residual.air import foretold_rows
-from cpfls_cli.gap.residual.newness import news
 from cpfls_cli.gap.settings import CHANCE, GapSettings
 from cpfls_cli.playback.constants import ENOUGH_BLOCKS, STRONG
 from cpfls_cli.playback.instruments import Instruments
+from cpfls_cli.playback.newness import PER_WINDOW, news
 
 
 class _Run(NamedTuple):

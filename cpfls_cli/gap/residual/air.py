@@ -10,10 +10,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import jackknife_error
-from cpfls_cli.gap.balance.balance_system import System, floors, left_over
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
+from cpfls_cli.gap.balance.balance_system import System, floors, left_over, system
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight, dense
 from cpfls_cli.gap.residual.dependence import rank_dependence, state_signals, without_actuation
-from cpfls_cli.gap.residual.newness import newly_left, ranks
 from cpfls_cli.gap.residual.repeated import without_copies
 from cpfls_cli.gap.settings import COUNTS, ERRORS, RARE, GapSettings
 from cpfls_cli.playback.disturbance import FoundGusts, gusts_in
@@ -30,13 +29,13 @@ from cpfls_cli.playback.instruments import (
     late,
     late_by,
 )
+from cpfls_cli.playback.newness import MOST_FORETOLD, NewlyLeft, newly_left, ranks
 from cpfls_cli.weak_form.resampling import about_flight_mean
 from cpfls_cli.weak_form.windows import Recording, Windows
 
-_FORETOLD = {"repeats": 1 / 2, "setpoints": 1 / 3, "past": 1 / 5}
+_FORETOLD = {"repeats": 1 / 2, "setpoints": 1 / 3, "past": MOST_FORETOLD}
 """Share of what is left that instruments may foretell, at 95 %, where it is called the air: the smaller part of it.
-Other runs show all that the vehicle does again, a linear answer to setpoints about two thirds of it, and what was
-before a third of what of it is new."""
+Other runs show all that the vehicle does again, a linear answer to setpoints about two thirds of it."""
 
 _WITNESSES: dict[Told, tuple[ToldBy, ...]] = {
     "repeats": ("repeats", "past"),
@@ -207,10 +206,10 @@ class _Left:
         """Mark the channels of which the instruments that found gusts tell that this is all, with what is foretold."""
         told_by, steady = found.told_by, np.ones(6, dtype=bool)
         if told_by == "past":
-            newly = newly_left(self.hypothesis, self.linear, found.noise, self.settings)
+            newly = self._newly(found.noise)
             foretold, without = newly.shares
             found = replace(found, foretold=foretold, foretold_without=without)
-            steady = ~newly.grows(self.settings.shifts)
+            steady = ~newly.grows(self.settings.shifts, RARE)
         told = np.isfinite(found.size) & _gusty(found, self.moved, _FORETOLD[told_by])
         if told_by == "repeats" or not told.any():
             return found, told
@@ -220,6 +219,19 @@ class _Left:
         turned, pushed = np.split(self.residual.any(axis=0), 2)
         turning, pushing = np.split(blown, 2)
         return found, told & like & bool(turning[turned].all() and (pushing.any() or not pushed.any()))
+
+    def _newly(self, noise: Array) -> NewlyLeft:
+        """Take what comes newly, and what motion and rotors told of it before."""
+        windows = dense(self.hypothesis.flights[0].windows)
+        flights = [replace(flight, windows=windows, seen={}) for flight in self.hypothesis.flights]
+        there = system(flights, self.hypothesis.chosen)
+        states = [state_signals(*pair) for pair in zip(there.flights, there.signals, strict=True)]
+        names = [name for name in states[0] if all(name in state for state in states)]
+        told = [np.stack([state[name] for name in names], axis=1) for state in states]
+        residual = there.left(self.linear)
+        left = [residual[there.flight_index == number] for number in range(len(states))]
+        moving = np.isin(names, list(without_actuation(states[0])))
+        return newly_left(windows, left, told, moving, noise, self.settings.block_s)
 
     def _like_air(self, rng: np.random.Generator) -> BoolArray:
         """Mark channels of which the air is believed where setpoints do not foretell them.

@@ -108,19 +108,32 @@ def test_in_still_air_torques_of_gusts_have_a_bound(flights):
     assert found.gusts is None or not found.gusts.size[:3].any()
 
 
-def test_without_instruments_there_is_a_bound_alone(flights):
-    """What the model lacks of the motion counts as gust then."""
-    known = flights["45 g", "setpoints"]
-    alone = replace(known, setpoints=tuple(None for _ in known.runs), names=())
-    model = VehicleModel(vehicle=SMALL.vehicle)
-    found, told = find_gusts(model, alone), find_gusts(model, known)
-    # Nor are they asked where they did not tell the body.
-    np.testing.assert_array_equal(find_gusts(model, known, told=False).high, found.high)
-    assert found.told_by == "none"
-    assert found.gusts is None
+def alone(known):
+    """Forget what was asked, and that paths come again."""
+    nothing = Repeats(tuple({} for _ in known.runs), {})
+    return replace(known, setpoints=tuple(None for _ in known.runs), names=(), repeats=nothing)
+
+
+def test_without_instruments_what_was_before_tells_them(flights):
+    """What the model lacks of the motion goes on as it was, and is no gust."""
+    known, model = flights["45 g", "setpoints"], VehicleModel(vehicle=SMALL.vehicle)
+    found, told = find_gusts(model, alone(known)), find_gusts(model, known)
+    assert found.told_by == "past"
+    assert np.abs(np.log(found.size[:3] / bodies(SMALL)[:3] / GUSTS)).max() < 0.25
+    assert np.abs(np.log(found.memory[:3] / MEMORY_S)).max() < 0.5
     assert found.lack is None
     assert told.lack is not None
-    assert (found.high > told.size).all()
+    # Nor are they asked where nothing told the body.
+    bound = find_gusts(model, known, told=False)
+    assert bound.told_by == "none"
+    assert bound.gusts is None
+    assert (bound.high[:3] > found.size[:3]).all()
+
+
+def test_without_instruments_nothing_is_told_in_still_air(flights):
+    found = find_gusts(VehicleModel(vehicle=SMALL.vehicle), alone(flights["still", "setpoints"]))
+    assert found.told_by == "none"
+    assert found.gusts is None
 
 
 def test_beside_a_body_that_is_not_known_nothing_is(flights):
@@ -156,9 +169,9 @@ def test_a_vehicle_simulated_in_its_own_gusts_shows_the_same(flights):
     assert (np.abs(played - 0.5 * (low + high)) < 1.7 * 0.5 * (high - low)).all()
 
 
-@pytest.mark.parametrize("runs", ["repeats", "alone"])
-def test_a_vehicle_holds_gusts_where_runs_tell_its_body(flights, runs):
-    """Two runs of two paths tell the body by what was before, and of gusts a bound. All but the inertia is known."""
+@pytest.mark.parametrize(("runs", "told_by"), [("repeats", "repeats"), ("alone", "past")])
+def test_a_vehicle_holds_the_gusts_of_its_flights(flights, runs, told_by):
+    """Two runs of two paths tell the body by what was before, and the gusts too. All but the inertia is known."""
     flown = [replace(flight, setpoints={}) for flight in flights["1.5 kg", "repeats"].flown]
     vehicle = replace(LARGE.vehicle, unknown=("inertia",))
     settings = PlaybackSettings(
@@ -167,12 +180,7 @@ def test_a_vehicle_holds_gusts_where_runs_tell_its_body(flights, runs):
     known = flown if runs == "repeats" else [flown[0], flown[RUNS]]
     found = find_vehicle(vehicle, known, settings, np.random.default_rng(1), lambda *_: None)
     assert found.loop.shows_loop
-    if runs == "alone":
-        assert found.constants.told_by == "past"
-        assert np.diag(found.model.body.inertia)[:2] == pytest.approx(LARGE.inertia[:2], rel=0.15)
-        assert np.isnan(found.gusts.size).all()
-        assert (found.gusts.high[:2] / LARGE.inertia[:2] > GUSTS[:2]).all()
-        assert found.model.gusts is None
-    else:
-        assert found.gusts.told_by == "repeats"
-        assert found.model.gusts.size[:2] / LARGE.inertia[:2] == pytest.approx(GUSTS[:2], rel=0.25)
+    assert found.constants.told_by == told_by
+    assert np.diag(found.model.body.inertia)[:2] == pytest.approx(LARGE.inertia[:2], rel=0.15)
+    assert found.gusts.told_by == told_by
+    assert found.model.gusts.size[:2] / LARGE.inertia[:2] == pytest.approx(GUSTS[:2], rel=0.25)

@@ -8,11 +8,10 @@ from scipy.signal import lfilter
 from scipy.stats import ttest_1samp
 
 from cpfls_cli.blocks import jackknife_error
-from cpfls_cli.gap.balance.weak_flight import PER_WINDOW
 from cpfls_cli.gap.naming.by_instruments import _chance
 from cpfls_cli.gap.residual.air import _growing, _gusty
-from cpfls_cli.gap.residual.newness import news
 from cpfls_cli.playback.instruments import held as stays
+from cpfls_cli.playback.newness import PER_WINDOW, news
 
 BLOCKS, WINDOWS = 20, 12
 OWN, OTHER = np.array([True, False]), np.array([False, True])

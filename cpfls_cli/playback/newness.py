@@ -7,18 +7,21 @@ fierce. What is new of an effect comes from the motion, which goes on as it was,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.gap.balance.balance_system import System, system
-from cpfls_cli.gap.balance.weak_flight import PER_WINDOW, dense
-from cpfls_cli.gap.residual.dependence import state_signals, without_actuation
-from cpfls_cli.gap.settings import RARE, GapSettings
 from cpfls_cli.playback.past import LATER, News, what_is_new
 from cpfls_cli.rounding import levelled
-from cpfls_cli.weak_form.resampling import blocks_of
+from cpfls_cli.weak_form.resampling import BLOCK_S, blocks_of
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows
+
+PER_WINDOW = FEWEST_SAMPLES
+"""Windows that begin within one where what they see is followed in time: as many as samples follow its curve."""
+
+MOST_FORETOLD = 1 / 5
+"""Share of what is new that may be foretold where it is called the air, at 95 %: of an effect a third is."""
 
 
 def news(rows: Sequence[Array], left: Sequence[Array], told: Sequence[Array], *, many: bool = False) -> News:
@@ -33,9 +36,9 @@ class NewlyLeft:
 
     Attributes
     ----------
-    new, foretold : array, shape (window, 6), N m and N
+    new, foretold : array, shape (window, axis), N m and N
         And what was foretold of it.
-    noise : array, shape (6,)
+    noise : array, shape (axis,)
         Variance of the noise in it, which nothing foretells either.
     moved : array, shape (window, signal)
         Signals of the motion in windows that ended as it began, and their squares about the mean.
@@ -50,16 +53,16 @@ class NewlyLeft:
 
     @property
     def shares(self) -> tuple[Array, Array]:
-        """Shares that were foretold, shape (6,), and without each block, shape (block, 6); NaN where all is noise."""
+        """Shares that were foretold, shape (axis,), and without each block, (block, axis); NaN where all is noise."""
         told, size = _by_block(self.new * self.foretold, self.block), _by_block(self.new**2 - self.noise, self.block)
         whole = np.where(size.sum(axis=0) > 0, size.sum(axis=0), np.nan)
         without = (told.sum(axis=0) - told) / (whole - size)
         return told.sum(axis=0) / whole, without
 
-    def grows(self, shifts: int) -> BoolArray:
-        """Mark channels whose new part is surely the larger, or the smaller, the more a signal moved before.
+    def grows(self, shifts: int, rare: float) -> BoolArray:
+        """Mark axes whose new part is surely the larger, or the smaller, the more a signal moved before.
 
-        By ranks; what chance has to offer, over all channels and signals, have blocks whose signs are drawn.
+        By ranks; what chance has to offer, over all axes and signals, have blocks whose signs are drawn.
 
         References
         ----------
@@ -72,33 +75,38 @@ class NewlyLeft:
         # The same draws each time that it is asked of flights, beside other names too.
         signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(shifts, len(products)))
         chance = np.abs(signs @ products / scale).max(axis=1)
-        return np.asarray((chance[:, None] >= alike).sum(axis=0) <= max(RARE * (1 + shifts) - 1, 0))
+        return np.asarray((chance[:, None] >= alike).sum(axis=0) <= max(rare * (1 + shifts) - 1, 0))
 
 
-def newly_left(hypothesis: System, linear: Array, noise: Array, settings: GapSettings) -> NewlyLeft:
-    """Take what comes newly of what a hypothesis leaves, and what motion and rotors told of it before.
+def newly_left(
+    windows: Windows,
+    left: Sequence[Array],
+    told: Sequence[Array],
+    moving: BoolArray,
+    noise: Array,
+    block_s: float = BLOCK_S,
+) -> NewlyLeft:
+    """Take what comes newly of what is left along runs, and what was told of it before.
 
     Parameters
     ----------
-    linear : array, shape (column,)
-        Coefficients of its base.
-    noise : array, shape (6, 2)
+    windows : Windows
+        A `PER_WINDOW`-th of one apart.
+    left : sequence of array, shape (window, axis), N m and N
+        Of each run.
+    told : sequence of array, shape (window, signal)
+        Of motion and rotors.
+    moving : array of bool, shape (signal,)
+        Those of the motion.
+    noise : array, shape (axis, 2)
         Variances of white noise in what is left, and in what a derivative is taken of, as of samples.
     """
-    windows = dense(hypothesis.flights[0].windows)
-    there = system([replace(flight, windows=windows, seen={}) for flight in hypothesis.flights], hypothesis.chosen)
-    states = [state_signals(*pair) for pair in zip(there.flights, there.signals, strict=True)]
-    names = [name for name in states[0] if all(name in state for state in states)]
-    told = [np.stack([state[name] for name in names], axis=1) for state in states]
-    residual = there.left(linear)
-    left = [residual[there.flight_index == number] for number in range(len(states))]
     rows, foretold, lasts = news([own[..., None] for own in left], left, told, many=True)
     last = [np.arange(len(own) - len(new), len(own)) for own, new in zip(left, rows, strict=True)]
-    variance, ahead = np.zeros(6), round(LATER * PER_WINDOW)
+    variance, ahead = np.zeros(len(noise)), round(LATER * PER_WINDOW)
     for own, kernel in zip(noise.T, (windows.weight, windows.slope), strict=True):
         later, now = (np.pad(kernel, pad) for pad in ((ahead * windows.hop, 0), (0, ahead * windows.hop)))
         variance += own * ((later - lasts * now) ** 2).sum(axis=1)
-    moving = np.isin(names, list(without_actuation(states[0])))
     mean = np.concatenate(told)[:, moving].mean(axis=0)
     moved = np.concatenate([own[at - ahead - PER_WINDOW][:, moving] for own, at in zip(told, last, strict=True)])
     hop_s = float(windows.hop * windows.period)
@@ -108,7 +116,7 @@ def newly_left(hypothesis: System, linear: Array, noise: Array, settings: GapSet
         np.concatenate(foretold)[..., 0],
         variance,
         np.hstack([moved, (moved - mean) ** 2]),
-        blocks_of(index, np.asarray(np.concatenate(last) * hop_s), settings.block_s),
+        blocks_of(index, np.asarray(np.concatenate(last) * hop_s), block_s),
     )
 
 
