@@ -49,9 +49,9 @@ def cross(first: Array, second: Array) -> Array:
     array, shape (..., 3)
     """
     if first.size == second.size == 3:
-        (a, b, c), (u, v, w) = first.ravel().tolist(), second.ravel().tolist()
-        product = np.array([b * w - c * v, c * u - a * w, a * v - b * u])
-        return product if first.ndim == second.ndim == 1 else product.reshape(max(first.shape, second.shape, key=len))
+        (x, y, z), (p, q, r) = first.ravel().tolist(), second.ravel().tolist()
+        one = np.array([y * r - z * q, z * p - x * r, x * q - y * p])
+        return one if first.ndim == second.ndim == 1 else one.reshape(max(first.shape, second.shape, key=len))
     (a, b, c), (u, v, w) = ((each[..., 0], each[..., 1], each[..., 2]) for each in (first, second))
     along = b * w - c * v
     product = np.empty((*along.shape, 3))

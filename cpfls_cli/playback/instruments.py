@@ -169,7 +169,7 @@ def late(values: Array, samples: int) -> Array:
     return np.concatenate([np.repeat(values[:1], samples, axis=0), values[: len(values) - samples]])
 
 
-def foretold(asked: Array, values: Array) -> Array:
+class Foretelling:
     """Predict values from what was asked for, each part as the other parts tell.
 
     What a part itself would tell of its gusts is thereby left out, however many numbers predict.
@@ -177,21 +177,30 @@ def foretold(asked: Array, values: Array) -> Array:
     Parameters
     ----------
     asked : array, shape (time, column)
-    values : array, shape (time, ...)
-
-    Returns
-    -------
-    array, shape (time, ...)
     """
-    size = asked.std(axis=0)
-    asked = np.hstack([np.ones((len(asked), 1)), asked / np.where(size > 0, size, 1.0)])
-    flat, parts = values.reshape(len(values), -1), contiguous(len(values), FOLDS)
-    found = np.empty_like(flat)
-    for fold in range(FOLDS):
-        rest, aside = asked[parts != fold], parts == fold
-        square = rest.T @ rest + _RIDGE * len(rest) * np.eye(asked.shape[1])
-        found[aside] = asked[aside] @ np.linalg.solve(square, rest.T @ flat[parts != fold])
-    return found.reshape(values.shape)
+
+    def __init__(self, asked: Array) -> None:
+        size = asked.std(axis=0)
+        self._asked = np.hstack([np.ones((len(asked), 1)), asked / np.where(size > 0, size, 1.0)])
+        self._parts = contiguous(len(asked), FOLDS)
+        self._squares: dict[int, Array] = {}
+
+    def __call__(self, values: Array) -> Array:
+        """Predict values, shape (time, ...)."""
+        flat = values.reshape(len(values), -1)
+        found = np.empty_like(flat)
+        for fold in range(FOLDS):
+            aside = self._parts == fold
+            rest = self._asked[~aside]
+            if fold not in self._squares:
+                self._squares[fold] = rest.T @ rest + _RIDGE * len(rest) * np.eye(rest.shape[1])
+            found[aside] = self._asked[aside] @ np.linalg.solve(self._squares[fold], rest.T @ flat[~aside])
+        return found.reshape(values.shape)
+
+
+def foretold(asked: Array, values: Array) -> Array:
+    """Predict values, shape (time, ...), from what was asked for, shape (time, column); see `Foretelling`."""
+    return Foretelling(asked)(values)
 
 
 def foretold_by_run(asked: Mapping[int, Array], values: Sequence[Array] | Mapping[int, Array]) -> dict[int, Array]:

@@ -23,7 +23,7 @@ from cpfls_cli.gap.residual.air import foretold_rows
 from cpfls_cli.gap.settings import CHANCE, GapSettings
 from cpfls_cli.playback.constants import ENOUGH_BLOCKS, STRONG
 from cpfls_cli.playback.instruments import Instruments
-from cpfls_cli.playback.past import what_is_new
+from cpfls_cli.playback.past import Past, what_is_new
 
 
 class _Run(NamedTuple):
@@ -332,7 +332,7 @@ def _after(rows: Sequence[Array]) -> tuple[list[Array], list[Array]]:
     """
     ahead = PER_WINDOW // 4
     told, left = [own[..., :-1] for own in rows], [own[..., -1] for own in rows]
-    return what_is_new(rows, left, told, ahead, range(PER_WINDOW, 2 * PER_WINDOW, ahead))
+    return what_is_new(rows, left, Past.of(told, ahead, range(PER_WINDOW, 2 * PER_WINDOW, ahead)))
 
 
 def _in_other_runs(given: Instruments, rows: Sequence[Array], middles: Sequence[IntArray]) -> Iterator[Array]:
