@@ -35,6 +35,8 @@ A velocity may be what a loop of position asks for: that answers gusts so slowly
 
 Told = Literal["repeats", "setpoints", "none"]
 """What tells gusts and what a model lacks apart."""
+ToldBy = Literal[Told, "past"]
+"""Where nothing moves a vehicle but its loop, what was before may tell."""
 
 FOLDS = 5
 """Parts of the flights that are kept aside in turn."""
@@ -44,6 +46,8 @@ _HELD_M = 1.0
 """How far a vehicle that holds its place may be blown; where the setpoint is left over from before, it flies on."""
 _RIDGE = 1e-6
 """Of predictions, so that setpoints that hardly differ from each other do no harm."""
+OF_MANY = 1e-3
+"""The same where many signals predict that go together, in flights that differ."""
 
 
 class Run(NamedTuple):
@@ -169,7 +173,7 @@ def late(values: Array, samples: int) -> Array:
     return np.concatenate([np.repeat(values[:1], samples, axis=0), values[: len(values) - samples]])
 
 
-class Foretelling:
+def foretold(asked: Array, values: Array, ridge: float = _RIDGE) -> Array:
     """Predict values from what was asked for, each part as the other parts tell.
 
     What a part itself would tell of its gusts is thereby left out, however many numbers predict.
@@ -177,37 +181,32 @@ class Foretelling:
     Parameters
     ----------
     asked : array, shape (time, column)
+    values : array, shape (time, ...)
+    ridge : float
+        Prior precision of the prediction, for columns as large as 1.
+
+    Returns
+    -------
+    array, shape (time, ...)
     """
-
-    def __init__(self, asked: Array) -> None:
-        size = asked.std(axis=0)
-        self._asked = np.hstack([np.ones((len(asked), 1)), asked / np.where(size > 0, size, 1.0)])
-        self._parts = contiguous(len(asked), FOLDS)
-        self._squares: dict[int, Array] = {}
-
-    def __call__(self, values: Array) -> Array:
-        """Predict values, shape (time, ...)."""
-        flat = values.reshape(len(values), -1)
-        found = np.empty_like(flat)
-        for fold in range(FOLDS):
-            aside = self._parts == fold
-            rest = self._asked[~aside]
-            if fold not in self._squares:
-                self._squares[fold] = rest.T @ rest + _RIDGE * len(rest) * np.eye(rest.shape[1])
-            found[aside] = self._asked[aside] @ np.linalg.solve(self._squares[fold], rest.T @ flat[~aside])
-        return found.reshape(values.shape)
+    size = asked.std(axis=0)
+    asked = np.hstack([np.ones((len(asked), 1)), asked / np.where(size > 0, size, 1.0)])
+    flat, parts = values.reshape(len(values), -1), contiguous(len(values), FOLDS)
+    found = np.empty_like(flat)
+    for fold in range(FOLDS):
+        rest, aside = asked[parts != fold], parts == fold
+        square = rest.T @ rest + ridge * len(rest) * np.eye(asked.shape[1])
+        found[aside] = asked[aside] @ np.linalg.solve(square, rest.T @ flat[parts != fold])
+    return found.reshape(values.shape)
 
 
-def foretold(asked: Array, values: Array) -> Array:
-    """Predict values, shape (time, ...), from what was asked for, shape (time, column); see `Foretelling`."""
-    return Foretelling(asked)(values)
-
-
-def foretold_by_run(asked: Mapping[int, Array], values: Sequence[Array] | Mapping[int, Array]) -> dict[int, Array]:
+def foretold_by_run(
+    asked: Mapping[int, Array], values: Sequence[Array] | Mapping[int, Array], ridge: float = _RIDGE
+) -> dict[int, Array]:
     """Predict values of runs by their numbers, all runs together, from what was asked for; see `foretold`."""
     if not asked:
         return {}
-    told = foretold(np.concatenate(list(asked.values())), np.concatenate([values[number] for number in asked]))
+    told = foretold(np.concatenate(list(asked.values())), np.concatenate([values[number] for number in asked]), ridge)
     return dict(zip(asked, np.split(told, np.cumsum([len(own) for own in asked.values()])[:-1]), strict=True))
 
 

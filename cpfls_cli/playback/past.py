@@ -7,9 +7,9 @@ before, nor any loop.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from cpfls_cli.playback.balances import (
     middles_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.instruments import Foretelling
+from cpfls_cli.playback.instruments import OF_MANY, foretold_by_run
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows
 
 _WINDOW_S, _SLOW_S = 0.08, 0.25
@@ -40,57 +40,31 @@ _BEFORE = range(2 * _PER_WINDOW, 4 * _PER_WINDOW, _PER_WINDOW // 2)
 one of them, and logs that were filtered forward and backward what they know of what comes."""
 
 
-@dataclass(frozen=True)
-class Past:
-    """What windows that ended before others tell of these.
+class News(NamedTuple):
+    """What comes newly after windows of runs.
 
     Attributes
     ----------
-    ahead : int
-        By how many windows later is later.
-    before : sequence of int
-        How many windows ago what is known ended, the longest last; the first of them no longer overlap.
-    counts : mapping of int to int
-        Of each run that is long enough, how many windows are foretold.
-    foretelling : Foretelling or None
-        Of all runs together; None where no run is long enough.
+    rows, foretold : list of array, shape (window, axis, column)
+        What is new, and what of that was foretold; of each run the last windows.
+    lasts : array, shape (axis, 1)
+        Share of what is left that lasts until then.
     """
 
-    ahead: int
-    before: Sequence[int]
-    counts: Mapping[int, int]
-    foretelling: Foretelling | None
-
-    @classmethod
-    def of(cls, told: Sequence[Array], ahead: int, before: Sequence[int]) -> Past:
-        """Arrange what is known of windows.
-
-        Parameters
-        ----------
-        told : sequence of array, shape (window, signal) or (window, axis, signal)
-            What is known of each window when it has ended; of each axis by itself, where all are foretold alike.
-        ahead, before
-            As the attributes.
-        """
-        past = [
-            np.concatenate(each, axis=-1)
-            for each in zip(*(_later(told, -lag, ahead, before) for lag in before), strict=True)
-        ]
-        flat = {number: own.reshape(-1, own.shape[-1]) for number, own in enumerate(past) if len(own)}
-        foretelling = Foretelling(np.concatenate(list(flat.values()))) if flat else None
-        return cls(ahead, before, {number: len(own) for number, own in flat.items()}, foretelling)
-
-    def later(self, values: Sequence[Array], by: int) -> list[Array]:
-        """Take the windows that something is known of, or those so many after them."""
-        return _later(values, by, self.ahead, self.before)
+    rows: list[Array]
+    foretold: list[Array]
+    lasts: Array
 
 
-def _later(values: Sequence[Array], by: int, ahead: int, before: Sequence[int]) -> list[Array]:
-    first = before[-1]
-    return [own[first + by :][: max(0, len(own) - first - ahead)] for own in values]
-
-
-def what_is_new(rows: Sequence[Array], left: Sequence[Array], past: Past) -> tuple[list[Array], list[Array]]:
+def what_is_new(
+    rows: Sequence[Array],
+    left: Sequence[Array],
+    told: Sequence[Array],
+    ahead: int,
+    before: Sequence[int],
+    *,
+    many: bool = False,
+) -> News:
     """Give what comes newly after each window, and what windows that ended before it tell of that.
 
     With r what is left, a moment later and now, and a the share of it that lasts so long, ``r' - a r`` has of a gust
@@ -103,34 +77,39 @@ def what_is_new(rows: Sequence[Array], left: Sequence[Array], past: Past) -> tup
         Of each run, linear in what acts.
     left : sequence of array, shape (window, axis)
         What is left of the balances.
-
-    Returns
-    -------
-    list of array, shape (window, axis, column)
-        What is new; of each run the last windows.
-    list of array, shape (window, axis, column)
-        What of that was foretold.
+    told : sequence of array, shape (window, signal) or (window, axis, signal)
+        What is known of each window when it has ended; of each axis by itself, where all are foretold alike.
+    ahead : int
+        By how many windows later is later.
+    before : sequence of int
+        How many windows ago what is known ended, the longest last; the first of them no longer overlap.
+    many : bool
+        Whether many signals are known that go together.
 
     References
     ----------
     Holtz-Eakin, Newey and Rosen 1988 (quasi-differences, with the past as instrument); Söderström and Stoica 2002.
     """
+    first = before[-1]
+
+    def later(values: Sequence[Array], by: int) -> list[Array]:
+        return [own[first + by :][: max(0, len(own) - first - ahead)] for own in values]
+
     # What a run is off by throughout is no gust.
     off = [own - own.mean(axis=0) if len(own) else own for own in left]
-    was = [np.sum(each, axis=0) for each in zip(*(past.later(off, -lag) for lag in past.before), strict=True)]
+    was = [np.sum(each, axis=0) for each in zip(*(later(off, -lag) for lag in before), strict=True)]
     # By what was before both, which the noise of neither has a part in.
     kept, now = (
-        sum((each * own).sum(axis=0) for each, own in zip(past.later(off, by), was, strict=True))
-        for by in (past.ahead, 0)
+        sum((each * own).sum(axis=0) for each, own in zip(later(off, by), was, strict=True)) for by in (ahead, 0)
     )
     lasts = np.clip(kept / np.where(now > 0, now, np.inf), 0.0, 1.0)[:, None]
-    new = [then - lasts * own for then, own in zip(past.later(rows, past.ahead), past.later(rows, 0), strict=True)]
-    if past.foretelling is None:
-        return new, list(new)
-    counts = past.counts
-    told = past.foretelling(np.concatenate([new[number].reshape(count, -1) for number, count in counts.items()]))
-    known = dict(zip(counts, np.split(told, np.cumsum([*counts.values()])[:-1]), strict=True))
-    return new, [known[number].reshape(own.shape) if number in known else own for number, own in enumerate(new)]
+    new = [then - lasts * own for then, own in zip(later(rows, ahead), later(rows, 0), strict=True)]
+    past = [np.concatenate(each, axis=-1) for each in zip(*(later(told, -lag) for lag in before), strict=True)]
+    flat = {number: own.reshape(-1, own.shape[-1]) for number, own in enumerate(past) if len(own)}
+    values = {number: new[number].reshape(len(own), -1) for number, own in flat.items()}
+    known = foretold_by_run(flat, values, OF_MANY) if many else foretold_by_run(flat, values)
+    foretold = [known[number].reshape(own.shape) if number in known else own for number, own in enumerate(new)]
+    return News(new, foretold, lasts)
 
 
 class PastBalances(Balances):
@@ -168,23 +147,17 @@ class PastBalances(Balances):
             self.of_band(own._replace(known=mean) for own, mean in zip(rows, slow, strict=True)),
         ]
 
-    @cached_property
-    def _parts(self) -> list[tuple[int, PlaybackFlight]]:
-        return [
+    def _new(self, band: Windows, signals: Mapping[int, Signals], laid: Laid) -> Iterator[Rows]:
+        parts = [
             (number, replace(self.flights[number], stretches=(part,)))
             for number in self.path
             for part in self.flights[number].stretches
         ]
-
-    @cached_property
-    def _past(self) -> Past:
-        return Past.of([averaged(self.bands[0], flight, _seen(flight)) for _, flight in self._parts], 1, _BEFORE)
-
-    def _new(self, band: Windows, signals: Mapping[int, Signals], laid: Laid) -> Iterator[Rows]:
-        rows = [laid(band, flight, signals[number]) for number, flight in self._parts]
+        rows = [laid(band, flight, signals[number]) for number, flight in parts]
         left = [np.einsum("wac,ac->wa", own, laid.left) for own in rows]
-        new, known = what_is_new(rows, left, self._past)
-        for (number, flight), own, foretold in zip(self._parts, new, known, strict=True):
+        told = [averaged(band, flight, _seen(flight)) for _, flight in parts]
+        new, known, _ = what_is_new(rows, left, told, 1, _BEFORE)
+        for (number, flight), own, foretold in zip(parts, new, known, strict=True):
             middles = middles_of(band, flight)
             yield Rows(number, own, foretold, middles[len(middles) - len(own) :])
 
