@@ -35,6 +35,8 @@ the second, which leaves what is slow of it: most effects that a model lacks are
 _PARTED_HZ = 2.0
 """Above what was foretold is fast, about."""
 _PER_WINDOW = round(1 / (1 - OVERLAP))
+LATER = 0.25
+"""What is new comes so much later, share of a window."""
 _BEFORE = range(2 * _PER_WINDOW, 4 * _PER_WINDOW, _PER_WINDOW // 2)
 """What was before ended a whole window before another begins: gusts that remember in more ways than one forget all but
 one of them, and logs that were filtered forward and backward what they know of what comes."""
@@ -156,7 +158,7 @@ class PastBalances(Balances):
         rows = [laid(band, flight, signals[number]) for number, flight in parts]
         left = [np.einsum("wac,ac->wa", own, laid.left) for own in rows]
         told = [averaged(band, flight, _seen(flight)) for _, flight in parts]
-        new, known, _ = what_is_new(rows, left, told, 1, _BEFORE)
+        new, known, _ = what_is_new(rows, left, told, round(LATER * _PER_WINDOW), _BEFORE)
         for (number, flight), own, foretold in zip(parts, new, known, strict=True):
             middles = middles_of(band, flight)
             yield Rows(number, own, foretold, middles[len(middles) - len(own) :])

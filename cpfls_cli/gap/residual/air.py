@@ -36,14 +36,15 @@ from cpfls_cli.weak_form.windows import Recording, Windows
 _FORETOLD = {"repeats": 1 / 2, "setpoints": 1 / 3, "past": 1 / 5}
 """Share of what is left that instruments may foretell, at 95 %, where it is called the air: the smaller part of it.
 Other runs show all that the vehicle does again, a linear answer to setpoints about two thirds of it, and what was
-before two fifths of what of it is new."""
+before a third of what of it is new."""
 
 _WITNESSES: dict[Told, tuple[ToldBy, ...]] = {
-    "repeats": ("repeats",),
+    "repeats": ("repeats", "past"),
     "setpoints": ("setpoints", "past"),
     "none": ("past",),
 }
-"""What tells gusts where that is known of flights; a later one tells what the one before neither tells nor refutes."""
+"""What tells gusts where that is known of flights: the next where one knows too little of them, or, of setpoints, what
+they neither tell nor refute."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +142,7 @@ def air(
     Returns
     -------
     Air or None
-        None for flights that are too short or of several rates.
+        None for flights that are too short or of several rates, and for too few of them that instruments know.
     """
     residual, known = hypothesis.left(linear), np.all([flight.known for flight in hypothesis.flights], axis=0)
     sensors = floors(replace(hypothesis, flights=tuple(in_air(hypothesis.flights, np.zeros(6)))), linear)
@@ -152,15 +153,20 @@ def air(
         return None
     found, told, refuted = bound, np.zeros(6, dtype=bool), np.zeros(6, dtype=bool)
     for told_by in _WITNESSES[given.kind]:
-        own, like = left.told_by(told_by, rng)
+        own = gusts_in(left.sides, given, told_by)
+        if own is None:
+            continue
+        own, like = left.told_by(own, rng)
         like &= known & ~refuted
         refuted = own.foretold - ERRORS * own.foretold_error > _FORETOLD[told_by]
         if found is bound or like.sum() > told.sum():
             found, told = own, like
-        if told[known].all():
+        if told_by == "repeats" or told[known].all():
             break
+    if found is bound:
+        return None
     # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
-    sized = told | (given.kind == "repeats")
+    sized = told | (found.told_by == "repeats")
     parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in RANGES}
     parts = {name: np.where(known, values, np.nan) for name, values in parts.items()}
     return Air(replace(found, **parts), told, known & np.isfinite(found.size) & sized)
@@ -197,16 +203,14 @@ class _Left:
             sides.append(np.stack([momentum[run.part], -direct[run.part]], axis=1))
         return sides
 
-    def told_by(self, told_by: ToldBy, rng: np.random.Generator) -> tuple[FoundGusts, BoolArray]:
-        """Find gusts by one kind of instruments, and mark the channels of which they tell that this is all."""
-        found = gusts_in(self.sides, self.given, told_by)
-        assert found is not None, "these flights are long enough, and of one rate"
-        steady = np.ones(6, dtype=bool)
+    def told_by(self, found: FoundGusts, rng: np.random.Generator) -> tuple[FoundGusts, BoolArray]:
+        """Mark the channels of which the instruments that found gusts tell that this is all, with what is foretold."""
+        told_by, steady = found.told_by, np.ones(6, dtype=bool)
         if told_by == "past":
             newly = newly_left(self.hypothesis, self.linear, found.noise, self.settings)
             foretold, without = newly.shares
             found = replace(found, foretold=foretold, foretold_without=without)
-            steady = ~newly.grows(self.settings.shifts, rng)
+            steady = ~newly.grows(self.settings.shifts)
         told = np.isfinite(found.size) & _gusty(found, self.moved, _FORETOLD[told_by])
         if told_by == "repeats" or not told.any():
             return found, told

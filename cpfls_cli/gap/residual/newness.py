@@ -16,17 +16,15 @@ from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.weak_flight import PER_WINDOW, dense
 from cpfls_cli.gap.residual.dependence import state_signals, without_actuation
 from cpfls_cli.gap.settings import RARE, GapSettings
-from cpfls_cli.playback.past import News, what_is_new
+from cpfls_cli.playback.past import LATER, News, what_is_new
 from cpfls_cli.rounding import levelled
 from cpfls_cli.weak_form.resampling import blocks_of
 
-_AHEAD = PER_WINDOW // 4
-"""By how many windows later is later; windows are a `PER_WINDOW`-th of one apart."""
-
 
 def news(rows: Sequence[Array], left: Sequence[Array], told: Sequence[Array], *, many: bool = False) -> News:
-    """Give what comes newly after windows of runs, and what windows that ended before tell of it; see `what_is_new`."""
-    return what_is_new(rows, left, told, _AHEAD, range(PER_WINDOW, 2 * PER_WINDOW, _AHEAD), many=many)
+    """Give what comes newly after windows of runs, a `PER_WINDOW`-th of one apart; see `what_is_new`."""
+    ahead = round(LATER * PER_WINDOW)
+    return what_is_new(rows, left, told, ahead, range(PER_WINDOW, 2 * PER_WINDOW, ahead), many=many)
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,7 @@ class NewlyLeft:
         without = (told.sum(axis=0) - told) / (whole - size)
         return told.sum(axis=0) / whole, without
 
-    def grows(self, shifts: int, rng: np.random.Generator) -> BoolArray:
+    def grows(self, shifts: int) -> BoolArray:
         """Mark channels whose new part is surely the larger, or the smaller, the more a signal moved before.
 
         By ranks; what chance has to offer, over all channels and signals, have blocks whose signs are drawn.
@@ -71,7 +69,8 @@ class NewlyLeft:
         products = _by_block(rows.reshape(len(rows), -1), self.block)
         scale = np.sqrt(np.maximum((products**2).sum(axis=0), 1.0))
         alike = np.abs(products.sum(axis=0) / scale).reshape(rows.shape[1:]).max(axis=0)
-        signs = rng.choice([-1.0, 1.0], size=(shifts, len(products)))
+        # The same draws each time that it is asked of flights, beside other names too.
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(shifts, len(products)))
         chance = np.abs(signs @ products / scale).max(axis=1)
         return np.asarray((chance[:, None] >= alike).sum(axis=0) <= max(RARE * (1 + shifts) - 1, 0))
 
@@ -95,13 +94,13 @@ def newly_left(hypothesis: System, linear: Array, noise: Array, settings: GapSet
     left = [residual[there.flight_index == number] for number in range(len(states))]
     rows, foretold, lasts = news([own[..., None] for own in left], left, told, many=True)
     last = [np.arange(len(own) - len(new), len(own)) for own, new in zip(left, rows, strict=True)]
-    variance = np.zeros(6)
+    variance, ahead = np.zeros(6), round(LATER * PER_WINDOW)
     for own, kernel in zip(noise.T, (windows.weight, windows.slope), strict=True):
-        later, now = (np.pad(kernel, pad) for pad in ((_AHEAD * windows.hop, 0), (0, _AHEAD * windows.hop)))
+        later, now = (np.pad(kernel, pad) for pad in ((ahead * windows.hop, 0), (0, ahead * windows.hop)))
         variance += own * ((later - lasts * now) ** 2).sum(axis=1)
     moving = np.isin(names, list(without_actuation(states[0])))
     mean = np.concatenate(told)[:, moving].mean(axis=0)
-    moved = np.concatenate([own[at - _AHEAD - PER_WINDOW][:, moving] for own, at in zip(told, last, strict=True)])
+    moved = np.concatenate([own[at - ahead - PER_WINDOW][:, moving] for own, at in zip(told, last, strict=True)])
     hop_s = float(windows.hop * windows.period)
     index = np.repeat(np.arange(len(last)), [len(at) for at in last])
     return NewlyLeft(

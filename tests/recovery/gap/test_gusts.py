@@ -130,6 +130,17 @@ def test_gusts_about_axes_are_told_of_flights_without_velocity(flown, kind, setp
     assert np.isnan(found.found.size[3:]).all()
 
 
+def test_where_instruments_know_too_little_what_was_before_tells(flown, monkeypatch):
+    recordings = recorded(flown["asked"], TRUE.vehicle, setpoints=False)
+    # No path comes again.
+    monkeypatch.setattr("cpfls_cli.gap.residual.air._WITNESSES", {"none": ("repeats", "past")})
+    found = in_what_is_left(recordings)
+    assert found.found.told_by == "past"
+    assert found.told.all()
+    monkeypatch.setattr("cpfls_cli.gap.residual.air._WITNESSES", {"none": ("repeats",)})
+    assert diagnosed(recordings).air is None
+
+
 def test_what_does_not_come_again_is_noise_beside_what_does(flown):
     # Half of the inertia is missed about x, which comes again; nothing is about the other axes.
     vehicle = replace(TRUE.vehicle, inertia_kg_m2=(2 * INERTIA[0], *INERTIA[1:]))
