@@ -374,8 +374,12 @@ lint: $(INSTALLED_DEV)
 site: $(INSTALLED_DOCS)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
-tutorials: $(INSTALLED)
-	$(BIN)/python docs/run_blocks.py README.md docs/tutorial-*.md
+# Each page is a target, so that --jobs types two side by side.
+TYPED := $(addprefix typed/,$(wildcard docs/tutorial-*.md) README.md)
+.PHONY: $(TYPED)
+tutorials: $(TYPED)
+$(TYPED): typed/%: | $(INSTALLED)
+	$(BIN)/python docs/run_blocks.py $*
 
 # Equal sources give an equal wheel, byte by byte: it is built twice. Then it does what README.md begins with in an
 # environment that holds nothing else, and the source distribution is installed in its place.

@@ -48,9 +48,10 @@ def cross(first: Array, second: Array) -> Array:
     -------
     array, shape (..., 3)
     """
-    if first.ndim == second.ndim == 1:
-        (a, b, c), (u, v, w) = first.tolist(), second.tolist()
-        return np.array([b * w - c * v, c * u - a * w, a * v - b * u])
+    if first.size == second.size == 3:
+        (x, y, z), (p, q, r) = first.ravel().tolist(), second.ravel().tolist()
+        one = np.array([y * r - z * q, z * p - x * r, x * q - y * p])
+        return one if first.ndim == second.ndim == 1 else one.reshape(max(first.shape, second.shape, key=len))
     (a, b, c), (u, v, w) = ((each[..., 0], each[..., 1], each[..., 2]) for each in (first, second))
     along = b * w - c * v
     product = np.empty((*along.shape, 3))

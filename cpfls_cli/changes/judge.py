@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.changes.causes import Cause, causes
 from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.changes.reference import Reference, common_numbers, kinds_of
@@ -235,6 +235,7 @@ class _Space:
         self.searched = [index for index, cause in enumerate(listed) if cause.searched]
         self.prior = np.log([cause.prior for cause in listed])
         self.searched_prior = np.log([listed[index].searched for index in self.searched])
+        self._parted: dict[tuple[bytes, int], list[tuple[list[IntArray], IntArray]]] = {}
 
     def whitened(self, apart: Array) -> Array:
         """Turn numbers into such that do not go together, of variance 1, along the first axis."""
@@ -285,9 +286,16 @@ class _Space:
             total += told[key]
         return total
 
-    def _parts(self, directions: Array) -> Iterator[tuple[list[IntArray], IntArray]]:
+    def _parts(self, directions: Array) -> list[tuple[list[IntArray], IntArray]]:
         """Part the kinds into such that no direction moves together: the numbers of each kind, and the directions."""
         moves = np.array([(directions[numbers] != 0.0).any(axis=0) for numbers in self.numbers])
+        # Directions of many sizes, and of many rows, move the same.
+        key = moves.tobytes(), moves.shape[1]
+        if key not in self._parted:
+            self._parted[key] = list(self._linked(moves))
+        return self._parted[key]
+
+    def _linked(self, moves: BoolArray) -> Iterator[tuple[list[IntArray], IntArray]]:
         linked = np.eye(len(moves), dtype=bool) | (moves @ moves.T)
         for _ in range(len(moves).bit_length()):
             linked = linked @ linked

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import binary_erosion
 
+from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.blocks import contiguous, jackknife_error
 from cpfls_cli.effects.registry import CATALOGUE
@@ -343,7 +344,7 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
         return
     inertia = symmetric(signals.vehicle.inertia_kg_m2)
     momentum = signals.body_rate @ inertia
-    turned = own.derivative(momentum) + own.average(np.cross(signals.body_rate, momentum))
+    turned = own.derivative(momentum) + own.average(rotations.cross(signals.body_rate, momentum))
     assert signals.torque is not None, "rotor speeds are there"
     assert signals.thrust is not None, "rotor speeds are there"
     found = _followed(own, inside, turned, np.column_stack([signals.torque, signals.thrust]), signals.period)

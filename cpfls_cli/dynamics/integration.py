@@ -132,7 +132,7 @@ def free_runs(
             turning = law(_attitude(rotation, beyond), rate)
             turned = Turning(_definite(turning.inertia), turning.direct).acceleration(torque)
             # R [rate]_x is row by row a cross product with the rate.
-            return np.concatenate([np.cross(rotation, rate[:, None]).reshape(-1, 9), turned], axis=1)
+            return np.concatenate([rotations.cross(rotation, rate[:, None]).reshape(-1, 9), turned], axis=1)
 
         for part in range(steps):
             first, last = begin + change * (part / steps), begin + change * ((part + 1) / steps)

@@ -100,7 +100,7 @@ def body_torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Ar
     """
     omega = rotations.body_rate(attitude, attitude_rate)
     alpha = rotations.body_acceleration(attitude, attitude_rate, attitude_acceleration)
-    return np.asarray(alpha @ inertia.T + np.cross(omega, omega @ inertia.T))
+    return np.asarray(alpha @ inertia.T + rotations.cross(omega, omega @ inertia.T))
 
 
 def rigid_columns(motion: Motion) -> Array:

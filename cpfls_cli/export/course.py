@@ -103,7 +103,7 @@ def fly_body(course: Course, mass: float, inertia: Array, wrench: Wrench, lag: f
         air = np.einsum("nji,nj->ni", state.rotation, state.velocity)
         torque, force = wrench(speed, air, state.rate, state.rotation)
         linear = np.einsum("nij,nj->ni", state.rotation, force) / mass + gravity
-        moment = torque - np.cross(state.rate, state.rate @ inertia)
+        moment = torque - rotations.cross(state.rate, state.rate @ inertia)
         velocity, rate = state.velocity + period * linear, state.rate + period * np.linalg.solve(inertia, moment.T).T
         turned = state.rotation @ rotations.turns(period * rate)
         state = State(state.position + period * velocity, velocity, turned, rate)

@@ -10,7 +10,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.polynomial import state_terms
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric_columns
 from cpfls_cli.playback.evaluation import Evaluated, VehicleAt
@@ -293,7 +293,7 @@ class Balances:
             there = np.isfinite(known).all(axis=(1, 2)) & np.isfinite(place)
             block = np.where(there, place * self.flights[number].motion.period // self.block_s, -1)
             for each in np.unique(block[there]):
-                mine, theirs = own[block == each], known[block == each]
+                mine, theirs = (taken(values, block == each) for values in (own, known))
                 sums = _Products(_product(theirs, mine), _product(mine, mine), _product(theirs, theirs), len(mine))
                 before = found.get((first, int(each)))
                 found[first, int(each)] = sums if before is None else before.plus(sums)
@@ -431,6 +431,14 @@ def averaged(band: Windows, flight: PlaybackFlight, values: Array) -> Array:
     return np.concatenate(
         [np.zeros((0, values.shape[1])), *(band.average(values[part]) for part in _long(band, flight))]
     )
+
+
+def taken(values: Array, there: BoolArray) -> Array:
+    """Take rows: a view where they follow one another, as a copy takes as long as what is made of them."""
+    rows = np.flatnonzero(there)
+    if len(rows) and rows[-1] - rows[0] + 1 == len(rows):
+        return values[rows[0] : rows[-1] + 1]
+    return values[rows]
 
 
 def _product(one: Array, other: Array) -> Array:

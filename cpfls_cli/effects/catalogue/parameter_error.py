@@ -127,14 +127,19 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     momentum = np.zeros((len(signals), 6, 10))
     direct = np.zeros_like(momentum)
     momentum[:, :3, :3] = -turning
-    direct[:, :3, :3] = -np.cross(signals.body_rate[:, :, None], turning, axis=1)
+    direct[:, :3, :3] = -_across(signals.body_rate, turning)
     direct[:, :3, 3:6] = -_coupling(signals.body_rate, moments)[:, :, None] * np.eye(3)
     direct[:, 5, _THRUST_SCALE] = signals.wrench[:, 5]
     # A point at r moves with omega' x r + omega x (omega x r) beyond the centre of mass.
-    levers = np.cross(signals.body_rate[:, :, None], signals.vehicle.mass_kg * np.eye(3), axis=1)
+    levers = _across(signals.body_rate, signals.vehicle.mass_kg * np.eye(3)[None])
     momentum[:, 3:, 7:] = levers
-    direct[:, 3:, 7:] = np.cross(signals.body_rate[:, :, None], levers, axis=1)
+    direct[:, 3:, 7:] = _across(signals.body_rate, levers)
     return Columns(direct, momentum)
+
+
+def _across(rate: Array, columns: Array) -> Array:
+    """Cross body rates, shape (time, 3), with each of some columns, shape (time, 3, column)."""
+    return rotations.cross(rate[:, None], columns.swapaxes(1, 2)).swapaxes(1, 2)
 
 
 def with_thrust(rows: Array, thrust: Array) -> Array:

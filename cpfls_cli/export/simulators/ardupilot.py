@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.effects.effect import hub_wrench, thrust_wrench, wrench
@@ -228,7 +229,7 @@ def _fly(text: str, course: Course, *, own: bool) -> State:
     def wrench_of(speed: Array, air: Array, rate: Array, _rotation: Array) -> tuple[Array, Array]:
         command = speed[:, order] / most
         thrust = weight / motors * ((1 - expo) * command + expo * command**2) / hovering
-        through = air[:, None] + np.cross(rate[:, None], hubs)
+        through = air[:, None] + rotations.cross(rate[:, None], hubs)
         if own:
             thrust = thrust - weight / motors * (np.maximum(through[..., 2], 0.0) / slipstream) ** 2
             root, turning = np.sqrt(np.abs(thrust)), lever * command * thrust
@@ -238,11 +239,11 @@ def _fly(text: str, course: Course, *, own: bool) -> State:
             # The square that grows as the cube does in hover.
             turning = lever * full * (3 * expo * hover**2 + 2 * (1 - expo) * hover) / (2 * hover) * command**2
         force = thrust[..., None] * [0.0, 0.0, 1.0] - momentum * root[..., None] * through
-        torque = np.cross(hubs, force).sum(axis=1) - damping * moments * rate
+        torque = rotations.cross(hubs, force).sum(axis=1) - damping * moments * rate
         torque[:, 2] += turning.sum(axis=1)
         total = force.sum(axis=1)
         if own:
-            torque = torque + np.cross(rate, rate * moments)
+            torque = torque + rotations.cross(rate, rate * moments)
             total = total - body * np.abs(air) * air
         return torque, total
 

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.integration import runge_kutta_step
 from cpfls_cli.effects.effect import thrust_wrench, wrench
@@ -134,7 +135,7 @@ def fly_crazyflow(text: str, course: Course) -> State:
         position, velocity, rotation, turning, speed = parts(state)
         quaternion, speed = Rotation.from_matrix(rotation).as_quat(), speed if rate else command
         moved, _, faster, spun, wound = dynamics(position, quaternion, velocity, turning, command, speed, **given)
-        turned = state[:, 6:15].reshape(runs, 3, 3) @ np.cross(np.eye(3), turning[:, None])
+        turned = state[:, 6:15].reshape(runs, 3, 3) @ rotations.cross(np.eye(3), turning[:, None])
         return np.hstack([moved, faster, turned.reshape(runs, 9), spun, wound if rate else 0 * speed])
 
     rows = []

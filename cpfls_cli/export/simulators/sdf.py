@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import hub_wrench, wrench
 from cpfls_cli.effects.signals import Signals
@@ -192,10 +193,10 @@ def fly_sdf(text: str, course: Course) -> State:
     lag = float(column("timeConstantUp")[0])
 
     def wrench(speed: Array, air: Array, rate: Array, _rotation: Array) -> tuple[Array, Array]:
-        across = (air[:, None] + np.cross(rate[:, None], hubs)) * [1.0, 1.0, 0.0] * np.abs(speed)[..., None]
+        across = (air[:, None] + rotations.cross(rate[:, None], hubs)) * [1.0, 1.0, 0.0] * np.abs(speed)[..., None]
         up = [0.0, 0.0, 1.0]
         force = -drag[:, None] * across + (thrust * speed**2)[..., None] * up
-        torque = np.cross(hubs, force) - rolling[:, None] * across + (yaw * thrust * speed**2)[..., None] * up
+        torque = rotations.cross(hubs, force) - rolling[:, None] * across + (yaw * thrust * speed**2)[..., None] * up
         return torque.sum(axis=1), force.sum(axis=1)
 
     # Without a lag the filter is at the command at once.

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, momentum_form
@@ -262,7 +263,7 @@ def rotation_balance(signals: Signals, model: InertiaModel | None = None) -> Col
     """
     if model is None:
         momentum = signals.body_rate @ inertia_tensor(signals.vehicle)
-        return Columns(np.cross(signals.body_rate, momentum), momentum)
+        return Columns(rotations.cross(signals.body_rate, momentum), momentum)
     attitude = signals.attitude
     if attitude is None:
         raise InputError("the model needs the attitude, which the flight lacks")
@@ -294,7 +295,7 @@ def translation_balance(signals: Signals) -> Columns:
         felt = np.einsum("tji,tj->ti", signals.rotation, signals.acceleration)
         return Columns(mass * felt + weight)
     momentum = mass * signals.ground_velocity
-    return Columns(np.cross(signals.body_rate, momentum) + weight, momentum)
+    return Columns(rotations.cross(signals.body_rate, momentum) + weight, momentum)
 
 
 @dataclass(frozen=True)

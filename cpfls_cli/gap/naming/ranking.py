@@ -221,5 +221,8 @@ def likely(odds: Sequence[Array]) -> Array:
         # One block tells nothing of how far blocks differ.
         return np.full(len(odds) + 1, 1 / (len(odds) + 1))
     total = _weights(blocks) @ np.stack([np.zeros(blocks), *odds], axis=1)
-    density = np.exp(total - total.max(axis=1, keepdims=True))
-    return np.asarray((density / density.sum(axis=1, keepdims=True)).mean(axis=0))
+    # One set a row: what is taken of many short rows is a tenth as fast. Eight and more are added in pairs.
+    columns = np.ascontiguousarray(total.T)
+    density = np.exp(columns - columns.max(axis=0))
+    whole = density.sum(axis=0) if len(density) < 8 else np.ascontiguousarray(density.T).sum(axis=1)
+    return np.asarray(np.add.accumulate(density / whole, axis=1)[:, -1] / len(total))

@@ -209,7 +209,7 @@ class Answer:
         """Whether the rival is expected to be no rival."""
         return self.likely < RARE * self.own
 
-    @property
+    @cached_property
     def least_size(self) -> float:
         """Share of the effect's size from which on it is settled, if linear in it; nan where no size is."""
 

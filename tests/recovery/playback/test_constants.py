@@ -1,6 +1,7 @@
 """Constants of a vehicle in gusts, by what comes again: runs of a path, or setpoints from outside of the loop."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -68,10 +69,14 @@ def test_what_instruments_do_not_tell_is_not_determined(constants):
     assert not found.spread.determined[yaw]
 
 
+@cache
+def _of_three_paths(truth):
+    return list(gusty_flights([Flight(truth, GUSTS, path, 100 + path, reach=3.0) for path in range(3)], 30.0))
+
+
 def _by_what_was_before(truth, leave_out=()):
     """What flights of three paths in gusts tell without repeats or setpoints, from moments twice too large."""
-    flown = gusty_flights([Flight(truth, GUSTS, path, 100 + path, reach=3.0) for path in range(3)], 30.0)
-    alone = [replace(flight, setpoints={}) for flight in flown]
+    alone = [replace(flight, setpoints={}) for flight in _of_three_paths(truth)]
     twice = (*(2 * moment for moment in truth.inertia), 0.0, 0.0, 0.0)
     begun = replace(truth.vehicle, inertia_kg_m2=twice, unknown=("inertia",))
     return constants_of_past(begun, alone, instruments(alone), leave_out)
