@@ -18,6 +18,7 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs, stretches
 from cpfls_cli.blocks import half_width, jackknife_covariance
 from cpfls_cli.dynamics.rigid_body import rigid_columns, vertical, why_unphysical
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.identification.data import (
     Flights,
     OtherTorque,
@@ -205,7 +206,8 @@ def _by_past(
         return None
     vehicle = VehicleSettings(inertia_kg_m2=tuple(least_squares.tolist()))
     flights = _driven(vehicle, parts, given.flown[0].motion.period)
-    others = [block for block in blocks_of(vehicle) if block not in (INERTIA, PRODUCTS)]
+    tried = (INERTIA, PRODUCTS, *(name for name, effect in CATALOGUE.items() if not effect.needs))
+    others = [block for block in blocks_of(vehicle) if block not in tried]
     found = constants_of_past(vehicle, flights, replace(given, flown=flights), others)
     if found is None or not found.tells:
         return None

@@ -420,7 +420,7 @@ def _constants(problem: _Problem, told_by: ToldBy) -> Constants:
     told = np.zeros(len(free.numbers), dtype=bool)
     told[places] = _f_statistics(problem) >= STRONG
     if DRAG in problem.held or told_by == "past":
-        # What was before finds 1.2 to 1.8 times the true moment about yaw, which little but gusts turns.
+        # Where only gusts turn it, what was before finds 1.2 to 1.8 times the moment about yaw, and nothing shows that.
         told[free.index[LOG_INERTIA[2]]] = False
     explained, error = _explained_in_all(problem)
     # What was before has to show that the model explains it: nothing else does.
