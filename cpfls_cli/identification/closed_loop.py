@@ -201,11 +201,12 @@ def _by_past(
 ) -> FreedTorque | None:
     """Free the torque of flights that show the loop by what was before."""
     rows = np.concatenate(_laid(parts, 1.0 / axis_scale(training)))
-    least_squares = _parameters(np.einsum("tap,taq->pq", rows[:, :, :-1], rows)[None], None)[0]
+    (least_squares,) = _parameters(np.einsum("tap,taq->pq", rows[:, :, :-1], rows)[None], None)
     if why_unphysical(least_squares) is not None or not _shows_loop(training, least_squares):
         return None
     vehicle = VehicleSettings(inertia_kg_m2=tuple(least_squares.tolist()))
     flights = _driven(vehicle, parts, given.flown[0].motion.period)
+    # Of effects those that take no rotors: these are nobody's.
     tried = (INERTIA, PRODUCTS, *(name for name, effect in CATALOGUE.items() if not effect.needs))
     others = [block for block in blocks_of(vehicle) if block not in tried]
     found = constants_of_past(vehicle, flights, replace(given, flown=flights), others)
@@ -221,27 +222,20 @@ def _by_past(
     def freed(data: TorqueData) -> Array:
         return np.asarray(data.torque + rigid_columns(data.motion) @ (rigid_body - least_squares))
 
-    both = (OtherTorque(source, freed) for source in (training, learned))
-    return FreedTorque(*both, rigid_body, least_squares, found.half, len(parts), 0, 0, len(parts), "past")
+    whole, part, count = OtherTorque(training, freed), OtherTorque(learned, freed), len(parts)
+    return FreedTorque(whole, part, rigid_body, least_squares, found.half, count, 0, 0, count, "past")
 
 
 def _driven(vehicle: VehicleSettings, parts: Sequence[TorqueData], period: float) -> tuple[PlaybackFlight, ...]:
     """Give flights with rotor speeds by which any vehicle would have their torque, where they are not vertical."""
-    known = [~vertical(part.motion.attitude) for part in parts]
-    squares = []
-    for part, there in zip(parts, known, strict=True):
-        torque = np.zeros((len(part), 3))
-        torque[there] = rotations.body_torque(part.motion.attitude[there], part.torque[there])
-        squares.append(rotor_demand(vehicle, np.zeros(len(part)), torque).squared_speed)
-    most = max(float(np.abs(square).max()) for square in squares)
-    return tuple(
-        replace(
-            _flown(part, period),
-            speed=np.sqrt(most + square),
-            stretches=tuple(slice(*run) for run in runs(there)),
-        )
-        for part, there, square in zip(parts, known, squares, strict=True)
-    )
+    flights = []
+    for part in parts:
+        known = ~vertical(part.motion.attitude)
+        torque = np.where(known[:, None], rotations.body_torque(part.motion.attitude, part.torque), 0.0)
+        square = rotor_demand(vehicle, np.zeros(len(part)), torque).squared_speed
+        flights.append(replace(_flown(part, period), speed=square, stretches=tuple(slice(*run) for run in runs(known))))
+    most = max(float(np.abs(flight.speed).max()) for flight in flights)
+    return tuple(replace(flight, speed=np.sqrt(most + flight.speed)) for flight in flights)
 
 
 def _laid(parts: Sequence[TorqueData], scale: Array) -> list[Array]:

@@ -132,21 +132,20 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
     freed = diagnostics.freed
     if freed is None:
         return
+    pure = "in which no gust acts"
     if freed.setpoints:
         asked = joined("the sticks" if name == "sticks" else f"the setpoint of {name}" for name in freed.setpoints)
         know = "know" if len(freed.setpoints) > 1 or freed.setpoints == ("sticks",) else "knows"
-        source = f"{asked} {know} no gust, so the parameters come from the torque that follows, in which no gust acts"
+        source = f"{asked} {know} no gust, so the parameters come from the torque that follows, {pure}"
         little, without = "too little of yaw follows", "have no such setpoint"
     elif freed.told_by == "past":
         source = (
-            "the flights show the loop and have no other instrument, so roll and pitch come from what was before, which"
-            " knows nothing of what is new in a gust that fades"
+            "the flights show the loop, so roll and pitch come from what was before, which knows no gust that is new"
         )
         little, without = "what was before does not tell it", ""
     else:
         paths = "1 path" if freed.paths == 1 else f"{freed.paths} paths"
-        source = f"{freed.runs} runs repeat {paths}, so the parameters come from the torque that comes again, in which"
-        source += " no gust acts"
+        source = f"{freed.runs} runs repeat {paths}, so the parameters come from the torque that comes again, {pure}"
         little, without = "too little of yaw comes again", "repeat none"
     moments = ", ".join(
         f"{name} {value:.3g} ({value * np.exp(-half):.3g} to {value * np.exp(half):.3g})"
