@@ -52,7 +52,7 @@ class LackGroup:
 class DisturbanceGroup:
     """Gusts in the flights that a model was found in or held against, torque about body axes and force along them."""
 
-    told_by: str = dataset("what told gusts from what the model lacks: repeats, setpoints or none")
+    told_by: str = dataset("what told gusts from what a model lacks: repeats, setpoints, past (what was before), none")
     name: tuple[str, ...] = dataset("roll, pitch, yaw, x, y, z", "gust")
     size: Array = dataset("standard deviation, N m or N", "gust", units="SI", gaps=True)
     low: Array = dataset("lower end of the 95 % interval; 0 where it is not known", "gust", units="SI", gaps=True)
@@ -61,7 +61,10 @@ class DisturbanceGroup:
     memory_low: Array = dataset("lower end of the 95 % interval", "gust", units="s", gaps=True)
     memory_high: Array = dataset("upper end of the 95 % interval", "gust", units="s", gaps=True)
     foretold: Array | None = dataset(
-        "share of all that is left which repeats or setpoints foretell", "gust", gaps=True, default=None
+        "share of what is left that repeats or setpoints foretell; by the past, of what is new in it",
+        "gust",
+        gaps=True,
+        default=None,
     )
     alone: BoolArray | None = dataset("whether all that is left of a gap is gusts and noise", "gust", default=None)
     white: Array | None = dataset(

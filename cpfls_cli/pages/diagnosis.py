@@ -115,7 +115,7 @@ def diagnosis_blocks(diagnosis: Source[DiagnosisRecord], index: int) -> Iterator
     yield from _sizes(record, index)
     if record.disturbance is not None and (record.gusts or record.gusts_beside):
         yield Heading("Gusts")
-        yield from [Text(left_to_gusts(record.gusts))] if record.gusts else []
+        yield from [Text(left_to_gusts(record.gusts, record.disturbance.told_by))] if record.gusts else []
         axes = list(record.disturbance.axes(record.inertia, record.base.mass))
         yield gust_table(f"gusts-{index}", axes, record.disturbance)
     yield Heading("Effects and their numbers")

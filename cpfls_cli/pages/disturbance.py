@@ -36,7 +36,7 @@ def still_air_text() -> Text:
     return Text("flown in still air; the model holds the gusts of its flights: --gusts plays them")
 
 
-def left_to_gusts(axes: Sequence[GustAxis]) -> str:
+def left_to_gusts(axes: Sequence[GustAxis], told_by: str) -> str:
     """Say that what is left is gusts: sizes and how long they last, rotations first."""
     said = []
     for own in ([axis for axis in axes if axis.turns], [axis for axis in axes if not axis.turns]):
@@ -47,7 +47,8 @@ def left_to_gusts(axes: Sequence[GustAxis]) -> str:
             )
             where = f"{'about' if own[0].turns else 'along'} {', '.join(axis.name for axis in own)}"
             said.append(f"{sizes} {_unit(own[0])} {where}, lasting {lasting} s")
-    return f"What is left is gusts, {'; '.join(said)}: nothing that was asked of the vehicle foretells them."
+    nothing = "nothing that the vehicle did before" if told_by == "past" else "nothing that was asked of the vehicle"
+    return f"What is left is gusts, {'; '.join(said)}: {nothing} foretells them."
 
 
 def gust_words(axes: list[GustAxis], told_by: str) -> str:

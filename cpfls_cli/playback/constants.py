@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,13 +22,11 @@ from cpfls_cli.playback.balances import BANDS, OVERLAP, Balances, Sums, fitting_
 from cpfls_cli.playback.fit import Fitted, Uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers
-from cpfls_cli.playback.instruments import FOLDS, Instruments, Told
+from cpfls_cli.playback.instruments import FOLDS, Instruments, ToldBy
 from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.parameters import DRAG, INERTIA, LEARNED, LOG_INERTIA, FreeNumbers, blocks_of, needs_velocity
 from cpfls_cli.playback.past import PastBalances
 from cpfls_cli.vehicle.settings import VehicleSettings
-
-ToldBy = Literal[Told, "past"]
 
 ENOUGH_BLOCKS = 8
 """Whose scatter tells an error by instruments."""

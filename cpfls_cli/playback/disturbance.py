@@ -23,7 +23,7 @@ from cpfls_cli.blocks import contiguous, half_width, jackknife_error, mean_error
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.gusts import RANGES, GustRanges, Gusts
-from cpfls_cli.playback.instruments import Instruments, Told
+from cpfls_cli.playback.instruments import Instruments, ToldBy
 from cpfls_cli.playback.lack import AxisLack, Lack, Rest, lack_of
 from cpfls_cli.playback.loop import wrench_during
 from cpfls_cli.playback.model import VehicleModel
@@ -77,7 +77,7 @@ class FoundGusts(GustRanges):
         What the model lacks; None without instruments, or where no parts were asked for.
     """
 
-    told_by: Told
+    told_by: ToldBy
     noise: Array
     foretold: Array
     foretold_without: Array
@@ -232,7 +232,7 @@ def _wrench_of_part(model: VehicleModel, weights: Array, flight: PlaybackFlight)
 def gusts_in(
     sides: Sequence[Array],
     given: Instruments,
-    told_by: Told,
+    told_by: ToldBy,
     parts: Mapping[str, Sequence[Array]] = MappingProxyType({}),
 ) -> FoundGusts | None:
     """Find sizes and memories of gusts in what both sides of a balance differ by; see `find_gusts`.
@@ -289,7 +289,7 @@ def _share_foretold(powers: _Powers) -> tuple[Array, Array]:
     return 1 - kept.sum(axis=0) / whole.sum(axis=0), without
 
 
-def _powers(sides: Sequence[Array], given: Instruments, band: _Band, told_by: Told) -> _Powers:
+def _powers(sides: Sequence[Array], given: Instruments, band: _Band, told_by: ToldBy) -> _Powers:
     """Take the power of what does not come again, by block of a run."""
     left = [band.left(flight, own) for flight, own in zip(given.flown, sides, strict=True)]
     if told_by == "repeats":
@@ -317,7 +317,7 @@ def _powers(sides: Sequence[Array], given: Instruments, band: _Band, told_by: To
     return _Powers(np.array(power), np.array(whole), np.array(count, dtype=np.int64), np.concatenate(each_left))
 
 
-def _foretold_parts(parts: Mapping[str, Sequence[Array]], given: Instruments, band: _Band, told_by: Told) -> _Complex:
+def _foretold_parts(parts: Mapping[str, Sequence[Array]], given: Instruments, band: _Band, told_by: ToldBy) -> _Complex:
     """Give parts of a model as instruments foretell them, shape (axis, piece, part, frequency)."""
     values = [np.stack(own, axis=2) for own in zip(*parts.values(), strict=True)]
     flat = [own.reshape(len(own), -1) for own in values]

@@ -35,6 +35,8 @@ A velocity may be what a loop of position asks for: that answers gusts so slowly
 
 Told = Literal["repeats", "setpoints", "none"]
 """What tells gusts and what a model lacks apart."""
+ToldBy = Literal[Told, "past"]
+"""Where nothing moves a vehicle but its loop, what was before may tell."""
 
 FOLDS = 5
 """Parts of the flights that are kept aside in turn."""
@@ -44,6 +46,8 @@ _HELD_M = 1.0
 """How far a vehicle that holds its place may be blown; where the setpoint is left over from before, it flies on."""
 _RIDGE = 1e-6
 """Of predictions, so that setpoints that hardly differ from each other do no harm."""
+OF_MANY = 1e-3
+"""The same where many signals predict that go together, in flights that differ."""
 
 
 class Run(NamedTuple):
@@ -169,7 +173,7 @@ def late(values: Array, samples: int) -> Array:
     return np.concatenate([np.repeat(values[:1], samples, axis=0), values[: len(values) - samples]])
 
 
-def foretold(asked: Array, values: Array) -> Array:
+def foretold(asked: Array, values: Array, ridge: float = _RIDGE) -> Array:
     """Predict values from what was asked for, each part as the other parts tell.
 
     What a part itself would tell of its gusts is thereby left out, however many numbers predict.
@@ -178,6 +182,8 @@ def foretold(asked: Array, values: Array) -> Array:
     ----------
     asked : array, shape (time, column)
     values : array, shape (time, ...)
+    ridge : float
+        Prior precision of the prediction, for columns as large as 1.
 
     Returns
     -------
@@ -189,16 +195,18 @@ def foretold(asked: Array, values: Array) -> Array:
     found = np.empty_like(flat)
     for fold in range(FOLDS):
         rest, aside = asked[parts != fold], parts == fold
-        square = rest.T @ rest + _RIDGE * len(rest) * np.eye(asked.shape[1])
+        square = rest.T @ rest + ridge * len(rest) * np.eye(asked.shape[1])
         found[aside] = asked[aside] @ np.linalg.solve(square, rest.T @ flat[parts != fold])
     return found.reshape(values.shape)
 
 
-def foretold_by_run(asked: Mapping[int, Array], values: Sequence[Array] | Mapping[int, Array]) -> dict[int, Array]:
+def foretold_by_run(
+    asked: Mapping[int, Array], values: Sequence[Array] | Mapping[int, Array], ridge: float = _RIDGE
+) -> dict[int, Array]:
     """Predict values of runs by their numbers, all runs together, from what was asked for; see `foretold`."""
     if not asked:
         return {}
-    told = foretold(np.concatenate(list(asked.values())), np.concatenate([values[number] for number in asked]))
+    told = foretold(np.concatenate(list(asked.values())), np.concatenate([values[number] for number in asked]), ridge)
     return dict(zip(asked, np.split(told, np.cumsum([len(own) for own in asked.values()])[:-1]), strict=True))
 
 

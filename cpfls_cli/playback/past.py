@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from cpfls_cli.playback.balances import (
     middles_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.instruments import foretold_by_run
+from cpfls_cli.playback.instruments import OF_MANY, foretold_by_run
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows
 
 _WINDOW_S, _SLOW_S = 0.08, 0.25
@@ -35,14 +35,38 @@ the second, which leaves what is slow of it: most effects that a model lacks are
 _PARTED_HZ = 2.0
 """Above what was foretold is fast, about."""
 _PER_WINDOW = round(1 / (1 - OVERLAP))
+LATER = 0.25
+"""What is new comes so much later, share of a window."""
 _BEFORE = range(2 * _PER_WINDOW, 4 * _PER_WINDOW, _PER_WINDOW // 2)
 """What was before ended a whole window before another begins: gusts that remember in more ways than one forget all but
 one of them, and logs that were filtered forward and backward what they know of what comes."""
 
 
+class News(NamedTuple):
+    """What comes newly after windows of runs.
+
+    Attributes
+    ----------
+    rows, foretold : list of array, shape (window, axis, column)
+        What is new, and what of that was foretold; of each run the last windows.
+    lasts : array, shape (axis, 1)
+        Share of what is left that lasts until then.
+    """
+
+    rows: list[Array]
+    foretold: list[Array]
+    lasts: Array
+
+
 def what_is_new(
-    rows: Sequence[Array], left: Sequence[Array], told: Sequence[Array], ahead: int, before: Sequence[int]
-) -> tuple[list[Array], list[Array]]:
+    rows: Sequence[Array],
+    left: Sequence[Array],
+    told: Sequence[Array],
+    ahead: int,
+    before: Sequence[int],
+    *,
+    many: bool = False,
+) -> News:
     """Give what comes newly after each window, and what windows that ended before it tell of that.
 
     With r what is left, a moment later and now, and a the share of it that lasts so long, ``r' - a r`` has of a gust
@@ -61,13 +85,8 @@ def what_is_new(
         By how many windows later is later.
     before : sequence of int
         How many windows ago what is known ended, the longest last; the first of them no longer overlap.
-
-    Returns
-    -------
-    list of array, shape (window, axis, column)
-        What is new; of each run the last windows.
-    list of array, shape (window, axis, column)
-        What of that was foretold.
+    many : bool
+        Whether many signals are known that go together.
 
     References
     ----------
@@ -89,8 +108,10 @@ def what_is_new(
     new = [then - lasts * own for then, own in zip(later(rows, ahead), later(rows, 0), strict=True)]
     past = [np.concatenate(each, axis=-1) for each in zip(*(later(told, -lag) for lag in before), strict=True)]
     flat = {number: own.reshape(-1, own.shape[-1]) for number, own in enumerate(past) if len(own)}
-    known = foretold_by_run(flat, {number: new[number].reshape(len(own), -1) for number, own in flat.items()})
-    return new, [known[number].reshape(own.shape) if number in known else own for number, own in enumerate(new)]
+    values = {number: new[number].reshape(len(own), -1) for number, own in flat.items()}
+    known = foretold_by_run(flat, values, OF_MANY) if many else foretold_by_run(flat, values)
+    foretold = [known[number].reshape(own.shape) if number in known else own for number, own in enumerate(new)]
+    return News(new, foretold, lasts)
 
 
 class PastBalances(Balances):
@@ -137,7 +158,7 @@ class PastBalances(Balances):
         rows = [laid(band, flight, signals[number]) for number, flight in parts]
         left = [np.einsum("wac,ac->wa", own, laid.left) for own in rows]
         told = [averaged(band, flight, _seen(flight)) for _, flight in parts]
-        new, known = what_is_new(rows, left, told, 1, _BEFORE)
+        new, known, _ = what_is_new(rows, left, told, round(LATER * _PER_WINDOW), _BEFORE)
         for (number, flight), own, foretold in zip(parts, new, known, strict=True):
             middles = middles_of(band, flight)
             yield Rows(number, own, foretold, middles[len(middles) - len(own) :])

@@ -23,7 +23,7 @@ from cpfls_cli.playback.history_fit import find_history
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.loop import LoopBounds, loop_bounds
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.parameters import ROOM, Physical, needs_velocity
+from cpfls_cli.playback.parameters import LAW, ROOM, Physical, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Choice, Kept, Progress, choose, fitted_to_all
 from cpfls_cli.playback.table import wrench_of
@@ -364,7 +364,8 @@ def beside_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterator[Fo
     """Widen the intervals of inertia and drag factor by what the loop leaves open.
 
     About yaw torque and inertia are known by their ratio: what makes Izz larger makes the drag factor smaller. Where
-    the flights show the loop nothing is determined but what carries the weight, for every effect answers with it.
+    the flights show the loop nothing is determined but what carries the weight, for every effect answers with it: the
+    thrust factor, where no law of the rotors found beside it carries a part of the weight.
 
     Parameters
     ----------
@@ -374,11 +375,12 @@ def beside_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterator[Fo
     low, high = np.fmin(loop.low, 1.0), np.fmax(loop.high, 1.0)
     factors = {f"inertia.{name}": ends for name, *ends in zip(INERTIA_PARAMETERS[:3], low, high, strict=True)}
     factors["drag_factor"] = [1 / high[2], 1 / low[2]]
+    carries = {"thrust_factor"} if LAW not in {number.name for number in numbers} else set[str]()
     for number in numbers:
         below, above = (float(factor) for factor in factors.get(number.name, (1.0, 1.0)))
         ends = number.low * below, number.high * above
         known = ends[1] <= KNOWN * ends[0] if number.name in factors else True
-        told = known and (number.name == "thrust_factor" or not loop.shows_loop)
+        told = known and (number.name in carries or not loop.shows_loop)
         yield number._replace(low=ends[0], high=ends[1], determined=number.determined and told)
 
 

@@ -20,10 +20,10 @@ from cpfls_cli.gap.naming.confirmed import nothing_by_size
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of
 from cpfls_cli.gap.naming.scoring import known_before
 from cpfls_cli.gap.residual.air import foretold_rows
+from cpfls_cli.gap.residual.newness import news
 from cpfls_cli.gap.settings import CHANCE, GapSettings
 from cpfls_cli.playback.constants import ENOUGH_BLOCKS, STRONG
 from cpfls_cli.playback.instruments import Instruments
-from cpfls_cli.playback.past import what_is_new
 
 
 class _Run(NamedTuple):
@@ -311,7 +311,8 @@ def _runs(
         of_path.append(path + len(given.runs) * (place[middles[-1]] // length))
         of_run.append(-1.0 - number - len(given.runs) * (middles[-1] // length))
     known = foretold_rows(given, windows, own) if given.kind == "setpoints" else _in_other_runs(given, own, middles)
-    return _of_blocks(own, known, of_path), _of_blocks(*_after(own), of_run)
+    new, foretold, _ = news(own, [run[..., -1] for run in own], [run[..., :-1] for run in own])
+    return _of_blocks(own, known, of_path), _of_blocks(new, foretold, of_run)
 
 
 def _of_blocks(rows: Sequence[Array], known: Iterable[Array], blocks: Sequence[Array]) -> Iterator[_Run]:
@@ -320,19 +321,6 @@ def _of_blocks(rows: Sequence[Array], known: Iterable[Array], blocks: Sequence[A
         last = block[len(block) - len(mine) :]
         told = np.isfinite(theirs).all(axis=(1, 2)) & np.isfinite(last)
         yield _Run(mine[told], theirs[told], last[told].astype(np.int64))
-
-
-def _after(rows: Sequence[Array]) -> tuple[list[Array], list[Array]]:
-    """Give what comes newly after each window, and what windows that ended before it tell of that.
-
-    Parameters
-    ----------
-    rows : sequence of array, shape (window, 6, number + 1)
-        Of each run, in floors; windows a `PER_WINDOW`-th of one apart.
-    """
-    ahead = PER_WINDOW // 4
-    told, left = [own[..., :-1] for own in rows], [own[..., -1] for own in rows]
-    return what_is_new(rows, left, told, ahead, range(PER_WINDOW, 2 * PER_WINDOW, ahead))
 
 
 def _in_other_runs(given: Instruments, rows: Sequence[Array], middles: Sequence[IntArray]) -> Iterator[Array]:

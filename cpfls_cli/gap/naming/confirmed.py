@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
@@ -206,7 +206,8 @@ class Judge:
         difference, block = squares[0] - squares[1], block_index(there, self.settings)
         sums = np.array([difference[block == number].sum(axis=0) for number in np.unique(block)])
         spread = len(sums) * mean_error(sums) if len(sums) > 1 else np.zeros(6)
-        return Without(difference.sum(axis=0) / count, spread / count, np.sqrt(squares[0].sum(axis=0) / count))
+        gusts = np.any([flight.air > 0 for flight in self.repaired], axis=0)
+        return Without(difference.sum(axis=0) / count, spread / count, np.sqrt(squares[0].sum(axis=0) / count), gusts)
 
 
 class Without(NamedTuple):
@@ -220,16 +221,23 @@ class Without(NamedTuple):
         Standard error of it over blocks.
     left : array, shape (6,)
         Root mean square without it, in floors.
+    gusts : array of bool, shape (6,)
+        Channels whose floor holds gusts.
     """
 
     raised: Array
     error: Array
     left: Array
+    gusts: BoolArray = np.zeros(6, dtype=bool)
 
     @property
     def seen(self) -> Array:
-        """By how much the gap of each channel is larger without it; what is below the floor without it is noise."""
-        return np.where(self.left > 1.0, self.raised, 0.0)
+        """By how much the gap of each channel is larger without it; what is below the floor without it is noise.
+
+        The floor of gusts that are drawn anew is above most of them: below it counts what is surely larger.
+        """
+        surely = self.gusts & (self.raised > ERRORS * self.error)
+        return np.where((self.left > 1.0) | surely, self.raised, 0.0)
 
     @property
     def visibly(self) -> float:

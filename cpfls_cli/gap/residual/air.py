@@ -1,9 +1,10 @@
-"""Whether what is left of a gap is the air: gusts that nothing foretells that was asked, their size and memory."""
+"""Whether what is left of a gap is the air: gusts that nothing asked and nothing before foretells; size and memory."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -12,19 +13,38 @@ from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.gap.balance.balance_system import System, floors, left_over
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.residual.dependence import rank_dependence, state_signals, without_actuation
+from cpfls_cli.gap.residual.newness import newly_left, ranks
 from cpfls_cli.gap.residual.repeated import without_copies
 from cpfls_cli.gap.settings import COUNTS, ERRORS, RARE, GapSettings
 from cpfls_cli.playback.disturbance import FoundGusts, gusts_in
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.gusts import RANGES
-from cpfls_cli.playback.instruments import Instruments, Repeats, foretold_by_run, held, instruments, late, late_by
-from cpfls_cli.rounding import levelled
+from cpfls_cli.playback.instruments import (
+    Instruments,
+    Repeats,
+    Told,
+    ToldBy,
+    foretold_by_run,
+    held,
+    instruments,
+    late,
+    late_by,
+)
 from cpfls_cli.weak_form.resampling import about_flight_mean
 from cpfls_cli.weak_form.windows import Recording, Windows
 
-_FORETOLD = {"repeats": 1 / 2, "setpoints": 1 / 3, "none": 0.0}
+_FORETOLD = {"repeats": 1 / 2, "setpoints": 1 / 3, "past": 1 / 5}
 """Share of what is left that instruments may foretell, at 95 %, where it is called the air: the smaller part of it.
-Other runs show all that the vehicle does again, and a linear answer to setpoints about two thirds of it."""
+Other runs show all that the vehicle does again, a linear answer to setpoints about two thirds of it, and what was
+before a third of what of it is new."""
+
+_WITNESSES: dict[Told, tuple[ToldBy, ...]] = {
+    "repeats": ("repeats", "past"),
+    "setpoints": ("setpoints", "past"),
+    "none": ("past",),
+}
+"""What tells gusts where that is known of flights: the next where one knows too little of them, or, of setpoints, what
+they neither tell nor refute."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +128,8 @@ def air(
     """Find gusts in what a hypothesis leaves of flights.
 
     What the vehicle does goes with what was asked of it, and comes again where that does; a gust does neither. Without
-    instruments nothing tells them apart: a rotor answers every torque, and the noise of its gyroscope too.
+    either, what is new of a gust goes with nothing that was before, nor does its size; what is new of an effect goes
+    with the motion that it comes from.
 
     Parameters
     ----------
@@ -121,32 +142,106 @@ def air(
     Returns
     -------
     Air or None
-        None for flights that are too short or of several rates.
+        None for flights that are too short or of several rates, and for too few of them that instruments know.
     """
-    left = [left_over(hypothesis, number, linear) for number in range(len(hypothesis.flights))]
-    sides = []
-    for run in given.runs:
-        momentum, direct = left[run.flight].momentum, left[run.flight].direct
-        assert momentum is not None, "a balance has both"
-        sides.append(np.stack([momentum[run.part], -direct[run.part]], axis=1))
-    found, bound = gusts_in(sides, given, given.kind), gusts_in(sides, given, "none")
-    if found is None or bound is None:
-        return None
-    known = np.all([flight.known for flight in hypothesis.flights], axis=0)
-    residual = hypothesis.left(linear)
+    residual, known = hypothesis.left(linear), np.all([flight.known for flight in hypothesis.flights], axis=0)
     sensors = floors(replace(hypothesis, flights=tuple(in_air(hypothesis.flights, np.zeros(6)))), linear)
     moved = np.mean(about_flight_mean(residual, hypothesis.flight_index) ** 2, axis=0) / sensors**2
-    told = known & np.isfinite(found.size) & _gusty(found, np.where(known, moved, 0.0), _FORETOLD[given.kind])
-    if given.kind == "setpoints" and told.any():
-        turned, pushed = np.split(residual.any(axis=0), 2)
-        turning, pushing = np.split(np.isfinite(found.size), 2)
-        blows = turning[turned].all() and (pushing.any() or not pushed.any())
-        told &= bool(blows) & _like_air(hypothesis, residual, block, given, settings, rng)
+    left = _Left(hypothesis, linear, residual, block, np.where(known, moved, 0.0), given, settings)
+    bound = gusts_in(left.sides, given, "none")
+    if bound is None:
+        return None
+    found, told, refuted = bound, np.zeros(6, dtype=bool), np.zeros(6, dtype=bool)
+    for told_by in _WITNESSES[given.kind]:
+        own = gusts_in(left.sides, given, told_by)
+        if own is None:
+            continue
+        own, like = left.told_by(own, rng)
+        like &= known & ~refuted
+        refuted = own.foretold - ERRORS * own.foretold_error > _FORETOLD[told_by]
+        if found is bound or like.sum() > told.sum():
+            found, told = own, like
+        if told_by == "repeats" or told[known].all():
+            break
+    if found is bound:
+        return None
     # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
-    sized = told | (given.kind == "repeats")
+    sized = told | (found.told_by == "repeats")
     parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in RANGES}
     parts = {name: np.where(known, values, np.nan) for name, values in parts.items()}
     return Air(replace(found, **parts), told, known & np.isfinite(found.size) & sized)
+
+
+@dataclass(frozen=True)
+class _Left:
+    """What a hypothesis leaves of flights, and what is known of them.
+
+    Attributes
+    ----------
+    residual : array, shape (window, 6)
+    block : array of int, shape (window,)
+    moved : array, shape (6,)
+        Mean square, in squared floors of the sensors; 0 of a channel that is not known.
+    """
+
+    hypothesis: System
+    linear: Array
+    residual: Array
+    block: IntArray
+    moved: Array
+    given: Instruments
+    settings: GapSettings
+
+    @cached_property
+    def sides(self) -> list[Array]:
+        """What both sides of the balance differ by, of each run, shape (time, 2, 6)."""
+        left = [left_over(self.hypothesis, number, self.linear) for number in range(len(self.hypothesis.flights))]
+        sides = []
+        for run in self.given.runs:
+            momentum, direct = left[run.flight].momentum, left[run.flight].direct
+            assert momentum is not None, "a balance has both"
+            sides.append(np.stack([momentum[run.part], -direct[run.part]], axis=1))
+        return sides
+
+    def told_by(self, found: FoundGusts, rng: np.random.Generator) -> tuple[FoundGusts, BoolArray]:
+        """Mark the channels of which the instruments that found gusts tell that this is all, with what is foretold."""
+        told_by, steady = found.told_by, np.ones(6, dtype=bool)
+        if told_by == "past":
+            newly = newly_left(self.hypothesis, self.linear, found.noise, self.settings)
+            foretold, without = newly.shares
+            found = replace(found, foretold=foretold, foretold_without=without)
+            steady = ~newly.grows(self.settings.shifts)
+        told = np.isfinite(found.size) & _gusty(found, self.moved, _FORETOLD[told_by])
+        if told_by == "repeats" or not told.any():
+            return found, told
+        like = steady if told_by == "past" else self._like_air(rng)
+        # Air turns a vehicle about every axis and pushes it; nothing else shows it where nothing was asked.
+        blown = told & like if told_by == "past" else np.isfinite(found.size)
+        turned, pushed = np.split(self.residual.any(axis=0), 2)
+        turning, pushing = np.split(blown, 2)
+        return found, told & like & bool(turning[turned].all() and (pushing.any() or not pushed.any()))
+
+    def _like_air(self, rng: np.random.Generator) -> BoolArray:
+        """Mark channels of which the air is believed where setpoints do not foretell them.
+
+        Setpoints foretell no effect that is not linear in what they ask for. So a channel may follow no curve of a
+        signal, as far as they foretell that; and the air turns and pushes as much in gentle flight as in fierce.
+        """
+        flights, given, settings = self.hypothesis.flights, self.given, self.settings
+        if [run.flight for run in given.runs] != list(range(len(flights))):
+            return np.zeros(6, dtype=bool)
+        signals = zip(flights, self.hypothesis.signals, strict=True)
+        states = [without_actuation(state_signals(*pair)) for pair in signals]
+        names = [name for name in states[0] if all(name in state for state in states)]
+        flown = [np.stack([state[name] for name in names], axis=1) for state in states]
+        asked = np.concatenate(foretold_rows(given, flights[0].windows, flown))
+        time = np.concatenate([each["time"] for each in states])
+        state = dict(zip(names, asked.T, strict=True)) | {"time": time}
+        index = self.hypothesis.flight_index
+        ranked = rank_dependence(self.residual, index, self.block, state, settings.shifts, rng)
+        follows = [each.channel for each in ranked if each.p_value <= settings.significance and each.r2 > COUNTS]
+        grows = _growing(self.residual, asked, index, self.block, settings.shifts, rng)
+        return ~np.isin(CHANNELS, follows) & ~grows
 
 
 def _gusty(found: FoundGusts, moved: Array, most: float) -> BoolArray:
@@ -200,33 +295,6 @@ def foretold_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) -
     return [told.get(number, np.full_like(own, np.nan)) for number, own in enumerate(rows)]
 
 
-def _like_air(
-    hypothesis: System,
-    residual: Array,
-    block: IntArray,
-    given: Instruments,
-    settings: GapSettings,
-    rng: np.random.Generator,
-) -> BoolArray:
-    """Mark channels of which the air is believed where setpoints do not foretell them.
-
-    Setpoints foretell no effect that is not linear in what they ask for. So a channel may follow no curve of a signal,
-    as far as they foretell that; and the air turns and pushes as much in gentle flight as in fierce.
-    """
-    flights = hypothesis.flights
-    if [run.flight for run in given.runs] != list(range(len(flights))):
-        return np.zeros(6, dtype=bool)
-    states = [without_actuation(state_signals(*pair)) for pair in zip(flights, hypothesis.signals, strict=True)]
-    names = [name for name in states[0] if all(name in state for state in states)]
-    flown = [np.stack([state[name] for name in names], axis=1) for state in states]
-    asked = np.concatenate(foretold_rows(given, flights[0].windows, flown))
-    state = dict(zip(names, asked.T, strict=True)) | {"time": np.concatenate([each["time"] for each in states])}
-    index = hypothesis.flight_index
-    ranked = rank_dependence(residual, index, block, state, settings.shifts, rng)
-    follows = [each.channel for each in ranked if each.p_value <= settings.significance and each.r2 > COUNTS]
-    return ~np.isin(CHANNELS, follows) & ~_growing(residual, asked, index, block, settings.shifts, rng)
-
-
 def _growing(
     residual: Array,
     asked: Array,
@@ -242,13 +310,7 @@ def _growing(
     Winkler et al. 2014, permutation inference with the largest statistic.
     """
     rows = [about_flight_mean(values, flight_index) ** 2 for values in (residual, asked)]
-    sizes, moves = (_ranks(np.array([each[block == own].mean(axis=0) for own in np.unique(block)])) for each in rows)
+    sizes, moves = (ranks(np.array([each[block == own].mean(axis=0) for own in np.unique(block)])) for each in rows)
     alike = (moves.T @ sizes).max(axis=0, initial=0.0)
     chance = np.array([(moves.T @ rng.permutation(sizes)).max(initial=0.0) for _ in range(shifts)])
     return np.asarray((chance[:, None] >= alike).sum(axis=0) <= max(RARE * (1 + shifts) - 1, 0))
-
-
-def _ranks(values: Array) -> Array:
-    """Rank the rows of each column, equal ones alike, doubled and about their mean, so that products are exact."""
-    ranks = [np.unique(levelled(column), return_inverse=True)[1] for column in values.T]
-    return np.array([2.0 * each - each.max(initial=0) for each in ranks]).T

@@ -110,17 +110,14 @@ def test_a_lag_is_told_from_a_delay_and_from_the_loop_by_what_was_before(flown):
     assert number.low < TRUE.lag_s < number.high < 1.25 * TRUE.lag_s
 
 
-def test_gusts_alone_are_no_gap_where_instruments_tell_and_one_where_none_does(flown):
-    told = diagnosed(recorded(flown["asked"], TRUE.vehicle, setpoints=True))
-    assert told.diagnosis.verdict is GapVerdict.NO_GAP
-    assert told.air is not None
-    tells_sizes(told.air.found)
-    untold = diagnosed(recorded(flown["asked"], TRUE.vehicle, setpoints=False))
-    assert untold.diagnosis.verdict is GapVerdict.UNEXPLAINED
-    assert untold.air is not None
-    assert not untold.air.told.any()
-    assert np.isnan(untold.air.found.size).all()
-    assert np.all(untold.air.found.high[:3] > INERTIA * GUSTS)
+@pytest.mark.parametrize(("setpoints", "told_by"), [(True, "setpoints"), (False, "past")])
+def test_gusts_alone_are_no_gap(flown, setpoints, told_by):
+    run = diagnosed(recorded(flown["asked"], TRUE.vehicle, setpoints=setpoints))
+    assert run.diagnosis.verdict is GapVerdict.NO_GAP
+    assert run.air is not None
+    assert run.air.found.told_by == told_by
+    assert run.air.told.all()
+    tells_sizes(run.air.found)
 
 
 @pytest.mark.parametrize(("kind", "setpoints"), [("asked", True), ("again", False)])
@@ -131,6 +128,17 @@ def test_gusts_about_axes_are_told_of_flights_without_velocity(flown, kind, setp
     assert found.told.tolist() == [True] * 3 + [False] * 3
     tells_sizes(found.found)
     assert np.isnan(found.found.size[3:]).all()
+
+
+def test_where_instruments_know_too_little_what_was_before_tells(flown, monkeypatch):
+    recordings = recorded(flown["asked"], TRUE.vehicle, setpoints=False)
+    # No path comes again.
+    monkeypatch.setattr("cpfls_cli.gap.residual.air._WITNESSES", {"none": ("repeats", "past")})
+    found = in_what_is_left(recordings)
+    assert found.found.told_by == "past"
+    assert found.told.all()
+    monkeypatch.setattr("cpfls_cli.gap.residual.air._WITNESSES", {"none": ("repeats",)})
+    assert diagnosed(recordings).air is None
 
 
 def test_what_does_not_come_again_is_noise_beside_what_does(flown):
@@ -147,6 +155,13 @@ def test_a_copy_of_a_flight_repeats_none(flown):
     assert known_motion([first, replace(first, name="copy"), second]).kind == "setpoints"
     runs = recorded(flown["again"][:2], TRUE.vehicle, setpoints=False)
     assert list(known_motion([*runs, replace(runs[0], name="copy")]).repeats.likeness) == [(0, 1)]
+
+
+def test_what_the_vehicle_does_is_not_called_gusts_where_nothing_was_asked(flown):
+    found = in_what_is_left(recorded(flown["calm"], TRUE.vehicle, setpoints=False))
+    assert not found.told.any()
+    assert np.isnan(found.found.size).all()
+    assert np.all(found.found.foretold[:2] > 3 * found.found.foretold_error[:2])
 
 
 @pytest.mark.parametrize(("kind", "turning"), [("calm", [False, False]), ("damped", [True, True])])

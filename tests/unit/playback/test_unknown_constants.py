@@ -180,6 +180,9 @@ def test_flights_that_show_the_loop_determine_what_carries_the_weight_alone():
     numbers = [FoundNumber(name, "", 1.0, 0.9, 1.1, np.nan, True, False) for name in names]
     assert LOOP.shows_loop
     assert [number.name for number in beside_loop(numbers, LOOP) if number.determined] == ["thrust_factor"]
+    # A law found beside it carries a part of the weight, and answers with the loop as every effect.
+    numbers.append(FoundNumber("thrust_law.linear", "", -0.3, -0.4, -0.2, np.nan, True, False))
+    assert not any(number.determined for number in beside_loop(numbers, LOOP))
 
 
 def replace_explained(bounds, share):
