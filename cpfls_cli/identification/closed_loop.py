@@ -30,9 +30,9 @@ from cpfls_cli.identification.data import (
 )
 from cpfls_cli.inertia import INERTIA_ENTRIES, KNOWN, VISIBLE
 from cpfls_cli.playback.balances import block_length
-from cpfls_cli.playback.constants import ToldBy, constants_of_past
+from cpfls_cli.playback.constants import constants_of_past
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.instruments import FOLDS, Instruments, foretold_by_run, instruments, late, late_by
+from cpfls_cli.playback.instruments import FOLDS, Instruments, ToldBy, foretold_by_run, instruments, late, late_by
 from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.playback.loop import BalancedTorque, LoopBounds, bounds_between
 from cpfls_cli.playback.parameters import INERTIA, PRODUCTS, blocks_of
