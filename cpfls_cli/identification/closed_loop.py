@@ -1,8 +1,9 @@
-"""What an autopilot's loop does to the torque of flights: freed of it where instruments tell, else bounded.
+"""What an autopilot's loop does to the torque of flights: freed of it where something tells, else bounded.
 
 An autopilot answers gusts with torque, so least squares of torque on motion finds a mixture of vehicle and autopilot.
 Another run of the same path has the same motion asked for, and another gust, and a setpoint from outside of the loop
-knows of no gust: they are the instruments.
+knows of no gust: they are the instruments. Where there are none, what was before knows nothing of what is new in a
+gust.
 """
 
 from __future__ import annotations
@@ -14,17 +15,30 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli import rotations
-from cpfls_cli.arrays import Array, BoolArray, IntArray, stretches
+from cpfls_cli.arrays import Array, BoolArray, IntArray, runs, stretches
 from cpfls_cli.blocks import half_width, jackknife_covariance
 from cpfls_cli.dynamics.rigid_body import rigid_columns, vertical, why_unphysical
-from cpfls_cli.identification.data import Flights, TorqueData, TorqueSource, axis_scale, gathered, sample_times
-from cpfls_cli.inertia import KNOWN, VISIBLE
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.identification.data import (
+    Flights,
+    OtherTorque,
+    TorqueData,
+    TorqueSource,
+    axis_scale,
+    gathered,
+    sample_times,
+)
+from cpfls_cli.inertia import INERTIA_ENTRIES, KNOWN, VISIBLE
 from cpfls_cli.playback.balances import block_length
+from cpfls_cli.playback.constants import constants_of_past
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.instruments import FOLDS, Instruments, foretold_by_run, instruments, late, late_by
+from cpfls_cli.playback.instruments import FOLDS, Instruments, ToldBy, foretold_by_run, instruments, late, late_by
 from cpfls_cli.playback.kernels import MeasuredMotion
 from cpfls_cli.playback.loop import BalancedTorque, LoopBounds, bounds_between
+from cpfls_cli.playback.parameters import INERTIA, PRODUCTS, blocks_of
 from cpfls_cli.regressor.motion import RIGID, Motion
+from cpfls_cli.vehicle.rotors import rotor_demand
+from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, windows
 
 _FEWEST_BLOCKS = 8
@@ -51,7 +65,7 @@ class FreedTorque:
 
     Attributes
     ----------
-    training, learned : TorqueData
+    training, learned : TorqueSource
         Those of the training part and of the samples learned from that the instruments know.
     rigid_body, least_squares : array, shape (6,), kg m^2
         Inertia parameters by instruments, and by least squares of the torque as measured.
@@ -61,12 +75,14 @@ class FreedTorque:
         Runs that repeat each other, and their paths; or runs with setpoints, of no common path.
     alone, flights : int
         Flights without instruments, and all flights.
+    told_by : str
+        "repeats", "setpoints", or "past", which is what was before.
     setpoints : tuple of str
-        The instruments, where no runs repeat each other.
+        Those that are the instruments.
     """
 
-    training: TorqueData
-    learned: TorqueData
+    training: TorqueSource
+    learned: TorqueSource
     rigid_body: Array
     least_squares: Array
     half: Array
@@ -74,6 +90,7 @@ class FreedTorque:
     paths: int
     alone: int
     flights: int
+    told_by: ToldBy
     setpoints: tuple[str, ...] = ()
 
     @property
@@ -90,7 +107,7 @@ class FreedTorque:
 
 
 def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque | None:
-    """Free the torque of flights of what instruments do not know: other runs of a path, or setpoints.
+    """Free the torque of flights of what instruments do not know: other runs of a path, or setpoints; or by the past.
 
     Flights that have none are left out. So where there are such, the rest is taken only if least squares of it shows
     the loop in all, or instruments find another body; setpoints, which tell less than repeats, only then.
@@ -102,7 +119,10 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     foretold errs alike in many blocks. The torque becomes what the rigid body takes along the run's own motion and what
     is known of the fast rest, ``tau' - A' x``, as far as A does not hold it. Least squares of it gives the rigid body
     of the instruments again, and an inertia that depends on attitude as far as instruments know of it. Where they know
-    most of what a rigid body leaves, slow or fast, it is no gust, and nothing is freed.
+    most of what a rigid body leaves, slow or fast, it is no gust, and nothing is freed by them.
+
+    Where that is so, or there are none, and least squares shows the loop, what was before is asked for the body, though
+    not about yaw (`constants_of_past`). The torque becomes what it was, and what that body takes more than the other.
 
     Parameters
     ----------
@@ -112,8 +132,8 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     Returns
     -------
     FreedTorque or None
-        None where no flight has instruments, for too short a time, or they do not tell roll and pitch to a factor of
-        two or find no body; and of flights that stay in their files.
+        None where nothing tells roll and pitch to a factor of two, or finds no body; where no instruments, for long
+        enough, are there and the flights do not show the loop; and of flights that stay in their files.
 
     References
     ----------
@@ -125,12 +145,16 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     if period is None or len(parts) < len(flights):
         return None
     given = instruments([_flown(part, period) for part in parts])
-    if given.kind == "none":
-        return None
-    scale = 1.0 / axis_scale(training)
-    whole = [
-        np.concatenate([rigid_columns(part.motion), part.torque[:, :, None]], axis=2) * scale[:, None] for part in parts
-    ]
+    by_instruments = None if given.kind == "none" else _by_instruments(training, learned, parts, given)
+    return by_instruments or _by_past(training, learned, parts, given)
+
+
+def _by_instruments(
+    training: TorqueSource, learned: TorqueSource, parts: Sequence[TorqueData], given: Instruments
+) -> FreedTorque | None:
+    """Free the torque of flights by repeats or setpoints."""
+    period, scale = given.flown[0].motion.period, 1.0 / axis_scale(training)
+    whole = _laid(parts, scale)
     rows = [whole[run.flight][run.part] for run in given.runs]
     runs = _runs(given, rows, period)
     repeated = given.kind == "repeats"
@@ -163,16 +187,66 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
         paths=len(given.repeats.paths()),
         alone=len(parts) - len({given.runs[run.number].flight for run in runs}),
         flights=len(parts),
+        told_by=given.kind,
         setpoints=() if repeated else given.names,
     )
     if not (found.told[:2].all() and len(found.learned)):
         return None
-    taken = (repeated and not found.alone) or found.contradicts or _shows_loop(found, training)
+    taken = (repeated and not found.alone) or found.contradicts or _shows_loop(training, least_squares)
     return found if taken else None
 
 
-def _shows_loop(found: FreedTorque, training: TorqueSource) -> bool:
-    return loop_along(training, lambda motion: rigid_columns(motion) @ found.least_squares).shows_loop
+def _by_past(
+    training: TorqueSource, learned: TorqueSource, parts: Sequence[TorqueData], given: Instruments
+) -> FreedTorque | None:
+    """Free the torque of flights that show the loop by what was before."""
+    rows = np.concatenate(_laid(parts, 1.0 / axis_scale(training)))
+    (least_squares,) = _parameters(np.einsum("tap,taq->pq", rows[:, :, :-1], rows)[None], None)
+    if why_unphysical(least_squares) is not None or not _shows_loop(training, least_squares):
+        return None
+    vehicle = VehicleSettings(inertia_kg_m2=tuple(least_squares.tolist()))
+    flights = _driven(vehicle, parts, given.flown[0].motion.period)
+    # Of effects those that take no rotors: these are nobody's.
+    tried = (INERTIA, PRODUCTS, *(name for name, effect in CATALOGUE.items() if not effect.needs))
+    others = [block for block in blocks_of(vehicle) if block not in tried]
+    found = constants_of_past(vehicle, flights, replace(given, flown=flights), others)
+    if found is None or not found.tells:
+        return None
+    inertia, yaw = found.fitted.model.body.inertia, list(_OF_YAW)
+    rigid_body = np.array([inertia[entry] for entry in INERTIA_ENTRIES])
+    # What was before does not tell it.
+    rigid_body[yaw] = least_squares[yaw]
+    if why_unphysical(rigid_body) is not None:
+        return None
+
+    def freed(data: TorqueData) -> Array:
+        return np.asarray(data.torque + rigid_columns(data.motion) @ (rigid_body - least_squares))
+
+    whole, part, count = OtherTorque(training, freed), OtherTorque(learned, freed), len(parts)
+    return FreedTorque(whole, part, rigid_body, least_squares, found.half, count, 0, 0, count, "past")
+
+
+def _driven(vehicle: VehicleSettings, parts: Sequence[TorqueData], period: float) -> tuple[PlaybackFlight, ...]:
+    """Give flights with rotor speeds by which any vehicle would have their torque, where they are not vertical."""
+    flights = []
+    for part in parts:
+        known = ~vertical(part.motion.attitude)
+        torque = np.where(known[:, None], rotations.body_torque(part.motion.attitude, part.torque), 0.0)
+        square = rotor_demand(vehicle, np.zeros(len(part)), torque).squared_speed
+        flights.append(replace(_flown(part, period), speed=square, stretches=tuple(slice(*run) for run in runs(known))))
+    most = max(float(np.abs(flight.speed).max()) for flight in flights)
+    return tuple(replace(flight, speed=np.sqrt(most + flight.speed)) for flight in flights)
+
+
+def _laid(parts: Sequence[TorqueData], scale: Array) -> list[Array]:
+    """Lay columns of the rigid body beside the torque, scaled by axis, of each flight, shape (samples, 3, 7)."""
+    return [
+        np.concatenate([rigid_columns(part.motion), part.torque[:, :, None]], axis=2) * scale[:, None] for part in parts
+    ]
+
+
+def _shows_loop(training: TorqueSource, rigid_body: Array) -> bool:
+    return loop_along(training, lambda motion: rigid_columns(motion) @ rigid_body).shows_loop
 
 
 def told_by(

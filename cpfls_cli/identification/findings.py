@@ -68,7 +68,7 @@ class FitDiagnostics:
     freed : FreedTorque or None
         What the parameters were learned from, where instruments tell the vehicle from the loop.
     loop : LoopBounds or None
-        How far the loop may have misled the model, where nothing tells it from the vehicle.
+        How far the loop may have misled the model, where nothing from outside tells it from the vehicle.
     """
 
     fit: Fit
@@ -132,14 +132,20 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
     freed = diagnostics.freed
     if freed is None:
         return
+    pure = "in which no gust acts"
     if freed.setpoints:
         asked = joined("the sticks" if name == "sticks" else f"the setpoint of {name}" for name in freed.setpoints)
         know = "know" if len(freed.setpoints) > 1 or freed.setpoints == ("sticks",) else "knows"
-        source = f"{asked} {know} no gust, so the parameters come from the torque that follows"
+        source = f"{asked} {know} no gust, so the parameters come from the torque that follows, {pure}"
         little, without = "too little of yaw follows", "have no such setpoint"
+    elif freed.told_by == "past":
+        source = (
+            "the flights show the loop, so roll and pitch come from what was before, which knows no gust that is new"
+        )
+        little, without = "what was before does not tell it", ""
     else:
         paths = "1 path" if freed.paths == 1 else f"{freed.paths} paths"
-        source = f"{freed.runs} runs repeat {paths}, so the parameters come from the torque that comes again"
+        source = f"{freed.runs} runs repeat {paths}, so the parameters come from the torque that comes again, {pure}"
         little, without = "too little of yaw comes again", "repeat none"
     moments = ", ".join(
         f"{name} {value:.3g} ({value * np.exp(-half):.3g} to {value * np.exp(half):.3g})"
@@ -150,7 +156,7 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
     rest = f"; {freed.alone} of the training flights {without} and contribute nothing" if freed.alone else ""
     least = " ".join(f"{value:.3g}" for value in freed.least_squares[:3])
     yield (
-        f"{source}, in which no gust acts; scores are for the torque as measured, gusts included. "
+        f"{source}; scores are for the torque as measured, gusts included. "
         f"Rigid body, kg m^2: {moments}; least squares of the torque as measured finds {least}{rest}"
     )
 
@@ -158,25 +164,29 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
 def _loop(diagnostics: FitDiagnostics) -> Iterator[str]:
     """Say where the flights show the loop and nothing tells it from the vehicle."""
     loop = diagnostics.loop
-    if loop is not None and loop.shows_loop:
+    if loop is not None and loop.shows_loop and diagnostics.freed is None:
         yield loop_in_words(loop)
 
 
-def loop_in_words(loop: LoopBounds) -> str:
+def loop_in_words(loop: LoopBounds, *, by_past: bool = False) -> str:
     """Say how far the loop may have misled a model, and what to fly."""
     shares = ", ".join(
         f"{100 * max(share, 0):.0f} % of {axis}" for axis, share in zip(AXES[:2], loop.explained, strict=False)
     )
+    shown = f"the flights show the loop: torque explains {shares} in some band of 0.5 to 6 Hz"
+    fly = (
+        "Fly each path at least three times, one log each, and give all flights (cpfls trajectory --repeat plans them),"
+        " or log the setpoint of position or velocity, or the sticks"
+    )
+    if by_past:
+        return f"{shown}. What was before tells roll and pitch, but nothing judges the model. {fly}"
     bounds = " and ".join(
         f"{name} from {low:.2g} to {high:.2g}"
         for name, low, high in zip(INERTIA_PARAMETERS[:2], loop.low, loop.high, strict=False)
     )
     return (
-        f"the flights show the loop: torque explains {shares} in some band of 0.5 to 6 Hz. An autopilot that reacts to "
-        "gusts, or an effect missing here, makes a body look heavier or lighter than it is; true moments over "
-        f"those found: {bounds}. Fly each path at least three times, one log each, and give all flights (cpfls "
-        "trajectory --repeat plans them), or log the setpoint of position or velocity, or the sticks; cpfls vehicle "
-        "may tell the body of these flights by what was before"
+        f"{shown}. An autopilot that reacts to gusts, or an effect missing here, makes a body look heavier or lighter "
+        f"than it is; true moments over those found: {bounds}. What was before does not tell them closer. {fly}"
     )
 
 

@@ -73,8 +73,8 @@ def identify(
 ) -> Identification:
     """Identify a model and judge it beside its baselines.
 
-    Where instruments tell the vehicle from its loop, parameters and the errors that the search minimises are those of
-    the torque that they know (`freed_torque`), in which no gust acts; scores are those of the torque as measured.
+    Where instruments or what was before tell the vehicle from its loop, parameters and the errors that the search
+    minimises are those of the torque that they know (`freed_torque`); scores are those of the torque as measured.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def identify(
         scores=scores,
         learned=scores[TRAINING]["model"] if len(learned) == len(training) else score_of(learned, model.torque),
         freed=freed,
-        loop=None if freed is not None else loop_along(training, model.torque),
+        loop=loop_along(training, model.torque) if freed is None or freed.told_by == "past" else None,
     )
     return Identification(
         **vars(diagnostics),

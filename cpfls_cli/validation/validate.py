@@ -125,7 +125,7 @@ def validate(
         band=drawn.relative_width,
         definite=definite_share(model, draws),
     )
-    judged = beside_loop(verdict(grounds), result.loop)
+    judged = beside_loop(verdict(grounds), result.loop, by_past=result.freed is not None)
     return Validation(structures, residuals, draws, drawn, again, steps, physics, period, judged)
 
 

@@ -80,13 +80,15 @@ def contradicted(found: Verdict, contradictions: Sequence[str]) -> Verdict:
     )
 
 
-def beside_loop(found: Verdict, loop: LoopBounds | None) -> Verdict:
+def beside_loop(found: Verdict, loop: LoopBounds | None, *, by_past: bool = False) -> Verdict:
     """Take back a good verdict on a model whose flights show the loop.
 
     Parameters
     ----------
     loop : LoopBounds or None
-        None where something tells the vehicle from its autopilot.
+        None where something from outside tells the vehicle from its autopilot.
+    by_past : bool
+        Whether what was before tells it.
     """
     if loop is None or not loop.shows_loop:
         return found
@@ -94,7 +96,7 @@ def beside_loop(found: Verdict, loop: LoopBounds | None) -> Verdict:
     # What decided stays first.
     first = 0 if label is Trust.LOOP else 1
     reason, speaks = list(found.reason), list(found.speaks)
-    reason.insert(first, loop_in_words(loop))
+    reason.insert(first, loop_in_words(loop, by_past=by_past))
     speaks.insert(first, AGAINST)
     return replace(found, label=label, reason=tuple(reason), speaks=tuple(speaks))
 

@@ -58,11 +58,13 @@ def test_without_windows_torque_decides():
     assert confirmed_axes(judged, MODEL).all()
 
 
+@pytest.mark.parametrize("by_past", [False, True])
 @pytest.mark.parametrize("label", [Trust.CONTROL, Trust.INSIDE, Trust.RIGID_BODY])
-def test_no_model_of_flights_that_show_the_loop_is_good(label):
-    found = beside_loop(Verdict(label, "", ("better",), (1,)), LOOP)
+def test_no_model_of_flights_that_show_the_loop_is_good(label, by_past):
+    found = beside_loop(Verdict(label, "", ("better",), (1,)), LOOP, by_past=by_past)
     assert found.label == Trust.LOOP
     assert "50 % of roll, 80 % of pitch" in found.reason[0]
+    assert ("What was before tells roll and pitch" in found.reason[0]) is by_past
     assert found.speaks == (-1, 1)
 
 
