@@ -51,7 +51,7 @@ _KNOWN, _SEEN = 3.0, 0.1
 """Ratio of the ends of an interval up to which a size is known, and the least share of what is left that it has."""
 _LAG_S, _LAGS, _FOLDS, _RIDGE = 0.1, 5, 5, 1e-6
 """What was asked for is answered within half a second; parts that are predicted by the others."""
-_NEW_S, _DRAWS, _RARE = 0.4, 199, 0.01
+_NEW_S, _RARE = 0.4, 0.01
 """Windows in which what was before is asked, and how surely what is new may grow with it."""
 _FAR, _NOISE, _AT_END = 12.0, 3.0, 1e-3
 """Logarithms: of factors by which powers may be off where they begin, noise upwards, and what is near a bound."""
@@ -243,7 +243,7 @@ def _by_past(found: FoundGusts, bound: FoundGusts, given: Instruments, sides: Se
     newly = newly_left(seen, left, told, moving, found.noise)
     foretold, without = newly.shares
     foretells_little = foretold + half_width(jackknife_error(without), len(without)) < MOST_FORETOLD
-    gusty = np.isfinite(found.size) & foretells_little & ~newly.grows(_DRAWS, _RARE)
+    gusty = np.isfinite(found.size) & foretells_little & ~newly.grows(_RARE)
     if not (gusty[:3].all() and (gusty[3:].any() or len(gusty) == 3)):
         return bound
     ends = {name: np.where(gusty, getattr(found, name), getattr(bound, name)) for name in RANGES}

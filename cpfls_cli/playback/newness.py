@@ -23,6 +23,9 @@ PER_WINDOW = FEWEST_SAMPLES
 MOST_FORETOLD = 1 / 5
 """Share of what is new that may be foretold where it is called the air, at 95 %: of an effect a third is."""
 
+_DRAWS = 999
+"""Of chance, so many that a rare one is known to a third."""
+
 
 def news(rows: Sequence[Array], left: Sequence[Array], told: Sequence[Array], *, many: bool = False) -> News:
     """Give what comes newly after windows of runs, a `PER_WINDOW`-th of one apart; see `what_is_new`."""
@@ -59,7 +62,7 @@ class NewlyLeft:
         without = (told.sum(axis=0) - told) / (whole - size)
         return told.sum(axis=0) / whole, without
 
-    def grows(self, shifts: int, rare: float) -> BoolArray:
+    def grows(self, rare: float) -> BoolArray:
         """Mark axes whose new part is surely the larger, or the smaller, the more a signal moved before.
 
         By ranks; what chance has to offer, over all axes and signals, have blocks whose signs are drawn.
@@ -73,9 +76,9 @@ class NewlyLeft:
         scale = np.sqrt(np.maximum((products**2).sum(axis=0), 1.0))
         alike = np.abs(products.sum(axis=0) / scale).reshape(rows.shape[1:]).max(axis=0)
         # The same draws each time that it is asked of flights, beside other names too.
-        signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(shifts, len(products)))
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(_DRAWS, len(products)))
         chance = np.abs(signs @ products / scale).max(axis=1)
-        return np.asarray((chance[:, None] >= alike).sum(axis=0) <= max(rare * (1 + shifts) - 1, 0))
+        return np.asarray((chance[:, None] >= alike).sum(axis=0) < rare * (1 + _DRAWS))
 
 
 def newly_left(

@@ -209,7 +209,7 @@ class _Left:
             newly = self._newly(found.noise)
             foretold, without = newly.shares
             found = replace(found, foretold=foretold, foretold_without=without)
-            steady = ~newly.grows(self.settings.shifts, RARE)
+            steady = ~newly.grows(RARE)
         told = np.isfinite(found.size) & _gusty(found, self.moved, _FORETOLD[told_by])
         if told_by == "repeats" or not told.any():
             return found, told
