@@ -3,8 +3,8 @@
     python benchmarks/gusts.py [DRAWS]
 
 Two vehicles of 45 g and 1.5 kg in three levels of gusts, on a path with sines of up to 5 Hz, 20 s long: flown four
-times without setpoints in the log, or three paths once with the position that was asked for. The body is the true one,
-but for damping and drag, which no model here has. Nothing of the package flies them.
+times without setpoints in the log, or three paths once with the position that was asked for, or without it. The body is
+the true one, but for damping and drag, which no model here has. Nothing of the package flies them.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
+from cpfls_cli.playback.gusts import RANGES
 from cpfls_cli.playback.instruments import Instruments, Repeats, instruments
 from cpfls_cli.playback.model import VehicleModel
 from tests.builders.gusty_flights import CALM, GUSTS, LARGE, MEMORY_S, SMALL, STORM, Flight, Truth, gusty_flights
@@ -39,7 +40,7 @@ def main(draws: int) -> None:
     rows = []
     for name, truth in VEHICLES.items():
         for gusts in (CALM, GUSTS, STORM):
-            for kind in ("repeats", "setpoints"):
+            for kind in ("repeats", "setpoints", "past"):
                 model = VehicleModel(vehicle=truth.vehicle)
                 drawn = [find_gusts(model, _flown(truth, gusts, kind, draw)) for draw in range(draws)]
                 rows += [_row(name, truth, gusts, kind, part, [each for each in drawn if each]) for part in PARTS]
@@ -58,7 +59,7 @@ def _row(
     bodies = np.array([*truth.inertia, *[truth.mass] * 3])[axes]
     sizes = bodies * np.array([*gusts, *[SHOVE * max(gusts)] * 3])[axes]
     memories = np.array([*MEMORY_S, *[SHOVE_MEMORY_S] * 3])[axes]
-    values = {key: np.array([getattr(each, key)[axes] for each in drawn]) for key in vars(drawn[0]) if key != "told_by"}
+    values = {key: np.array([getattr(each, key)[axes] for each in drawn]) for key in RANGES}
     told = np.isfinite(values["size"])
     open_ = (~told & np.isfinite(values["high"])).nonzero()
     bounds = (values["high"] / bodies)[open_]
@@ -83,7 +84,8 @@ def _flown(truth: Truth, gusts: tuple[float, float, float], kind: str, draw: int
         return instruments([replace(flight, setpoints={}) for flight in gusty_flights(asked, SECONDS)])
     asked = [Flight(truth, gusts, PATHS * draw + path, draw, reach=REACH_HZ) for path in range(PATHS)]
     given = instruments(list(gusty_flights(asked, SECONDS)))
-    return replace(given, repeats=Repeats(tuple({} for _ in given.runs), {}))
+    alone = replace(given, repeats=Repeats(tuple({} for _ in given.runs), {}))
+    return alone if kind == "setpoints" else replace(alone, setpoints=tuple(None for _ in given.runs), names=())
 
 
 if __name__ == "__main__":
