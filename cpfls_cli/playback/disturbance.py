@@ -232,7 +232,7 @@ def _by_past(found: FoundGusts, bound: FoundGusts, given: Instruments, sides: Se
     left, told = [], []
     for flight, own in zip(given.flown, sides, strict=True):
         motion = flight.motion
-        moves = [motion.rate, motion.rotation[:, 2], *([motion.velocity] if flight.translates else [])]
+        moves = [motion.rate, motion.rotation[:, 2], *([motion.velocity] if len(found.size) > 3 else [])]
         signals = np.hstack([flight.speed**2, *moves])
         for part in (part for part in flight.stretches if seen.count(part.stop - part.start)):
             left.append(seen.derivative(own[part, 0]) - seen.average(own[part, 1]))
