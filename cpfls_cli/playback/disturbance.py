@@ -71,7 +71,7 @@ class FoundGusts(GustRanges):
     noise : array, shape (axis, 2)
         Variance of the white noise beside it, and of that which a derivative is taken of, as of samples.
     foretold : array, shape (axis,)
-        Share of all that is left which instruments foretell; NaN without instruments.
+        Share of all that is left which instruments foretell, or the past of what is new in it; NaN where nothing tells.
     foretold_without : array, shape (block, axis)
         The same without each block, for its errors.
     white : array, shape (axis,), N m s^0.5 and N s^0.5, or None
@@ -182,12 +182,13 @@ def find_gusts(
     model : VehicleModel
         Its constants have to be those of the vehicle: a wrong body is answered with gusts.
     given : Instruments
-        Of flights with rotor speeds. Without any all that is left is counted, and no size is known.
+        Of flights with rotor speeds. Without any, gusts are told by what was before; where that does not tell them, all
+        that is left is counted, and no size is known.
     determined : mapping of str to bool
         Of numbers of the model that were sought. Nothing is known about an axis whose moment of inertia is not
         determined, and of forces where the thrust factor is not.
     told : bool
-        Whether instruments told the constants too. Those of a fit may be mixed with the loop, even where torque
+        Whether something told the constants too. Those of a fit may be mixed with the loop, even where torque
         explains nearly all of the rotation, by as much as the gusts are: then they are not asked, and there is a bound.
 
     Returns
