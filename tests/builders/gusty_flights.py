@@ -97,7 +97,7 @@ def gusty_flights(flights, seconds=30.0):
     """Fly all flights at once, as long as each other; the bandwidth of the attitude loop is in rad/s."""
     samples = round(seconds / STEP_S)
     rngs = [np.random.default_rng([flight.path, flight.draw]) for flight in flights]
-    path = np.stack([_path(flight.path, flight.reach, flight.swing, samples) for flight in flights], axis=1)
+    path = np.stack([path_of(flight, samples) for flight in flights], axis=1)
     pushes = [_pushes(rng, samples, flight) * flight.gusts for rng, flight in zip(rngs, flights, strict=True)]
     shoves = [_memory(rng, samples, np.ones(3)) * 0.06 * max(f.gusts) for rng, f in zip(rngs, flights, strict=True)]
     noise = [f.truth.gyro_noise * rng.standard_normal((samples, 3)) for rng, f in zip(rngs, flights, strict=True)]
@@ -138,9 +138,13 @@ def _memory(rng, samples, memory_s):
     return np.stack([lfilter([1.0], [1.0, -k], column) for k, column in zip(keep, drawn.T, strict=True)], axis=1)
 
 
+def path_of(flight, samples):
+    """Draw position, velocity, acceleration and heading that a flight is asked for, shape (samples, 10)."""
+    return _path(flight.path, flight.reach, flight.swing, samples)
+
+
 @lru_cache(8)
 def _path(number, reach, swing, samples):
-    """Draw position, velocity, acceleration and heading that a flight is asked for, shape (samples, 10)."""
     rng = np.random.default_rng([1000, number])
     turns = 2 * np.pi * np.linspace(0.08, 0.8, 9)
     size = rng.uniform(0.5, 1.0, (3, 9)) * 0.035 / (turns / 2 / np.pi) ** 1.2 * np.array([[1.0], [1.0], [0.5]])
