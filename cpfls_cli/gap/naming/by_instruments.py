@@ -167,14 +167,14 @@ def may_be_nothing(found: NamedFit, given: Instruments, floor: Array, settings: 
         shapes = slice(first, first := first + len(candidate.effect.shapes))
         own = np.zeros(len(values), dtype=bool)
         own[places.get(candidate.key, slice(0))] = True
-        absent = candidate.effect.name in nothing
-        for products, numbers, outside in sources:
+        chances = list[float]()
+        for products, numbers, _ in sources:
             others = numbers & ~own
             others[shapes] = False
             flown = products[products.any(axis=(1, 2))]
-            if outside and (own & numbers).any() and len(flown) >= ENOUGH_BLOCKS + (own & numbers).sum():
-                absent = _chance(flown, own & numbers, others, values) > CHANCE
-                break
+            if (own & numbers).any() and len(flown) >= ENOUGH_BLOCKS + (own & numbers).sum():
+                chances.append(_chance(flown, own & numbers, others, values))
+        absent = len(chances) * min(chances) > CHANCE if chances else candidate.effect.name in nothing
         names += [candidate.effect.name] if absent else []
     return names
 
@@ -230,8 +230,8 @@ def _sources(found: NamedFit, given: Instruments, floor: Array, settings: GapSet
         flown = products[products.any(axis=(1, 2))]
         if len(flown) >= ENOUGH_BLOCKS:
             # What a bound tells better than these flights is not told by them.
-            numbers = left & (_strength(flown) > STRONG) & (np.diagonal(flown.sum(axis=0))[:-1] > prior)
-            numbers &= early | (place > 0)
+            numbers = left & (np.diagonal(flown.sum(axis=0))[:-1] > prior) & (early | (place > 0))
+            numbers = _strong(flown, numbers)
             sources.append(_Told(products, numbers, place == 0))
             left = left & ~numbers
     return sources
@@ -248,6 +248,32 @@ def _movable(hypothesis: System, floor: Array) -> BoolArray:
     of_vehicle = hypothesis.places[0][1]
     free[of_vehicle] &= np.isin([each.name for each in hypothesis.free[0].effect.coefficients], list(NUMBERS))
     return np.concatenate([free, np.ones(len(hypothesis.shapes), dtype=bool)])
+
+
+def _strong(crossed: Array, numbers: BoolArray) -> BoolArray:
+    """Leave the numbers that are told each beside all others; of those that are not, the weakest goes first.
+
+    References
+    ----------
+    Sanderson and Windmeijer 2016 (the strength of instruments of one number beside others).
+    """
+    alone = _strength(crossed)
+    kept = numbers & (alone > STRONG)
+    while (unclear := kept & (_strength(_beside_others(crossed, kept)) <= STRONG)).any():
+        kept[np.argmin(np.where(unclear, alone, np.inf))] = False
+    return kept
+
+
+def _beside_others(crossed: Array, kept: BoolArray) -> Array:
+    """Keep of what is known of each number, and of what it moves, what no other explains: diagonals of the products."""
+    own = crossed[:, :-1, :-1][:, kept][:, :, kept]
+    scale = np.sqrt(np.diagonal(own.sum(axis=0)))
+    own = own / np.outer(scale, scale)
+    inverse = np.linalg.pinv(own.sum(axis=0))
+    alone = np.diag(inverse)
+    places, beside = np.flatnonzero(kept), np.zeros_like(crossed)
+    beside[:, places, places] = np.einsum("ij,bjk,ki->bi", inverse / alone[:, None], own, inverse / alone)
+    return beside
 
 
 def _strength(crossed: Array) -> Array:
