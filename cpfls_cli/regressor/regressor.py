@@ -9,13 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.fuzzy.basis import (
-    Basis,
-    antecedent,
-    basis,
-    features,
-    rule_firing,
-)
+from cpfls_cli.fuzzy.basis import Basis, antecedent, basis, features, rule_firing
 from cpfls_cli.fuzzy.inputs import InputRange, MappedInput, input_range, map_input
 from cpfls_cli.fuzzy.membership import Memberships, breakpoints, uniform_weights
 from cpfls_cli.regressor.motion import Carrier, Motion, carrier
@@ -102,7 +96,7 @@ class Regressor:
             for angle in (ROLL, PITCH)
         )
         by_inputs = {block.function.inputs: self._features(block) for block in structure.blocks}
-        self.features: tuple[Basis | None, ...] = tuple(by_inputs[block.function.inputs] for block in structure.blocks)
+        self.features: tuple[Basis, ...] = tuple(by_inputs[block.function.inputs] for block in structure.blocks)
 
     @cached_property
     def carriers(self) -> tuple[Carrier, ...]:
@@ -162,12 +156,9 @@ class Regressor:
         index : int
             Index of the block.
         """
-        consequent = self.features[index]
-        if consequent is None:
-            return Basis(np.ones((len(self.motion), 1)), np.zeros((0, len(self.motion), 1)))
         if self.structure.blocks[index].rules == 1:
-            return consequent
-        return basis(self.antecedents(index, partitions), consequent)
+            return self.features[index]
+        return basis(self.antecedents(index, partitions), self.features[index])
 
     def antecedents(self, index: int, partitions: Breakpoints) -> list[Memberships]:
         """Evaluate the antecedents of one inertia function, one per input.
@@ -195,7 +186,7 @@ class Regressor:
         -------
         array, shape (samples, rules)
         """
-        if self.features[index] is None:
+        if self.structure.blocks[index].rules == 1:
             return np.ones((len(self.motion), 1))
         return rule_firing(self.antecedents(index, partitions))[0]
 
@@ -217,9 +208,9 @@ class Regressor:
                 dJ[:, angle, row, column] = dJ[:, angle, column, row] = gradient @ of_block
         return InertiaValues(J, dJ)
 
-    def _features(self, block: Block) -> Basis | None:
+    def _features(self, block: Block) -> Basis:
         if not block.partitions:
-            return None
+            return Basis(np.ones((len(self.motion), 1)), np.zeros((0, len(self.motion), 1)))
         settings = self.structure.settings
         angles = [self.motion.attitude[:, angle] for angle in block.function.inputs]
         mapped = [self.mapped[angle] for angle in block.function.inputs]
