@@ -107,21 +107,21 @@ def euler_rate_matrix_derivative(attitude: Array, attitude_rate: Array) -> Array
     Parameters
     ----------
     attitude : array, shape (time, 3), rad
-    attitude_rate : array, shape (time, 3), rad/s
+    attitude_rate : array, shape (..., time, 3), rad/s
 
     Returns
     -------
-    array, shape (time, 3, 3), 1/s
+    array, shape (..., time, 3, 3), 1/s
         dW/dt.
     """
     (sr, cr), (sp, cp) = ((np.sin(a), np.cos(a)) for a in attitude.T[:2])
-    roll_rate, pitch_rate = attitude_rate[:, 0], attitude_rate[:, 1]
-    dW = np.zeros((len(attitude), 3, 3))
-    dW[:, 0, 2] = -cp * pitch_rate
-    dW[:, 1, 1] = -sr * roll_rate
-    dW[:, 1, 2] = cr * cp * roll_rate - sr * sp * pitch_rate
-    dW[:, 2, 1] = -cr * roll_rate
-    dW[:, 2, 2] = -sr * cp * roll_rate - cr * sp * pitch_rate
+    roll_rate, pitch_rate = attitude_rate[..., 0], attitude_rate[..., 1]
+    dW = np.zeros((*roll_rate.shape, 3, 3))
+    dW[..., 0, 2] = -cp * pitch_rate
+    dW[..., 1, 1] = -sr * roll_rate
+    dW[..., 1, 2] = cr * cp * roll_rate - sr * sp * pitch_rate
+    dW[..., 2, 1] = -cr * roll_rate
+    dW[..., 2, 2] = -sr * cp * roll_rate - cr * sp * pitch_rate
     return dW
 
 
@@ -161,24 +161,24 @@ def attitude_rate(attitude: Array, body_rate: Array) -> Array:
     Parameters
     ----------
     attitude : array, shape (time, 3), rad
-    body_rate : array, shape (time, 3), rad/s, body frame
+    body_rate : array, shape (..., time, 3), rad/s, body frame
 
     Returns
     -------
-    array, shape (time, 3), rad/s
+    array, shape (..., time, 3), rad/s
         Not finite where the pitch is exactly +-90 degrees.
     """
-    if len(attitude) == 1:
+    if attitude.size == body_rate.size == 3:
         ((sr, sp, _),), ((cr, cp, _),) = np.sin(attitude).tolist(), np.cos(attitude).tolist()
         if cp != 0.0:
             ((p, q, r),) = body_rate.tolist()
             yaw_rate = (sr * q + cr * r) / cp
             return np.array([[p + sp * yaw_rate, cr * q - sr * r, yaw_rate]])
     (sr, cr), (sp, cp) = ((np.sin(a), np.cos(a)) for a in attitude.T[:2])
-    p, q, r = body_rate.T
+    p, q, r = (body_rate[..., axis] for axis in range(3))
     with np.errstate(divide="ignore", invalid="ignore"):
         yaw_rate = (sr * q + cr * r) / cp
-        return np.column_stack([p + sp * yaw_rate, cr * q - sr * r, yaw_rate])
+        return np.stack([p + sp * yaw_rate, cr * q - sr * r, yaw_rate], axis=-1)
 
 
 def attitude_acceleration(attitude: Array, body_rate: Array, body_acceleration: Array) -> Array:

@@ -178,6 +178,6 @@ def _identified(model: InertiaModel) -> TurningLaw:
 def body_inertia(model: InertiaModel, attitude: Array) -> tuple[InertiaValues, Array]:
     """Evaluate an inertia on Euler angles, and about the body axes, ``W^-T J W^-1``, shape (samples, 3, 3), kg m^2."""
     values = model.inertia(attitude)
-    axes = [rotations.attitude_rate(attitude, np.broadcast_to(axis, attitude.shape)) for axis in np.eye(3)]
-    inverse = np.stack(axes, axis=2)
+    axes = rotations.attitude_rate(attitude, np.broadcast_to(np.eye(3)[:, None], (3, *attitude.shape)))
+    inverse = np.ascontiguousarray(axes.transpose(1, 2, 0))
     return values, np.asarray(inverse.swapaxes(1, 2) @ values.value @ inverse)

@@ -58,8 +58,8 @@ def inertia_matrix_gradient(attitude: Array, inertia: Array) -> Array:
     """
     W = rotations.euler_rate_matrix(attitude)
     # The gradient by one angle is the derivative along a motion of unit rate in that angle alone.
-    unit_rates = (np.broadcast_to(axis, attitude.shape) for axis in np.eye(3))
-    dW = np.stack([rotations.euler_rate_matrix_derivative(attitude, rate) for rate in unit_rates], axis=1)
+    unit_rates = np.broadcast_to(np.eye(3)[:, None], (3, *attitude.shape))
+    dW = np.ascontiguousarray(rotations.euler_rate_matrix_derivative(attitude, unit_rates).swapaxes(0, 1))
     half = dW.swapaxes(2, 3) @ inertia @ W[:, None]
     gradient: Array = half + half.swapaxes(2, 3)
     return gradient

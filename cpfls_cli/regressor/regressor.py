@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -100,8 +101,13 @@ class Regressor:
             map_input(motion.attitude[:, angle], structure.settings.input_map, structure.circular, ranges[angle])
             for angle in (ROLL, PITCH)
         )
-        self.carriers: tuple[Carrier, ...] = tuple(carrier(block.function, motion) for block in structure.blocks)
-        self.features: tuple[Basis | None, ...] = tuple(self._features(block) for block in structure.blocks)
+        by_inputs = {block.function.inputs: self._features(block) for block in structure.blocks}
+        self.features: tuple[Basis | None, ...] = tuple(by_inputs[block.function.inputs] for block in structure.blocks)
+
+    @cached_property
+    def carriers(self) -> tuple[Carrier, ...]:
+        """Factors of each inertia function along the motion."""
+        return tuple(carrier(block.function, self.motion) for block in self.structure.blocks)
 
     def matrix(self, partitions: Breakpoints) -> Array:
         """Build Q for given partitions.
@@ -159,6 +165,8 @@ class Regressor:
         consequent = self.features[index]
         if consequent is None:
             return Basis(np.ones((len(self.motion), 1)), np.zeros((0, len(self.motion), 1)))
+        if self.structure.blocks[index].rules == 1:
+            return consequent
         return basis(self.antecedents(index, partitions), consequent)
 
     def antecedents(self, index: int, partitions: Breakpoints) -> list[Memberships]:

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from cpfls_cli.reduction.settings import ReductionSettings
+from cpfls_cli.reduction.training_set import choose
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings
-from tests.builders.reductions import random_selections, reduce
+from tests.builders.reductions import random_selections, row_space
 
 
 @pytest.fixture(scope="module")
@@ -30,8 +31,9 @@ def regressor():
 
 @pytest.fixture(scope="module")
 def reduced(regressor):
-    """Selections by criterion and size, each made once."""
-    return cache(lambda criterion, size: reduce(regressor, ReductionSettings(criterion=criterion, size=size)))
+    """Selections by criterion and size, each made once, and the row space once for all."""
+    space = row_space(regressor, ReductionSettings().rank_tolerance)
+    return cache(lambda criterion, size: choose(space, ReductionSettings(criterion=criterion, size=size)))
 
 
 def worst_prediction(regressor, indices):
@@ -64,8 +66,8 @@ def test_an_eighth_of_the_samples_is_better_conditioned_than_all_of_them(regress
     assert selection.condition_number == pytest.approx(np.linalg.cond(rows), rel=1e-6)
 
 
-def test_printed_rule_starts_by_the_thin_decomposition(regressor):
-    selection = reduce(regressor, ReductionSettings(criterion="paper-literal", size=80))
+def test_printed_rule_starts_by_the_thin_decomposition(reduced):
+    selection = reduced("paper-literal", 80)
     assert np.flatnonzero(selection.rank_trace == 113)[0] + 1 == 38
     assert selection.condition_number == pytest.approx(3383, rel=0.05)
 
