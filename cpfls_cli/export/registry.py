@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cpfls_cli.errors import InputError, install_command
+from cpfls_cli.errors import InputError, about, install_command
 from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import NOTHING, Held, Holds, Missing, Off, missing, probe_flight, together
 from cpfls_cli.export.json_form import json_text
@@ -170,10 +170,8 @@ class Exported:
 def exported(sheet: Sheet, form: str, file: str) -> Exported:
     """Write a model in one of `FORMS`."""
     chosen = FORMS[form]
-    try:
+    with about(sheet.file, InputError):
         held, holds = chosen.held(sheet.model)
-    except InputError as error:
-        raise InputError(f"{sheet.file}: {error}") from None
     left, told = _left(sheet, held, holds, chosen)
     files = [Path(file).with_suffix(ending).name for ending in (chosen.also, chosen.ending) if ending]
     return Exported({name: chosen.write(sheet, held, told, name) for name in files}, held, left, told)

@@ -8,7 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.errors import InputError
+from cpfls_cli.errors import InputError, about
 from cpfls_cli.flightlog.airframe import Airframe, Parameters, stated_airframe, usual_airframe
 from cpfls_cli.flightlog.clock import common_rate, same_rate
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Load, Recognition, Rival
@@ -410,10 +410,8 @@ def _of_other_load(logs: Sequence[KnownLog]) -> list[KnownLog]:
 
 def _airframe(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
     """Take the rotors that parameters state, else those that the motion tells, and hold the one against the other."""
-    try:
+    with about(logs[0].name, InputError):
         stated = next((found for one in logs if (found := stated_airframe(one.parameters)) is not None), None)
-    except InputError as error:
-        raise InputError(f"{logs[0].name}: {error}") from None
     moved = [one.recognition.moved for one in logs if one.recognition.moved is not None]
     best = max(moved, key=lambda found: (found.clear, sum(found.explained)), default=None)
     if best is not None and best.clear and stated is None:
