@@ -179,7 +179,7 @@ class SweepPlan:
     @property
     def no_runs(self) -> RunGroup:
         """Its runs before the first is finished."""
-        return RunGroup.none(len(self.parts), max(setting.genes for setting in self.settings))
+        return RunGroup.none(self.parts, max(setting.genes for setting in self.settings))
 
     def record(self, runs: RunGroup) -> SweepRecord:
         """Arrange the sweep with the runs that are finished."""
