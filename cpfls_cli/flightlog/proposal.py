@@ -14,7 +14,7 @@ from cpfls_cli.flightlog.clock import common_rate, same_rate
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Load, Recognition, Rival
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.settings import SETPOINTS, ColumnMap, SignalMap, SignalName
-from cpfls_cli.flightlog.topics import Topics
+from cpfls_cli.flightlog.topics import Topics, column_names
 from cpfls_cli.units import UnitName, known_unit
 from cpfls_cli.vehicle_limits import IN_ROOM, room, thrust_number
 from cpfls_cli.words import joined
@@ -72,9 +72,8 @@ def known_log(name: str, topics: Topics, units: Mapping[str, str], parameters: P
     InputError
         See `recognise`.
     """
-    columns = (f"{topic}.{field}" if topic else field for topic, fields in topics.items() for field in fields)
     recognition = recognise(topics, units, parameters, system)
-    return KnownLog(name, recognition, parameters, system, frozenset(columns))
+    return KnownLog(name, recognition, parameters, system, frozenset(column_names(topics)))
 
 
 @dataclass(frozen=True, kw_only=True)
