@@ -26,7 +26,6 @@ from cpfls_cli.export.source import (
 from cpfls_cli.export.text import strict_json
 from cpfls_cli.fuzzy.membership import Z_FUNCTION
 from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric
-from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.regressor.structure import Block
 
 FORMAT, VERSION = "cpfls/model-json", 2
@@ -130,7 +129,9 @@ def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
         "terms_of_motion": sheet.terms,
         "terms_of_rotors": sheet.rotor_terms,
         "factors_of_products": FACTORS.tolist(),
-        "gusts": None if sheet.model.gusts is None else _gusts(sheet.model.gusts),
+        "gusts": None
+        if sheet.model.gusts is None
+        else {**GustsGroup.of(sheet.model.gusts).summary, "frame": BODY, "how_to_play": GUST_RECIPE},
         "weights": {name: column.tolist() for name, column in sheet.weights._asdict().items()},
         "learned": None
         if sheet.remainder is None
@@ -143,10 +144,6 @@ def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
         "reference_runs": [run_of(run) for run in runs],
     }
     return strict_json({**document, **sheet.evidence})
-
-
-def _gusts(gusts: Gusts) -> dict[str, Any]:
-    return {**GustsGroup.of(gusts).summary, "frame": BODY, "how_to_play": GUST_RECIPE}
 
 
 def _structure(model: InertiaFunctions) -> dict[str, Any]:
