@@ -15,8 +15,6 @@ from cpfls_cli.effects.polynomial import FACTORS
 from cpfls_cli.export.points import PERIOD
 from cpfls_cli.export.sheet import EXPORTER, GUST_RECIPE, Sheet, base_of, rule_labels
 from cpfls_cli.export.source import (
-    airflow_order,
-    airflow_peaks,
     attitudes_of,
     points_of,
     response_of,
@@ -99,7 +97,7 @@ HOW_TO_EVALUATE = (
 
 def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
     """Write a model, and what it is worth, as strict JSON in ASCII; null for what is not finite, or not there."""
-    found, vehicle = sheet.identified, sheet.model.vehicle
+    found, vehicle, learned = sheet.identified, sheet.model.vehicle, sheet.model.remainder
     points, runs, attitudes = sheet.references
     document = {
         "format": FORMAT,
@@ -134,8 +132,8 @@ def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
         else {**GustsGroup.of(sheet.model.gusts).summary, "frame": BODY, "how_to_play": GUST_RECIPE},
         "weights": {name: column.tolist() for name, column in sheet.weights._asdict().items()},
         "learned": None
-        if sheet.remainder is None
-        else {"breakpoints": airflow_peaks(sheet), "harmonic_order": airflow_order(sheet)},
+        if learned is None
+        else {"breakpoints": learned.breakpoints, "harmonic_order": learned.harmonic_order},
         "judged": None,
         "provenance": _provenance(sheet),
         "period_s": PERIOD,
