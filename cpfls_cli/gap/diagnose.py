@@ -24,7 +24,7 @@ from cpfls_cli.gap.balance.weak_flight import TURNING, Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.by_instruments import (
     by_instruments,
-    may_be_nothing,
+    that_stand,
     untold,
     untold_axes,
 )
@@ -240,12 +240,15 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
     judge, refusals, fit = named.judge, list(named.refusals), named.judgement.found
     while True:
         found = by_instruments(fit, given, judge.floor, settings)
-        out = may_be_nothing(found, given, judge.floor, settings)
+        stand = that_stand(found, given, judge.floor, settings)
+        names = {each.effect.name for each in stand}
+        out = [each.effect for each in found.hypothesis.chosen if each.effect.name not in names]
         if not out:
             break
-        refusals += [Refusal(name, "judged by what instruments tell, it may be 0") for name in out]
-        kept = [each for each in found.hypothesis.chosen if each.effect.name not in out]
-        fit = fitted(judge.training, kept, judge.floor, settings)
+        for effect in out:
+            what = "".join(f"all that it adds to {name}" for name in effect.holds & names) or "it"
+            refusals.append(Refusal(effect.name, f"judged by what instruments tell, {what} may be 0"))
+        fit = fitted(judge.training, stand, judge.floor, settings)
     loose = tuple(effect.name for effect in untold(fit, found))
     late = told_apart(found, named.effects, given, judge.floor, settings)
     judgement, without = judge.judge(late.found), judge.judge(late.without)

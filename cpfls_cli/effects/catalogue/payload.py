@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -24,9 +24,16 @@ _STEP_S = 0.04
 _SMOOTHING_S = 0.1
 # Of the cable across, 30 degrees: a larger free swing at the start is a fit to something else.
 _LARGEST_START = 0.5
+_AT_REST = np.zeros(4)
+# Of the start, for its derivatives: a swing bends by a thousandth of it over that.
+_NUDGE = 1e-4
+# Of Gauss and Newton over each part of a flight.
+_MOVES = 2
+# Squares left at the beginning, over those of a start found there: some swings in gusts tell a start no better.
+_WORSE = 2.0
 # As many as the grid of lengths and the dampings and depths beside the best one.
 _SWINGS_KEPT = 16
-# Of the swing, over which its start is estimated: two tell it from the driven one, later ones have drifted apart.
+# Of the swing, over which its start is sought first: two tell it from the driven one.
 _PERIODS = 2.0
 
 _State = tuple[float, float, float, float, float, float]
@@ -66,8 +73,8 @@ def _unit(state: _State) -> _State:
 
 
 @compiled
-def integrate(nodes: Array, middles: Array, step: float, length: float, damping: float) -> Array:
-    """Integrate direction and rate of a cable from rest by the classical Runge-Kutta method.
+def integrate(nodes: Array, middles: Array, step: float, length: float, damping: float, start: Array) -> Array:
+    """Integrate direction and rate of a cable by the classical Runge-Kutta method.
 
     Parameters
     ----------
@@ -78,15 +85,17 @@ def integrate(nodes: Array, middles: Array, step: float, length: float, damping:
     step : float, s
     length : float, m
     damping : float, 1/s
+    start : array, shape (6,)
+        Direction, then rate in 1/s, at the first step.
 
     Returns
     -------
     array, shape (step, 6)
         Direction, then rate in 1/s.
     """
-    state = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
+    state = (start[0], start[1], start[2], start[3], start[4], start[5])
     states = np.zeros((len(nodes), 6))
-    states[0, 2] = -1.0
+    states[0] = start
     for number in range(len(middles)):
         first = _rate(state, nodes[number], length, damping)
         second = _rate(_moved(state, first, 0.5 * step), middles[number], length, damping)
@@ -100,11 +109,11 @@ def integrate(nodes: Array, middles: Array, step: float, length: float, damping:
 
 
 def swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -> Array:
-    """Integrate the swing of a load on a cable under a moving hook.
+    """Integrate the swing of a load on a cable under a moving hook, from rest.
 
     ``n'' = -(a + g z)_across / L - |n'|^2 n - c n'`` for the direction n of the cable, with the part of the
     acceleration across it; integrated by the classical Runge-Kutta method. Large swings are slower than small ones,
-    so no filter will do. The cable starts at rest.
+    so no filter will do.
 
     Parameters
     ----------
@@ -126,18 +135,62 @@ def swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -
     ----------
     Equation of the spherical pendulum with a moving pivot.
     """
+    return _at_samples(signals, _Way.of(signals, length, damping, depth).swing(_AT_REST))
+
+
+def _at_samples(signals: Signals, states: Array) -> Array:
     from scipy.interpolate import CubicSpline
 
-    stride = max(1, round(_STEP_S / signals.period))
-    felt = felt_acceleration(signals, depth)
-    nodes = np.ascontiguousarray(felt[::stride])
-    middles = 0.5 * (felt[:-stride:stride] + felt[stride::stride])
-    states = integrate(nodes, middles, stride * signals.period, length, damping)
-    # A jump of the velocity, as at the end of a crash, throws it beyond all numbers: from there on it hangs at rest.
-    states = np.where(np.isfinite(states).all(axis=1, keepdims=True), states, states[0])
-    at = signals.time[::stride]
     # The samples beyond the last step are less than a step away.
-    return np.asarray(CubicSpline(at, states)(signals.time))
+    return np.asarray(CubicSpline(signals.time[:: _stride(signals)], states)(signals.time))
+
+
+def _stride(signals: Signals) -> int:
+    return max(1, round(_STEP_S / signals.period))
+
+
+@dataclass(frozen=True)
+class _Way:
+    """The way of a hook in steps, under which a cable swings from any start."""
+
+    felt: Array
+    middles: Array
+    step: float
+    length: float
+    damping: float
+    gravity: float
+
+    @classmethod
+    def of(cls, signals: Signals, length: float, damping: float, depth: float) -> _Way:
+        stride = _stride(signals)
+        felt = felt_acceleration(signals, depth)
+        middles = 0.5 * (felt[:-stride:stride] + felt[stride::stride])
+        nodes, step = np.ascontiguousarray(felt[::stride]), stride * signals.period
+        return cls(nodes, middles, step, length, damping, signals.vehicle.gravity_m_s2)
+
+    @property
+    def natural(self) -> float:
+        """Frequency of small swings in rad/s."""
+        return float(np.sqrt(self.gravity / self.length))
+
+    def swing(self, start: Array) -> Array:
+        """Integrate from a deflection along x and y and a rate of it, both in radians, the rate over the frequency."""
+        across, rate = start[:2], start[2:] * self.natural
+        down = -np.sqrt(1 - across @ across)
+        first = np.array([*across, down, *rate, -(across @ rate) / down])
+        states = integrate(self.felt, self.middles, self.step, self.length, self.damping, first)
+        # A jump of the velocity, as at the end of a crash, throws it beyond all numbers: from there on it is at rest.
+        return np.where(np.isfinite(states).all(axis=1, keepdims=True), states, [0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
+
+    def pull(self, start: Array) -> Array:
+        """Pull across the vertical for each kilogram of the load, shape (step, 2)."""
+        states = self.swing(start)
+        return _tension(self.length, states, self.felt)[:, None] * states[:, :2]
+
+
+def _tension(length: float, states: Array, felt: Array) -> Array:
+    """Tension of the cable for each kilogram of the load, shape (time,), m/s^2."""
+    return np.asarray(length * (states[:, 3:] ** 2).sum(axis=1) - (felt * states[:, :3]).sum(axis=1))
 
 
 def felt_acceleration(signals: Signals, depth: float) -> Array:
@@ -175,16 +228,12 @@ def _smooth(signals: Signals, values: Array, derivative: Literal[0, 1] = 0) -> A
 
 
 def settled_swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -> Array:
-    """Add the free swing at the start, estimated from the force balance, to the driven swing.
-
-    The horizontal pull on the vehicle is ``m_p g`` times the whole swing. Where forces are known, least squares find
-    ``m_p`` and the two free swings of each direction, over two periods: later ones hold what has drifted apart since
-    the start. Else the cable starts at rest.
+    """Integrate the swing from where the force balance says that it began.
 
     Parameters
     ----------
     signals : Signals
-        With velocity.
+        With velocity. Without thrust and acceleration the cable starts at rest.
     length : float, m
     damping : float, 1/s
     depth : float, m
@@ -192,38 +241,93 @@ def settled_swing(signals: Signals, length: float, damping: float, depth: float 
 
     Returns
     -------
-    array, shape (time, 2)
+    array, shape (time, 6)
+        Direction of the cable from the hook, world frame, and its rate in 1/s.
     """
-    driven = _driven_swing(signals, length, damping, depth)
-    if signals.acceleration is None or signals.thrust is None or signals.attitude is None:
-        return driven
-    mass = signals.vehicle.mass_kg
-    pull = mass * signals.acceleration[:, :2] - signals.thrust[:, None] * signals.rotation[:, :2, 2]
-    free = _free_swing(signals, length, damping)
-    period = 2 * np.pi * np.sqrt(length / signals.vehicle.gravity_m_s2)
-    early = slice(round(_PERIODS * period / signals.period))
-    own = free[early]
-    nothing = np.zeros_like(own)
-    columns = np.concatenate(
-        [
-            np.column_stack([driven[early, 0], own, nothing, np.ones(len(own)), nothing[:, 0]]),
-            np.column_stack([driven[early, 1], nothing, own, nothing[:, 0], np.ones(len(own))]),
-        ]
-    )
-    solution = np.linalg.lstsq(columns, pull[early].T.reshape(-1), rcond=None)[0]
-    start = solution[1:5] / solution[0] if solution[0] > 0 else np.zeros(4)
-    if np.abs(start).max() > _LARGEST_START:
-        return driven
-    return np.asarray(driven + np.column_stack([free @ start[:2], free @ start[2:]]))
-
-
-def _driven_swing(signals: Signals, length: float, damping: float, depth: float) -> Array:
-    """Integrate the swing of a motion once, for any rotor speeds, shape (time, 2)."""
+    if signals.acceleration is not None and signals.thrust is not None and signals.attitude is not None:
+        way = _Way.of(signals, length, damping, depth)
+        start = _start(signals, way)
+        if start is not None:
+            return _at_samples(signals, way.swing(start))
     key, kept = ("swing", length, damping, depth), signals.of_motion
     if key not in kept:
         _make_room(kept)
-        kept[key] = swing(signals, length, damping, depth)[:, :2]
+        kept[key] = swing(signals, length, damping, depth)
     return kept[key]
+
+
+def _start(signals: Signals, way: _Way) -> Array | None:
+    """Find the start from which a load pulls on the vehicle as the force balance says, by least squares.
+
+    Of the horizontal forces mass and start of the load explain what a constant push and a drag do not. Two periods
+    tell the start from the driven swing; from there the search goes on over twice as much, up to the whole flight, so
+    that it never has to find its way among the swings of a load that has drifted apart. It ends where the beginning
+    contradicts: what rings late is no swing at the start.
+
+    Returns
+    -------
+    array, shape (4,), or None
+        As `_Way.swing` takes it; None where nothing pulls like a load.
+    """
+    assert signals.acceleration is not None
+    assert signals.thrust is not None
+    assert signals.velocity is not None
+    steps = slice(None, None, _stride(signals))
+    tilt = signals.rotation[steps, :2, 2]
+    needed = signals.vehicle.mass_kg * signals.acceleration[steps, :2] - signals.thrust[steps, None] * tilt
+    balance = _Balance(way, needed, signals.velocity[steps, :2])
+    first = balance.up_to(_PERIODS)
+    start = first.start(_AT_REST)
+    periods = 2 * _PERIODS
+    while start is not None and periods < 2 * balance.periods:
+        later = balance.up_to(periods).start(start)
+        if later is None or first.left(later) > _WORSE * first.left(start):
+            break
+        start, periods = later, 2 * periods
+    return start
+
+
+@dataclass(frozen=True)
+class _Balance:
+    """Horizontal forces that something but rotors and weight applies, beside the velocity that a drag goes with."""
+
+    way: _Way
+    needed: Array
+    velocity: Array
+
+    @property
+    def periods(self) -> float:
+        """Number of small swings that it lasts."""
+        return len(self.needed) * self.way.step * self.way.natural / (2 * np.pi)
+
+    def up_to(self, periods: float) -> _Balance:
+        steps = round(len(self.needed) * periods / self.periods)
+        way = replace(self.way, felt=self.way.felt[:steps], middles=self.way.middles[: steps - 1])
+        return _Balance(way, self.needed[:steps], self.velocity[:steps])
+
+    def start(self, start: Array) -> Array | None:
+        """Move a start by Gauss and Newton; None beyond all bounds, or where no load explains the forces."""
+        for _ in range(_MOVES):
+            pull = self.way.pull(start)
+            bends = [(self.way.pull(start + _NUDGE * each) - pull) / _NUDGE for each in np.eye(4)]
+            columns, needed = self._rows(pull, *bends)
+            mass, *moves = np.linalg.lstsq(columns, needed, rcond=None)[0][:5]
+            if mass <= 0:
+                return None
+            start = start + np.array(moves) / mass
+            if not np.linalg.norm(start[:2]) < 1:
+                return None
+        return start if np.abs(start).max() <= _LARGEST_START else None
+
+    def left(self, start: Array) -> float:
+        """Sum the squares that a load with this start leaves."""
+        columns, needed = self._rows(self.way.pull(start))
+        return float(np.square(needed - columns @ np.linalg.lstsq(columns, needed, rcond=None)[0]).sum())
+
+    def _rows(self, *pulls: Array) -> tuple[Array, Array]:
+        pushes = [np.broadcast_to(each, self.needed.shape) for each in np.eye(2)]
+        columns = [each.T.reshape(-1) for each in (*pulls, *pushes, self.velocity)]
+        return np.stack(columns, axis=1), self.needed.T.reshape(-1)
 
 
 def _make_room(kept: dict[Hashable, Array]) -> None:
@@ -232,25 +336,11 @@ def _make_room(kept: dict[Hashable, Array]) -> None:
         del kept[next(iter(kept))]
 
 
-def _free_swing(signals: Signals, length: float, damping: float) -> Array:
-    time = signals.time - signals.time[0]
-    natural = np.sqrt(signals.vehicle.gravity_m_s2 / length)
-    turn = np.sqrt(max(natural**2 - damping**2 / 4, 1e-6)) * time
-    return np.asarray(np.exp(-0.5 * damping * time)[:, None] * np.column_stack([np.cos(turn), np.sin(turn)]))
-
-
-# Square of the part of the cable across the vertical, 80 degrees: beyond, its length says nothing about its height.
-_LARGEST_ACROSS = 0.97
-
-
 def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-    length = shape["length_m"]
-    swung = settled_swing(signals, length, shape["damping_1_s"], shape["depth_m"])
-    across = np.minimum((swung**2).sum(axis=1), _LARGEST_ACROSS)
-    cable = np.column_stack([swung, -np.sqrt(1 - across)])
-    rate = np.gradient(cable, signals.time, axis=0)
-    tension = length * (rate**2).sum(axis=1) - (felt_acceleration(signals, shape["depth_m"]) * cable).sum(axis=1)
-    pull = np.einsum("tji,tj->ti", signals.rotation, cable * tension[:, None])
+    length, depth = shape["length_m"], shape["depth_m"]
+    states = settled_swing(signals, length, shape["damping_1_s"], depth)
+    tension = _tension(length, states, felt_acceleration(signals, depth))
+    pull = np.einsum("tji,tj->ti", signals.rotation, states[:, :3] * tension[:, None])
     levers = (wrench(cross(hook, pull)) for hook in -np.eye(3)[::-1])
     return Columns(stack(*levers, wrench(force=pull)))
 

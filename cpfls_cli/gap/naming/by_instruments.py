@@ -13,9 +13,10 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.refine import fit_within_bounds, shape_columns
-from cpfls_cli.gap.balance.weak_flight import dense
+from cpfls_cli.gap.balance.weak_flight import Candidate, dense
 from cpfls_cli.gap.naming.confirmed import nothing_by_size
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of
 from cpfls_cli.gap.naming.scoring import known_before
@@ -140,8 +141,8 @@ def untold_axes(found: NamedFit, given: Instruments, floor: Array, settings: Gap
     return ~told
 
 
-def may_be_nothing(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> list[str]:
-    """Name the effects that may be 0 by what instruments tell.
+def that_stand(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> list[Candidate]:
+    """Keep the effects that are not 0 by what instruments tell, and what an effect holds where all else of it may be 0.
 
     Where an effect is 0, what is left without it does not go with what instruments know of it. That is asked at its
     shapes instead of whether its numbers may be 0, which instruments may tell badly from each other: a drag from the
@@ -161,22 +162,37 @@ def may_be_nothing(found: NamedFit, given: Instruments, floor: Array, settings: 
     """
     sources = _sources(found, given, floor, settings)
     nothing, places = nothing_by_size(found), {candidate.key: place for candidate, place in found.hypothesis.places}
-    values = np.append(found.estimates.linear, found.hypothesis.shape_values)
-    first, names = len(found.estimates.linear), []
+    values = _numbers(found)
+    first, stand = len(found.estimates.linear), list[Candidate]()
     for candidate in found.hypothesis.chosen:
-        shapes = slice(first, first := first + len(candidate.effect.shapes))
-        own = np.zeros(len(values), dtype=bool)
-        own[places.get(candidate.key, slice(0))] = True
-        absent = candidate.effect.name in nothing
-        for products, numbers, outside in sources:
-            others = numbers & ~own
-            others[shapes] = False
-            flown = products[products.any(axis=(1, 2))]
-            if outside and (own & numbers).any() and len(flown) >= ENOUGH_BLOCKS + (own & numbers).sum():
-                absent = _chance(flown, own & numbers, others, values) > CHANCE
-                break
-        names += [candidate.effect.name] if absent else []
-    return names
+        effect, shapes = candidate.effect, np.arange(first, first := first + len(candidate.effect.shapes))
+        linear = np.arange(len(values))[places.get(candidate.key, slice(0))]
+        chance = _chance_of(sources, linear, shapes, values)
+        if chance > CHANCE if np.isfinite(chance) else effect.name in nothing:
+            continue
+        for held in (CATALOGUE[name] for name in effect.holds):
+            known = {number.name for number in held.numbers}
+            own = [number.name not in known for number in effect.numbers]
+            beyond = np.concatenate([linear, shapes])[own]
+            if _chance_of(sources, beyond, shapes[:0], values) > settings.significance:
+                candidate = Candidate(held, {shape.name: candidate.shape[shape.name] for shape in held.shapes})
+        stand.append(candidate)
+    return stand
+
+
+def _chance_of(sources: Sequence[_Told], own: IntArray, shapes: IntArray, values: Array) -> float:
+    """Compute the probability of what all sources show of numbers that they tell if these are 0, shapes as they are.
+
+    NaN where no source tells any of them.
+    """
+    asked, chances = np.isin(np.arange(len(values)), own), list[float]()
+    for products, numbers, _ in sources:
+        others = numbers & ~asked
+        others[shapes] = False
+        flown = products[products.any(axis=(1, 2))]
+        if (asked & numbers).any() and len(flown) >= ENOUGH_BLOCKS + (asked & numbers).sum():
+            chances.append(_chance(flown, asked & numbers, others, values))
+    return len(chances) * min(chances, default=np.nan)
 
 
 def _chance(crossed: Array, own: BoolArray, others: BoolArray, values: Array) -> float:
@@ -230,8 +246,8 @@ def _sources(found: NamedFit, given: Instruments, floor: Array, settings: GapSet
         flown = products[products.any(axis=(1, 2))]
         if len(flown) >= ENOUGH_BLOCKS:
             # What a bound tells better than these flights is not told by them.
-            numbers = left & (_strength(flown) > STRONG) & (np.diagonal(flown.sum(axis=0))[:-1] > prior)
-            numbers &= early | (place > 0)
+            numbers = left & (np.diagonal(flown.sum(axis=0))[:-1] > prior) & (early | (place > 0))
+            numbers = _strong(flown, numbers)
             sources.append(_Told(products, numbers, place == 0))
             left = left & ~numbers
     return sources
@@ -248,6 +264,32 @@ def _movable(hypothesis: System, floor: Array) -> BoolArray:
     of_vehicle = hypothesis.places[0][1]
     free[of_vehicle] &= np.isin([each.name for each in hypothesis.free[0].effect.coefficients], list(NUMBERS))
     return np.concatenate([free, np.ones(len(hypothesis.shapes), dtype=bool)])
+
+
+def _strong(crossed: Array, numbers: BoolArray) -> BoolArray:
+    """Leave the numbers that are told each beside all others; of those that are not, the weakest goes first.
+
+    References
+    ----------
+    Sanderson and Windmeijer 2016 (the strength of instruments of one number beside others).
+    """
+    alone = _strength(crossed)
+    kept = numbers & (alone > STRONG)
+    while (unclear := kept & (_strength(_beside_others(crossed, kept)) <= STRONG)).any():
+        kept[np.argmin(np.where(unclear, alone, np.inf))] = False
+    return kept
+
+
+def _beside_others(crossed: Array, kept: BoolArray) -> Array:
+    """Keep of what is known of each number, and of what it moves, what no other explains: diagonals of the products."""
+    own = crossed[:, :-1, :-1][:, kept][:, :, kept]
+    scale = np.sqrt(np.diagonal(own.sum(axis=0)))
+    own = own / np.outer(scale, scale)
+    inverse = np.linalg.pinv(own.sum(axis=0))
+    alone = np.diag(inverse)
+    places, beside = np.flatnonzero(kept), np.zeros_like(crossed)
+    beside[:, places, places] = np.einsum("ij,bjk,ki->bi", inverse / alone[:, None], own, inverse / alone)
+    return beside
 
 
 def _strength(crossed: Array) -> Array:

@@ -83,7 +83,14 @@ def taut(state):
 
 def test_the_compiled_swing_of_a_load_takes_the_same_steps():
     felt = np.array([0.0, 0.0, 9.81]) + np.random.default_rng(8).standard_normal((41, 3))
-    found = integrate(np.ascontiguousarray(felt[::2]), np.ascontiguousarray(felt[1::2]), 0.04, 0.7, 0.2)
+    found = integrate(
+        np.ascontiguousarray(felt[::2]),
+        np.ascontiguousarray(felt[1::2]),
+        0.04,
+        0.7,
+        0.2,
+        np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0]),
+    )
     state = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
     for number in range(20):
         state = taut(runge_kutta_step(swing, state, tuple(felt[2 * number : 2 * number + 3]), 0.04))

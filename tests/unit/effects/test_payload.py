@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
@@ -13,6 +14,7 @@ from cpfls_cli.effects.catalogue.payload import integrate, settled_swing, swing
 from cpfls_cli.effects.signals import Signals
 
 GRAVITY = np.array([0.0, 0.0, 9.81])
+HANGING = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 
 
 def direction(angles):
@@ -50,7 +52,7 @@ def push(t):
 def test_integration_agrees_with_lagrange_in_large_swings():
     step, length, damping = 0.02, 1.5, 0.1
     at = np.arange(0.0, 8.0, step)
-    found = integrate(push(at), push(at[:-1] + step / 2), step, length, damping)
+    found = integrate(push(at), push(at[:-1] + step / 2), step, length, damping, HANGING)
     expected = hanging(push, at, length, damping)
     np.testing.assert_allclose(found[:, :3], expected, atol=1e-5)
     np.testing.assert_allclose(found[:, 3:], CubicSpline(at, expected)(at, 1), atol=5e-3)
@@ -60,26 +62,26 @@ def test_integration_agrees_with_lagrange_in_large_swings():
 def test_an_undamped_load_under_a_still_hook_keeps_its_energy():
     step, length, steps = 0.02, 1.0, 600
     pulse = np.array([[6.0, -4.0, 9.81]] * 20 + [GRAVITY.tolist()] * (steps - 20))
-    found = integrate(pulse, pulse[:-1], step, length, 0.0)[25:]
+    found = integrate(pulse, pulse[:-1], step, length, 0.0, HANGING)[25:]
     energy = 0.5 * length * (found[:, 3:] ** 2).sum(axis=1) + 9.81 * found[:, 2]
     np.testing.assert_allclose(energy, energy[0], rtol=2e-5)
     np.testing.assert_allclose((found[:, :3] ** 2).sum(axis=1), 1.0, atol=1e-12)
     assert np.abs((found[:, :3] * found[:, 3:]).sum(axis=1)).max() < 1e-12
 
 
-def tumbling(vehicle):
+def tumbling(vehicle, time=TIME):
     """A flight of which position, attitude, rates and the way of any of its points are known by formula."""
-    position = np.column_stack([0.6 * np.sin(2.0 * TIME), 0.5 * np.sin(1.3 * TIME + 1), 0.2 * np.cos(2.5 * TIME)])
-    attitude = np.column_stack([0.3 * np.sin(2.2 * TIME), 0.25 * np.sin(1.7 * TIME + 2), 0.5 * np.sin(0.6 * TIME)])
-    move, turn = CubicSpline(TIME, position), CubicSpline(TIME, attitude)
+    position = np.column_stack([0.6 * np.sin(2.0 * time), 0.5 * np.sin(1.3 * time + 1), 0.2 * np.cos(2.5 * time)])
+    attitude = np.column_stack([0.3 * np.sin(2.2 * time), 0.25 * np.sin(1.7 * time + 2), 0.5 * np.sin(0.6 * time)])
+    move, turn = CubicSpline(time, position), CubicSpline(time, attitude)
     return Signals(
-        time=TIME,
+        time=time,
         vehicle=vehicle,
         attitude=attitude,
-        body_rate=rotations.body_rate(attitude, turn(TIME, 1)),
+        body_rate=rotations.body_rate(attitude, turn(time, 1)),
         position=position,
-        velocity=move(TIME, 1),
-        acceleration=move(TIME, 2),
+        velocity=move(time, 1),
+        acceleration=move(time, 2),
     )
 
 
@@ -109,7 +111,7 @@ def test_noise_of_the_accelerometer_moves_the_swing_no_more_than_without_its_ste
         noisy = replace(signals, acceleration=signals.acceleration + noise)
         coarse.append(swing(noisy, 1.5, 0.2)[:, :2] - swing(signals, 1.5, 0.2)[:, :2])
         whole = [
-            integrate(felt, 0.5 * (felt[:-1] + felt[1:]), step, 1.5, 0.2)[:, :2]
+            integrate(felt, 0.5 * (felt[:-1] + felt[1:]), step, 1.5, 0.2, HANGING)[:, :2]
             for felt in (noisy.acceleration + GRAVITY, signals.acceleration + GRAVITY)
         ]
         fine.append(whole[0] - whole[1])
@@ -148,10 +150,11 @@ def test_force_is_what_the_load_needs_besides_its_weight(columns, flight):
 
 def balanced(signals, start, length=1.5, damping=0.1, load=0.6):
     """A level flight whose thrust and attitude are such that vehicle and load obey Newton's law, and its cable."""
-    way = CubicSpline(TIME, 0.5 * signals.position)
-    cable = hanging(lambda t: way(t, 2) + GRAVITY, TIME, length, damping, start)
-    felt = way(TIME, 2) + GRAVITY
-    rate = CubicSpline(TIME, cable)(TIME, 1)
+    time = signals.time
+    way = CubicSpline(time, 0.5 * signals.position)
+    cable = hanging(lambda t: way(t, 2) + GRAVITY, time, length, damping, start)
+    felt = way(time, 2) + GRAVITY
+    rate = CubicSpline(time, cable)(time, 1)
     tension = length * (rate**2).sum(axis=1) - (felt * cable).sum(axis=1)
     thrust = signals.vehicle.mass_kg * felt - load * tension[:, None] * cable
     size = np.linalg.norm(thrust, axis=1)
@@ -159,8 +162,8 @@ def balanced(signals, start, length=1.5, damping=0.1, load=0.6):
     level = replace(
         signals,
         attitude=np.column_stack([roll, pitch, np.zeros_like(roll)]),
-        velocity=way(TIME, 1),
-        acceleration=way(TIME, 2),
+        velocity=way(time, 1),
+        acceleration=way(time, 2),
         stated_thrust=size,
     )
     return level, cable[:, :2]
@@ -173,7 +176,26 @@ def off(found, cable):
 def test_a_load_that_swings_from_the_start_shows_in_the_balance_of_forces(flight):
     level, cable = balanced(tumbling(flight.vehicle), (0.12, -0.15, 0.3, 0.2))
     assert off(swing(level, 1.5, 0.1)[:, :2], cable) > 0.09
-    assert off(settled_swing(level, 1.5, 0.1), cable) < 0.02
+    assert off(settled_swing(level, 1.5, 0.1)[:, :2], cable) < 0.02
+
+
+def test_a_large_swing_is_followed_all_flight_long(flight):
+    """Slower than a small one, so that it is not the driven swing and a free one beside it."""
+    long = tumbling(flight.vehicle, np.arange(0.0, 25.0, 0.01))
+    level, cable = balanced(long, (0.4, -0.35, 0.8, 0.7), damping=0.02)
+    assert off(settled_swing(level, 1.5, 0.02)[:, :2], cable) < 0.02
+
+
+def test_in_gusts_all_of_a_flight_tells_the_start(flight):
+    """In gusts of a hundredth of the weight that last a second: two swings alone leave twice as much."""
+    long = tumbling(flight.vehicle, np.arange(0.0, 25.0, 0.01))
+    level, cable = balanced(long, (0.12, -0.15, 0.3, 0.2))
+    found = []
+    for seed in range(6):
+        gust = lfilter([1.0], [1.0, -0.99], np.random.default_rng(seed).standard_normal((len(cable), 2)), axis=0)
+        tilted = level.attitude + np.pad(0.01 * gust * np.sqrt(1 - 0.99**2), ((0, 0), (0, 1)))
+        found.append(off(settled_swing(replace(level, attitude=tilted), 1.5, 0.1)[:, :2], cable))
+    assert np.mean(found) < 0.02
 
 
 def test_what_rings_late_in_a_flight_is_no_swing_at_its_start(flight):
@@ -182,7 +204,7 @@ def test_what_rings_late_in_a_flight_is_no_swing_at_its_start(flight):
     natural = np.sqrt(9.81 / 1.5)
     gust = np.where(natural * TIME > 2.1 * 2 * np.pi, 0.02 * np.sin(natural * TIME), 0.0)
     blown = replace(level, attitude=level.attitude + gust[:, None] * [1.0, 1.0, 0.0])
-    assert off(settled_swing(blown, 1.5, 0.1), cable) < 0.01
+    assert off(settled_swing(blown, 1.5, 0.1)[:, :2], cable) < 0.01
 
 
 LEVEL = {"length_m": 1.0, "damping_1_s": 0.2, "depth_m": 0.0}

@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 from scipy.stats import ttest_1samp
 
 from cpfls_cli.blocks import jackknife_error
-from cpfls_cli.gap.naming.by_instruments import _chance
+from cpfls_cli.gap.naming.by_instruments import _chance, _strong
 from cpfls_cli.gap.residual.air import _growing, _gusty
 from cpfls_cli.playback.instruments import held as stays
 from cpfls_cli.playback.newness import PER_WINDOW, news
@@ -42,6 +42,19 @@ def test_alone_it_is_a_test_of_means():
     nothing = np.zeros(2, dtype=bool)
     expected = ttest_1samp(products[:, 0, -1], 0.0).pvalue
     assert _chance(products, OWN, nothing, np.zeros(2)) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("apart", "told"), [(0.6, [True, True, False]), (0.02, [True, False, False])])
+def test_of_numbers_that_instruments_hardly_tell_apart_the_weaker_is_not_told(apart, told):
+    """A load and a wrong thrust, which in hover do the same; and one of which nothing is known."""
+    rng = np.random.default_rng(5)
+    known = rng.standard_normal((BLOCKS, WINDOWS, 3))
+    known[..., 1] = known[..., 0] + apart * known[..., 1]
+    moved = known + rng.standard_normal((BLOCKS, WINDOWS, 1)) * [0.3, 1.0, 1.0]
+    known[..., 2] = rng.standard_normal((BLOCKS, WINDOWS))
+    left = np.zeros((BLOCKS, WINDOWS, 1))
+    products = np.einsum("bwk,bwl->bkl", np.concatenate([known, left], axis=2), np.concatenate([moved, left], axis=2))
+    assert _strong(products, np.ones(3, dtype=bool)).tolist() == told
 
 
 def shares(*foretold, scatter=0.0):
