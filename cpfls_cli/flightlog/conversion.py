@@ -240,8 +240,8 @@ def setpoints_to_program_frames(signals: Mapping[str, Array], settings: ImportSe
         By the names that `SETPOINTS` gives: attitude as roll, pitch, yaw, also of a quaternion; thrust and sticks as
         logged.
     """
-    named = {short: signals[name] for name, short in SETPOINTS.items() if name in signals}
-    converted: dict[str, Array] = dict(named)
+    named: dict[str, Array] = {short: signals[name] for name, short in SETPOINTS.items() if name in signals}
+    converted = dict(named)
     converted |= {name: world_to_enu(named[name], settings.world_frame) for name in _WORLD_SIGNALS if name in named}
     if "body_rate" in named:
         converted["body_rate"] = body_to_flu(named["body_rate"], settings.body_frame)
