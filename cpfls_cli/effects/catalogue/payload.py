@@ -27,8 +27,10 @@ _LARGEST_START = 0.5
 _AT_REST = np.zeros(4)
 # Of the start, for its derivatives: a swing bends by a thousandth of it over that.
 _NUDGE = 1e-4
-# Of Gauss and Newton over each part of a flight.
+# Of Gauss and Newton over the first part; over each later one a single one, from so near.
 _MOVES = 2
+# Of a part over the one before: a start from two swings is not a swing off after eight.
+_LONGER = 4
 # Squares left at the beginning, over those of a start found there: some swings in gusts tell a start no better.
 _WORSE = 2.0
 # As many as the grid of lengths and the dampings and depths beside the best one.
@@ -260,8 +262,8 @@ def _start(signals: Signals, way: _Way) -> Array | None:
     """Find the start from which a load pulls on the vehicle as the force balance says, by least squares.
 
     Of the horizontal forces mass and start of the load explain what a constant push and a drag do not. Two periods
-    tell the start from the driven swing; from there the search goes on over twice as much, up to the whole flight, so
-    that it never has to find its way among the swings of a load that has drifted apart. It ends where the beginning
+    tell the start from the driven swing; from there the search goes on over four times as much, up to the whole flight,
+    so that it never has to find its way among the swings of a load that has drifted apart. It ends where the beginning
     contradicts: what rings late is no swing at the start.
 
     Returns
@@ -277,13 +279,14 @@ def _start(signals: Signals, way: _Way) -> Array | None:
     needed = signals.vehicle.mass_kg * signals.acceleration[steps, :2] - signals.thrust[steps, None] * tilt
     balance = _Balance(way, needed, signals.velocity[steps, :2])
     first = balance.up_to(_PERIODS)
-    start = first.start(_AT_REST)
-    periods = 2 * _PERIODS
-    while start is not None and periods < 2 * balance.periods:
-        later = balance.up_to(periods).start(start)
-        if later is None or first.left(later) > _WORSE * first.left(start):
+    start, periods = first.start(_AT_REST, _MOVES), _PERIODS
+    most = np.inf if start is None else _WORSE * first.left(start)
+    while start is not None and periods < balance.periods:
+        periods *= _LONGER
+        later = balance.up_to(periods).start(start, 1)
+        if later is None or first.left(later) > most:
             break
-        start, periods = later, 2 * periods
+        start = later
     return start
 
 
@@ -305,16 +308,16 @@ class _Balance:
         way = replace(self.way, felt=self.way.felt[:steps], middles=self.way.middles[: steps - 1])
         return _Balance(way, self.needed[:steps], self.velocity[:steps])
 
-    def start(self, start: Array) -> Array | None:
+    def start(self, start: Array, moves: int) -> Array | None:
         """Move a start by Gauss and Newton; None beyond all bounds, or where no load explains the forces."""
-        for _ in range(_MOVES):
+        for _ in range(moves):
             pull = self.way.pull(start)
             bends = [(self.way.pull(start + _NUDGE * each) - pull) / _NUDGE for each in np.eye(4)]
             columns, needed = self._rows(pull, *bends)
-            mass, *moves = np.linalg.lstsq(columns, needed, rcond=None)[0][:5]
+            mass, *change = np.linalg.lstsq(columns, needed, rcond=None)[0][:5]
             if mass <= 0:
                 return None
-            start = start + np.array(moves) / mass
+            start = start + np.array(change) / mass
             if not np.linalg.norm(start[:2]) < 1:
                 return None
         return start if np.abs(start).max() <= _LARGEST_START else None
