@@ -34,7 +34,7 @@ _LONGER = 4
 # Squares left at the beginning, over those of a start found there: some swings in gusts tell a start no better.
 _WORSE = 2.0
 # As many as the grid of lengths and the dampings and depths beside the best one.
-_SWINGS_KEPT = 16
+_SWINGS_KEPT = 32
 # Of the swing, over which its start is sought first: two tell it from the driven one.
 _PERIODS = 2.0
 
@@ -246,19 +246,19 @@ def settled_swing(signals: Signals, length: float, damping: float, depth: float 
     array, shape (time, 6)
         Direction of the cable from the hook, world frame, and its rate in 1/s.
     """
+    way, start = _Way.of(signals, length, damping, depth), _AT_REST
     if signals.acceleration is not None and signals.thrust is not None and signals.attitude is not None:
-        way = _Way.of(signals, length, damping, depth)
         start = _start(signals, way)
-        if start is not None:
-            return _at_samples(signals, way.swing(start))
+    if start is not _AT_REST:
+        return _at_samples(signals, way.swing(start))
     key, kept = ("swing", length, damping, depth), signals.of_motion
     if key not in kept:
         _make_room(kept)
-        kept[key] = swing(signals, length, damping, depth)
-    return kept[key]
+        kept[key] = way.swing(start)
+    return _at_samples(signals, kept[key])
 
 
-def _start(signals: Signals, way: _Way) -> Array | None:
+def _start(signals: Signals, way: _Way) -> Array:
     """Find the start from which a load pulls on the vehicle as the force balance says, by least squares.
 
     Of the horizontal forces mass and start of the load explain what a constant push and a drag do not. Two periods
@@ -268,8 +268,8 @@ def _start(signals: Signals, way: _Way) -> Array | None:
 
     Returns
     -------
-    array, shape (4,), or None
-        As `_Way.swing` takes it; None where nothing pulls like a load.
+    array, shape (4,)
+        As `_Way.swing` takes it; at rest where nothing pulls like a load.
     """
     assert signals.acceleration is not None
     assert signals.thrust is not None
@@ -281,13 +281,14 @@ def _start(signals: Signals, way: _Way) -> Array | None:
     first = balance.up_to(_PERIODS)
     start, periods = first.start(_AT_REST, _MOVES), _PERIODS
     most = np.inf if start is None else _WORSE * first.left(start)
-    while start is not None and periods < balance.periods:
-        periods *= _LONGER
-        later = balance.up_to(periods).start(start, 1)
-        if later is None or first.left(later) > most:
+    starts = [_AT_REST]
+    while start is not None and first.left(start) <= most:
+        starts.append(start)
+        if periods >= balance.periods:
             break
-        start = later
-    return start
+        periods *= _LONGER
+        start = balance.up_to(periods).start(start, 1)
+    return min(starts, key=balance.left) if len(starts) > 1 else _AT_REST
 
 
 @dataclass(frozen=True)
@@ -437,7 +438,7 @@ EFFECT = Effect(
         Shape(
             "length_m",
             "m",
-            (0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.55, 1.9, 2.4, 3.1, 4.0),
+            tuple(float(length) for length in np.geomspace(0.3, 4.0, 24).round(2)),
             "length of the cable",
             # A light damping lets it swing all flight long, and a few per cent make it one swing late.
             valley=0.02,

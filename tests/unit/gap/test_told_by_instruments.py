@@ -8,8 +8,12 @@ from scipy.signal import lfilter
 from scipy.stats import ttest_1samp
 
 from cpfls_cli.blocks import jackknife_error
-from cpfls_cli.gap.naming.by_instruments import _chance, _strong
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.naming import by_instruments
+from cpfls_cli.gap.naming.by_instruments import _chance, _strong, _Told, that_stand
 from cpfls_cli.gap.residual.air import _growing, _gusty
+from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.instruments import held as stays
 from cpfls_cli.playback.newness import PER_WINDOW, news
 
@@ -55,6 +59,37 @@ def test_of_numbers_that_instruments_hardly_tell_apart_the_weaker_is_not_told(ap
     left = np.zeros((BLOCKS, WINDOWS, 1))
     products = np.einsum("bwk,bwl->bkl", np.concatenate([known, left], axis=2), np.concatenate([moved, left], axis=2))
     assert _strong(products, np.ones(3, dtype=bool)).tolist() == told
+
+
+def told(true, found, reach, rng):
+    """What a source knows of three numbers, found where they are not: `reach` of what they move, beside gusts."""
+    known = rng.standard_normal((BLOCKS, WINDOWS, 3)) * reach
+    gust = rng.standard_normal((BLOCKS, WINDOWS, 1))
+    moved = known + gust * [0.7, -0.5, 0.3]
+    left = gust[..., 0] + moved @ (np.array(true) - found)
+    rows = np.concatenate([moved, left[..., None]], axis=2)
+    known = np.concatenate([known, np.zeros_like(gust)], axis=2)
+    return _Told(np.einsum("bwk,bwl->bkl", known, rows), np.ones(3, dtype=bool), outside=True)
+
+
+@pytest.mark.parametrize(
+    ("true", "names"),
+    [([1.0, 2.0, -1.0], ["wind"]), ([1.0, 0.0, 0.0], ["rotor_drag"]), ([0.0, 0.0, 0.0], [])],
+    ids=["a wind", "a drag in still air", "nothing"],
+)
+@pytest.mark.parametrize("knows", [True, False], ids=["both sources know it", "one hardly does"])
+def test_an_effect_stands_where_any_source_shows_it_and_what_it_holds_where_that_is_all(
+    true, names, knows, monkeypatch
+):
+    rng = np.random.default_rng(6)
+    found = np.array(true) + 0.02
+    sources = [told(true, found, 1.0 if knows else 0.03, rng), told(true, found, 1.0, rng)]
+    monkeypatch.setattr(by_instruments, "_sources", lambda *_: sources)
+    wind = Candidate(CATALOGUE["wind"].exact, {"W_x": found[1], "W_y": found[2]})
+    hypothesis = SimpleNamespace(chosen=[wind], places=((wind, slice(1)),), shape_values=found[1:])
+    fit = SimpleNamespace(hypothesis=hypothesis, estimates=SimpleNamespace(linear=found[:1], effects=[()]))
+    stand = that_stand(fit, None, np.ones(6), GapSettings())
+    assert [each.effect.name for each in stand] == names
 
 
 def shares(*foretold, scatter=0.0):
