@@ -15,8 +15,9 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # What is written is read on the same machine: waiting for its disk takes ten ms a file, and no test asks for it.
 os.fsync = lambda _: None
 
-# As the program itself does: a tenth of the time of the tests went into looking for garbage among what stays.
-gc.set_threshold(20_000, *gc.get_threshold()[1:])
+# As the program itself does, and later still: a tenth of the time of the tests went into looking for garbage among what
+# stays.
+gc.set_threshold(100_000, *gc.get_threshold()[1:])
 
 
 def pytest_collection_finish():

@@ -87,16 +87,6 @@ def test_gains_are_those_of_the_least_favourable_vehicle(gains, folder):
     assert "THR_MDL_FAC" in record.parameter.name
 
 
-def test_json_is_the_summary(cpfls, folder):
-    result = cpfls(
-        "tune", folder / "study.yaml", folder / "vehicle.h5", "--autopilot", "px4", "-o", folder / "json.h5", "--json"
-    )
-    told = json.loads(result.stdout)
-    assert told["parameters"]["MC_ROLLRATE_P"]["proposed"] > 0
-    assert told["falls_short"]["proposed"] == []
-    assert told["file"].endswith("json.params")
-
-
 def test_the_page_draws_bode_nichols_and_steps(gains, cpfls, folder):
     assert gains["px4"].exit_code == 0
     result = cpfls("report", folder / "study.yaml", folder / "px4.h5", "-o", folder / "px4.html")
@@ -197,17 +187,21 @@ def test_without_a_mapping_a_log_gives_parameters_alone(cpfls, folder, tmp_path)
     assert any("the config has no import.signals.body_rate" in words for words in record.warning)
 
 
-def test_a_log_that_is_too_short_for_noise_is_told(cpfls, folder, tmp_path):
+def test_json_is_the_summary_and_a_log_that_is_too_short_for_noise_is_told(cpfls, folder, tmp_path):
     (tmp_path / "study.yaml").write_text(STUDY + LOGGED)
     rows = [("IMU", (1_000_000 + 2500 * step, 0.1 * step, 0.2, 0.3)) for step in range(20)]
     (tmp_path / "log.bin").write_bytes(dataflash({"IMU": ("Qfff", "TimeUS,GyrX,GyrY,GyrZ")}, rows))
     result = cpfls(
-        *("tune", tmp_path / "study.yaml", folder / "vehicle.h5", "--autopilot", "px4"),
+        *("tune", tmp_path / "study.yaml", folder / "vehicle.h5", "--autopilot", "px4", "--json"),
         *("--flight", tmp_path / "log.bin", "-o", tmp_path / "gains.h5"),
     )
     assert result.exit_code == 0, result.stderr
     record = read_record(tmp_path / "gains.h5", GainsRecord)
     assert any("no log holds 256 samples" in words for words in record.warning)
+    told = json.loads(result.stdout)
+    assert told["parameters"]["MC_ROLLRATE_P"]["proposed"] > 0
+    assert told["falls_short"]["proposed"] == []
+    assert told["file"].endswith("gains.params")
 
 
 def test_an_imported_flight_keeps_the_parameters_of_its_log(cpfls, tmp_path):

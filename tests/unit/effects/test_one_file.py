@@ -25,16 +25,12 @@ OF_OTHERS = {("logs/blackbox.py", "gyro_scale")}
 IMPORTED = {"parameter_error"}
 
 
-def docstrings(tree):
-    """Strings that stand alone: docstrings of modules, classes, functions and constants."""
-    return {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-
-
 @cache
 def read(path):
     """Literals of a module, and the modules that it imports from; its tree is not kept."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    alone, nodes = docstrings(tree), list(ast.walk(tree))
+    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    # Strings that stand alone: docstrings of modules, classes, functions and constants.
+    alone = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
     strings = [node for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
     texts = [node.value for node in strings if id(node) not in alone]
     return texts, [node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module]
