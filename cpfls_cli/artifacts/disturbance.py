@@ -101,20 +101,16 @@ class DisturbanceGroup:
                 axis.name: {
                     "unit": "N m" if axis.turns else "N",
                     "alone": None if self.alone is None else bool(self.alone[number]),
-                    "foretold": None if self.foretold is None else _known(self.foretold[number]),
+                    "foretold": None if self.foretold is None else float(self.foretold[number]),
                     **{
-                        name if place < 3 else f"{name}_s": _known(getattr(self, name)[number])
+                        name if place < 3 else f"{name}_s": float(getattr(self, name)[number])
                         for place, name in enumerate(columns)
                     },
                     "acceleration": {
                         "unit": "rad/s^2" if axis.turns else "m/s^2",
-                        **{name: _known(getattr(axis, name)) for name in columns[:3]},
+                        **{name: getattr(axis, name) for name in columns[:3]},
                     },
                 }
                 for number, axis in enumerate(self.axes(inertia, mass))
             },
         }
-
-
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

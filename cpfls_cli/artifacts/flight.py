@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, group_of, record
+from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, group_of, paired, record
 from cpfls_cli.dynamics.rigid_body import not_positive_definite
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.regressor.motion import Motion
@@ -89,23 +89,17 @@ class QualityGroup:
     @property
     def cut_off_hz(self) -> dict[str, float]:
         """Cut-off of the filter before the log, by signal of `import.signals`; those in which none is seen lack."""
-        if self.filtered is None or self.cut_off is None:
-            return {}
-        return dict(zip(self.filtered, self.cut_off.tolist(), strict=True))
+        return paired(self.filtered, self.cut_off)
 
     @property
     def updated_hz(self) -> dict[str, float]:
         """Updates a second, by signal of `import.signals`; those that are as fast as the log lack."""
-        if self.slow is None or self.updated is None:
-            return {}
-        return dict(zip(self.slow, self.updated.tolist(), strict=True))
+        return paired(self.slow, self.updated)
 
     @property
     def findings(self) -> dict[str, int]:
         """What was found and done, with how often."""
-        if self.reason is None or self.count is None:
-            return {}
-        return dict(zip(self.reason, self.count.tolist(), strict=True))
+        return paired(self.reason, self.count)
 
 
 @record
@@ -140,7 +134,7 @@ class AutopilotGroup:
     @property
     def parameters(self) -> dict[str, float]:
         """Values by name."""
-        return dict(zip(self.name, self.value.tolist(), strict=True))
+        return paired(self.name, self.value)
 
 
 @record
@@ -173,7 +167,7 @@ class FlownEffectsGroup:
     @property
     def by_name(self) -> dict[str, float]:
         """The true values by ``effect.coefficient``."""
-        return dict(zip(self.name, self.value.tolist(), strict=True))
+        return paired(self.name, self.value)
 
 
 def _effect_values(effects: SimulatedEffects) -> Iterator[tuple[str, float]]:

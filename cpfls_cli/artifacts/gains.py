@@ -250,9 +250,7 @@ class GainsRecord(Record):
             "asked": {"gain_db": self.asked_gain, "phase_deg": self.asked_phase, "disk_deg": self.asked_disk},
             "disk_required_deg": self.required,
             "hover_thrust": self.hover,
-            "parameters": {
-                row.pop("name"): {name: _known(value) for name, value in row.items()} for row in rows_of(self.parameter)
-            },
+            "parameters": {row.pop("name"): row for row in rows_of(self.parameter)},
             "sets": {
                 name: {axis: self._axis(own, place) for place, axis in enumerate(self.axis)}
                 for own, name in enumerate(self.set_of)
@@ -271,14 +269,9 @@ class GainsRecord(Record):
         answers |= {"overshoot_most": "overshoot_most", "rise_s": "rise"}
 
         def told(group: object, names: Mapping[str, str]) -> dict[str, Any]:
-            return {name: _known(float(getattr(group, column)[own, axis])) for name, column in names.items()}
+            return {name: float(getattr(group, column)[own, axis]) for name, column in names.items()}
 
         return {name: told(getattr(self, name), margins) for name in groups} | told(self, answers)
-
-
-def _known(value: Any) -> Any:
-    """Put None in the place of a number that is not finite."""
-    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def _parameters(proposals: Sequence[Proposal], today: dict[str, float], names: Mapping[str, str]) -> ParametersGroup:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.replay import FADING, PlaybackGroup, played_row, rival_row, row_of
-from cpfls_cli.artifacts.spec import BODY, columns_of, dataset, group, record, rows_of
+from cpfls_cli.artifacts.spec import BODY, columns_of, dataset, group, paired, record, rows_of
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS, effect
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
 from cpfls_cli.gap.naming.results import Estimate, NamedEffect
@@ -200,7 +200,7 @@ class ParameterGroup:
     @property
     def values(self) -> dict[str, float]:
         """Estimates by name."""
-        return dict(zip(self.name, self.value.tolist(), strict=True))
+        return paired(self.name, self.value)
 
     @property
     def summary(self) -> dict[str, Any]:

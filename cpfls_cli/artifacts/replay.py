@@ -32,6 +32,12 @@ WORST = 5
 VEHICLE = "vehicle"
 """In the place of a model: the vehicle of the config."""
 
+
+def played_words(played: str) -> str:
+    """Name what is played: a file, or the vehicle of the config."""
+    return "the vehicle of the config" if played == VEHICLE else played
+
+
 USUAL = "usual"
 """What is between samples where nobody says: measured speeds are straight lines, commands stay."""
 

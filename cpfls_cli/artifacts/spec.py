@@ -307,6 +307,11 @@ def rows_of(group: object) -> list[dict[str, Any]]:
     return [dict(zip(columns, row, strict=True)) for row in zip(*listed, strict=True)]
 
 
+def paired(names: Iterable[str] | None, values: np.ndarray | None) -> dict[str, Any]:
+    """Pair names with values, both datasets of a group; nothing where an artifact lacks them."""
+    return {} if names is None or values is None else dict(zip(names, values.tolist(), strict=True))
+
+
 class _Entry(NamedTuple):
     """A field that is a dataset, or a group (which has no specification), with its type without None."""
 

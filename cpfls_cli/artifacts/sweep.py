@@ -86,24 +86,11 @@ class RunGroup:
         return len(self.seed)
 
     @classmethod
-    def none(cls, parts: int, genes: int) -> Self:
-        """Begin a sweep of which no run is finished, for so many parts of data and genes of its longest chromosome."""
-        whole, scores = np.zeros(0, dtype=np.int64), np.zeros((0, parts))
-        return cls(
-            setting=whole,
-            seed=whole,
-            generations=whole,
-            evaluations=whole,
-            mse=scores,
-            max_error=scores,
-            relative_error=scores,
-            condition_number=np.zeros(0),
-            chromosome=np.zeros((0, genes), dtype=np.int32),
-            learned_mse=np.zeros(0),
-            learned_max_error=np.zeros(0),
-            learned_relative_error=np.zeros(0),
-            settled=whole,
-        )
+    def none(cls, parts: Sequence[str], genes: int) -> Self:
+        """Begin a sweep of which no run is finished, for parts of data and so many genes of its longest chromosome."""
+        run = cls.of_run(0, 0, parts, genes, None)
+        nothing: dict[str, Any] = {f.name: getattr(run, f.name)[:0] for f in fields(cls)}
+        return cls(**nothing)
 
     def followed_by(self, other: Self) -> Self:
         """Add runs after these."""
@@ -117,7 +104,12 @@ class RunGroup:
 
     def with_run(self, setting: int, seed: int, parts: Sequence[str], result: Identification | None) -> Self:
         """Add a run, without a result where no chromosome gave a finite model."""
-        chromosome = np.full(self.chromosome.shape[1], _NO_GENE, dtype=np.int32)
+        return self.followed_by(self.of_run(setting, seed, parts, self.chromosome.shape[1], result))
+
+    @classmethod
+    def of_run(cls, setting: int, seed: int, parts: Sequence[str], genes: int, result: Identification | None) -> Self:
+        """Arrange one run."""
+        chromosome = np.full(genes, _NO_GENE, dtype=np.int32)
         condition_number, generations, evaluations, settled = np.nan, 0, 0, 0
         if result is not None:
             chosen = result.front.chromosomes[result.front.chosen]
@@ -127,7 +119,7 @@ class RunGroup:
             settled = int(np.argmax(result.history.best[:, 0] <= (1.0 + _SETTLED) * result.history.best[-1, 0]))
         learned = _errors(None if result is None else result.learned)
         mse, max_error, relative_error = np.array([_scores(result, part) for part in parts]).T
-        run = type(self)(
+        return cls(
             setting=np.array([setting]),
             seed=np.array([seed]),
             generations=np.array([generations]),
@@ -142,7 +134,6 @@ class RunGroup:
             learned_relative_error=np.array(learned[2:]),
             settled=np.array([settled]),
         )
-        return self.followed_by(run)
 
 
 def _scores(result: Identification | None, part: str) -> tuple[float, float, float]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Container, Sequence
 from dataclasses import dataclass
-from math import isnan
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -163,11 +162,7 @@ class QuestionGroup:
     @property
     def summary(self) -> list[dict[str, Any]]:
         """The questions for machines; null where nothing is known."""
-        rows = rows_of(self)
-        return [
-            {key: None if isinstance(value, float) and isnan(value) else value for key, value in row.items()}
-            for row in rows
-        ]
+        return rows_of(self)
 
 
 @dataclass(frozen=True)

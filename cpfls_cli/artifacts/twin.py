@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.flight import ClockGroup
-from cpfls_cli.artifacts.replay import VEHICLE
+from cpfls_cli.artifacts.replay import played_words
 from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, CurveGroup, DeviationGroup, response_word
 from cpfls_cli.artifacts.spec import WORLD, Format, Record, columns_of, dataset, group, group_of, record, rows_of
 from cpfls_cli.response.mismatch import Deviation
@@ -268,7 +268,7 @@ class TwinRecord(Record):
 
     def name(self, vehicle: int) -> str:
         """Name a simulated vehicle."""
-        return "the vehicle of the config" if self.vehicle[vehicle] == VEHICLE else self.vehicle[vehicle]
+        return played_words(self.vehicle[vehicle])
 
     @property
     def summary(self) -> dict[str, Any]:

@@ -236,7 +236,7 @@ class ResponsesGroup:
         return {
             name: {
                 "word": response_word(cost),
-                "cost": cost if np.isfinite(cost) else None,
+                "cost": cost,
                 "band_hz": [low, high] if np.isfinite(low) else None,
             }
             for name, cost, low, high in zip(
@@ -486,10 +486,7 @@ class VehicleRecord(ModelRecord):
             "trades": [list(row.values()) for row in rows_of(self.trade)],
             "loop": {
                 "shown": self.loop.shown,
-                **{
-                    name: [float(value) if np.isfinite(value) else None for value in getattr(self.loop, name)]
-                    for name in ("low", "high", "explained")
-                },
+                **{name: getattr(self.loop, name).tolist() for name in ("low", "high", "explained")},
             },
             "instruments": None if self.instruments is None else self.instruments.summary,
             "responses": None if self.responses is None else self.responses.summary,

@@ -363,10 +363,7 @@ def init(
     common: Common,
 ) -> None:
     """Look into logs of one vehicle and write a config for them, with the reason of every guess."""
-    with messages_for_errors():
-        _run_without_config(
-            "init", output, common, lambda command, job: command.run(job, logs, command.Stated(mass, arm))
-        )
+    _run_without_config("init", output, common, lambda command, job: command.run(job, logs, command.Stated(mass, arm)))
 
 
 @_command("import")
@@ -704,9 +701,8 @@ def export(
     common: Common,
 ) -> None:
     """Write a model as code or for a simulator; flights, replays, gaps and others for Foxglove or PlotJuggler."""
-    with messages_for_errors():
-        chosen = form and form.value
-        _run_without_config("export", output, common, lambda command, job: command.run(job, model, chosen, name))
+    chosen = form and form.value
+    _run_without_config("export", output, common, lambda command, job: command.run(job, model, chosen, name))
 
 
 @_command()
@@ -719,8 +715,7 @@ def spread(
     common: Common,
 ) -> None:
     """Draw vehicles from what the flights of one tell, for simulators that fly many: .yaml, .json or .npz."""
-    with messages_for_errors():
-        _run_without_config("spread", output, common, lambda command, job: command.run(job, model, count, seed))
+    _run_without_config("spread", output, common, lambda command, job: command.run(job, model, count, seed))
 
 
 @_command("verify-export")
@@ -811,9 +806,10 @@ def _run(title: str, config: Path, output: Path, common: Common, call: Callable[
 
 def _run_without_config(title: str, output: Path, common: Common, call: Callable[[Any, Job], Outcome]) -> None:
     """Run one command that needs no study."""
-    from cpfls_cli.config.load import validate
+    with messages_for_errors():
+        from cpfls_cli.config.load import validate
 
-    _run_with(validate({}, "default"), title, [], output, common, _narration(title, common), call)
+        _run_with(validate({}, "default"), title, [], output, common, _narration(title, common), call)
 
 
 @contextmanager

@@ -48,7 +48,7 @@ def run(job: Job, today: Sequence[Path], since: Sequence[Path], *, fail_on_chang
     check_folder(job.output, job.force, FILES, kept=FOLDER)
     for name in FILES:
         refuse_inputs(job.output / name, job.inputs)
-    kept, twice = _once(given, inputs)
+    kept, twice = once(given, inputs)
     if job.dry_run:
         line = Text(f"{job.output}: would be filled; the config and all inputs are good")
         return Outcome({"dry_run": True, "output": str(job.output)}, (line,))
@@ -67,7 +67,7 @@ def run(job: Job, today: Sequence[Path], since: Sequence[Path], *, fail_on_chang
     )
 
 
-def _once(given: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> tuple[dict[str, Path], list[str]]:
+def once(given: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> tuple[dict[str, Path], list[str]]:
     """Leave out copies of a flight; one that is of today and of the reference is refused."""
     known: dict[str, str] = {}
     kept, warnings = {}, []

@@ -32,6 +32,8 @@ _IMPORTED = ("casadi", "jax", "numpy", "rotorpy")
 def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     """Write a model in another form."""
     form = form or _form_of(job.output)
+    if job.output.suffix != ENDINGS[form]:
+        raise InputError(f"{job.output}: --format {form} writes a file that ends in {ENDINGS[form]}; name it so")
     if form in VIEWERS:
         return import_module("cpfls_cli.commands.viewers").run(job, model, form)  # type: ignore[no-any-return]
     prefix = _prefix_of(job.output, form, name)
@@ -63,7 +65,7 @@ def _summary(job: Job, form: str, sheet: Sheet, made: Exported, sizes: dict[str,
         "rotors": sheet.model.rotors,
         "weights": len(sheet.weights),
         "effects": [effect.name for effect in sheet.model.effects],
-        "learned": sheet.remainder is not None,
+        "learned": sheet.model.remainder is not None,
         "missing": [asdict(each) for each in made.missing],
         "parameters": identified and identified.structure.parameters,
         "fuzzy": sheet.rules is not None,
@@ -95,14 +97,11 @@ def _prefix_of(output: Path, form: str, name: str | None) -> str:
 
 def _outputs_of(output: Path, form: str) -> list[Path]:
     """Name the files to be written, the one that needs the others last."""
-    ending = ENDINGS[form]
-    if output.suffix != ending:
-        raise InputError(f"{output}: --format {form} writes a file that ends in {ending}; name it so")
     stem = output.stem
     importable = (
         stem.isidentifier() and not keyword.iskeyword(stem) and stem not in {*_IMPORTED, *sys.stdlib_module_names}
     )
-    if ending == ".py" and not importable:
+    if output.suffix == ".py" and not importable:
         raise InputError(
             f"{output}: Python cannot import a module of this name; use letters, digits and _, no digit first, none of "
             f"its own words or modules, not {', '.join(_IMPORTED[:-1])} or {_IMPORTED[-1]}, such as "

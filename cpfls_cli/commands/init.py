@@ -10,8 +10,8 @@ from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
 from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.consistency.findings import contradictions
-from cpfls_cli.errors import ConfigError, CpflsError, InputError
-from cpfls_cli.flightlog.proposal import KnownLog, Proposal, known_log, propose
+from cpfls_cli.errors import ConfigError, CpflsError, InputError, about
+from cpfls_cli.flightlog.proposal import Proposal, known_log, propose
 from cpfls_cli.flights.imported import imported
 from cpfls_cli.flights.recordings import check_flight, read_import
 from cpfls_cli.logs.formats import log_contents
@@ -32,7 +32,9 @@ def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
     known = []
     for number, log in enumerate(logs):
         job.progress(number, len(logs), log.name)
-        known.append(_known(log))
+        own = log_contents(log)
+        with about(log, InputError):
+            known.append(known_log(str(log), own.topics, own.units, own.parameters, own.system))
     proposal = propose(known, stated.mass_kg, stated.arm_m)
     text, output = config_text(proposal, stated), str(job.output)
     wrong = _contradictions(text, logs[0], whole=not asked_keys(proposal, stated))
@@ -95,11 +97,3 @@ def _contradictions(text: str, log: Path, *, whole: bool) -> tuple[str, ...]:
         # What does not import is for the person who fills it in; the import says why.
         return ()
     return contradictions(finding.of(log.name) for finding in check_flight(flight, study, driven=whole))
-
-
-def _known(log: Path) -> KnownLog:
-    own = log_contents(log)
-    try:
-        return known_log(str(log), own.topics, own.units, own.parameters, own.system)
-    except InputError as error:
-        raise InputError(f"{log}: {error}") from None

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cpfls_cli.artifacts.job import Job
-from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
@@ -92,9 +91,3 @@ def mission_texts(job: Job, mission: Mission, record: TrajectoryRecord) -> dict[
             assert record.excited is not None, "asked for before"
             texts[path] = system_id_lines(record.excited, next(axes), run, hover)
     return texts
-
-
-def write_mission(texts: dict[Path, str]) -> None:
-    """Write files for autopilots."""
-    for path, text in texts.items():
-        write_text(path, text)

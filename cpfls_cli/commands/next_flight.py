@@ -20,7 +20,7 @@ from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.registry import effect as find
-from cpfls_cli.errors import ComputationError, InputError, SettingError
+from cpfls_cli.errors import ComputationError, InputError, SettingError, about
 from cpfls_cli.export.mission import waypoint_lines
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.gap.balance.balance_system import system
@@ -113,10 +113,8 @@ def run(job: Job, diagnosis: Path | None = None, plot: bool = False) -> Outcome:
 
 def _effects(study: Study) -> list[Effect]:
     key = "trajectory.next_flight.to_tell"
-    try:
+    with about(key, InputError):
         effects = [find(name) for name in dict.fromkeys(study.trajectory.next_flight.to_tell)]
-    except InputError as error:
-        raise InputError(f"{key}: {error}") from None
     require_tellable(effects, key, study.vehicle)
     return effects
 

@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.artifacts.job import Job, begin, finish, go_on
 from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.config.study import generator, settings_of
-from cpfls_cli.errors import ComputationError, ConfigError
+from cpfls_cli.errors import ComputationError, ConfigError, about
 from cpfls_cli.flights.training import flight_roles, split_training, uniform_regressor
 from cpfls_cli.pages.selection import answer
 from cpfls_cli.pages.source import source_of
@@ -43,14 +43,12 @@ def run(job: Job, flights: Sequence[Path]) -> Outcome:
 
 @contextmanager
 def _naming(flights: Sequence[Path]) -> Iterator[None]:
+    names = " ".join(str(path) for path in flights)
     try:
-        yield
-    except (ComputationError, ConfigError) as error:
-        kind = ConfigError if isinstance(error, ConfigError) else ComputationError
-        raise kind(f"{' '.join(str(path) for path in flights)}: {error}") from None
+        with about(names, ConfigError, ComputationError):
+            yield
     except np.linalg.LinAlgError:
         # Numbers that a damaged file holds, of sizes that overflow in products.
-        names = " ".join(str(path) for path in flights)
         raise ComputationError(
             f"{names}: the regressor has numbers too far apart in size to choose samples; look at the flight's largest "
             "values with `cpfls info`"

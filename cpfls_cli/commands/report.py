@@ -10,9 +10,8 @@ from cpfls_cli.artifacts.job import Job, begin
 from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.spec import Record
 from cpfls_cli.artifacts.store import read_any
-from cpfls_cli.config.load import validate
+from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import resolved
-from cpfls_cli.config.yaml_text import parse_yaml
 from cpfls_cli.pages.comparison import model_verdicts
 from cpfls_cli.pages.page import Page, report_page
 from cpfls_cli.pages.source import Source, Sources, unique_labels
@@ -49,7 +48,7 @@ def read_sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:
 
 def source_of_record(record: Record, path: object, label: str, sha256: str) -> Source:
     """Name an artifact for a report."""
-    study = validate(parse_yaml(record.origin.config, f"{path}: /config"), f"{path}: /config")
+    study = stored_study(record.origin.config, path)
     parameters = model_structure(study.identification).parameters
     return Source(label, sha256, record, resolved(study), study.vehicle, parameters)
 

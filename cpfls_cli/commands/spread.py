@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.rebuilt import estimates
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.vehicle_sheets import sheet_of
-from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.errors import ComputationError, InputError, about
 from cpfls_cli.export.samples import Samples, require_ending
 from cpfls_cli.export.text import identifier
 from cpfls_cli.pages.export import spread_answer, spread_summary
@@ -34,13 +34,11 @@ def run(job: Job, model: Path, count: int, seed: int) -> Outcome:
             "`cpfls vehicle` finds a vehicle with one"
         )
     sheet = sheet_of(model, identifier(model.stem), source, force=job.force)
-    try:
+    with about(model, InputError, ComputationError):
         require_sure(known := estimates(record))
         if job.dry_run:
             return _nothing_written(job, model, count)
         spread = drawn(sheet.model, known, count, np.random.default_rng(seed))
-    except (InputError, ComputationError) as error:
-        raise type(error)(f"{model}: {error}") from None
     numbers = {number.name: number for number in known.numbers}
     samples = Samples(
         sheet=sheet,

@@ -29,7 +29,7 @@ from cpfls_cli.control.track import AttitudeLoop, Sensing, flown_signals, scores
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, RigidBody, TorqueModel, turning_law
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import body_torque, inertia_matrix, inertia_tensor
-from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.errors import ComputationError, InputError, about
 from cpfls_cli.flights.models import rebuilt
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.inertia import six_parameters, symmetric
@@ -82,14 +82,11 @@ def _identified(path: Path, study: Study) -> IdentifiedRecord:
 def _plan(trajectory: Path, study: Study) -> Plan:
     source = read_record(trajectory, TrajectoryRecord, "time", *MOTION)
     planned = {name: getattr(source, name) for name in MOTION}
-    with settings_of("simulation", study):
-        settings = study.simulation.computed_torque
-        try:
-            plan = plan_of(source.time, planned, settings.control_rate_hz)
-            start_of(plan, np.array(settings.initial_error_rad))
-            return plan
-        except ComputationError as error:
-            raise ComputationError(f"{trajectory}: {error}") from None
+    settings = study.simulation.computed_torque
+    with settings_of("simulation", study), about(trajectory, ComputationError):
+        plan = plan_of(source.time, planned, settings.control_rate_hz)
+        start_of(plan, np.array(settings.initial_error_rad))
+        return plan
 
 
 def _controllers(plan: Plan, model: TorqueModel, rigid_body: Array, vehicle: VehicleSettings) -> list[Controller]:

@@ -12,9 +12,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish, go_on, require_numbers
-from cpfls_cli.artifacts.output import write_text
+from cpfls_cli.artifacts.output import write_files
 from cpfls_cli.artifacts.trajectory import ExcitedGroup, TrajectoryRecord
-from cpfls_cli.commands.mission import Mission, mission_paths, mission_texts, write_mission
+from cpfls_cli.commands.mission import Mission, mission_paths, mission_texts
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError, SettingError
 from cpfls_cli.excitation.optimise import Excitation, optimised_rotation
@@ -98,9 +98,8 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False, mission: Mi
     if job.dry_run:
         return nothing_written(job)
     source = source_of(job, finish(job, record, inputs))
-    for path, drawn in zip(figures, path_figures(source) if figures else (), strict=True):
-        write_text(path, drawn.picture.svg)
-    write_mission(texts)
+    drawn = path_figures(source) if figures else ()
+    write_files({path: figure.picture.svg for path, figure in zip(figures, drawn, strict=True)} | texts)
     blocks = [*plan_blocks(planned, demand, flight.excitation), *answer(source)]
     blocks += [Text(f"drawn: {', '.join(map(str, figures))}")] if figures else []
     blocks += mission_blocks(texts, mission.forms, source.record)

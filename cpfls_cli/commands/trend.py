@@ -25,11 +25,11 @@ from cpfls_cli.artifacts.trend import TrendRecord
 from cpfls_cli.changes.judge import FALSE_ALARM, NAMED
 from cpfls_cli.changes.trend import load_ruptures, trend
 from cpfls_cli.commands import report
-from cpfls_cli.commands.changed import units_of
+from cpfls_cli.commands.changed import once, units_of
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.evolution.archive import Evaluation
-from cpfls_cli.flights.inputs import hashes_of, numbered_roles
+from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.kept_numbers import FOLDER, find_kept, kept_numbers
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.pages.source import source_of, unique_labels
@@ -78,7 +78,7 @@ def run(job: Job, given: Sequence[Path], options: Options) -> Outcome:
     check_folder(job.output, job.force or (own.is_file() and holds(own, TrendRecord)), FILES, kept=FOLDER)
     for name in FILES:
         refuse_inputs(job.output / name, job.inputs)
-    kept, notes = _once(flights, inputs)
+    kept, notes = once(flights, inputs)
     if job.dry_run:
         line = Text(f"{job.output}: would be filled from {len(kept)} flights; the config and all inputs are good")
         return Outcome({"dry_run": True, "output": str(job.output)}, (line,))
@@ -120,21 +120,6 @@ def _is_apart(path: Path, folder: Path, output: Path) -> bool:
 def _natural(path: Path) -> list[tuple[int, str]]:
     """Give what orders names as people do: log 2 before log 10."""
     return [(int(part), "") if part.isdigit() else (0, part) for part in re.split(r"([0-9]+)", str(path))]
-
-
-def _once(given: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> tuple[dict[str, Path], list[str]]:
-    """Leave out copies of a flight."""
-    known: dict[str, Path] = {}
-    kept, notes = {}, []
-    for role, path in given.items():
-        hashes = hashes_of(path, inputs[role])
-        same = next((known[each] for each in hashes if each in known), None)
-        if same is None:
-            kept[role] = path
-            known.update(dict.fromkeys(hashes, path))
-        else:
-            notes.append(f"{path}: is the same as {same}; counted once")
-    return kept, notes
 
 
 @dataclass(frozen=True)

@@ -169,7 +169,7 @@ def _exists(proposal: Proposal, today: Mapping[str, float]) -> bool:
 def _lacking(autopilot: Autopilot, today: Mapping[str, float], proposals: Sequence[Proposal]) -> Iterator[str]:
     """Say which parameters of the file the log does not hold."""
     # Behind a switch that is off a log leaves all out.
-    switched = any(name in today for name in _switches(autopilot))
+    switched = any(each.name in today for each in autopilot.parameters if each.role.endswith("_on"))
     missing = [
         each.parameter.name
         for each in proposals
@@ -192,10 +192,6 @@ def _steps(autopilot: Autopilot, values: Mapping[str, float], today: Mapping[str
             f"{number(autopilot.law(values).rate_hz, 4)} steps of the law in a second are assumed; a log of your "
             "vehicle tells them (--flight)"
         )
-
-
-def _switches(autopilot: Autopilot) -> list[str]:
-    return [each.name for each in autopilot.parameters if each.role.endswith("_on")]
 
 
 def _require_control() -> None:

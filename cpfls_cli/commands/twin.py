@@ -23,7 +23,7 @@ from cpfls_cli.commands.numbers import with_numbers
 from cpfls_cli.commands.replay import model_notes
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study, generator, settings_of
-from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.errors import ComputationError, InputError, about
 from cpfls_cli.flights.inputs import known_by
 from cpfls_cli.flights.models import learned_by, read_model
 from cpfls_cli.flights.playback import flights_to_play
@@ -112,10 +112,8 @@ def _possible(path: Path, model: VehicleModel | None, study: Study) -> tuple[Seq
     record = read_record(path, ModelRecord)
     if not isinstance(record, VehicleRecord):
         return [model] * DRAWS, None
-    try:
+    with about(path, InputError, ComputationError):
         spread = drawn(model, estimates(record), DRAWS, generator(study, "spread"))
-    except (InputError, ComputationError) as error:
-        raise type(error)(f"{path}: {error}") from None
     return spread.models, spread.lack
 
 

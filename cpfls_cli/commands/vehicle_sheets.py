@@ -13,8 +13,6 @@ from cpfls_cli.artifacts.identified import IdentifiedRecord
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.spec import InputFile, rows_of
 from cpfls_cli.artifacts.store import read_record
-from cpfls_cli.config.load import stored_study
-from cpfls_cli.config.study import Study
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Missing, Off, sized
@@ -41,11 +39,6 @@ def sheet_of(path: Path, name: str, file: InputFile, *, force: bool) -> Sheet:
     if sheet.verdict == "do-not-use" and not force:
         raise InputError(f"{path}: its verdict is do-not-use; --force exports it anyway, marked as such")
     return replace(sheet, name=name, file=path.name, sha256=file.sha256)
-
-
-def study_of(sheet: Sheet) -> Study:
-    """Give the study that a model was made with."""
-    return stored_study(sheet.origin.config, sheet.file)
 
 
 def bare_sheet(record: ModelRecord, model: VehicleModel) -> Sheet:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cpfls_cli.artifacts.job import input_file
-from cpfls_cli.commands.vehicle_sheets import sheet_of, study_of
+from cpfls_cli.commands.vehicle_sheets import sheet_of
+from cpfls_cli.config.load import stored_study
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.registry import FORMS, exported, require_package
 from cpfls_cli.export.text import identifier
@@ -60,7 +61,7 @@ def run(model: Path, flight: Path, options: Options, *, force: bool, dry_run: bo
         )
     sheet = sheet_of(model, identifier(model.stem), input_file(model), force=force)
     made = exported(sheet, options.form, f"{sheet.name}.py")
-    study = study_of(sheet)
+    study = stored_study(sheet.origin.config, sheet.file)
     read = read_model(model, study)
     (logged,) = flights_to_play([flight], study, options.hold)
     along, player = made_ready(read, logged)

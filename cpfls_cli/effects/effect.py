@@ -276,24 +276,21 @@ def stack(*wrenches: Array) -> Array:
     return np.stack(wrenches, axis=2)
 
 
-def wrench(torque: Array | None = None, force: Array | None = None, samples: int | None = None) -> Array:
+def wrench(torque: Array | None = None, force: Array | None = None) -> Array:
     """Join a body torque and a body force.
 
     Parameters
     ----------
     torque, force : array, shape (time, 3), or None
-        None for zero.
-    samples : int or None
-        Needed where both are None.
+        None for zero; one of them is given.
 
     Returns
     -------
     array, shape (time, 6), N m and N
     """
     given = torque if torque is not None else force
-    length = samples if given is None else len(given)
-    assert length is not None, "torque, force or samples"
-    zero = np.zeros((length, 3))
+    assert given is not None, "torque or force"
+    zero = np.zeros_like(given)
     return np.concatenate([zero if torque is None else torque, zero if force is None else force], axis=1)
 
 

@@ -144,13 +144,6 @@ class EvolutionState:
         )
 
 
-def best(generation: Generation) -> Array:
-    """Give the smallest value of each objective among all chromosomes ever evaluated; +inf where none was finite."""
-    # The front holds the smallest value of every objective, so the archive itself is not needed.
-    smallest: Array = generation.front_objectives.min(axis=0)
-    return smallest
-
-
 def ended(state: EvolutionState, settings: EvolutionSettings) -> End | None:
     """Tell why an evolution has reached its end; None where another generation is to be bred."""
     if state.index >= settings.generations:

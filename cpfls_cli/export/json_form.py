@@ -15,8 +15,6 @@ from cpfls_cli.effects.polynomial import FACTORS
 from cpfls_cli.export.points import PERIOD
 from cpfls_cli.export.sheet import EXPORTER, GUST_RECIPE, Sheet, base_of, rule_labels
 from cpfls_cli.export.source import (
-    airflow_order,
-    airflow_peaks,
     attitudes_of,
     points_of,
     response_of,
@@ -26,7 +24,6 @@ from cpfls_cli.export.source import (
 from cpfls_cli.export.text import strict_json
 from cpfls_cli.fuzzy.membership import Z_FUNCTION
 from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric
-from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.regressor.structure import Block
 
 FORMAT, VERSION = "cpfls/model-json", 2
@@ -100,7 +97,7 @@ HOW_TO_EVALUATE = (
 
 def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
     """Write a model, and what it is worth, as strict JSON in ASCII; null for what is not finite, or not there."""
-    found, vehicle = sheet.identified, sheet.model.vehicle
+    found, vehicle, learned = sheet.identified, sheet.model.vehicle, sheet.model.remainder
     points, runs, attitudes = sheet.references
     document = {
         "format": FORMAT,
@@ -130,11 +127,13 @@ def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
         "terms_of_motion": sheet.terms,
         "terms_of_rotors": sheet.rotor_terms,
         "factors_of_products": FACTORS.tolist(),
-        "gusts": None if sheet.model.gusts is None else _gusts(sheet.model.gusts),
+        "gusts": None
+        if sheet.model.gusts is None
+        else {**GustsGroup.of(sheet.model.gusts).summary, "frame": BODY, "how_to_play": GUST_RECIPE},
         "weights": {name: column.tolist() for name, column in sheet.weights._asdict().items()},
         "learned": None
-        if sheet.remainder is None
-        else {"breakpoints": airflow_peaks(sheet), "harmonic_order": airflow_order(sheet)},
+        if learned is None
+        else {"breakpoints": learned.breakpoints, "harmonic_order": learned.harmonic_order},
         "judged": None,
         "provenance": _provenance(sheet),
         "period_s": PERIOD,
@@ -143,10 +142,6 @@ def json_text(sheet: Sheet, told: Sequence[str] = ()) -> str:
         "reference_runs": [run_of(run) for run in runs],
     }
     return strict_json({**document, **sheet.evidence})
-
-
-def _gusts(gusts: Gusts) -> dict[str, Any]:
-    return {**GustsGroup.of(gusts).summary, "frame": BODY, "how_to_play": GUST_RECIPE}
 
 
 def _structure(model: InertiaFunctions) -> dict[str, Any]:

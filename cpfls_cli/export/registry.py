@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
-from cpfls_cli.errors import InputError, install_command
+from cpfls_cli.errors import InputError, about, install_command
 from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import NOTHING, Held, Holds, Missing, Off, missing, probe_flight, together
 from cpfls_cli.export.json_form import json_text
@@ -21,7 +22,7 @@ from cpfls_cli.export.simulators.mjcf import fly_mjcf, mjcf_held, mjcf_text
 from cpfls_cli.export.simulators.px4 import AIRFRAME, px4_text
 from cpfls_cli.export.simulators.rotorpy import fly_rotorpy, rotorpy_held, rotorpy_text
 from cpfls_cli.export.simulators.sdf import fly_sdf, sdf_held, sdf_text
-from cpfls_cli.export.simulators.urdf import OTHERWISE, fly_urdf, fly_urdf_as_held, urdf_held, urdf_text
+from cpfls_cli.export.simulators.urdf import OTHERWISE, fly_urdf, urdf_held, urdf_text
 from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
@@ -114,7 +115,7 @@ TARGETS = {
         package="",
         step_s=1e-3,
         levels=4,
-        fly_as_held=fly_urdf_as_held,
+        fly_as_held=partial(fly_urdf, in_world=False),
         otherwise=OTHERWISE,
     ),
     "ardupilot": Target(
@@ -126,7 +127,7 @@ TARGETS = {
         package="",
         step_s=ardupilot.STEP_S,
         levels=4,
-        fly_as_held=ardupilot.fly_ardupilot_as_held,
+        fly_as_held=partial(ardupilot.fly_ardupilot, own=False),
         otherwise=ardupilot.OTHERWISE,
     ),
     "rotorpy": Target("RotorPy", ".py", rotorpy_held, rotorpy_text, fly=fly_rotorpy, package="rotorpy", levels=4),
@@ -170,10 +171,8 @@ class Exported:
 def exported(sheet: Sheet, form: str, file: str) -> Exported:
     """Write a model in one of `FORMS`."""
     chosen = FORMS[form]
-    try:
+    with about(sheet.file, InputError):
         held, holds = chosen.held(sheet.model)
-    except InputError as error:
-        raise InputError(f"{sheet.file}: {error}") from None
     left, told = _left(sheet, held, holds, chosen)
     files = [Path(file).with_suffix(ending).name for ending in (chosen.also, chosen.ending) if ending]
     return Exported({name: chosen.write(sheet, held, told, name) for name in files}, held, left, told)

@@ -19,7 +19,6 @@ from cpfls_cli.export.holding import Missing
 from cpfls_cli.export.points import Expected, ReferencePoints, ReferenceRun, attitude_points, reference_points, runs_of
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.table import Remainder
 from cpfls_cli.regressor.structure import Block, ModelStructure
 from cpfls_cli.version import __version__
 
@@ -156,11 +155,6 @@ class Sheet:
         return Weights(row, term, rotor, self.model.table.weights[row, term, rotor])
 
     @property
-    def remainder(self) -> Remainder | None:
-        """The learned part."""
-        return self.model.remainder
-
-    @property
     def terms(self) -> list[str]:
         """Names of the terms of the motion."""
         columns = range((self.model.table.weights.shape[1] - len(STATE_TERMS)) // 2)
@@ -214,8 +208,8 @@ class Sheet:
         )
         if model.effects:
             yield f"Effects: {', '.join(CATALOGUE[effect.name].title for effect in model.effects)}."
-        if self.remainder is not None:
-            rows = ", ".join(_ROWS[row] for row in self.remainder.rows)
+        if model.remainder is not None:
+            rows = ", ".join(_ROWS[row] for row in model.remainder.rows)
             yield f"Learned, without a name: {rows} over the direction of the airflow."
         if model.gusts is not None:
             size, memory, white = (", ".join(f"{value:.4g}" for value in values) for values in model.gusts)

@@ -19,6 +19,7 @@ from cpfls_cli.export.sheet import Sheet, rule_labels
 from cpfls_cli.export.text import c_row, c_rows, comment_lines, comment_text, filled, literal_text, number, python_rows
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.table import airflow_of
 from cpfls_cli.regressor.structure import ModelStructure
 
 _OUTSIDE, _VERTICAL = 1, 4
@@ -39,7 +40,7 @@ class CSource:
 def c_source(sheet: Sheet, stem: str, told: Sequence[str] = ()) -> CSource:
     """Write a model as C99, with further paragraphs in its head."""
     points, runs, attitudes = sheet.references
-    peaks = airflow_peaks(sheet)
+    peaks, order = airflow_of(sheet.model.remainder)
     rows = zip(*(column.tolist() for column in sheet.weights), strict=True)
     words = {
         **_common_words(sheet, told),
@@ -52,7 +53,7 @@ def c_source(sheet: Sheet, stem: str, told: Sequence[str] = ()) -> CSource:
         "weights": [f"{{{row}, {term}, {rotor}, R({number(weight)})}}," for row, term, rotor, weight in rows],
         "peaks": len(peaks),
         "rules_of_airflow": max(len(peaks) - 1, 1),
-        "features": 1 + (2 * airflow_order(sheet) or 1),
+        "features": 1 + (2 * order or 1),
         "peak_rows": filled(c_row(peaks), 4),
         **({} if sheet.rules is None else _c_rules(sheet.rules)),
         **({} if sheet.identified is None else _c_visited(sheet.identified)),
@@ -149,7 +150,7 @@ def python_source(sheet: Sheet, file: str, library: str = "numpy", told: Sequenc
         "second_rows": _whole(FACTORS[:, 1]),
         "rule_count": len(coefficients),
         "parameter_rows": filled(", ".join(map(number, parameters)), 4),
-        "peaks": airflow_peaks(sheet).tolist(),
+        "peaks": airflow_of(sheet.model.remainder).breakpoints.tolist(),
         **({} if rules is None else _python_rules(rules)),
         "visited_rows": [] if sheet.identified is None else visited_rows(sheet.identified),
         "points": [_python_entries(point) for point in points_of(points)] if tests else [],
@@ -251,7 +252,7 @@ def _common_words(sheet: Sheet, told: Sequence[str]) -> dict[str, Any]:
         "attitude": sheet.identified is not None,
         "fuzzy": rules is not None,
         "rigid": bool(sheet.rigid_body.any()),
-        "learned": sheet.remainder is not None,
+        "learned": sheet.model.remainder is not None,
         "vertical": VERTICAL,
         "cells": CELLS,
         "cell_deg": 360 // CELLS,
@@ -262,7 +263,7 @@ def _common_words(sheet: Sheet, told: Sequence[str]) -> dict[str, Any]:
         "gravity": number(vehicle.gravity_m_s2),
         **{name.removesuffix("_s"): number(value) for name, value in response_of(sheet).items()},
         "gusts": [[number(value) for value in values] for values in sheet.model.gusts or ()],
-        "order": airflow_order(sheet),
+        "order": airflow_of(sheet.model.remainder).order,
         "period": number(PERIOD),
         **({} if rules is None else _structure_words(rules)),
     }
@@ -313,16 +314,6 @@ def response_of(sheet: Sheet) -> dict[str, float]:
     response = sheet.model.response
     lag, slow = response.lag_s, response.slow_s
     return {"delay_s": response.delay_s, "lag_s": lag, "slow_s": slow}
-
-
-def airflow_order(sheet: Sheet) -> int:
-    """Give the order of the harmonics of the learned part; 0 for the seesaw, and without one."""
-    return 0 if sheet.remainder is None else sheet.remainder.harmonic_order
-
-
-def airflow_peaks(sheet: Sheet) -> Array:
-    """Give the peaks of the membership functions of the learned part; none without one."""
-    return np.zeros(0) if sheet.remainder is None else sheet.remainder.breakpoints
 
 
 def points_of(points: ReferencePoints) -> list[dict[str, Any]]:

@@ -174,6 +174,7 @@ def _of_replay(title: str, record: ReplayRecord, study: Study) -> View:
         known = {what: own[:, :-1].reshape(-1, own.shape[2]) for what, own in values.items() if own is not None}
         if len(known) < len(values):
             return
+        known[DIFFERENCE] = known[MEASURED] - known[MODEL]
         flight = int(record.window.flight[windows[0]])
         times = record.window.start[windows][:, None] + period * np.arange(len(record.horizon_s))
         order = np.argsort(times.ravel(), kind="stable")
@@ -181,7 +182,7 @@ def _of_replay(title: str, record: ReplayRecord, study: Study) -> View:
         yield Track(
             name=name,
             time=time,
-            values={what: own[order] for what, own in known.items()} | {DIFFERENCE: _less(known)[order]},
+            values={what: own[order] for what, own in known.items()},
             unit=unit,
             frame=BODY if unit == "rad/s" else WORLD,
             description=about,
@@ -223,10 +224,6 @@ def _of_replay(title: str, record: ReplayRecord, study: Study) -> View:
         if errors is not None
     ]
     return View(title, tracks, curves, stamps=_stamps(study), on_log_clock=record.flight.begins is not None)
-
-
-def _less(known: Mapping[str, Array]) -> Array:
-    return np.asarray(known[MEASURED] - known[MODEL])
 
 
 def _short(name: str) -> str:

@@ -1,6 +1,6 @@
 """Conversion of a log's columns: selected by name, in SI, in body FLU and world ENU."""
 
-from collections.abc import Container, Mapping
+from collections.abc import Collection, Container, Mapping
 from dataclasses import fields, replace
 from difflib import get_close_matches
 from typing import Literal
@@ -10,6 +10,7 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, SettingError
+from cpfls_cli.flightlog.agreement import rotations_of
 from cpfls_cli.flightlog.repair import unwrap_angles
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, ColumnMap, ImportSettings, SignalMap
 from cpfls_cli.units import STANDARD_GRAVITY, to_si
@@ -182,7 +183,7 @@ def _hint(name: str, columns: Mapping[str, Array]) -> str:
     return f" (nearest: {shown})" if nearest else ""
 
 
-def columns_in_words(columns: Mapping[str, Array]) -> str:
+def columns_in_words(columns: Collection[str]) -> str:
     """Say once what the log holds; of a log of topics, which has hundreds of columns, its topics."""
     of_topics = all("." in column for column in columns)
     names = sorted({column.partition(".")[0] for column in columns}) if of_topics else list(columns)
@@ -239,7 +240,7 @@ def setpoints_to_program_frames(signals: Mapping[str, Array], settings: ImportSe
         By the names that `SETPOINTS` gives: attitude as roll, pitch, yaw, also of a quaternion; thrust and sticks as
         logged.
     """
-    named = {short: signals[name] for name, short in SETPOINTS.items() if name in signals}
+    named: dict[str, Array] = {short: signals[name] for name, short in SETPOINTS.items() if name in signals}
     converted = dict(named)
     converted |= {name: world_to_enu(named[name], settings.world_frame) for name in _WORLD_SIGNALS if name in named}
     if "body_rate" in named:
@@ -310,10 +311,7 @@ def attitude_to_enu_flu(attitude: Array, body: BodyFrame, world: WorldFrame) -> 
 
 def attitude_from_quaternion(quaternion: Array, order: Literal["wxyz", "xyzw"]) -> Array:
     """Convert quaternions from body to world, shape (time, 4), of any length, to `euler_angles`."""
-    from scipy.spatial.transform import Rotation
-
-    scalar_last = np.roll(quaternion, -1, axis=1) if order == "wxyz" else quaternion
-    return euler_angles(Rotation.from_quat(scalar_last).as_matrix())
+    return euler_angles(rotations_of(quaternion, order).as_matrix())
 
 
 def euler_angles(rotation: Array) -> Array:

@@ -14,7 +14,7 @@ from cpfls_cli.flightlog.clock import increasing_rows
 from cpfls_cli.flightlog.nameless import nameless_clock
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalName
-from cpfls_cli.flightlog.topics import STAMP, Topics
+from cpfls_cli.flightlog.topics import STAMP, Topics, column_names
 from cpfls_cli.units import KNOWN_UNITS, UnitName
 
 _TIME_NAMES = [
@@ -56,9 +56,7 @@ class LogTable:
     def __init__(self, topics: Topics, units: Mapping[str, str]) -> None:
         self.topics, self.units = topics, units
         self.flat = set(topics) == {""}
-        self.names = tuple(
-            f"{topic}.{field}" if topic else field for topic, fields in topics.items() for field in fields
-        )
+        self.names = column_names(topics)
         if self.flat and max(map(len, topics[""].values()), default=0) < _FEWEST_SAMPLES:
             raise InputError(
                 f"holds only {max(map(len, topics[''].values()), default=0)} samples, too few for a flight"
@@ -110,6 +108,13 @@ class LogTable:
         time, values = self.values(columns)
         values = values if spikes else self.without_spikes(columns)
         return np.column_stack([np.interp(self.grid, time, column) for column in values.T])
+
+    def stated_unit(self, column: str, signal: SignalName) -> UnitName | None:
+        """Give the unit that the log states of a column, None where it states none or one that a signal cannot have."""
+        stated = self.units.get(column, "")
+        # Pulses in us are no time: their range makes them shares.
+        unit = next((known for known in get_args(UnitName) if known == stated and known != "us"), None)
+        return unit if unit is not None and KNOWN_UNITS[unit].si in UNITS_OF_SIGNAL[signal] else None
 
     def rate_hz(self, columns: Sequence[str]) -> float:
         """Median rate of the topic of a column."""
@@ -166,7 +171,9 @@ def holding_values(log: LogTable, candidates: Sequence[Named]) -> dict[SignalNam
     """Keep what has enough values that change, by signal."""
     kept: dict[SignalName, list[Named]] = {}
     for candidate in candidates:
-        named = _in_stated_unit(log, candidate)
+        # The unit that a log states wins over the one that its kind is known for.
+        unit = log.stated_unit(candidate.group.columns[0], candidate.signal)
+        named = candidate if unit is None else replace(candidate, unit=unit, scale=1.0)
         time, values = log.values(named.group.columns)
         if named.signal in ROTORS and len(time) < _FEWEST_SAMPLES:
             # Outputs that are not there hold no numbers.
@@ -211,14 +218,3 @@ def make_grid(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) -
             " or not a clock; cut out the part that flies"
         )
     log.grid = np.arange(begin, end, 1 / rate)
-
-
-def _in_stated_unit(log: LogTable, named: Named) -> Named:
-    """Let the unit that a log states win over the one that its kind is known for."""
-    stated = log.units.get(named.group.columns[0], "")
-    kinds = UNITS_OF_SIGNAL[named.signal]
-    # Pulses in us are no time: their range makes them shares.
-    unit = next((known for known in get_args(UnitName) if known == stated and known != "us"), None)
-    if unit is None or KNOWN_UNITS[unit].si not in kinds:
-        return named
-    return replace(named, unit=unit, scale=1.0)

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalName
+from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, UNITS_OF_SIGNAL, SignalName
 from cpfls_cli.flightlog.vocabulary import (
     A_WORD,
     ALLOWED,
@@ -254,12 +254,8 @@ def _in_other_unit(group: ColumnGroup, stated: tuple[UnitName, float] | None) ->
 
 
 _SETPOINT_OF: Final[Mapping[SignalName, SignalName]] = {
-    "position": "setpoint_position",
-    "velocity": "setpoint_velocity",
-    "attitude": "setpoint_attitude",
+    **{measured: name for name, measured in SETPOINTS.items()},
     "quaternion": "setpoint_attitude",
-    "body_rate": "setpoint_body_rate",
-    "thrust": "setpoint_thrust",
 }
 
 

@@ -8,13 +8,13 @@ from typing import Final, Literal
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.errors import InputError
+from cpfls_cli.errors import InputError, about
 from cpfls_cli.flightlog.airframe import Airframe, Parameters, stated_airframe, usual_airframe
 from cpfls_cli.flightlog.clock import common_rate, same_rate
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Load, Recognition, Rival
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.settings import SETPOINTS, ColumnMap, SignalMap, SignalName
-from cpfls_cli.flightlog.topics import Topics
+from cpfls_cli.flightlog.topics import Topics, column_names
 from cpfls_cli.units import UnitName, known_unit
 from cpfls_cli.vehicle_limits import IN_ROOM, room, thrust_number
 from cpfls_cli.words import joined
@@ -72,9 +72,8 @@ def known_log(name: str, topics: Topics, units: Mapping[str, str], parameters: P
     InputError
         See `recognise`.
     """
-    columns = (f"{topic}.{field}" if topic else field for topic, fields in topics.items() for field in fields)
     recognition = recognise(topics, units, parameters, system)
-    return KnownLog(name, recognition, parameters, system, frozenset(columns))
+    return KnownLog(name, recognition, parameters, system, frozenset(column_names(topics)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -410,10 +409,8 @@ def _of_other_load(logs: Sequence[KnownLog]) -> list[KnownLog]:
 
 def _airframe(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
     """Take the rotors that parameters state, else those that the motion tells, and hold the one against the other."""
-    try:
+    with about(logs[0].name, InputError):
         stated = next((found for one in logs if (found := stated_airframe(one.parameters)) is not None), None)
-    except InputError as error:
-        raise InputError(f"{logs[0].name}: {error}") from None
     moved = [one.recognition.moved for one in logs if one.recognition.moved is not None]
     best = max(moved, key=lambda found: (found.clear, sum(found.explained)), default=None)
     if best is not None and best.clear and stated is None:

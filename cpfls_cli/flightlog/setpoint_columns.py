@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Final, Literal, get_args
+from typing import Final, Literal
 
 import numpy as np
 
@@ -14,10 +14,10 @@ from cpfls_cli.flightlog.log_table import LogTable
 from cpfls_cli.flightlog.names import Named, column_groups, is_of, wished_signals
 from cpfls_cli.flightlog.recognised import Guess, Rival, Seen, Sure
 from cpfls_cli.flightlog.repair import unwrap_angles
-from cpfls_cli.flightlog.settings import SETPOINTS, UNITS_OF_SIGNAL, SignalMap, SignalName
+from cpfls_cli.flightlog.settings import SETPOINTS, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import hold_asked
 from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, CRAZYFLIE, KNOWN_SETPOINTS, PX4, KnownSetpoint
-from cpfls_cli.units import KNOWN_UNITS, UnitName, known_unit
+from cpfls_cli.units import UnitName, known_unit
 
 _FEWEST_SAMPLES = 20
 _FEWEST_COMPARED = 100
@@ -88,14 +88,6 @@ class _Candidate:
     doubts: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class _Judged:
-    """A guess, or why there is none."""
-
-    guess: Guess | None
-    why: str = ""
-
-
 def tell_setpoints(seen: Seen, parameters: Parameters, system: str) -> None:
     """Take columns for setpoints that what was measured follows, and for sticks and thrust those of known logs.
 
@@ -113,12 +105,12 @@ def tell_setpoints(seen: Seen, parameters: Parameters, system: str) -> None:
         candidates += [own for own in _by_words(seen) if not known & {*own.columns.columns}]
     for name in SETPOINTS:
         judged = [_judged(seen, own) for own in candidates if own.signal == name and _changes(seen.log, own)]
-        taken = [own.guess for own in judged if own.guess is not None]
+        taken = [own for own in judged if isinstance(own, Guess)]
         if taken:
             # The first that is sure; what a controller is given stands before what it makes of it.
             seen.guesses[name] = min(taken, key=lambda guess: guess.sure == "guess")
         else:
-            seen.left_out += [own.why for own in judged]
+            seen.left_out += [own for own in judged if isinstance(own, str)]
 
 
 # Candidates.
@@ -155,9 +147,8 @@ def _channels(row: KnownSetpoint, parameters: Parameters) -> tuple[str, ...]:
 
 def _in_stated_unit(log: LogTable, signal: SignalName, mapped: SignalMap) -> SignalMap:
     """Let the unit that a log states win over the one that its kind is known for."""
-    stated = log.units.get(mapped.columns[0], "")
-    unit = next((own for own in get_args(UnitName) if own == stated), None)
-    if unit is None or KNOWN_UNITS[unit].si not in UNITS_OF_SIGNAL[signal] or len(mapped.columns) != 3:
+    unit = log.stated_unit(mapped.columns[0], signal)
+    if unit is None or len(mapped.columns) != 3:
         return mapped
     return replace(mapped, unit=unit, scale=1.0, offset=0.0)
 
@@ -197,7 +188,8 @@ def _changes(log: LogTable, own: _Candidate) -> bool:
 # Judgement.
 
 
-def _judged(seen: Seen, own: _Candidate) -> _Judged:
+def _judged(seen: Seen, own: _Candidate) -> Guess | str:
+    """Make a guess of a candidate, or say why it is none."""
     asked = _asked(seen, own.columns)
     if own.signal in ("setpoint_thrust", "sticks"):
         return _by_range(own, asked)
@@ -206,42 +198,41 @@ def _judged(seen: Seen, own: _Candidate) -> _Judged:
     if measured is None:
         against = f"there is no {_words(own.signal)} to compare it with"
         if not own.known:
-            return _Judged(None, f"{columns}: looks like a setpoint of the {_words(own.signal)}, but {against}")
-        return _Judged(_guess(own, own.columns, f"{own.called}; {against}", "named"))
+            return f"{columns}: looks like a setpoint of the {_words(own.signal)}, but {against}"
+        return _guess(own, own.columns, f"{own.called}; {against}", "named")
     if own.signal == "setpoint_attitude":
         asked = _as_angles(seen, own, asked, measured)
     fit = _Following.of(measured, asked, seen.rate_hz, _units(own))
     if not fit.followed.any():
-        return _Judged(
-            None,
+        return (
             f"{columns}: looks like a setpoint of the {_words(own.signal)}, which does not follow it; if gusts are "
-            f"why, state it as import.signals.{own.signal}",
+            f"why, state it as import.signals.{own.signal}"
         )
     return _by_motion(own, fit)
 
 
-def _by_range(own: _Candidate, asked: Array) -> _Judged:
+def _by_range(own: _Candidate, asked: Array) -> Guess | str:
     """Judge shares by their range; nothing that is measured is in their unit."""
     columns, known = ", ".join(own.columns.columns), asked[np.isfinite(asked)]
     if not len(known):
-        return _Judged(None, f"{columns}: {own.called}, but it is absent in flight")
+        return f"{columns}: {own.called}, but it is absent in flight"
     largest = float(np.quantile(np.abs(known), 0.999))
     what = "the largest thrust" if own.signal == "setpoint_thrust" else "full deflection"
     if own.columns.unit == "1" and largest > _FULL:
-        return _Judged(None, f"{columns}: {own.called}, but reaches {largest:.3g} times {what}")
+        return f"{columns}: {own.called}, but reaches {largest:.3g} times {what}"
     if own.signal == "setpoint_thrust" and not float(np.median(known)) > 0:
-        return _Judged(None, f"{columns}: {own.called}, but it does not lift")
+        return f"{columns}: {own.called}, but it does not lift"
     unit = f"shares of {what}" if own.columns.unit == "1" else f"in {own.columns.unit}"
-    return _Judged(_guess(own, own.columns, f"{own.called}; {unit}, {largest:.2g} at most", "named"))
+    return _guess(own, own.columns, f"{own.called}; {unit}, {largest:.2g} at most", "named")
 
 
-def _by_motion(own: _Candidate, fit: "_Following") -> _Judged:
+def _by_motion(own: _Candidate, fit: "_Following") -> Guess | str:
     """Judge a setpoint that is followed: its unit by the size, its signs by the direction."""
     columns, what = own.columns.columns, _words(own.signal)
     axes = columns if len(columns) == len(fit.along) else ("roll", "pitch", "yaw")
     opposed = [axis for axis, against in zip(axes, fit.opposed, strict=True) if against]
     if opposed and (own.known or axes is not columns):
-        return _Judged(None, f"{', '.join(columns)}: {own.called}, but the {what} runs against {', '.join(opposed)}")
+        return f"{', '.join(columns)}: {own.called}, but the {what} runs against {', '.join(opposed)}"
     mapped, gain = own.columns, fit.gain
     if not own.states_unit:
         factor = _nearest(gain, _units(own))
@@ -249,9 +240,7 @@ def _by_motion(own: _Candidate, fit: "_Following") -> _Judged:
         mapped, gain = replace(mapped, unit=unit), gain / factor
     most = _TIMES if own.known else _TIMES_BY_WORDS
     if not 1 / most < gain < most:
-        return _Judged(
-            None, f"{', '.join(columns)}: {own.called}; the {what} is {gain:.2g} times as large, which no unit explains"
-        )
+        return f"{', '.join(columns)}: {own.called}; the {what} is {gain:.2g} times as large, which no unit explains"
     if opposed:
         mapped = replace(mapped, sign=tuple(-1.0 if against else 1.0 for against in fit.opposed))
     share = f"{float(np.mean(np.abs(fit.along[fit.followed | fit.opposed]))):.2f}"
@@ -262,7 +251,7 @@ def _by_motion(own: _Candidate, fit: "_Following") -> _Judged:
     rivals = tuple(Rival(f"leave {own.signal} out", doubt) for doubt in doubts)
     reason = f"{own.called}; the {what} follows it{turned} (correlation {share}){size}"
     sure: Sure = "guess" if rivals else "data"
-    return _Judged(_guess(own, mapped, reason, sure, rivals))
+    return _guess(own, mapped, reason, sure, rivals)
 
 
 def _units(own: _Candidate) -> tuple[float, ...]:
@@ -298,13 +287,7 @@ def _measured(seen: Seen, signal: SignalName) -> Array | None:
     quaternion = seen.guesses.get("quaternion")
     if signal == "setpoint_attitude" and quaternion is not None:
         return attitude_from_quaternion(seen.mapped(quaternion), _quaternion_order(seen))
-    counterparts: dict[SignalName, SignalName] = {
-        "setpoint_position": "position",
-        "setpoint_velocity": "velocity",
-        "setpoint_attitude": "attitude",
-        "setpoint_body_rate": "body_rate",
-    }
-    guess = seen.guesses.get(counterparts[signal])
+    guess = seen.guesses.get(SETPOINTS[signal])
     if guess is None:
         return None
     values = seen.mapped(guess)

@@ -56,7 +56,7 @@ UNITS_OF_SIGNAL: Final = MappingProxyType(
         "sticks": ("1",),
     }
 )
-SETPOINTS: Final[Mapping[SignalName, str]] = MappingProxyType(
+SETPOINTS: Final[Mapping[SignalName, SignalName]] = MappingProxyType(
     {
         "setpoint_position": "position",
         "setpoint_velocity": "velocity",

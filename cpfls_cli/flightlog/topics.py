@@ -31,6 +31,11 @@ _THINNED = 1.5
 _ROUNDING = 1 + 1e-9
 
 
+def column_names(topics: Topics) -> tuple[str, ...]:
+    """Name all columns of a log: ``topic.field``, or the field alone where the log is flat."""
+    return tuple(f"{topic}.{field}" if topic else field for topic, fields in topics.items() for field in fields)
+
+
 def topic_and_field(column: str) -> tuple[str, str]:
     """Split ``topic.field`` or ``topic[instance].field``, where 0 needs no number; without a field that is empty."""
     topic, _, field = column.partition(".")
@@ -116,20 +121,18 @@ def _with_clock(topics: Topics, settings: ImportSettings) -> ImportSettings:
     if settings.time_column is None and fastest:
         return replace(settings, time_column=fastest)
     if settings.time_column is None:
-        raise InputError(f"import.signals: the log has none of the mapped topics; {columns_in_words(_named(topics))}")
+        raise InputError(
+            f"import.signals: the log has none of the mapped topics; {columns_in_words(column_names(topics))}"
+        )
     example = f", such as {fastest}" if fastest else ""
     raise InputError(
         f"import.time_column = {settings.time_column!r}: in this log every topic has its own stamps; name those of the"
-        f" fastest mapped one{example}, or null for them; {columns_in_words(_named(topics))}"
+        f" fastest mapped one{example}, or null for them; {columns_in_words(column_names(topics))}"
     )
 
 
-def _named(topics: Topics) -> dict[str, Array]:
-    return {f"{topic}.{field}": np.empty(0) for topic, fields in topics.items() for field in fields}
-
-
 def _resampled(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Array], tuple[str, ...]]:
-    columns = _named(topics)
+    columns = {name: np.empty(0) for name in column_names(topics)}
     base, stamp = topic_and_field(str(settings.time_column))
     clocks = {topic: fields.get(stamp, fields[STAMP]) for topic, fields in topics.items() if STAMP in fields}
     target = topics[base][stamp]

@@ -107,7 +107,7 @@ def flight_source(path: Path, *, torque: bool = True) -> TorqueSource:
     if samples is None or samples <= IN_MEMORY:
         flight = read_record(path, FlightRecord, *names)
         asked = {short: flight.signals[name] for name, short in SETPOINTS.items() if name in flight.signals}
-        columns = {name: own.reshape(len(own), -1) for name, own in asked.items()}
+        columns: dict[str, Array] = {name: own.reshape(len(own), -1) for name, own in asked.items()}
         return replace(_torque_data([getattr(flight, name) for name in names]), setpoints=columns)
     check_rows(path, FlightRecord.spec(), paths)
     return FlightFile(path.resolve(), paths, 0, samples, path.stat().st_size, samples)

@@ -14,7 +14,7 @@ from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study
-from cpfls_cli.errors import InputError
+from cpfls_cli.errors import InputError, about
 from cpfls_cli.flights.same_vehicle import read_of_vehicle, with_numbers_of
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import VehicleModel
@@ -85,10 +85,8 @@ def read_base(path: Path | None, study: Study) -> VehicleModel:
 
 def rebuilt(path: Path, record: ModelRecord) -> VehicleModel:
     """Rebuild the model of a record; the path is for messages."""
-    try:
+    with about(path, InputError):
         return vehicle_model(record.vehicle)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
 
 
 def is_vehicle(path: Path) -> bool:

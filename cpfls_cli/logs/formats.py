@@ -13,7 +13,7 @@ from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cpfls_cli.errors import InputError, install_command
+from cpfls_cli.errors import InputError, about, install_command
 
 if TYPE_CHECKING:
     from cpfls_cli.arrays import Array
@@ -198,10 +198,8 @@ def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
     """Read the columns of a log that a config maps, on one clock."""
     on_one_clock = import_module("cpfls_cli.flightlog.topics").on_one_clock
     contents = log_contents(path, settings.mapped_columns)
-    try:
+    with about(path, InputError):
         columns, chosen, warnings = on_one_clock(contents.topics, contents.units, settings)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
     begins = contents.begins.get(str(chosen.time_column), contents.begins.get("", 0.0))
     warnings = (*contents.warnings, *warnings)
     return LogColumns(columns, chosen, warnings, contents.flown_at, begins, contents.parameters, contents.system)

@@ -327,19 +327,15 @@ def _held_out_table(record: DiagnosisRecord, index: int) -> Table:
     rows = [_gap_row(record, channel) for channel in loud]
     rows += [] if record.playback is None else list(_playback_rows(record.playback))
     within = ", ".join(record.gap.channel[channel] for channel in quiet)
+    beside = ", which holds the gusts" if record.gusts else ""
     caption = [
-        f"Held-out flights, before and after. To beat: the noise floor{_beside_gusts(record)}, or no model.",
+        f"Held-out flights, before and after. To beat: the noise floor{beside}, or no model.",
         "" if record.playback is None else _playback_words(record.playback),
         f"Within the noise: {within}." if within else "",
         "" if record.effects.names() else f"After: {model_words(record)}.",
     ]
     header = ("Held out", "Unit", "Before", "After", "To beat", "That is")
     return Table(f"held-out-{index}", " ".join(filter(None, caption)), header, rows, frozenset({0, 1, 5}))
-
-
-def _beside_gusts(record: DiagnosisRecord) -> str:
-    """Say that a floor holds gusts too, where it does."""
-    return ", which holds the gusts" if record.gusts else ""
 
 
 def _gap_row(record: DiagnosisRecord, channel: int) -> list[str | Cell]:

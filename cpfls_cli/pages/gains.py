@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.artifacts.gains import DEFAULT, PROPOSED, GainsRecord, ParameterRow
 from cpfls_cli.pages.source import Source
-from cpfls_cli.report.canvas import BASELINE, GREY, band, legend_over, line, plain_ticks, plot, style_of
+from cpfls_cli.report.canvas import BASELINE, GREY, band, legend_over, line, logarithmic, plain_ticks, plot, style_of
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Plot, Table, Text
 from cpfls_cli.report.numbers import number, percent, sentence
 from cpfls_cli.words import joined
@@ -94,7 +94,7 @@ def _parameters(record: GainsRecord, index: int) -> Table:
             row.name,
             Cell(f"{row.proposed:.6g}", "warning" if row.clipped else "plain"),
             _plain(row.today) if known else _plain(row.default),
-            _range(row),
+            f"{row.low:.6g} to {_plain(row.high)}",
             f"{row.meaning}{f', {row.unit}' if row.unit else ''}{_clipped(row)}",
         ]
         for row in record.rows
@@ -106,10 +106,6 @@ def _parameters(record: GainsRecord, index: int) -> Table:
 
 def _clipped(row: ParameterRow) -> str:
     return f"; {row.wanted:.4g} was wanted, which the range does not hold" if row.clipped else ""
-
-
-def _range(row: ParameterRow) -> str:
-    return f"{row.low:.6g} to {_plain(row.high)}"
 
 
 def _plain(value: float) -> str:
@@ -249,12 +245,9 @@ def _noise(record: GainsRecord, name: str) -> Plot:
 
 
 def _hertz(axes: Axes, record: GainsRecord) -> None:
-    axes.set_xscale("log")
     axes.set_xlim(float(record.frequency[0]), float(record.frequency[-1]))
     axes.set_xlabel("Hz")
-    axes.set_xticks([], minor=True)
-    ticks = [tick for tick in (0.1, 1.0, 10.0, 100.0, 1000.0) if tick <= record.frequency[-1]]
-    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    logarithmic(axes, [tick for tick in (0.1, 1.0, 10.0, 100.0, 1000.0) if tick <= record.frequency[-1]])
 
 
 def _unwrapped(phase: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.gap.settings import CLEAR
-from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, plot, style_of
+from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, logarithmic, plot, style_of
 from cpfls_cli.report.content import Cell, Plot, Table
 from cpfls_cli.report.numbers import number, plain
 
@@ -117,11 +117,8 @@ def gap_sizes_figure(name: str, gap: GapChangeGroup) -> Plot:
         axes.set_ylim(-0.6, len(channels) - 0.4)
         axes.grid(visible=False, axis="y")
         largest = float(np.nanmax([*before, *after, 1.0]))
-        axes.set_xscale("log")
         axes.set_xlim(0.8 * _LEAST, 1.6 * max(largest, 3.0))
-        ticks = [0.1, 1.0, *(10.0**power for power in range(1, 9) if 10.0**power < 1.6 * largest)]
-        axes.set_xticks(ticks, [plain(tick) for tick in ticks])
-        axes.set_xticks([], minor=True)
+        logarithmic(axes, [0.1, 1.0, *(10.0**power for power in range(1, 9) if 10.0**power < 1.6 * largest)])
         axes.set_xlabel("gap, noise floors")
         legend_over(figure, axes)
 

@@ -20,6 +20,7 @@ from cpfls_cli.artifacts.replay import (
     like_fading,
     lost_to,
     played_row,
+    played_words,
     rival_row,
     rival_rows,
     row_of,
@@ -118,11 +119,12 @@ def verdict_box(replay: Source[ReplayRecord]) -> Box:
     model = played_row(record)
     better = {name: bool(less(*group.total[[model, rival]])) for name, (group, rival) in rivals.items()}
     moving = [name for name, (group, rival) in rivals.items() if group.total[rival] > 0]
+    name = played_words(record.played)
     if not moving:
-        return Box("REPLAY", sentence(f"{_name(record)} cannot be judged: the flight shows no motion"), sentences)
+        return Box("REPLAY", sentence(f"{name} cannot be judged: the flight shows no motion"), sentences)
     good = all(better[name] for name in moving)
     signals = joined(_SIGNALS[name][0] for name in moving if better[name] == good)
-    title = f"{_name(record)} predicts {'better' if good else 'worse'} than what it has to beat"
+    title = f"{name} predicts {'better' if good else 'worse'} than what it has to beat"
     whole = sentence(f"{title}, summed over all horizons to {_seconds(record.horizon_s[-1])}: {signals}")
     if wrong:
         return Box("REPLAY", contradicted(wrong[0]), [*map(sentence, wrong[1:]), whole, *sentences], "warning")
@@ -226,10 +228,6 @@ def _region(held: PlaybackGroup) -> str:
     return f", at {known}, where most of the windows lie in which its body rates are better ({share} of all)"
 
 
-def _name(record: ErrorsByHorizon) -> str:
-    return "the vehicle of the config" if record.played == VEHICLE else record.played
-
-
 def _rivals(record: ErrorsByHorizon) -> dict[str, tuple[SignalErrorGroup, int]]:
     """Pair each signal with what a model has to beat in it: the best of those that know no model."""
     known = {name: group for name, group in record.errors.items() if group is not None}
@@ -274,8 +272,9 @@ def _diverged(record: ReplayRecord) -> Iterator[str]:
     for row in _shown(record):
         count, prediction = int(record.diverged[row]), record.prediction[row]
         if count:
-            others = (_WORDS[prediction], "")
-            who, where = (_name(record), f", first {_first_lost(record)}") if prediction == MODEL else others
+            who, where = _WORDS[prediction], ""
+            if prediction == MODEL:
+                who, where = played_words(record.played), f", first {_first_lost(record)}"
             yield (
                 f"{who}: runs away in {count} of {record.windows} windows{where}; a run is stopped there and counts as "
                 "it stood"
@@ -317,8 +316,8 @@ def errors_table(record: ErrorsByHorizon, index: int) -> Table:
             )
     header = ("Error of", "Prediction", *(f"After {_seconds(record.horizon_s[h])}" for h in chosen), "Sum")
     caption = (
-        f"Mean error of {_name(record)} over {record.windows} windows of {joined(record.flown)}, played back "
-        "without correction; sum over all horizons."
+        f"Mean error of {played_words(record.played)} over {record.windows} windows of {joined(record.flown)}, played "
+        "back without correction; sum over all horizons."
     )
     return Table(f"replay-{index}", caption, header, rows, frozenset({0, 1}))
 
@@ -388,7 +387,7 @@ def _facts(record: ReplayRecord) -> list[tuple[str, str]]:
     ]
     every = "every sample" if record.every == 1 else f"one in {record.every} samples"
     return [
-        ("Played back", _name(record)),
+        ("Played back", played_words(record.played)),
         ("Along", "; ".join(driven)),
         ("From", f"{every}, for {_seconds(record.horizon_s[-1])}"),
         *([] if record.history_s is None else [("With the past", f"{_seconds(record.history_s)} before each start")]),
@@ -430,8 +429,8 @@ def horizon_figure(name: str, record: ErrorsByHorizon) -> Plot:
         legend_over(figure, panels[0])
 
     caption = (
-        f"Mean error of {_name(record)} after so many seconds without correction. Grey: what it has to beat. A curve "
-        "that leaves the top of a panel is farther off than the panel is high."
+        f"Mean error of {played_words(record.played)} after so many seconds without correction. Grey: what it has to "
+        "beat. A curve that leaves the top of a panel is farther off than the panel is high."
     )
     return plot(
         name, caption, "Mean error by horizon, of the model and of what it has to beat", 0.9 + 1.7 * len(groups), draw

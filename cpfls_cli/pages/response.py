@@ -8,14 +8,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.artifacts.replay import VEHICLE
+from cpfls_cli.artifacts.replay import played_words
 from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, ResponseRecord
 from cpfls_cli.pages.gap import MEASURED
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source
-from cpfls_cli.report.canvas import BASELINE, GREY, HELD, band, legend_above, legend_over, plain_ticks, plot, style_of
+from cpfls_cli.report.canvas import (
+    BASELINE,
+    GREY,
+    HELD,
+    band,
+    legend_above,
+    legend_over,
+    logarithmic,
+    plain_ticks,
+    plot,
+    style_of,
+)
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Table, Text, in_short
-from cpfls_cli.report.numbers import number, plain, sentence
+from cpfls_cli.report.numbers import number, sentence
 from cpfls_cli.response.mismatch import ACCEPTABLE, COHERENT, GOOD, Deviation
 from cpfls_cli.words import joined
 
@@ -71,7 +82,7 @@ def response_box(record: ResponseRecord) -> Box:
     off = [name for name in judged if words[name] == NOT_ACCEPTABLE]
     left = [each for row, each in enumerate(record.name) if words[each] == NOT_JUDGED and record.is_modelled(row)]
     open_ = f"; not judged: {joined(left)}" if left else ""
-    name = "the vehicle of the config" if record.played == VEHICLE else record.played
+    name = played_words(record.played)
     if record.contradiction:
         others = map(sentence, record.contradiction[1:])
         return Box("RESPONSE", contradicted(record.contradiction[0]), [*others, *told], "warning")
@@ -192,7 +203,7 @@ def response_blocks(response: Source[ResponseRecord], index: int) -> Iterator[Bl
     yield Heading(response.label)
     yield Facts(
         [
-            ("The model", "the vehicle of the config" if record.played == VEHICLE else record.played),
+            ("The model", played_words(record.played)),
             ("Flights", joined(record.flown)),
             ("Instruments", _INSTRUMENTS.get(record.instruments, record.instruments)),
         ]
@@ -222,11 +233,8 @@ def bode_figure(name: str, record: ResponseRecord, row: int) -> Plot:
         lower.set_ylim(0.0, 1.05)
         lower.set_ylabel("coherence")
         lower.set_xlabel("Hz")
-        lower.set_xscale("log")
-        lower.set_xticks([], minor=True)
         low, high = record.frequency[0], record.frequency[-1]
-        ticks = [tick for tick in _TICKS_HZ if 0.99 * low <= tick <= 1.01 * high]
-        lower.set_xticks(ticks, [plain(tick) for tick in ticks])
+        logarithmic(lower, [tick for tick in _TICKS_HZ if 0.99 * low <= tick <= 1.01 * high])
         legend_over(figure, upper)
 
     loop = "" if record.is_of_vehicle(row) else " Without instruments: of vehicle and autopilot together."

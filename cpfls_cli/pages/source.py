@@ -14,9 +14,8 @@ from typing_extensions import TypeVar
 
 from cpfls_cli.artifacts.job import Job
 from cpfls_cli.artifacts.spec import Record
-from cpfls_cli.config.load import validate
+from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import ReportSettings, resolved
-from cpfls_cli.config.yaml_text import parse_yaml
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.report.content import Block, Origin, Text
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -167,7 +166,7 @@ def answer_again(page: str, record: Record, path: Path) -> Iterator[Block]:
         Module of `pages` that words it.
     """
     try:
-        study = validate(parse_yaml(record.origin.config, f"{path}: /config"), f"{path}: /config")
+        study = stored_study(record.origin.config, path)
     except ConfigError as error:
         yield Text(f"what its command answered cannot be shown: {error}", "warning")
         return

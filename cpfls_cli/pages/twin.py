@@ -16,9 +16,9 @@ from cpfls_cli.pages.gap import MEASURED
 from cpfls_cli.pages.response import deviation_words, span_words
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source
-from cpfls_cli.report.canvas import BASELINE, HELD, band, legend_over, line, plain_ticks, plot, style_of
+from cpfls_cli.report.canvas import BASELINE, HELD, band, legend_over, line, logarithmic, plain_ticks, plot, style_of
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Plot, Table, Text, in_short
-from cpfls_cli.report.numbers import number, plain, sentence
+from cpfls_cli.report.numbers import number, sentence
 from cpfls_cli.simulation.twin import LIFT
 from cpfls_cli.words import joined
 
@@ -335,11 +335,9 @@ def _frequency_figure(record: TwinRecord, index: int) -> Plot:
                     _ratio(panels[:, column], record, row, record.name(vehicle), style, first=vehicle == 0)
             panels[0, column].set_title(record.channel[channel])
             panels[1, column].set_xlabel("Hz")
-            panels[1, column].set_xscale("log")
             low, high = record.answers.frequency[[0, -1]]
             ticks = [tick for tick in _TICKS_HZ if 0.99 * low <= tick <= 1.01 * high][:: 2 if len(channels) > 2 else 1]
-            panels[1, column].set_xticks([], minor=True)
-            panels[1, column].set_xticks(ticks, [plain(tick) for tick in ticks])
+            logarithmic(panels[1, column], ticks)
         panels[0, 0].set_ylabel("simulated over flight, dB")
         panels[1, 0].set_ylabel("degrees")
         legend_over(figure, panels[0, 0])

@@ -15,7 +15,7 @@ from cpfls_cli.blocks import contiguous, jackknife_covariance
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gauss_newton import minimised
 from cpfls_cli.playback.evaluation import Evaluated
-from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.flight import PlaybackFlight, motion_at
 from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.kernels import NO_PARAMETERS, Loss, MeasuredMotion, errors_of_runs, sensitivities
 from cpfls_cli.playback.model import VehicleModel
@@ -60,9 +60,7 @@ class FitWindows:
     @cached_property
     def motion(self) -> MeasuredMotion:
         """Motion at these samples."""
-        whole = self.flight.motion
-        position, velocity, rotation, rate = (np.ascontiguousarray(each[self.samples]) for each in whole[:4])
-        return MeasuredMotion(position, velocity, rotation, rate, whole.period)
+        return motion_at(self.flight.motion, self.samples)
 
     @cached_property
     def places(self) -> IntArray:

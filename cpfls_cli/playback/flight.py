@@ -19,6 +19,12 @@ _REMEMBERED = 4
 """Terms of rotors: derivatives follow the loss at the same numbers, and two threads ask."""
 
 
+def motion_at(motion: MeasuredMotion, samples: slice | IntArray) -> MeasuredMotion:
+    """Take samples of a motion, in arrays of their own where that needs a copy."""
+    position, velocity, rotation, rate = (np.ascontiguousarray(each[samples]) for each in motion[:4])
+    return MeasuredMotion(position, velocity, rotation, rate, motion.period)
+
+
 @dataclass(frozen=True, kw_only=True)
 class PlaybackFlight:
     """A flight on a uniform clock, in stretches without pauses.

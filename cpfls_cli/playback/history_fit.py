@@ -19,10 +19,10 @@ from cpfls_cli.blocks import mean_error
 from cpfls_cli.gauss_newton import minimised
 from cpfls_cli.playback.evaluation import Evaluated
 from cpfls_cli.playback.fit import Believed, FitPoint, Fitted, FittedNumbers, FitWindows, weighed, windows_of
-from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.flight import PlaybackFlight, motion_at
 from cpfls_cli.playback.history import Observer, missed_wrench, past_of
 from cpfls_cli.playback.judging import block_errors, parts_of
-from cpfls_cli.playback.kernels import MeasuredMotion, Parameters, errors_of_runs, sensitivities
+from cpfls_cli.playback.kernels import Parameters, errors_of_runs, sensitivities
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Judged
 
@@ -160,8 +160,7 @@ class _Begun(NamedTuple):
         steps, known = past_of(flight, window.starts, round(past_s / flight.motion.period))
         samples = np.arange(int(steps.min(initial=window.starts[0])), int(window.starts.max()) + 1)
         errors = np.empty((len(samples) - 1, 1, 4, 3))
-        position, velocity, rotation, rate = (np.ascontiguousarray(each[samples]) for each in flight.motion[:4])
-        motion = MeasuredMotion(position, velocity, rotation, rate, flight.motion.period)
+        motion = motion_at(flight.motion, samples)
         weights = at.weights(at.rotor_terms(flight, samples), at.flown)
         errors_of_runs(motion, at.body, at.flown, weights, np.arange(len(errors)), flight.translates, errors)
         missed = np.zeros((len(samples), 6))

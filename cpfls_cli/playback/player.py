@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, body_inertia, momentum_form
 from cpfls_cli.dynamics.rigid_body import positive_definite
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_flight
+from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, motion_at, playback_flight
 from cpfls_cli.playback.history import Observer, missed_wrench, past_of
 from cpfls_cli.playback.kernels import FASTEST, Body, MeasuredMotion, Terms, errors_of_runs
 from cpfls_cli.playback.model import VehicleModel
@@ -203,9 +203,7 @@ def free_runs(player: Player, flight: PlaybackFlight, starts: IntArray, horizon:
     if player.observer is not None:
         return _runs_with_past(player, player.observer, flight, starts, horizon)
     first, part = int(starts[0]), slice(int(starts[0]), int(starts[-1]) + horizon + 1)
-    whole = in_the_air(flight, player.wind).motion
-    position, velocity, rotation, rate = (values[part] for values in whole[:4])
-    motion = MeasuredMotion(position, velocity, rotation, rate, whole.period)
+    motion = motion_at(in_the_air(flight, player.wind).motion, part)
     used, weights = player.step_weights(part)
     errors = np.empty((len(starts), horizon, 4, 3))
     if player.fuzzy is None:
@@ -233,8 +231,7 @@ def _runs_with_past(player: Player, observer: Observer, flight: PlaybackFlight, 
         samples = (own[:, None] + np.arange(horizon + 1)).ravel()
         weights = by_sample[samples - begin].reshape(len(own), horizon + 1, *by_sample.shape[1:])
         weights[:, :-1, :, 0] += pushes[first : first + _BATCH, None] * fading
-        position, velocity, rotation, rate = (values[samples] for values in still.motion[:4])
-        motion = MeasuredMotion(position, velocity, rotation, rate, still.motion.period)
+        motion = motion_at(still.motion, samples)
         errors = np.empty((len(own), horizon, 4, 3))
         places = np.arange(len(own)) * (horizon + 1)
         flat = weights.reshape(-1, *weights.shape[2:])

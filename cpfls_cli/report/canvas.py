@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -209,6 +209,13 @@ def plain_ticks(axis: Axis) -> None:
     from matplotlib.ticker import FuncFormatter
 
     axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, smallest=1e-4)))
+
+
+def logarithmic(axes: Axes, ticks: Sequence[float]) -> None:
+    """Make the x axis logarithmic, with ticks that are written in full and none between."""
+    axes.set_xscale("log")
+    axes.set_xticks([], minor=True)
+    axes.set_xticks(ticks, [plain(tick) for tick in ticks])
 
 
 def style_of(index: int) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from cpfls_cli.artifacts.job import Interrupted, Job, check_outputs, header_of, take_inputs
 from cpfls_cli.artifacts.spec import Header, InputFile
-from cpfls_cli.errors import InputError
+from cpfls_cli.errors import InputError, about
 from cpfls_cli.evolution.archive import Evaluate
 from cpfls_cli.identification.search import SearchRun, SearchStep, Stop, StopReason, is_end
 from cpfls_cli.search.checkpoint import Checkpoint, StoppedSearch
@@ -118,11 +118,8 @@ class Resumable:
 
         @contextmanager
         def workers(evaluate: Evaluate) -> Iterator[Workforce]:
-            try:
-                with watch.deferring(), options.employed(evaluate) as workforce:
-                    yield workforce
-            except WorkerError as error:
-                raise WorkerError(f"{options.workers_option}: {error}") from None
+            with about(options.workers_option, WorkerError), watch.deferring(), options.employed(evaluate) as workforce:
+                yield workforce
 
         return SearchRun(
             resumed=self.stopped.state if self.stopped else None,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -22,7 +22,7 @@ from cpfls_cli.artifacts.sweep import ALL_SAMPLES, RunGroup, SettingGroup, Sweep
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.overrides import Variant, variants
 from cpfls_cli.config.study import Study, generator, settings_of
-from cpfls_cli.errors import ComputationError, ConfigError, InputError
+from cpfls_cli.errors import ComputationError, ConfigError, InputError, about
 from cpfls_cli.flights.inputs import choosing_source, held_out_parts
 from cpfls_cli.flights.training import SplitFlights, TrainingData, split_training, uniform_regressor
 from cpfls_cli.identification.data import TorqueSource, gathered
@@ -38,6 +38,8 @@ from cpfls_cli.search.resumable import Resumable, SearchOptions, Watch
 
 # Work of an evaluation that does not grow with the samples, in samples.
 _FIXED_WORK = 1000
+_FAILURES = (ConfigError, ComputationError)
+"""What is said with the part of a sweep in which it came about."""
 
 
 class SweepSamples:
@@ -177,7 +179,7 @@ class SweepPlan:
     @property
     def no_runs(self) -> RunGroup:
         """Its runs before the first is finished."""
-        return RunGroup.none(len(self.parts), max(setting.genes for setting in self.settings))
+        return RunGroup.none(self.parts, max(setting.genes for setting in self.settings))
 
     def record(self, runs: RunGroup) -> SweepRecord:
         """Arrange the sweep with the runs that are finished."""
@@ -217,11 +219,9 @@ class SweepPlan:
         """Tell roughly how long so many runs take."""
         return sum(self.setting(run).work for run in range(runs))
 
-    @contextmanager
-    def naming(self, run: int) -> Iterator[None]:
+    def naming(self, run: int) -> AbstractContextManager[None]:
         """Name the run in which something failed."""
-        with naming(f"sweep setting '{self.setting(run).variant.name}', seed {self.seed(run)}"):
-            yield
+        return about(f"sweep setting '{self.setting(run).variant.name}', seed {self.seed(run)}", *_FAILURES)
 
 
 def sweep_plan(
@@ -234,7 +234,7 @@ def sweep_plan(
     """Gather the settings of a sweep, and choose the samples of each."""
     samples, settings, kept = SweepSamples(job, flights, inputs), [], choosing_source(choose_on, inputs)
     for variant in variants(job.study):
-        with naming(f"sweep setting '{variant.name}'"):
+        with about(f"sweep setting '{variant.name}'", *_FAILURES):
             data, condition_number = samples.of(variant)
             held_out = held_out_parts(variant.study, data.rests, inputs, validate)
             settings.append(SweptSetting(variant, data, condition_number, held_out, _kept(variant, kept)))
@@ -251,15 +251,6 @@ def _kept(variant: Variant, kept: TorqueSource | None) -> TorqueSource | None:
     with settings_of("identification", variant.study):
         require_flights(choice, given=chosen_on is not None)
     return chosen_on
-
-
-@contextmanager
-def naming(what: str) -> Iterator[None]:
-    """Name the part of a sweep in which something failed."""
-    try:
-        yield
-    except (ComputationError, ConfigError) as error:
-        raise type(error)(f"{what}: {error}") from None
 
 
 _SECTIONS = ("reduction", "identification", "sweep")

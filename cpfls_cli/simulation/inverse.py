@@ -60,7 +60,7 @@ def simulate(
     ----------
     Equations (1) and (2); method.md sections 1 and 2.
     """
-    about_body, thrust = _needed(planned, vehicle)
+    about_body, thrust = needed_wrench(planned, vehicle)
     demand = rotor_demand(vehicle, thrust, about_body)
     generalised = rotations.generalised_torque(planned["attitude"], about_body)
     exact = {**planned, "torque": generalised, "body_torque": about_body, "rotor_speed": demand.speed}
@@ -132,7 +132,7 @@ def flyability(planned: Mapping[str, Array], vehicle: VehicleSettings, tilt_max:
     ----------
     Section 2 of the paper; method.md sections 2 and 3.
     """
-    about_body, thrust = _needed(planned, vehicle)
+    about_body, thrust = needed_wrench(planned, vehicle)
     tilt = tilt_of(planned["attitude"])
     most = sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors) * vehicle.rotor_speed_max_rad_s**2
     limits = [("thrust, N", thrust, most)] + ([("tilt, rad", tilt, tilt_max)] if tilt_max else [])
@@ -147,7 +147,7 @@ def tilt_of(attitude: Array) -> Array:
     return np.asarray(np.arctan2(np.hypot(sp * cr, sr), cr * cp))
 
 
-def _needed(planned: Mapping[str, Array], vehicle: VehicleSettings) -> tuple[Array, Array]:
+def needed_wrench(planned: Mapping[str, Array], vehicle: VehicleSettings) -> tuple[Array, Array]:
     """Compute the body torque, shape (time, 3), N m, and the thrust, shape (time,), N, that a motion needs."""
     rotation = planned["attitude"], planned["attitude_rate"], planned["attitude_acceleration"]
     about_body = body_torque(*rotation, inertia_tensor(vehicle))

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.rigid_body import body_torque, inertia_tensor
 from cpfls_cli.errors import ComputationError, SettingError
-from cpfls_cli.simulation.inverse import collective_thrust, tilt_of
+from cpfls_cli.simulation.inverse import needed_wrench, tilt_of
 from cpfls_cli.trajectory.excited import AddedMotion
 from cpfls_cli.trajectory.planning import Trajectory
 from cpfls_cli.trajectory.settings import TrajectorySettings
@@ -40,9 +39,7 @@ def squared_speeds(planned: Mapping[str, Array], vehicle: VehicleSettings) -> Ar
     array, shape (time, rotor), rad^2/s^2
         Negative where no rotor can.
     """
-    rotation = (planned["attitude"], planned["attitude_rate"], planned["attitude_acceleration"])
-    about_body = body_torque(*rotation, inertia_tensor(vehicle))
-    thrust = collective_thrust(vehicle, about_body, planned["acceleration"])
+    about_body, thrust = needed_wrench(planned, vehicle)
     squared: Array = rotor_demand(vehicle, thrust, about_body).squared_speed
     return squared
 

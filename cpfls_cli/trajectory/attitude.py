@@ -17,6 +17,10 @@ from cpfls_cli.trajectory.rotation import RotationMotion
 _NO_THRUST = 1e-9
 
 
+MOTION = ("position", "velocity", "acceleration", "jerk", "snap", "crackle", "pop")
+"""Names of a path in space and its derivatives in a `Trajectory`."""
+
+
 def along(time: Array, motion: Array, heading: Array, gravity: float) -> dict[str, Array]:
     """Arrange the samples of a path in space and the attitude that flies it, by their names in a `Trajectory`.
 
@@ -35,8 +39,7 @@ def along(time: Array, motion: Array, heading: Array, gravity: float) -> dict[st
         If the path asks for free fall, where the attitude is not defined.
     """
     flat = flat_attitude(time, motion[2:5], heading, gravity)
-    names = ("position", "velocity", "acceleration", "jerk", "snap", "crackle", "pop")
-    return dict(zip(names, motion, strict=True)) | rotation_samples(time, flat, heading)
+    return dict(zip(MOTION, motion, strict=True)) | rotation_samples(time, flat, heading)
 
 
 def rotation_samples(time: Array, motion: RotationMotion, heading: Array) -> dict[str, Array]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import SettingError
-from cpfls_cli.trajectory.attitude import along
+from cpfls_cli.trajectory.attitude import MOTION, along
 from cpfls_cli.trajectory.planning import Trajectory
 from cpfls_cli.trajectory.profile import Holds, covering
 from cpfls_cli.trajectory.settings import ExciteSettings
@@ -91,13 +91,10 @@ class AddedMotion:
         ComputationError
             If both together ask for free fall, where the attitude is not defined.
         """
-        own = np.stack([getattr(path, name) for name in _MOTION])
+        own = np.stack([getattr(path, name) for name in MOTION])
         heading = np.stack([path.yaw, path.yaw_rate, path.yaw_acceleration])
         flown = along(path.time, own + self.motion, heading + self.heading, gravity)
         return Trajectory(duration=path.duration, legs=path.legs, maxima=path.maxima, runs=path.runs, **flown)
-
-
-_MOTION = ("position", "velocity", "acceleration", "jerk", "snap", "crackle", "pop")
 
 
 def added_motion(settings: ExciteSettings, path: Trajectory, gravity: float) -> AddedMotion:

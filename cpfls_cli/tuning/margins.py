@@ -169,15 +169,8 @@ def _reached(time: Array, values: Array, level: float) -> float:
     return float(time[above[0]]) if len(above) else nan
 
 
-def step_answer(law: Law, plants: tuple[AxisPlant, ...], step: float = STEP_RAD) -> StepAnswer:
-    """Step a law and linear plants, no limits of the motors, to an asked angle about all axes at once.
-
-    Parameters
-    ----------
-    plants : tuple of AxisPlant
-        About x, y, z.
-    step : float, rad
-    """
+def step_answer(law: Law, plants: tuple[AxisPlant, ...]) -> StepAnswer:
+    """Step a law and linear plants about x, y, z, no limits of the motors, to `STEP_RAD` about all axes at once."""
     count, period, controller = round(_STEP_S * law.rate_hz), law.period, Controller(law)
     columns = {name: np.array([getattr(each, name) for each in plants]) for name in AxisPlant.__dataclass_fields__}
     late = 1 + columns["delay"] / period
@@ -192,7 +185,7 @@ def step_answer(law: Law, plants: tuple[AxisPlant, ...], step: float = STEP_RAD)
     controller.command(np.zeros(3), np.zeros(3))
     for number in range(count):
         shown[number] = angle
-        sent[number] = controller.command(controller.asked_rate(step - angle, rate), rate)
+        sent[number] = controller.command(controller.asked_rate(STEP_RAD - angle, rate), rate)
         first, second = number - whole, number - whole - 1
         arrived = np.where(first >= 0, sent[first, axes], 0.0) * (1 - share)
         arrived = arrived + np.where(second >= 0, sent[second, axes], 0.0) * share
@@ -206,7 +199,7 @@ def step_answer(law: Law, plants: tuple[AxisPlant, ...], step: float = STEP_RAD)
         change = pushed - columns["damping"] * rate
         angle = angle + period * (rate + 0.5 * period * change)
         rate = rate + period * change
-    return StepAnswer(np.arange(count, dtype=float) * period, shown / float(step))
+    return StepAnswer(np.arange(count, dtype=float) * period, shown / STEP_RAD)
 
 
 @dataclass(frozen=True)

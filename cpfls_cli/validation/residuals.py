@@ -10,10 +10,10 @@ from scipy.special import chdtrc, ndtri, stdtr
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import FEWEST_BLOCKS, mean_error
-from cpfls_cli.identification.data import TorqueData, TorqueSource
+from cpfls_cli.identification.data import TorqueData, TorqueSource, gathered
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.rotations import wrapped
-from cpfls_cli.validation.timeline import lagged_pairs, leading_samples, sample_numbers, sample_period
+from cpfls_cli.validation.timeline import lagged_pairs, sample_numbers, sample_period
 
 # More do not change a picture; 0.1 GB of signals.
 _MOST_SAMPLES = 200_000
@@ -85,7 +85,7 @@ def examine_residuals(
     ----------
     Ljung, System Identification: Theory for the User, section 16.6 (residual analysis).
     """
-    data = leading_samples(source, _MOST_SAMPLES)
+    data = gathered(source, np.arange(min(len(source), _MOST_SAMPLES)))
     predicted = torque(data.motion)
     errors, period, number = data.torque - predicted, sample_period(data.time), sample_numbers(data.time, lags + 1)
     exact = np.max(np.abs(errors), axis=0) <= _ROUNDING * np.max(np.abs(data.torque))

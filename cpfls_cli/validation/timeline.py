@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.identification.data import TorqueData, TorqueSource, gathered, sample_times
+from cpfls_cli.identification.data import TorqueSource, sample_times
 
 # Flights of several sample rates may follow each other, and samples may be missing: as many steps around each tell
 # what is usual there.
@@ -93,17 +93,6 @@ def lagged_pairs(number: IntArray, lag: int) -> tuple[IntArray, IntArray]:
     earlier = np.flatnonzero(later < len(number))
     earlier = earlier[number[later[earlier]] == number[earlier] + lag]
     return earlier, later[earlier]
-
-
-def leading_samples(source: TorqueSource, most: int) -> TorqueData:
-    """Gather the first samples of a source in memory.
-
-    Returns
-    -------
-    TorqueData
-        All of them where there are not more.
-    """
-    return gathered(source, np.arange(min(len(source), most)))
 
 
 def _steps(time: Array) -> Array:

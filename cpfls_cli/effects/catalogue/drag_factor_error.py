@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from cpfls_cli.effects.effect import Effect, Shape
-from cpfls_cli.effects.signals import Signals
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -14,10 +13,6 @@ def _vehicle(vehicle: VehicleSettings, shape: Mapping[str, float]) -> VehicleSet
     factor = 1.0 + shape["error"]
     rotors = (replace(each, drag_factor_n_m_s2=factor * each.drag_factor_n_m_s2) for each in vehicle.rotors)
     return replace(vehicle, rotors=tuple(rotors))
-
-
-def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
-    return replace(signals, vehicle=_vehicle(signals.vehicle, shape))
 
 
 def _accounts(number: str, values: Mapping[str, float]) -> float:
@@ -41,7 +36,7 @@ EFFECT = Effect(
     },
     source="definition; the drag factor is the number that data sheets lack",
     shapes=(Shape("error", "1", (-0.6, -0.4, -0.2, -0.1, 0.1, 0.2, 0.4, 0.8, 1.5), "true factor over stated, less 1"),),
-    apply=_apply,
+    apply=lambda signals, shape: replace(signals, vehicle=_vehicle(signals.vehicle, shape)),
     in_vehicle=lambda parts, shape, _: parts._replace(vehicle=_vehicle(parts.vehicle, shape)),
     accounts=_accounts,
 )

@@ -315,23 +315,30 @@ class _Balance:
             pull = self.way.pull(start)
             bends = [(self.way.pull(start + _NUDGE * each) - pull) / _NUDGE for each in np.eye(4)]
             columns, needed = self._rows(pull, *bends)
-            mass, *change = np.linalg.lstsq(columns, needed, rcond=None)[0][:5]
+            # Beyond all numbers where a jump of the velocity throws the load.
+            mass, *change = _solved(columns, needed)[:5] if np.isfinite(columns).all() else (0.0,)
             if mass <= 0:
                 return None
             start = start + np.array(change) / mass
-            if not np.linalg.norm(start[:2]) < 1:
+            if np.linalg.norm(start[:2]) >= 1 or np.linalg.norm(start[2:]) >= 1:
                 return None
         return start if np.abs(start).max() <= _LARGEST_START else None
 
     def left(self, start: Array) -> float:
         """Sum the squares that a load with this start leaves."""
         columns, needed = self._rows(self.way.pull(start))
-        return float(np.square(needed - columns @ np.linalg.lstsq(columns, needed, rcond=None)[0]).sum())
+        if not np.isfinite(columns).all():
+            return np.inf
+        return float(np.square(needed - columns @ _solved(columns, needed)).sum())
 
     def _rows(self, *pulls: Array) -> tuple[Array, Array]:
         pushes = [np.broadcast_to(each, self.needed.shape) for each in np.eye(2)]
         columns = [each.T.reshape(-1) for each in (*pulls, *pushes, self.velocity)]
         return np.stack(columns, axis=1), self.needed.T.reshape(-1)
+
+
+def _solved(columns: Array, needed: Array) -> Array:
+    return np.asarray(np.linalg.lstsq(columns, needed, rcond=None)[0])
 
 
 def _make_room(kept: dict[Hashable, Array]) -> None:

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.effects import scales
 from cpfls_cli.effects.catalogue.rotor_drag import EFFECT as ROTOR_DRAG
 from cpfls_cli.effects.catalogue.rotor_drag import IN_PLANE, drag
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, hub_wrench, stack
@@ -54,9 +53,7 @@ _EFFECT = Effect(
     formula="F_i = -k_d w_i (u_i - R^T W) in the rotor plane,  M = sum r_i x F_i",
     sentence="A steady wind pushes the vehicle to one side of the world, whichever way it points.",
     coefficients=(
-        Coefficient(
-            "k_d", "N s^2/(m rad)", 0.0, 5.0, "drag per rotor, rotor speed and air speed", scales.drag_per_rotor_speed
-        ),
+        *ROTOR_DRAG.coefficients,
         Coefficient("W_x", "m/s", -_STRONGEST, _STRONGEST, "wind along x of the world"),
         Coefficient("W_y", "m/s", -_STRONGEST, _STRONGEST, "wind along y of the world"),
     ),

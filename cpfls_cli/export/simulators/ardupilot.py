@@ -202,17 +202,8 @@ def _momentum_drag(momentum: float, weight: float, column: float, speed: float, 
     return float(np.cos(tilt) * momentum * speed * np.cos(tilt) * np.sqrt(lift * column))
 
 
-def fly_ardupilot(text: str, course: Course) -> State:
-    """Fly an exported vehicle by the equations of ArduPilot's multicopter; see `Target.fly`."""
-    return _fly(text, course, own=True)
-
-
-def fly_ardupilot_as_held(text: str, course: Course) -> State:
-    """Fly it without `OTHERWISE`; see `Target.fly_as_held`."""
-    return _fly(text, course, own=False)
-
-
-def _fly(text: str, course: Course, *, own: bool) -> State:
+def fly_ardupilot(text: str, course: Course, *, own: bool = True) -> State:
+    """Fly an exported vehicle by the equations of ArduPilot's multicopter, or without `OTHERWISE`; see `Target.fly`."""
     keys = json.loads("\n".join(line for line in text.splitlines() if not line.startswith("#")))
     motors, mass, most = keys["num_motors"], keys["mass"], keys["rotor_speed_max_rad_s"]
     order = np.array(keys["rotors"]) - 1

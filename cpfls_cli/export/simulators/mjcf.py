@@ -18,6 +18,7 @@ from cpfls_cli.effects.polynomial import STATE_TERMS
 from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
 from cpfls_cli.export.sheet import Sheet
+from cpfls_cli.export.simulators.sdf import written
 from cpfls_cli.export.text import number, xml_text
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
@@ -81,8 +82,7 @@ def mjcf_text(sheet: Sheet, held: Held, told: Sequence[str], _file: str) -> str:
     list_of = ElementTree.SubElement(root, "actuator")
     for actuator in actuators:
         ElementTree.SubElement(list_of, "general", _attributes(actuator, held.response.lag_s))
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+    return written(root)
 
 
 _USE = (

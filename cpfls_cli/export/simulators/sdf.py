@@ -42,7 +42,7 @@ _RADIUS_M = 0.05
 SHORTEST_S = 1e-6
 """Lag of rotors that have none: the plugin divides by it."""
 
-_ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
 def sdf_held(model: VehicleModel) -> tuple[Held, Holds]:
@@ -143,7 +143,7 @@ def _link(model: ElementTree.Element, name: str, place: Array, centre: Array, ma
     ElementTree.SubElement(inertial, "pose").text = _pose(centre)
     ElementTree.SubElement(inertial, "mass").text = number(mass)
     entries = ElementTree.SubElement(inertial, "inertia")
-    for entry, place_of in zip(_ENTRIES, INERTIA_ENTRIES, strict=True):
+    for entry, place_of in zip(ENTRIES, INERTIA_ENTRIES, strict=True):
         ElementTree.SubElement(entries, entry).text = number(inertia[place_of])
 
 
@@ -211,7 +211,7 @@ def _whole_body(model: ElementTree.Element) -> tuple[float, Array, Array]:
         inner = np.array([float(word) for word in link.findtext("inertial/pose", "").split()[:3]])
         masses.append(float(link.findtext("inertial/mass", "")))
         centres.append(place + inner)
-        own.append(symmetric([float(link.findtext(f"inertial/inertia/{entry}", "")) for entry in _ENTRIES]))
+        own.append(symmetric([float(link.findtext(f"inertial/inertia/{entry}", "")) for entry in ENTRIES]))
         if link.get("name") != "base_link":
             hubs.append(place)
     mass = float(sum(masses))

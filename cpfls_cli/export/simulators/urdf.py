@@ -22,7 +22,7 @@ from cpfls_cli.export.course import Course, fly_body
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.simulators.sdf import written
+from cpfls_cli.export.simulators.sdf import ENTRIES, written
 from cpfls_cli.export.text import number, xml_text
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.playback.model import VehicleModel
@@ -34,7 +34,6 @@ OTHERWISE = "drag along the axes of the world, where the vehicle has it along th
 _ROTORS, _RPM, _GRAVITY = 4, 30 / np.pi, 9.8
 """Of gym-pybullet-drones, which has its gravity in its code."""
 _TURNS = np.array([-1.0, 1.0, -1.0, 1.0])
-_ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 _HEIGHT_SHARE, _RADIUS_M, _KMH = 0.2, 0.05, 30.0
 """Of the cylinder that collides, in arms; of a rotor that nobody knows the size of; and a speed that only limits."""
 
@@ -121,7 +120,7 @@ def _link(root: ElementTree.Element, name: str, place: Array, mass: float, inert
     inertial = ElementTree.SubElement(link, "inertial")
     ElementTree.SubElement(inertial, "origin", rpy="0 0 0", xyz=" ".join(map(number, place)))
     ElementTree.SubElement(inertial, "mass", value=number(mass))
-    entries = zip(_ENTRIES, INERTIA_ENTRIES, strict=True)
+    entries = zip(ENTRIES, INERTIA_ENTRIES, strict=True)
     ElementTree.SubElement(inertial, "inertia", {entry: number(inertia[at]) for entry, at in entries})
     return link
 
@@ -134,24 +133,21 @@ def _fixed(root: ElementTree.Element, name: str, place: Array) -> None:
     ElementTree.SubElement(joint, "child", link=f"{name}_link")
 
 
-def fly_urdf(text: str, course: Course) -> State:
-    """Fly an exported vehicle by the published equations of gym-pybullet-drones; see `Target.fly`."""
-    return _fly(text, course, in_world=True)
+def fly_urdf(text: str, course: Course, *, in_world: bool = True) -> State:
+    """Fly an exported vehicle by the published equations of gym-pybullet-drones; see `Target.fly`.
 
-
-def fly_urdf_as_held(text: str, course: Course) -> State:
-    """Fly it with drag along the axes of the body; see `Target.fly_as_held`."""
-    return _fly(text, course, in_world=False)
-
-
-def _fly(text: str, course: Course, *, in_world: bool) -> State:
+    Parameters
+    ----------
+    in_world : bool
+        Whether drag acts along the axes of the world, as there, or along those of the body.
+    """
     root = ElementTree.fromstring(text)
     attributes = next(root.iter("properties")).attrib
     order = np.array([int(word) - 1 for word in attributes["rotors"].split()])
     kf, km, across, along = (float(attributes[name]) for name in ("kf", "km", "drag_coeff_xy", "drag_coeff_z"))
     links = {link.get("name"): link for link in root.iter("link")}
     body = {each.tag: each.attrib for each in links["base_link"].iter()}
-    mass, inertia = float(body["mass"]["value"]), symmetric([float(body["inertia"][name]) for name in _ENTRIES])
+    mass, inertia = float(body["mass"]["value"]), symmetric([float(body["inertia"][name]) for name in ENTRIES])
     origins = [next(links[f"prop{place}_link"].iter("origin")).get("xyz", "") for place in range(_ROTORS)]
     hubs = np.array([[float(word) for word in origin.split()] for origin in origins])
     drag = np.array([across, across, along])

@@ -181,17 +181,17 @@ def that_stand(found: NamedFit, given: Instruments, floor: Array, settings: GapS
 
 
 def _chance_of(sources: Sequence[_Told], own: IntArray, shapes: IntArray, values: Array) -> float:
-    """Compute the probability of what all sources show of numbers that they tell if these are 0, shapes as they are.
+    """Compute the probability of what all sources show of numbers that they know if these are 0, shapes as they are.
 
-    NaN where no source tells any of them.
+    A source is asked of a number that another one tells as well. NaN where none knows any of them.
     """
     asked, chances = np.isin(np.arange(len(values)), own), list[float]()
     for products, numbers, _ in sources:
-        others = numbers & ~asked
-        others[shapes] = False
         flown = products[products.any(axis=(1, 2))]
-        if (asked & numbers).any() and len(flown) >= ENOUGH_BLOCKS + (asked & numbers).sum():
-            chances.append(_chance(flown, asked & numbers, others, values))
+        known, others = asked & (_strength(flown) > STRONG), numbers & ~asked
+        others[shapes] = False
+        if known.any() and len(flown) >= ENOUGH_BLOCKS + known.sum():
+            chances.append(_chance(flown, known, others, values))
     return len(chances) * min(chances, default=np.nan)
 
 

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
-from cpfls_cli.effects.catalogue.payload import integrate, settled_swing, swing
+from cpfls_cli.effects.catalogue.payload import _Balance, _Way, integrate, settled_swing, swing
 from cpfls_cli.effects.signals import Signals
 
 GRAVITY = np.array([0.0, 0.0, 9.81])
@@ -196,6 +196,15 @@ def test_in_gusts_all_of_a_flight_tells_the_start(flight):
         tilted = level.attitude + np.pad(0.01 * gust * np.sqrt(1 - 0.99**2), ((0, 0), (0, 1)))
         found.append(off(settled_swing(replace(level, attitude=tilted), 1.5, 0.1)[:, :2], cable))
     assert np.mean(found) < 0.02
+
+
+@pytest.mark.parametrize("load", [1e-1, 1e-3, 1e-6, 1e-9])
+def test_a_start_that_would_throw_the_load_about_is_none(flight, load):
+    """Of forces that a load all but massless would have to be started beyond all numbers for."""
+    way = _Way.of(tumbling(flight.vehicle), 1.5, 0.1, 0.0)
+    rest, spun = way.pull(np.zeros(4)), way.pull(np.array([0.0, 0.0, 1e-4, 0.0]))
+    balance = _Balance(way, load * rest + (spun - rest) / 1e-4, np.zeros_like(rest))
+    assert balance.start(np.zeros(4), 2) is None
 
 
 def test_what_rings_late_in_a_flight_is_no_swing_at_its_start(flight):

@@ -7,7 +7,7 @@ import pytest
 
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.archive import Evaluation
-from cpfls_cli.evolution.engine import best, evolve, start, step
+from cpfls_cli.evolution.engine import evolve, start, step
 from cpfls_cli.evolution.settings import EvolutionSettings
 
 # The operators of the paper, after the Sheffield toolbox.
@@ -102,7 +102,7 @@ def test_generations_report_the_population_and_all_that_was_evaluated():
         np.testing.assert_array_equal(generation.objectives, zdt1(generation.genes).objectives)
     assert generations[-1].evaluations == len(recorder.seen)
     objectives = zdt1(np.array(recorder.seen)).objectives
-    np.testing.assert_array_equal(best(generations[-1]), objectives.min(axis=0))
+    np.testing.assert_array_equal(generations[-1].front_objectives.min(axis=0), objectives.min(axis=0))
     assert hypervolume(generations[-1].front_objectives, (9, 9)) == hypervolume(objectives, (9, 9))
 
 
@@ -160,7 +160,8 @@ def test_without_elitism_the_population_may_lose_its_best_but_the_archive_does_n
     generations = run(zdt1, settings=settings)
     populations = [generation.objectives.min(axis=0) for generation in generations]
     assert any(np.any(later > earlier) for earlier, later in pairwise(populations))
-    assert all(np.all(best(later) <= best(earlier)) for earlier, later in pairwise(generations))
+    best = [generation.front_objectives.min(axis=0) for generation in generations]
+    assert all(np.all(later <= earlier) for earlier, later in pairwise(best))
 
 
 def test_failed_models_never_stay_while_there_are_others():
@@ -172,7 +173,7 @@ def test_failed_models_never_stay_while_there_are_others():
     settings = replace(PAPER, population=40, generations=20, reinsertion="fitness")
     last = run(failing, settings=settings)[-1]
     assert np.all(np.isfinite(last.objectives))
-    assert np.all(np.isfinite(best(last)))
+    assert np.all(np.isfinite(last.front_objectives.min(axis=0)))
 
 
 def test_a_search_in_which_everything_fails_still_ends():

@@ -81,15 +81,16 @@ def told(true, found, reach, rng):
 def test_an_effect_stands_where_any_source_shows_it_and_what_it_holds_where_that_is_all(
     true, names, knows, monkeypatch
 ):
-    rng = np.random.default_rng(6)
-    found = np.array(true) + 0.02
-    sources = [told(true, found, 1.0 if knows else 0.03, rng), told(true, found, 1.0, rng)]
-    monkeypatch.setattr(by_instruments, "_sources", lambda *_: sources)
+    found, stand = np.array(true) + 0.02, []
     wind = Candidate(CATALOGUE["wind"].exact, {"W_x": found[1], "W_y": found[2]})
     hypothesis = SimpleNamespace(chosen=[wind], places=((wind, slice(1)),), shape_values=found[1:])
     fit = SimpleNamespace(hypothesis=hypothesis, estimates=SimpleNamespace(linear=found[:1], effects=[()]))
-    stand = that_stand(fit, None, np.ones(6), GapSettings())
-    assert [each.effect.name for each in stand] == names
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        sources = [told(true, found, 1.0 if knows else 0.03, rng), told(true, found, 1.0, rng)]
+        monkeypatch.setattr(by_instruments, "_sources", lambda *_, those=sources: those)
+        stand.append([each.effect.name for each in that_stand(fit, None, np.ones(6), GapSettings())])
+    assert stand.count(names) >= 17
 
 
 def shares(*foretold, scatter=0.0):

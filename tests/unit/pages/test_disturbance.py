@@ -10,6 +10,7 @@ from cpfls_cli.pages.disturbance import gust_blocks
 from cpfls_cli.pages.model import answer
 from cpfls_cli.playback.disturbance import FoundGusts
 from cpfls_cli.report.content import Table, Text, unfolded
+from cpfls_cli.report.outcome import as_json
 from tests.builders.forms import source_of_record
 from tests.builders.vehicle_models import QUAD, record_of, whole
 
@@ -72,7 +73,7 @@ def test_a_file_without_gusts_is_one_of_still_air():
 
 
 def test_machines_read_sizes_and_accelerations():
-    axes = record().summary["disturbance"]["axes"]
+    axes = as_json(record().summary["disturbance"]["axes"])
     assert list(axes) == ["roll", "pitch", "yaw", "x", "y", "z"]
     assert axes["roll"]["size"] == pytest.approx(3.0 * BODIES[0])
     assert axes["roll"]["acceleration"]["high"] == pytest.approx(3.6)

@@ -6,7 +6,6 @@ import pytest
 from cpfls_cli.identification.data import Flights
 from cpfls_cli.validation.timeline import (
     lagged_pairs,
-    leading_samples,
     sample_numbers,
     sample_period,
     stretch_numbers,
@@ -66,12 +65,6 @@ def test_a_pause_starts_a_stretch_and_jitter_does_not():
     np.testing.assert_array_equal(stretch_numbers(time), np.repeat([0, 1], [12, 8]))
     np.testing.assert_array_equal(stretch_numbers(time[:1]), [0])
     assert np.isnan(sample_period(time[:1]))
-
-
-def test_a_long_source_is_cut():
-    data = blank_flight(30)
-    assert len(leading_samples(data, 12)) == 12
-    assert len(leading_samples(data, 100)) == 30
 
 
 def test_a_slow_flight_and_a_fast_one_are_two_stretches():
