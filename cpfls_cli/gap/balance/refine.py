@@ -341,7 +341,9 @@ def _in_deepest_valley(
 ) -> Candidate:
     """Try one shape of the newest effect in steps of its valleys, with all that the grids of its others hold."""
     newest = chosen[-1]
+    # Where valleys are narrower than the steps of the grid, the best point of that lies beside its deepest one.
     low, high = _bracket(shape.grid, newest.shape[shape.name])
+    low, high = _bracket(shape.grid, low)[0], _bracket(shape.grid, high)[1]
     values = [value for value in _steps(shape, newest.shape[shape.name]) if low <= value <= high]
     grids = [values if each is shape else each.grid for each in newest.effect.shapes]
     names = [each.name for each in newest.effect.shapes]
