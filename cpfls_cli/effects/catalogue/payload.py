@@ -181,8 +181,10 @@ class _Way:
         down = -np.sqrt(1 - across @ across)
         first = np.array([*across, down, *rate, -(across @ rate) / down])
         states = integrate(self.felt, self.middles, self.step, self.length, self.damping, first)
-        # A jump of the velocity, as at the end of a crash, throws it beyond all numbers: from there on it is at rest.
-        return np.where(np.isfinite(states).all(axis=1, keepdims=True), states, [0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
+        # A jump of the velocity, as at the end of a crash, throws it further than steps can follow: from there on it is
+        # at rest.
+        lost = np.maximum.accumulate(~(np.abs(states[:, 3:]).max(axis=1) * self.step < 1))
+        return np.where(lost[:, None], [0.0, 0.0, -1.0, 0.0, 0.0, 0.0], states)
 
     def pull(self, start: Array) -> Array:
         """Pull across the vertical for each kilogram of the load, shape (step, 2)."""

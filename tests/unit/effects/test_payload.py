@@ -120,15 +120,18 @@ def test_noise_of_the_accelerometer_moves_the_swing_no_more_than_without_its_ste
     assert size[1] > 0.03
 
 
-def test_a_jump_of_the_velocity_leaves_the_swing_before_it(flight):
-    """As at the end of a crash: beyond all numbers it hangs at rest, and what was before stays."""
-    jump = 300 * (np.arange(len(flight)) >= len(flight) - 12)[:, None] * np.cumsum(np.ones((len(flight), 3)), axis=0)
+@pytest.mark.parametrize("size", [300, 30000])
+def test_a_jump_of_the_velocity_leaves_the_swing_before_it(columns, flight, size):
+    """As at the end of a crash: beyond what steps can follow it hangs at rest, and what was before stays."""
+    jump = size * (np.arange(len(flight)) >= len(flight) - 12)[:, None] * np.cumsum(np.ones((len(flight), 3)), axis=0)
     thrown = replace(flight, velocity=flight.velocity + jump, acceleration=None, specific_force=None)
     calm = replace(thrown, velocity=flight.velocity)
     swung, before = (swing(each, 0.05, 0.1) for each in (thrown, calm))
     assert np.isfinite(swung).all()
     half = len(flight) // 2
     np.testing.assert_allclose(swung[:half], before[:half], atol=0.01)
+    for length in (0.05, 0.3, 4.0):
+        assert np.isfinite(columns("payload", thrown, length_m=length, damping_1_s=0.1, depth_m=0.0).direct).all()
 
 
 def test_force_is_what_the_load_needs_besides_its_weight(columns, flight):
