@@ -50,13 +50,10 @@ class _Told(NamedTuple):
         Of what is known of each number, and of what is left, with what they move.
     numbers : array of bool, shape (number,)
         Those that are free, that it tells, and that no source before it does.
-    outside : bool
-        Whether it is what was asked from outside, and not what was before.
     """
 
     products: Array
     numbers: BoolArray
-    outside: bool
 
 
 def by_instruments(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> NamedFit:
@@ -91,7 +88,7 @@ def by_instruments(found: NamedFit, given: Instruments, floor: Array, settings: 
         shapes = slice(len(at.estimates.linear), None)
         step, error = np.abs(values - _numbers(at))[shapes], jackknife_error(left_out)[shapes]
         hypothesis = at.hypothesis.with_shapes(values[shapes]) if len(step) else at.hypothesis
-        moved = np.any([numbers for _, numbers, _ in sources], axis=0)
+        moved = np.any([numbers for _, numbers in sources], axis=0)
         at = NamedFit(hypothesis, found.block, estimates_of(hypothesis, values, left_out))
         if np.all(10 * step <= error):
             break
@@ -107,7 +104,7 @@ def _stepped(found: NamedFit, sources: Sequence[_Told]) -> tuple[Array, Array]:
     """Move numbers to where what is left has nothing of what is known of them; and with each block left out."""
     values, prior = _numbers(found), known_before(found.hypothesis)
     change, without = np.zeros(len(values)), np.zeros((len(sources[0].products), len(values)))
-    for products, numbers, _ in sources:
+    for products, numbers in sources:
         kept = products[:, np.append(numbers, False)]
         # What those before it have moved is no longer left.
         right = kept[:, :, -1] - kept[:, :, :-1] @ change
@@ -136,7 +133,7 @@ def untold_axes(found: NamedFit, given: Instruments, floor: Array, settings: Gap
     floor : array, shape (6,)
     """
     told, vehicle = np.zeros(3, dtype=bool), found.hypothesis.places[0][1]
-    for _, numbers, _ in _sources(found, given, floor, settings):
+    for _, numbers in _sources(found, given, floor, settings):
         told |= numbers[vehicle][:3]
     return ~told
 
@@ -186,7 +183,7 @@ def _chance_of(sources: Sequence[_Told], own: IntArray, shapes: IntArray, values
     A source is asked of a number that another one tells as well. NaN where none knows any of them.
     """
     asked, chances = np.isin(np.arange(len(values)), own), list[float]()
-    for products, numbers, _ in sources:
+    for products, numbers in sources:
         flown = products[products.any(axis=(1, 2))]
         known, others = asked & (_strength(flown) > STRONG), numbers & ~asked
         others[shapes] = False
@@ -248,7 +245,7 @@ def _sources(found: NamedFit, given: Instruments, floor: Array, settings: GapSet
             # What a bound tells better than these flights is not told by them.
             numbers = left & (np.diagonal(flown.sum(axis=0))[:-1] > prior) & (early | (place > 0))
             numbers = _strong(flown, numbers)
-            sources.append(_Told(products, numbers, place == 0))
+            sources.append(_Told(products, numbers))
             left = left & ~numbers
     return sources
 

@@ -69,7 +69,7 @@ def told(true, found, reach, rng):
     left = gust[..., 0] + moved @ (np.array(true) - found)
     rows = np.concatenate([moved, left[..., None]], axis=2)
     known = np.concatenate([known, np.zeros_like(gust)], axis=2)
-    return _Told(np.einsum("bwk,bwl->bkl", known, rows), np.ones(3, dtype=bool), outside=True)
+    return _Told(np.einsum("bwk,bwl->bkl", known, rows), np.ones(3, dtype=bool))
 
 
 @pytest.mark.parametrize(
