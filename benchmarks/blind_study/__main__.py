@@ -45,7 +45,7 @@ def main():
 
 def _size(told, usual, **fixed):
     each = usual if told.sets is None else dict.fromkeys(told.groups, told.sets)
-    names = ("seed", "draws", "levels", "kinds", "groups", "none", "vehicles", "gusts", "instruments")
+    names = ("seed", "draws", "levels", "kinds", "groups", "none", "vehicles", "gusts", "instruments", "in_turn")
     return Size(**{name: getattr(told, name) for name in names} | {"each": each} | fixed)
 
 
@@ -77,6 +77,7 @@ def _arguments():
     parser.add_argument("--baselines", type=_list, default=("mid",), help="noise levels that simpler ways judge, too")
     parser.add_argument("--gusts", type=_levels, default=GUSTS[:1], help="levels of gusts: 0,1,2")
     parser.add_argument("--instruments", type=_list, default=("none",), help=",".join(INSTRUMENTS))
+    parser.add_argument("--in-turn", action="store_true", help="each case in one of these airs, dealt out by chance")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--keep", action="store_true", help="keep the logs, 4 MB for each set")
     return parser.parse_args()

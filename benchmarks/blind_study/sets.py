@@ -6,6 +6,7 @@ import hashlib
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 
@@ -26,7 +27,7 @@ class Size:
 
     ``none`` is the number of sets that hide nothing, all of them if None; ``each`` the largest number of cases of some
     groups, with as many different things hidden as the group has. Each case is flown in gusts of each level with each
-    of the instruments.
+    of the instruments, or ``in_turn`` with one of these pairs alone, which are dealt out by chance.
     """
 
     seed: int
@@ -39,6 +40,7 @@ class Size:
     each: Mapping[str, int] = field(default_factory=dict)
     gusts: Sequence[int] = (0,)
     instruments: Sequence[str] = ("none",)
+    in_turn: bool = False
 
 
 @dataclass(frozen=True)
@@ -84,10 +86,18 @@ def sets(size):
         out += [[Set(_empty(place, size.seed), *noises[place % len(noises)], size.seed)] for place in range(size.none)]
     return [
         [replace(each, case=in_air(each.case, level, instruments, size.seed)) for each in own]
-        for own in _part(out, size)
-        for level in size.gusts
-        for instruments in size.instruments
+        for own, airs in _in_airs(_part(out, size), size)
+        for level, instruments in airs
     ]
+
+
+def _in_airs(groups, size):
+    """Give each case the pairs of gusts and instruments that it is flown with."""
+    airs = list(product(size.gusts, size.instruments))
+    if not size.in_turn:
+        return [(own, airs) for own in groups]
+    dealt = np.random.default_rng(size.seed).permutation(np.arange(len(groups)) % len(airs))
+    return [(own, [airs[place]]) for own, place in zip(groups, dealt, strict=True)]
 
 
 def _part(groups, size):
