@@ -27,7 +27,7 @@ from cpfls_cli.playback.instruments import Instruments, ToldBy
 from cpfls_cli.playback.lack import AxisLack, Lack, Rest, lack_of
 from cpfls_cli.playback.loop import wrench_during
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.newness import MOST_FORETOLD, PER_WINDOW, newly_left
+from cpfls_cli.playback.newness import MOST_FORETOLD, PER_WINDOW, blows, newly_left
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
 
 _Complex = npt.NDArray[np.complex128]
@@ -245,7 +245,7 @@ def _by_past(found: FoundGusts, bound: FoundGusts, given: Instruments, sides: Se
     foretold, without = newly.shares
     foretells_little = foretold + half_width(jackknife_error(without), len(without)) < MOST_FORETOLD
     gusty = np.isfinite(found.size) & foretells_little & ~newly.grows(_RARE)
-    if not (gusty[:3].all() and (gusty[3:].any() or len(gusty) == 3)):
+    if not blows(gusty, np.ones_like(gusty)):
         return bound
     ends = {name: np.where(gusty, getattr(found, name), getattr(bound, name)) for name in RANGES}
     white = None if found.white is None else np.where(gusty, found.white, np.nan)

@@ -81,6 +81,17 @@ class NewlyLeft:
         return np.asarray((chance[:, None] >= alike).sum(axis=0) < rare * (1 + _DRAWS))
 
 
+def blows(like: BoolArray, known: BoolArray) -> bool:
+    """Tell whether axes that look like air can be: it turns a vehicle about every axis that is known, and pushes it.
+
+    Parameters
+    ----------
+    like, known : array of bool, shape (axis,)
+        Torques, and forces behind them where there are any.
+    """
+    return bool((like | ~known)[:3].all() and (like[3:].any() or not known[3:].any()))
+
+
 def newly_left(
     windows: Windows,
     left: Sequence[Array],

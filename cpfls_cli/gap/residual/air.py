@@ -29,7 +29,7 @@ from cpfls_cli.playback.instruments import (
     late,
     late_by,
 )
-from cpfls_cli.playback.newness import MOST_FORETOLD, NewlyLeft, newly_left, ranks
+from cpfls_cli.playback.newness import MOST_FORETOLD, NewlyLeft, blows, newly_left, ranks
 from cpfls_cli.weak_form.resampling import about_flight_mean
 from cpfls_cli.weak_form.windows import Recording, Windows
 
@@ -42,8 +42,7 @@ _WITNESSES: dict[Told, tuple[ToldBy, ...]] = {
     "setpoints": ("setpoints", "past"),
     "none": ("past",),
 }
-"""What tells gusts where that is known of flights: the next where one knows too little of them, or, of setpoints, what
-they neither tell nor refute."""
+"""What tells gusts where that is known of flights: the next what those before it neither tell nor refute."""
 
 
 @dataclass(frozen=True)
@@ -150,25 +149,28 @@ def air(
     bound = gusts_in(left.sides, given, "none")
     if bound is None:
         return None
-    found, told, refuted = bound, np.zeros(6, dtype=bool), np.zeros(6, dtype=bool)
+    found, (told, sized, refuted) = None, np.zeros((3, 6), dtype=bool)
+    ends = {name: getattr(bound, name).copy() for name in (*RANGES, "noise")}
     for told_by in _WITNESSES[given.kind]:
         own = gusts_in(left.sides, given, told_by)
         if own is None:
             continue
-        own, like = left.told_by(own, rng)
-        like &= known & ~refuted
-        refuted = own.foretold - ERRORS * own.foretold_error > _FORETOLD[told_by]
-        if found is bound or like.sum() > told.sum():
-            found, told = own, like
-        if told_by == "repeats" or told[known].all():
+        own, like = left.told_by(own, told, rng)
+        like &= known & ~told & ~refuted
+        refuted |= own.foretold - ERRORS * own.foretold_error > _FORETOLD[told_by]
+        # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
+        size = ~sized & (like | (np.isfinite(own.size) & (told_by == "repeats")))
+        for name, values in ends.items():
+            values[size] = getattr(own, name)[size]
+        if found is None or like.sum() > told.sum():
+            found = own
+        told, sized = told | like, sized | size
+        if told[known].all():
             break
-    if found is bound:
+    if found is None:
         return None
-    # What other runs have not is no effect's, whatever else is left; what setpoints do not foretell may be one's.
-    sized = told | (found.told_by == "repeats")
-    parts = {name: np.where(sized, getattr(found, name), getattr(bound, name)) for name in RANGES}
-    parts = {name: np.where(known, values, np.nan) for name, values in parts.items()}
-    return Air(replace(found, **parts), told, known & np.isfinite(found.size) & sized)
+    ends |= {name: np.where(known, ends[name], np.nan) for name in RANGES}
+    return Air(replace(found, **ends), told, known & sized)
 
 
 @dataclass(frozen=True)
@@ -202,8 +204,8 @@ class _Left:
             sides.append(np.stack([momentum[run.part], -direct[run.part]], axis=1))
         return sides
 
-    def told_by(self, found: FoundGusts, rng: np.random.Generator) -> tuple[FoundGusts, BoolArray]:
-        """Mark the channels of which the instruments that found gusts tell that this is all, with what is foretold."""
+    def told_by(self, found: FoundGusts, others: BoolArray, rng: np.random.Generator) -> tuple[FoundGusts, BoolArray]:
+        """Mark channels of which a witness tells that gusts are all, beside those that others told; add its shares."""
         told_by, steady = found.told_by, np.ones(6, dtype=bool)
         if told_by == "past":
             newly = self._newly(found.noise)
@@ -214,11 +216,10 @@ class _Left:
         if told_by == "repeats" or not told.any():
             return found, told
         like = steady if told_by == "past" else self._like_air(rng)
-        # Air turns a vehicle about every axis and pushes it; nothing else shows it where nothing was asked.
-        blown = told & like if told_by == "past" else np.isfinite(found.size)
-        turned, pushed = np.split(self.residual.any(axis=0), 2)
-        turning, pushing = np.split(blown, 2)
-        return found, told & like & bool(turning[turned].all() and (pushing.any() or not pushed.any()))
+        # Nothing else than that all of it is air shows it where nothing was asked.
+        told = told & like
+        blown = told | others if told_by == "past" else np.isfinite(found.size)
+        return found, told & blows(blown, np.asarray(self.residual.any(axis=0)))
 
     def _newly(self, noise: Array) -> NewlyLeft:
         """Take what comes newly, and what motion and rotors told of it before."""

@@ -12,6 +12,7 @@ from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.residual.air import air, known_motion
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.playback.disturbance import gusts_in
 from cpfls_cli.weak_form.windows import Recording, common_windows
 from tests.builders.gusty_flights import CALM, GUSTS, MEMORY_S, SMALL, STORM, Flight, gusty_flights, logged
 
@@ -139,6 +140,21 @@ def test_where_instruments_know_too_little_what_was_before_tells(flown, monkeypa
     assert found.told.all()
     monkeypatch.setattr("cpfls_cli.gap.residual.air._WITNESSES", {"none": ("repeats",)})
     assert diagnosed(recordings).air is None
+
+
+def test_an_axis_that_other_runs_do_not_size_is_told_by_what_was_before(flown, monkeypatch):
+    def without_pitch(sides, given, told_by):
+        found = gusts_in(sides, given, told_by)
+        if told_by == "repeats":
+            found.size[1] = np.nan
+        return found
+
+    monkeypatch.setattr("cpfls_cli.gap.residual.air.gusts_in", without_pitch)
+    found = in_what_is_left(recorded(flown["again"], TRUE.vehicle, setpoints=False))
+    assert found.found.told_by == "repeats"
+    assert found.told.all()
+    assert found.split.all()
+    tells_sizes(found.found)
 
 
 def test_what_does_not_come_again_is_noise_beside_what_does(flown):
