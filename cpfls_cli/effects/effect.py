@@ -243,8 +243,10 @@ class Effect:
 
     @property
     def late(self) -> bool:
-        """Whether it delays the rotors, as a control loop seems to; the voltage of a supply follows no command."""
-        return self.actuation is not None and self.actuation.supply is None
+        """Whether it delays the rotors or their log, as a control loop seems to; the voltage of a supply does not."""
+        if self.actuation is None:
+            return self.kind == "actuator" and self.log is not None
+        return self.actuation.supply is None
 
     def form(self, coefficients: int, shapes: Collection[str]) -> Effect:
         """Tell by the numbers that were fitted whether it is this effect or what took its place."""

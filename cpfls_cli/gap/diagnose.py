@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import BoolArray
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.changes.judge import changed
 from cpfls_cli.changes.numbers import flight_numbers
 from cpfls_cli.consistency.audit import Audit, audit
@@ -46,7 +46,7 @@ from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.residual.air import Air, air, in_air, known_motion
-from cpfls_cli.gap.settings import NOISE, VISIBLE, GapSettings
+from cpfls_cli.gap.settings import CLEAR, NOISE, VISIBLE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.windows import Recording, common_windows
@@ -123,7 +123,7 @@ def diagnose(
         while gusts is not None and gusts.split.any() and gusts.told.sum() > told:
             told, quiet = int(gusts.told.sum()), np.minimum(quiet, gusts.noise(windows))
             axes = untold_axes(named.judgement.found, given, named.judge.floor, settings)
-            flights = flights.in_air(gusts, axes)
+            flights = flights.in_air(gusts, axes, known_motion(held))
             named = _by_instruments(_named(flights, settings, rng, progress), given, settings)
             gusts = _gusts(named, given, settings, rng)
     weak, (hypothesis, _, estimates), held_out = flights.training, *named.judgement
@@ -181,16 +181,18 @@ def _changed_between(training: Sequence[Recording], held: Sequence[Recording]) -
 
 
 class _Flights(NamedTuple):
-    """Flights that train, and those held out as logged and repaired."""
+    """Flights that train, and those held out as logged and repaired; in gusts what instruments know of these."""
 
     training: Sequence[WeakFlight]
     logged: Sequence[WeakFlight]
     repaired: Sequence[WeakFlight]
+    given: Instruments | None = None
 
-    def in_air(self, gusts: Air, axes: BoolArray) -> _Flights:
+    def in_air(self, gusts: Air, axes: BoolArray, given: Instruments) -> _Flights:
         """Give all of them the floor of their air; what fits show of axes untold by instruments is the loop's."""
-        in_gusts = (in_air(flights, gusts.floor(self.training, flights)) for flights in self)
-        return _Flights(*([flight.as_stated(axes) for flight in flights] for flights in in_gusts))
+        in_gusts = (in_air(flights, gusts.floor(self.training, flights)) for flights in self[:3])
+        training, logged, repaired = ([flight.as_stated(axes) for flight in flights] for flights in in_gusts)
+        return _Flights(training, logged, repaired, given)
 
 
 class _Named(NamedTuple):
@@ -219,7 +221,7 @@ def _named(
     """Search for effects, and judge them on the flights held out."""
     effects, steps, found, refusals = _searched(flights.training, settings, rng, progress)
     progress(0.65, "estimates")
-    judge = Judge(*flights, steps[-1].floor, settings, rng)
+    judge = Judge(*flights[:3], steps[-1].floor, settings, rng, flights.given)
     first = judge.judge(found)
     judgement, unconfirmed = judge.confirmed(first)
     differ = differences(first, judgement, steps[0], judge, settings)
@@ -243,12 +245,14 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
         stand = that_stand(found, given, judge.floor, settings)
         names = {each.effect.name for each in stand}
         out = [each.effect for each in found.hypothesis.chosen if each.effect.name not in names]
-        if not out:
+        fewer = fitted(judge.training, stand, judge.floor, settings)
+        # A gap above the gusts is none of them: what it takes to explain it stands.
+        if not out or (_left(fewer, judge.floor) > np.maximum(_left(found, judge.floor), CLEAR)).any():
             break
         for effect in out:
             what = "".join(f"all that it adds to {name}" for name in effect.holds & names) or "it"
             refusals.append(Refusal(effect.name, f"judged by what instruments tell, {what} may be 0"))
-        fit = fitted(judge.training, stand, judge.floor, settings)
+        fit = fewer
     loose = tuple(effect.name for effect in untold(fit, found))
     late = told_apart(found, named.effects, given, judge.floor, settings)
     judgement, without = judge.judge(late.found), judge.judge(late.without)
@@ -261,6 +265,11 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
             if each.effect.late
         ]
     return named._replace(judgement=judgement, refusals=refusals, alike=late.alike, sure=late.chances, untold=loose)
+
+
+def _left(found: NamedFit, floor: Array) -> Array:
+    """Compute the root mean square that a fit leaves of each channel, shape (6,), floors."""
+    return np.asarray(np.sqrt(np.mean((found.hypothesis.left(found.estimates.linear) / floor) ** 2, axis=0)))
 
 
 def _doubts(
@@ -348,7 +357,7 @@ def _concluded(
     effects = [*faults, *named]
     floor, differ = found.steps[-1].floor, found.differ
     # In gusts instruments tell the numbers, and a gap need not stand out.
-    still = not any(flight.air.any() for flight in hypothesis.flights)
+    still = not hypothesis.gusty.any()
     taken = held_out.removed_by_numbers(NOISE if still else 0.0)
     numbers = wrong_numbers(estimates, effects, taken)
     effects += [numbers] if numbers is not None else []

@@ -14,6 +14,7 @@ from cpfls_cli.effects.effect import Columns, Shape
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.noise_floor import noise_floor
 from cpfls_cli.gap.balance.weak_flight import Candidate, CandidateKey, WeakFlight, actuated, columns_of, nuisance
+from cpfls_cli.gap.settings import CLEAR, NOISE
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 NEGLIGIBLE = 0.003
@@ -142,6 +143,19 @@ class System:
     def known(self) -> BoolArray:
         """Which channels each window has, shape (window, 6)."""
         return np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in self.flights])
+
+    @property
+    def gusty(self) -> BoolArray:
+        """Channels whose floor holds gusts, shape (6,)."""
+        return np.asarray(np.any([flight.air > 0 for flight in self.flights], axis=0))
+
+    @property
+    def most_noise(self) -> Array:
+        """Mean square in squared floors up to which what is left of each channel is noise, shape (6,).
+
+        In gusts no less than a gap begins at: they are drawn anew in each flight, and known to a third.
+        """
+        return np.where(self.gusty, CLEAR**2, NOISE)
 
     def can(self, candidate: Candidate) -> bool:
         """Tell whether any flight has the signals that a candidate needs."""

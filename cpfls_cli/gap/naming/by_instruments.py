@@ -17,8 +17,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.refine import fit_within_bounds, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate, dense
-from cpfls_cli.gap.naming.confirmed import nothing_by_size
-from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of, nothing_by_size
 from cpfls_cli.gap.naming.scoring import known_before
 from cpfls_cli.gap.residual.air import foretold_rows
 from cpfls_cli.gap.settings import CHANCE, GapSettings
@@ -214,11 +213,25 @@ def untold(before: NamedFit, after: NamedFit) -> list[Effect]:
     return [each.effect for each, was, now in numbers if was is now]
 
 
-def foretold_of_left(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> Array:
-    """Multiply what is left with what instruments know of it, by block: 0 but for chance where nothing is missing."""
+def foretold_of_left(
+    hypothesis: System, linear: Array, given: Instruments, floor: Array, settings: GapSettings, *, late: bool
+) -> Array:
+    """Multiply what is left with what is known of it, by block: 0 but for chance where nothing is missing.
+
+    Parameters
+    ----------
+    linear : array, shape (column,)
+        Coefficients of its base.
+    given : Instruments
+        Of the same flights.
+    floor : array, shape (6,)
+    late : bool
+        Whether it is asked what is late, which what was before tells by far better than what was asked.
+    """
     total: dict[int, float] = {}
-    _, after = _runs(found.hypothesis, found.estimates.linear, given, floor, settings)
-    for run in after:
+    asked, before = (list(runs) for runs in _runs(hypothesis, linear, given, floor, settings))
+    known = late or not any(len(run.block) for run in asked)
+    for run in before if known else asked:
         for block in np.unique(run.block):
             own = run.block == block
             total[block] = total.get(block, 0.0) + float((run.rows[own, :, -1] * run.known[own, :, -1]).sum())

@@ -14,12 +14,22 @@ from cpfls_cli.blocks import mean_error
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
-from cpfls_cli.gap.naming.estimate import NamedFit, channel_weight, estimates, fitted, free_estimates, sized
-from cpfls_cli.gap.naming.held_out import HeldOut, held_out, share_removed
+from cpfls_cli.gap.naming.by_instruments import foretold_of_left
+from cpfls_cli.gap.naming.estimate import (
+    NamedFit,
+    channel_weight,
+    estimates,
+    fitted,
+    free_estimates,
+    nothing_by_size,
+    sized,
+)
+from cpfls_cli.gap.naming.held_out import HeldOut, held_out
 from cpfls_cli.gap.naming.leftover import Leftover, leftover
-from cpfls_cli.gap.naming.ranking import RankedStep, block_index
+from cpfls_cli.gap.naming.ranking import RankedStep, block_index, more_left, surely
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import CLEAR, ERRORS, NOISE, OFF, VISIBLE, GapSettings
+from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending, largest, levelled, smallest, tied
 
 
@@ -60,16 +70,6 @@ def earned(
             out = [refusal.name]
         found = found.without(out, floor, settings)
     return found, refusals
-
-
-def nothing_by_size(found: NamedFit) -> list[str]:
-    """Name the effects whose size does not differ from zero."""
-    names = []
-    for (effect, _), numbers in zip(found.hypothesis.chosen, found.estimates.effects, strict=True):
-        without_size = effect.unit_coefficient and not effect.shapes
-        if not (without_size or any(number.low > 0 or number.high < 0 for number in sized(effect, numbers))):
-            names.append(effect.name)
-    return names
 
 
 def on_bound(found: NamedFit, floor: Array) -> Refusal | None:
@@ -144,6 +144,8 @@ class Judge:
         The held-out flights as logged, and after repair of the sensors.
     floor : array, shape (6,)
         Of the training flights.
+    given : Instruments or None
+        Of the held-out flights; None in still air.
     """
 
     training: Sequence[WeakFlight]
@@ -152,6 +154,7 @@ class Judge:
     floor: Array
     settings: GapSettings
     rng: np.random.Generator
+    given: Instruments | None = None
 
     def judge(self, found: NamedFit) -> Judgement:
         """Evaluate effects on the held-out flights, beside the model with its own numbers refitted."""
@@ -191,10 +194,30 @@ class Judge:
                 f"on the held-out flights it makes the {CHANNELS[channel]} worse, "
                 f"{compared[worst].left[channel]:.2g} floors without it and {after[channel]:.2g} with it",
             )
-        least = smallest(compared, lambda each: compared[each].visibly)
-        if compared[least].visibly < VISIBLE**2:
+        unseen = [name for name, one in compared.items() if one.visibly < VISIBLE**2]
+        needless = [name for name in unseen if not self._known_before(judgement, name)]
+        if needless:
+            least = smallest(needless, lambda each: compared[each].visibly)
             return Refusal(least, "on the held-out flights the gap is as small without it")
-        return _filling(judgement, compared)
+        return _filling(judgement, {name: one for name, one in compared.items() if name not in unseen})
+
+    def _known_before(self, judgement: Judgement, name: str) -> bool:
+        """Tell whether held-out flights in gusts surely leave more that was known before without an effect.
+
+        Rotors answer gusts, so what they do takes squares off that gusts leave, where it is not in the model, too.
+        """
+        if self.given is None:
+            return False
+        hypothesis, _, numbers = judgement.found
+        told = zip(hypothesis.chosen, numbers.of_effect, strict=True)
+        others = [(each, linear) for each, linear in told if each.effect.name != name]
+        without = np.concatenate([numbers.of_vehicle, *(linear for _, linear in others)])
+        kept = system(self.repaired, [each for each, _ in others]), system(self.repaired, hypothesis.chosen)
+        left = (
+            foretold_of_left(there, linear, self.given, self.floor, self.settings, late=False)
+            for there, linear in zip(kept, (without, numbers.linear), strict=True)
+        )
+        return surely(more_left(*left))
 
     def _without(self, judgement: Judgement, name: str) -> Without:
         """Leave an effect out and refit the others."""
@@ -206,8 +229,8 @@ class Judge:
         difference, block = squares[0] - squares[1], block_index(there, self.settings)
         sums = np.array([difference[block == number].sum(axis=0) for number in np.unique(block)])
         spread = len(sums) * mean_error(sums) if len(sums) > 1 else np.zeros(6)
-        gusts = np.any([flight.air > 0 for flight in self.repaired], axis=0)
-        return Without(difference.sum(axis=0) / count, spread / count, np.sqrt(squares[0].sum(axis=0) / count), gusts)
+        left = np.sqrt(squares[0].sum(axis=0) / count)
+        return Without(difference.sum(axis=0) / count, spread / count, left, there.gusty)
 
 
 class Without(NamedTuple):
@@ -326,7 +349,7 @@ def _other_numbers(first: Judgement, judge: Judge, settings: GapSettings) -> tup
     refit = system(judge.repaired, hypothesis.chosen)
     own = estimates(refit, channel_weight(refit, unseen.floor), block_index(refit, settings))
     after = refit.left(own.linear)
-    if share_removed(unseen.parameters / unseen.noise, after / unseen.noise, unseen.known) < settings.named_share:
+    if unseen.share_removed(unseen.parameters / unseen.noise, after / unseen.noise) < settings.named_share:
         return ()
     if _size(after * unseen.known, unseen.floor).max() > CLEAR:
         return ()

@@ -259,3 +259,13 @@ def effect_sentence(effect: Effect, numbers: Sequence[Estimate], vehicle: Vehicl
     sure = {number.name: number.value for number in numbers if number.low > 0 or number.high < 0}
     more = "" if effect.describe is None else effect.describe(vehicle, sure)
     return f"{effect.sentence} {more}".rstrip()
+
+
+def nothing_by_size(found: NamedFit) -> list[str]:
+    """Name the effects whose size does not differ from zero."""
+    names = []
+    for (effect, _), numbers in zip(found.hypothesis.chosen, found.estimates.effects, strict=True):
+        without_size = effect.unit_coefficient and not effect.shapes
+        if not (without_size or any(number.low > 0 or number.high < 0 for number in sized(effect, numbers))):
+            names.append(effect.name)
+    return names

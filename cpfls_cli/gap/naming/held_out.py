@@ -21,7 +21,7 @@ from cpfls_cli.gap.balance.balance_system import (
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.naming.results import GapSize
-from cpfls_cli.gap.settings import CLEAR, COUNTS, NOISE, VISIBLE
+from cpfls_cli.gap.settings import CLEAR, COUNTS, VISIBLE
 from cpfls_cli.rounding import largest
 
 
@@ -41,6 +41,8 @@ class HeldOut:
     known : array of bool, shape (window, 6)
     noise : array, shape (window, 6)
         Floor of each window with the scatter that belongs to the effects.
+    most_noise : array, shape (6,)
+        Mean square of each channel in squared floors up to which it is noise.
     unlearned : mapping of str to float
         Effects of which these flights ask for a number that no flight learned from shows, such as that of a faster
         descent, with the share of the windows that do; nothing is judged there.
@@ -52,6 +54,7 @@ class HeldOut:
     floor: Array
     known: BoolArray
     noise: Array
+    most_noise: Array
     unlearned: Mapping[str, float]
 
     def size(self, residual: Array) -> GapSize:
@@ -79,8 +82,8 @@ class HeldOut:
         """
         before, after = (self.before if as_given else self.parameters) / self.noise, self.after / self.noise
         kinds = [slice(0, 3), slice(3, 6)]
-        sizes = [_above(before[:, kind], self.known[:, kind]) for kind in kinds]
-        each = [share_removed(before[:, kind], after[:, kind], self.known[:, kind]) for kind in kinds]
+        sizes = [_above(before[:, kind], self.known[:, kind], self.most_noise[kind]) for kind in kinds]
+        each = [self.share_removed(before, after, kind) for kind in kinds]
         of_kind = dict(zip(("torque", "force"), each, strict=True))
         clear = {
             name: share
@@ -89,6 +92,18 @@ class HeldOut:
         }
         better = largest(of_kind, lambda name: of_kind[name])
         return clear or {better: of_kind[better]}
+
+    def share_removed(self, before: Array, after: Array, channels: slice = slice(None)) -> float:
+        """Compute the share of a gap above the noise that was removed; 0 where nothing is gained.
+
+        Parameters
+        ----------
+        before, after : array, shape (window, 6), floors
+        """
+        before, after, known = before[:, channels], after[:, channels], self.known[:, channels]
+        gone = float(((before**2 - after**2) * known).sum())
+        remaining = _above(after, known, self.most_noise[channels])
+        return max(0.0, gone / (gone + remaining)) if gone > 0 else 0.0
 
     def removed_by_numbers(self, least: float) -> Array:
         """Compute the share of each channel's gap that refitted numbers of the vehicle remove; 0 below visibility.
@@ -105,32 +120,14 @@ class HeldOut:
         before, after = self.before / self.noise, self.parameters / self.noise
         rows = np.maximum(self.known.sum(axis=0), 1)
         gone = ((before**2 - after**2) * self.known).sum(axis=0) / rows
-        each = [share_removed(before[:, [c]], after[:, [c]], self.known[:, [c]]) for c in range(before.shape[1])]
+        each = [self.share_removed(before, after, slice(c, c + 1)) for c in range(before.shape[1])]
         gap = (before**2 * self.known).sum(axis=0) / rows > least
         return np.where(gap & (gone > VISIBLE**2), each, 0.0)
 
 
-def share_removed(before: Array, after: Array, known: BoolArray) -> float:
-    """Compute the share of a gap above the noise floor that was removed.
-
-    Parameters
-    ----------
-    before, after : array, shape (window, channel), floors
-    known : array of bool, shape (window, channel)
-
-    Returns
-    -------
-    float
-        0 where nothing is gained.
-    """
-    gone = float(((before**2 - after**2) * known).sum())
-    remaining = _above(after, known)
-    return max(0.0, gone / (gone + remaining)) if gone > 0 else 0.0
-
-
-def _above(residual: Array, known: BoolArray) -> float:
-    """Sum the mean squares of the channels above the floor, in squared floors."""
-    return float(np.maximum((residual**2 * known).sum(axis=0) - NOISE * known.sum(axis=0), 0.0).sum())
+def _above(residual: Array, known: BoolArray, most_noise: Array) -> float:
+    """Sum the squares of the channels above their noise, in squared floors."""
+    return float(np.maximum((residual**2 * known).sum(axis=0) - most_noise * known.sum(axis=0), 0.0).sum())
 
 
 def held_out(
@@ -175,5 +172,6 @@ def held_out(
         here,
         known,
         np.sqrt(here**2 + scatter * scatter_variance(full)),
+        full.most_noise,
         {name: share for name, there in beyond.items() if (share := float(there.any(axis=1).mean()))},
     )

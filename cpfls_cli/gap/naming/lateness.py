@@ -11,9 +11,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.gap.balance.balance_system import System
 from cpfls_cli.gap.balance.refine import refined
-from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.by_instruments import by_instruments, foretold_of_left, untold
 from cpfls_cli.gap.naming.estimate import NamedFit, fitted
 from cpfls_cli.gap.naming.ranking import chance_of_ranks, more_left, rank_effects, surely
@@ -62,7 +60,10 @@ def told_apart(
     effects : sequence of Effect
         That the search tried.
     """
-    tried = {each.effect.name: each.effect for each in candidates_of(effects) if _acts(each, found.hypothesis)}
+    late = [each for each in candidates_of(effects) if each.effect.late and found.hypothesis.can(each)]
+    # A clock is no part of the vehicle: its shift is asked where the search found one.
+    shifted = {each.effect.name for each in found.hypothesis.chosen}
+    tried = {each.effect.name: each.effect for each in late if each.effect.actuation or each.effect.name in shifted}
     if not tried:
         return Lateness(found, found, {}, ())
     sets = _Sets(found, tried, given, floor, settings)
@@ -76,11 +77,6 @@ def told_apart(
     alike = [names for names in rivals if names != best and sets.count(names) <= sets.count(best)]
     told = [sets.instead(best, names) for names in alike if not sets.surely_more(names, best)]
     return Lateness(sets.fits[best], sets.fits[()], sets.chances(best), tuple(chain(*told)))
-
-
-def _acts(candidate: Candidate, hypothesis: System) -> bool:
-    """Tell whether a candidate makes rotors late of which flights know the commands alone."""
-    return candidate.effect.late and hypothesis.can(candidate)
 
 
 def _chance_of(number: Estimate, period: float) -> float:
@@ -144,7 +140,8 @@ class _Sets:
         for names in tried:
             if (fit := self._fit(names)) is not None:
                 self.fits[names] = fit
-                self.left[names] = foretold_of_left(fit, self.given, self.floor, self.settings)
+                numbers = fit.hypothesis, fit.estimates.linear
+                self.left[names] = foretold_of_left(*numbers, self.given, self.floor, self.settings, late=True)
         return [names for names in tried if names in self.fits]
 
     def leaves(self, names: _Names) -> bool:

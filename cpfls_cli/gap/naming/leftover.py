@@ -26,7 +26,7 @@ from cpfls_cli.gap.residual.dependence import (
     without_actuation,
 )
 from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
-from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, NOISE, RARE, VISIBLE, GapSettings
+from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, RARE, VISIBLE, GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _USUAL_OF_BOUND = 0.2
@@ -71,9 +71,11 @@ def leftover(
     # A force turns nothing.
     directions = [*energy_directions(residual[:, :3], rates, block), *["neither"] * 3]
     unexplained = []
-    for channel, size, direction in zip(CHANNELS, sizes.tolist(), directions, strict=True):
+    for channel, size, noise, direction in zip(
+        CHANNELS, sizes.tolist(), hypothesis.most_noise, directions, strict=True
+    ):
         follows, rings = told.get(channel), band if band and band.channel == channel else None
-        if size > CLEAR or (size > np.sqrt(NOISE) and (follows or rings)):
+        if size > CLEAR or (size**2 > noise and (follows or rings)):
             signal, r2 = (follows.signal, follows.r2) if follows else (None, 0.0)
             share, frequency, energy = 0.0, None, direction
             if rings:

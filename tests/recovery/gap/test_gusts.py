@@ -8,7 +8,8 @@ import pytest
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.extended import extend, plain
-from cpfls_cli.gap.naming.ranking import block_index
+from cpfls_cli.gap.naming.by_instruments import foretold_of_left
+from cpfls_cli.gap.naming.ranking import block_index, surely
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.residual.air import air, known_motion
 from cpfls_cli.gap.settings import GapSettings
@@ -164,6 +165,32 @@ def test_what_does_not_come_again_is_noise_beside_what_does(flown):
     assert found.told[:3].tolist() == [False, True, True]
     assert found.split[:3].all()
     assert 0.5 < found.found.size[0] / INERTIA[0] / GUSTS[0] < 2.0
+
+
+@pytest.mark.parametrize(("kind", "setpoints"), [("asked", True), ("asked", False), ("again", False)])
+def test_of_what_a_wrong_inertia_leaves_more_is_known_than_of_gusts(flown, kind, setpoints):
+    recordings = recorded(flown[kind], heavier(TRUE.vehicle), setpoints=setpoints)
+    windows, model = common_windows(recordings, FEW), plain(None)
+    hypothesis = model.system([weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings])
+    right = model.linear.copy()
+    right[0] = 1 / HEAVY - 1
+    wrong_left, left = (
+        foretold_of_left(hypothesis, linear, known_motion(recordings), np.ones(6), FEW, late=False)
+        for linear in (model.linear, right)
+    )
+    assert surely(wrong_left - left)
+    assert not surely(left)
+
+
+@pytest.mark.parametrize(("offset_m", "stands"), [(3e-3, True), (2e-4, False)], ids=["above the gusts", "among them"])
+def test_what_stands_above_the_gusts_is_none_of_them(flown, monkeypatch, offset_m, stands):
+    rotors = TRUE.vehicle.rotors
+    moved = tuple(replace(each, position_m=(each.position_m[0] + offset_m, *each.position_m[1:])) for each in rotors)
+    recordings = recorded(flown["asked"], replace(TRUE.vehicle, rotors=moved), setpoints=True)
+    # As if instruments told nothing.
+    monkeypatch.setattr("cpfls_cli.gap.diagnose.that_stand", lambda *_: [])
+    names = [effect.name for effect in diagnosed(recordings).diagnosis.effects]
+    assert names == (["com_offset"] if stands else [])
 
 
 def test_a_copy_of_a_flight_repeats_none(flown):

@@ -9,8 +9,8 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.diagnose import not_judged
-from cpfls_cli.gap.naming.held_out import HeldOut, held_out, share_removed
-from cpfls_cli.gap.settings import NOISE
+from cpfls_cli.gap.naming.held_out import HeldOut, held_out
+from cpfls_cli.gap.settings import CLEAR, NOISE
 from tests.builders.gap_flights import candidate, fly, weak
 
 KNOWN = np.tile([True, True, True, False, False, False], (1000, 1))
@@ -18,6 +18,12 @@ KNOWN = np.tile([True, True, True, False, False, False], (1000, 1))
 
 def noise(*sizes):
     return np.random.default_rng(0).standard_normal((1000, 6)) * np.array([*sizes, 1e3, 1e3, 1e3])
+
+
+def judged(before, after, most_noise=NOISE):
+    floor = np.ones((1000, 6))
+    residuals = noise(*before), noise(*after), noise(*after)
+    return HeldOut(*residuals, floor[0], KNOWN, floor, np.full(6, most_noise), {})
 
 
 @pytest.mark.parametrize(
@@ -33,13 +39,19 @@ def noise(*sizes):
     ids=["all", "three quarters", "nothing", "worse", "one axis", "moved to another axis"],
 )
 def test_share_is_of_what_stands_above_the_floor(before, after, share):
-    assert share_removed(noise(*before), noise(*after), KNOWN) == pytest.approx(share, abs=0.02)
+    found = judged(before, after)
+    assert found.share_removed(found.before, found.after) == pytest.approx(share, abs=0.02)
+
+
+@pytest.mark.parametrize(("most_noise", "share"), [(NOISE, 0.65 / (0.65 + 0.44)), (CLEAR**2, 1.0)])
+def test_gusts_that_blow_a_little_harder_on_the_unseen_flights_are_no_gap(most_noise, share):
+    found = judged((1.1, 1.0, 1.3), (0.75, 1.0, 1.3), most_noise)
+    assert found.share_removed(found.before, found.after) == pytest.approx(share, abs=0.05)
 
 
 @pytest.mark.parametrize(("before", "taken"), [(1.1, False), (1.3, True)])
 def test_numbers_remove_a_gap_only_where_one_stands_above_the_noise(before, taken):
-    floor = np.ones((1000, 6))
-    found = HeldOut(noise(before, 1, 1), noise(1, 1, 1), noise(1, 1, 1), floor[0], KNOWN, floor, {})
+    found = judged((before, 1, 1), (1, 1, 1))
     assert (found.removed_by_numbers(NOISE)[0] > 0.9) == taken
     assert found.removed_by_numbers(0.0)[0] > 0.9
 
