@@ -12,8 +12,7 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.diagnose import considered
-from cpfls_cli.gap.naming.ranking import best_floor, block_index
-from cpfls_cli.gap.naming.scoring import candidates_of, score, scoring_matrix
+from cpfls_cli.gap.naming.ranking import best_floor, block_index, candidates_of, score, scoring_matrix
 from cpfls_cli.weak_form.resampling import folds
 from cpfls_cli.weak_form.windows import common_windows
 

@@ -15,13 +15,13 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.gap.balance.balance_system import is_free, system
 from cpfls_cli.gap.balance.refine import fit
-from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence
-from cpfls_cli.gap.naming.ranking import likely, rank_effects
+from cpfls_cli.gap.balance.weak_flight import WeakFlight
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, effect_sentence
+from cpfls_cli.gap.naming.odds import likely, odds
+from cpfls_cli.gap.naming.ranking import Scored, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
-from cpfls_cli.gap.naming.scoring import Scored
-from cpfls_cli.gap.naming.search import alternatives, beside_its_like, chance_beside_its_like, in_place_of, odds
-from cpfls_cli.gap.settings import COUNTS, RARE, GapSettings
+from cpfls_cli.gap.naming.search import alternatives, beside_its_like, chance_beside_its_like, in_place_of
+from cpfls_cli.gap.settings import COUNTS, RARE
 from cpfls_cli.rounding import ascending, at_most
 
 _MATTERS = 0.02
@@ -43,47 +43,35 @@ class JudgedEffect:
     odds: Mapping[tuple[str, ...], Array]
 
 
-def judge_effect(
-    flights: Sequence[WeakFlight],
-    chosen: Sequence[Candidate],
-    index: int,
-    estimates: Estimates,
-    share: float,
-    effects: Sequence[Effect],
-    settings: GapSettings,
-    rng: np.random.Generator,
-) -> JudgedEffect:
-    """Judge a chosen effect as if it were the last one to be found.
-
-    Parameters
-    ----------
-    index : int
-        Of the effect among them.
-    share : float
-        Of what all effects explain.
-    """
-    candidate = chosen[index]
-    others = [other for other in chosen if other is not candidate]
-    among = beside_its_like(chosen, index)
-    step = rank_effects(flights, others, effects, settings, None if among else rng, also=(candidate,))
-    own, *ranking = in_place_of(flights, chosen, index, step, settings)
-    effect = NamedEffect(
-        candidate.effect.name,
-        candidate,
-        estimates.of_effect[index],
-        estimates.effects[index],
-        chance_beside_its_like(flights, chosen, index, effects, settings) if among else step.p_value(own.gain),
-        share,
-        _frequency(own, ranking),
-        effect_sentence(candidate.effect, estimates.effects[index], flights[0].signals.vehicle),
-    )
-    rivals = tuple(alternatives(own, ranking, step.above_floor, settings))
-    compared = {
-        tuple(each.effect.name for each in other.chosen): odds(own, other, step.above_floor)
-        for other in ranking
-        if np.isfinite(other.gain) and candidate.effect.name not in other.candidate.effect.holds
-    }
-    return JudgedEffect(effect, rivals, compared)
+def judge_effects(found: NamedFit, effects: Sequence[Effect], rng: np.random.Generator) -> list[JudgedEffect]:
+    """Judge each named effect as if it were the last one to be found."""
+    hypothesis, estimates, settings = found.hypothesis, found.estimates, found.settings
+    flights, chosen = hypothesis.flights, hypothesis.chosen
+    judged = []
+    for index, share in enumerate(shares(found).tolist()):
+        candidate, numbers = chosen[index], estimates.effects[index]
+        others = [*chosen[:index], *chosen[index + 1 :]]
+        among = beside_its_like(candidate, others)
+        step = rank_effects(flights, others, effects, settings, None if among else rng, also=(candidate,))
+        own, *ranking = in_place_of(candidate, step, settings)
+        effect = NamedEffect(
+            candidate.effect.name,
+            candidate,
+            estimates.of_effect[index],
+            numbers,
+            chance_beside_its_like(flights, chosen, index, effects, settings) if among else step.p_value(own.gain),
+            share,
+            _frequency(own, ranking),
+            effect_sentence(candidate.effect, numbers, hypothesis.vehicle),
+        )
+        compared = {
+            tuple(each.effect.name for each in other.chosen): odds(own, other, step.above_floor)
+            for other in ranking
+            if np.isfinite(other.gain) and candidate.effect.name not in other.candidate.effect.holds
+        }
+        rivals = tuple(alternatives(own, ranking, step.above_floor, settings))
+        judged.append(JudgedEffect(effect, rivals, compared))
+    return judged
 
 
 def likely_sets(judged: Sequence[JudgedEffect]) -> tuple[LikelySet, ...]:
@@ -108,35 +96,26 @@ def _frequency(chosen: Scored, ranking: Sequence[Scored]) -> float:
     return float(np.mean(np.all([at_most(own, other) for other in [own, *total]], axis=0)))
 
 
-def shares(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], estimates: Estimates, floor: Array) -> Array:
-    """Split the explained part of the residual among the effects.
+def shares(found: NamedFit) -> Array:
+    """Split the explained part of the residual among the effects, shape (effect,).
 
     The share of an effect is the part of the explained residual that points its way, in floors; the shares add up to
     1. Effects that work against each other can have more than 1, or less than 0.
-
-    Parameters
-    ----------
-    estimates : Estimates
-        Of the hypothesis with all of them.
-    floor : array, shape (6,)
-
-    Returns
-    -------
-    array, shape (effect,)
     """
+    chosen, estimates = found.hypothesis.chosen, found.estimates
 
     def remaining(kept: Sequence[int]) -> Array:
         """Compute the residual with some of the effects only, at the coefficients of all of them."""
         linear = [estimates.of_effect[index] for index in kept if is_free(chosen[index])]
-        hypothesis = system(flights, [chosen[index] for index in kept])
-        return hypothesis.left(np.concatenate([estimates.of_vehicle, *linear]))
+        hypothesis = system(found.hypothesis.flights, [chosen[index] for index in kept])
+        return hypothesis.left(np.concatenate([estimates.of_vehicle, *linear])) / found.floor
 
     indices = range(len(chosen))
     everything = remaining(indices)
-    total = (remaining(()) - everything) / floor
-    parts = ((remaining([p for p in indices if p != index]) - everything) / floor for index in indices)
+    total = remaining(()) - everything
+    parts = (remaining([other for other in indices if other != index]) - everything for index in indices)
     along = np.array([(part * total).sum() for part in parts])
-    return np.asarray(along / max(abs(along.sum()), 1e-12) if len(along) else along)
+    return np.asarray(along / max(abs(along.sum()), 1e-12))
 
 
 def wrong_numbers(estimates: Estimates, effects: Sequence[NamedEffect], removed: Array) -> NamedEffect | None:

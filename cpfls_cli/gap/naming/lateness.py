@@ -16,11 +16,11 @@ from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.by_instruments import by_instruments, foretold_of_left, untold
 from cpfls_cli.gap.naming.estimate import NamedFit, fitted
-from cpfls_cli.gap.naming.ranking import chance_of_ranks, more_left, rank_effects, surely
+from cpfls_cli.gap.naming.odds import chance_of_ranks, more_left
+from cpfls_cli.gap.naming.ranking import candidates_of, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate
-from cpfls_cli.gap.naming.scoring import candidates_of
 from cpfls_cli.gap.naming.search import alternative
-from cpfls_cli.gap.settings import ERRORS, OFF, GapSettings
+from cpfls_cli.gap.settings import CHANCE, ERRORS, OFF
 from cpfls_cli.playback.instruments import Instruments
 
 _Names = tuple[str, ...]
@@ -45,9 +45,7 @@ class Lateness(NamedTuple):
     alike: tuple[Alternative, ...]
 
 
-def told_apart(
-    found: NamedFit, effects: Sequence[Effect], given: Instruments, floor: Array, settings: GapSettings
-) -> Lateness:
+def told_apart(found: NamedFit, effects: Sequence[Effect], given: Instruments) -> Lateness:
     """Decide by instruments what lies between command and rotors.
 
     In gusts a fit of all motion takes the loop for the rotors, and a lag for a delay. Effects of one number are tried
@@ -65,7 +63,7 @@ def told_apart(
     tried = {each.effect.name: each.effect for each in candidates_of(effects) if _acts(each, found.hypothesis)}
     if not tried:
         return Lateness(found, found, {}, ())
-    sets = _Sets(found, tried, given, floor, settings)
+    sets = _Sets(found, tried, given)
     best, rivals = sets.usual()
     more = sum(len(each.effect.shapes) for each in found.hypothesis.chosen if each.effect.late)
     for count in range(2, max(2, more) + 1):
@@ -109,8 +107,6 @@ class _Sets:
     found: NamedFit
     effects: Mapping[str, Effect]
     given: Instruments
-    floor: Array
-    settings: GapSettings
     fits: dict[_Names, NamedFit] = field(default_factory=dict)
     left: dict[_Names, Array] = field(default_factory=dict)
 
@@ -144,12 +140,12 @@ class _Sets:
         for names in tried:
             if (fit := self._fit(names)) is not None:
                 self.fits[names] = fit
-                self.left[names] = foretold_of_left(fit, self.given, self.floor, self.settings)
+                self.left[names] = foretold_of_left(fit, self.given)
         return [names for names in tried if names in self.fits]
 
     def leaves(self, names: _Names) -> bool:
         """Tell whether a set surely leaves something that was known before."""
-        return surely(self.left[names])
+        return chance_of_ranks(self.left[names]) < CHANCE
 
     def surely_more(self, one: _Names, other: _Names) -> bool:
         """Tell whether one leaves surely more than another, beyond what formulas are off by.
@@ -157,7 +153,7 @@ class _Sets:
         The right one leaves 0 but for chance; what is too much is left as well.
         """
         margin = more_left(*(np.sign(left.sum()) * left for left in (self.left[one], self.left[other])))
-        return surely(margin) and bool(margin.sum() > OFF**2 * self.left[()].sum())
+        return chance_of_ranks(margin) < CHANCE and bool(margin.sum() > OFF**2 * self.left[()].sum())
 
     def least(self, tried: Sequence[_Names]) -> _Names:
         """Choose the first that no later one leaves surely less than."""
@@ -193,7 +189,7 @@ class _Sets:
         def stands(name: str, number: Estimate) -> bool:
             if name == usual:
                 return number.value >= self.effects[name].shapes[0].grid[0]
-            return _chance_of(number, self._period) <= self.settings.significance
+            return _chance_of(number, self._period) <= self.found.settings.significance
 
         told = {name: number for name, (number, *_) in self._numbers(names).items()}
         return {name for name, each in told.items() if stands(name, each) and each.value < each.plausible[1]}
@@ -203,11 +199,11 @@ class _Sets:
         return self.given.flown[0].motion.period
 
     def _fit(self, names: _Names) -> NamedFit | None:
-        flights = self.found.hypothesis.flights
+        flights, floor, settings = self.found.hypothesis.flights, self.found.floor, self.found.settings
         chosen = [each for each in self.found.hypothesis.chosen if not each.effect.late]
         for effect in (self.effects[name] for name in names):
-            (scored,) = rank_effects(flights, chosen, [effect], self.settings, None, floor=self.floor).ranking
-            chosen = list(refined(flights, scored.chosen, self.floor).chosen)
-        before = fitted(flights, chosen, self.floor, self.settings)
-        after = by_instruments(before, self.given, self.floor, self.settings)
+            (scored,) = rank_effects(flights, chosen, [effect], settings, None, floor=floor).ranking
+            chosen = list(refined(flights, scored.chosen, floor).chosen)
+        before = fitted(flights, chosen, floor, settings)
+        after = by_instruments(before, self.given)
         return None if any(each.late for each in untold(before, after)) else after

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,15 +16,11 @@ from cpfls_cli.gap.balance.balance_system import System, left_over, system, wind
 from cpfls_cli.gap.balance.refine import least_squares
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight, dense
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted
+from cpfls_cli.gap.naming.odds import names_of
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect, NotExcited, Unexplained
 from cpfls_cli.gap.naming.search import of_motion
-from cpfls_cli.gap.residual.dependence import (
-    joined_states,
-    rank_dependence,
-    state_signals,
-    without_actuation,
-)
+from cpfls_cli.gap.residual.dependence import joined_states, rank_dependence, state_signals, without_actuation
 from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
 from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, NOISE, RARE, VISIBLE, GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -33,32 +29,11 @@ _USUAL_OF_BOUND = 0.2
 """A coefficient that is large but not unheard of, as a share of its bound."""
 
 
-@dataclass(frozen=True)
-class Leftover:
-    """Channels of which a fit leaves a gap."""
-
-    unexplained: tuple[Unexplained, ...]
-
-
-def leftover(
-    hypothesis: System,
-    linear: Array,
-    floor: Array,
-    block: IntArray,
-    settings: GapSettings,
-    rng: np.random.Generator,
-) -> Leftover:
-    """Analyse the residual of a fit: size, dependence on signals, narrow band, energy.
-
-    Parameters
-    ----------
-    linear : array, shape (column,)
-        Coefficients of its base.
-    floor : array, shape (6,)
-    block : array of int, shape (window,)
-    """
+def leftover(found: NamedFit, rng: np.random.Generator) -> tuple[Unexplained, ...]:
+    """List the channels of which a fit leaves a gap: size, dependence on signals, narrow band, energy."""
+    hypothesis, linear, settings, block = found.hypothesis, found.estimates.linear, found.settings, found.block
     residual = hypothesis.left(linear)
-    in_floors = residual / window_noise(hypothesis, residual, floor)
+    in_floors = residual / window_noise(hypothesis, residual, found.floor)
     sizes = np.sqrt(np.mean(in_floors**2, axis=0))
     states = joined_states([state_signals(f, s) for f, s in zip(hypothesis.flights, hypothesis.signals, strict=True)])
     dependence = rank_dependence(
@@ -71,15 +46,15 @@ def leftover(
     # A force turns nothing.
     directions = [*energy_directions(residual[:, :3], rates, block), *["neither"] * 3]
     unexplained = []
-    for channel, size, direction in zip(CHANNELS, sizes.tolist(), directions, strict=True):
+    for channel, size, energy in zip(CHANNELS, sizes.tolist(), directions, strict=True):
         follows, rings = told.get(channel), band if band and band.channel == channel else None
         if size > CLEAR or (size > np.sqrt(NOISE) and (follows or rings)):
-            signal, r2 = (follows.signal, follows.r2) if follows else (None, 0.0)
-            share, frequency, energy = 0.0, None, direction
+            signal, share = (follows.signal, follows.r2) if follows else (None, 0.0)
+            frequency = None
             if rings:
-                share, frequency, energy = rings.share, rings.frequency_hz, rings.energy
-            unexplained.append(Unexplained(channel, size, signal, max(r2, share), frequency, energy))
-    return Leftover(tuple(unexplained))
+                share, frequency, energy = max(share, rings.share), rings.frequency_hz, rings.energy
+            unexplained.append(Unexplained(channel, size, signal, share, frequency, energy))
+    return tuple(unexplained)
 
 
 def _band(hypothesis: System, linear: Array, settings: GapSettings, rng: np.random.Generator) -> NarrowBand | None:
@@ -118,7 +93,7 @@ def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[
 
 
 def beside_the_unnamed(
-    found: NamedFit, last: RankedStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
+    found: NamedFit, last: RankedStep, effects: Sequence[Effect], rng: np.random.Generator
 ) -> tuple[Estimates, tuple[str, ...]]:
     """Widen the intervals of named effects by what is more than chance and too small for a name.
 
@@ -127,9 +102,7 @@ def beside_the_unnamed(
 
     Parameters
     ----------
-    found : NamedFit
-        The named effects.
-    last : SearchStep
+    last : RankedStep
         Of the search, with nothing to add.
     effects : sequence of Effect
         To be tried.
@@ -140,12 +113,11 @@ def beside_the_unnamed(
         Intervals hold what the numbers are with the unnamed effects and without them.
     unnamed : tuple of str
     """
-    named = found.hypothesis.chosen
+    flights, named, settings = found.hypothesis.flights, found.hypothesis.chosen, found.settings
     if not named:
         return found.estimates, ()
-    flights = found.hypothesis.flights
     step = last
-    if {each.effect.name for each in named} != {each.effect.name for each in last.hypothesis.chosen}:
+    if names_of(named) != names_of(last.hypothesis.chosen):
         step = rank_effects(flights, named, effects, settings, rng)
     chosen = _beyond_chance(step, effects, settings, rng)
     bends = bends_of(named, flights)
@@ -153,7 +125,7 @@ def beside_the_unnamed(
         chosen = _beyond_chance(rank_effects(flights, chosen, bends, settings, rng), bends, settings, rng)
     if len(chosen) == len(named):
         return found.estimates, ()
-    wider = fitted(flights, chosen, last.floor, settings).estimates
+    wider = fitted(flights, chosen, found.floor, settings).estimates
     pairs = zip(found.estimates.effects, wider.effects, strict=False)
     held = tuple(tuple(_both(number, there) for number in numbers) for numbers, there in pairs)
     return replace(found.estimates, effects=held), tuple(each.effect.name for each in chosen[len(named) :])
@@ -167,9 +139,8 @@ def bends_of(named: Sequence[Candidate], flights: Sequence[WeakFlight]) -> list[
     flown = [flight.signals for flight in flights if "velocity" in flight.signals.available]
     squared = [(signals.air_velocity**2).sum(axis=1) for signals in flown]
     usual = float(np.sqrt(np.mean(np.concatenate(squared)))) if squared else np.inf
-    effects = (each.effect for each in named)
-    of_speed = (each for each in effects if each.kind == "wrench" and "velocity" in each.needs)
-    return [_bend(effect, usual) for effect in of_speed if not (effect.shapes or effect.physical)]
+    effects = (each.effect for each in named if each.effect.kind == "wrench" and "velocity" in each.effect.needs)
+    return [_bend(effect, usual) for effect in effects if not (effect.shapes or effect.physical)]
 
 
 def _bend(effect: Effect, usual: float) -> Effect:
@@ -206,14 +177,9 @@ def _both(number: Estimate, others: Sequence[Estimate]) -> Estimate:
 
 
 def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> tuple[NotExcited, ...]:
-    """List the effects that could be present unseen, with the reason.
-
-    Parameters
-    ----------
-    floor : array, shape (6,)
-    """
+    """List the effects that could be present unseen above a floor, shape (6,), with the reason."""
     # The vehicle's own numbers are free in every fit, so beyond themselves they never show.
-    names = {candidate.effect.name for candidate in hypothesis.free} | {c.effect.name for c in hypothesis.chosen}
+    names = names_of([*hypothesis.free, *hypothesis.chosen])
     reasons = ((effect.name, _reason(hypothesis, effect, floor)) for effect in effects if effect.name not in names)
     return tuple(NotExcited(name, reason) for name, reason in reasons if reason)
 
@@ -257,17 +223,7 @@ def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
 
 
 def usual_size(effect: Effect, vehicle: VehicleSettings, width: int) -> Array:
-    """Size linear coefficients that are large but not unheard of.
-
-    Parameters
-    ----------
-    width : int
-        Number of the coefficients.
-
-    Returns
-    -------
-    array, shape (width,)
-    """
+    """Size linear coefficients, so many as `width`, that are large but not unheard of, shape (width,)."""
     bounds = [max(abs(bound) for bound in c.bounds(vehicle)) for c in effect.coefficients]
     if effect.unit_coefficient or not bounds:
         return np.ones(width)

@@ -9,9 +9,9 @@ from cpfls_cli.effects.effect import Coefficient, Columns
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming.ranking import rank_effects
-from cpfls_cli.gap.naming.scoring import Scored
-from cpfls_cli.gap.naming.search import alternatives, simplest, unbeaten
+from cpfls_cli.gap.naming.odds import simplest, unbeaten
+from cpfls_cli.gap.naming.ranking import Scored, rank_effects
+from cpfls_cli.gap.naming.search import alternatives
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import fly, weak
 
