@@ -13,7 +13,7 @@ from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance.balance_system import System, system
+from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit_within_bounds, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate, dense
 from cpfls_cli.gap.naming.confirmed import nothing_by_size
@@ -100,10 +100,9 @@ def _stepped(found: NamedFit, sources: Sequence[_Told]) -> tuple[Array, Array]:
 
 def untold_axes(found: NamedFit, given: Instruments) -> BoolArray:
     """Mark the body axes, shape (3,), of whose inertia instruments tell nothing: a fit shows that of the loop."""
-    told, vehicle = np.zeros(3, dtype=bool), found.hypothesis.places[0][1]
-    for _, numbers in _sources(found, given):
-        told |= numbers[vehicle][:3]
-    return ~told
+    first = found.hypothesis.places[0][1].start
+    told = [numbers[first : first + 3] for _, numbers in _sources(found, given)]
+    return np.logical_not(np.any([np.zeros(3, dtype=bool), *told], axis=0))
 
 
 def that_stand(found: NamedFit, given: Instruments) -> list[Candidate]:
@@ -138,7 +137,8 @@ def _chance_of(sources: Sequence[_Told], own: IntArray, shapes: IntArray, values
 
     A source is asked of a number that another one tells as well. NaN where none knows any of them.
     """
-    asked, chances = np.isin(np.arange(len(values)), own), list[float]()
+    chances = list[float]()
+    asked = np.isin(np.arange(len(values)), own)
     for products, numbers in sources:
         flown = products[products.any(axis=(1, 2))]
         known, others = asked & (_strength(flown) > STRONG), numbers & ~asked
@@ -180,11 +180,16 @@ def foretold_of_left(found: NamedFit, given: Instruments) -> Array:
 def _sources(found: NamedFit, given: Instruments) -> list[_Told]:
     """List what tells numbers: what was asked; and what was before those that this does not tell, and what is late.
 
-    A linear answer to setpoints tells lateness by far worse.
+    Of the vehicle only those of the config: where it is measured, and what couples the rates, shows where several axes
+    turn at once, which instruments hardly tell. A linear answer to setpoints tells lateness by far worse.
     """
-    left, prior, sources = _movable(found.hypothesis, found.floor), known_before(found.hypothesis), list[_Told]()
-    late = [each.effect.late for each in found.hypothesis.chosen for _ in each.effect.shapes]
-    early = np.append(np.ones(len(left) - len(late), dtype=bool), np.logical_not(late))
+    hypothesis, prior, sources = found.hypothesis, known_before(found.hypothesis), list[_Told]()
+    weight = np.tile(found.floor, (len(hypothesis.residual), 1))
+    free = ~fit_within_bounds(hypothesis, weight, of_vehicle=True)[1] & hypothesis.base.any(axis=(0, 1))
+    vehicle, of_vehicle = hypothesis.places[0]
+    free[of_vehicle] &= np.isin([each.name for each in vehicle.effect.coefficients], list(NUMBERS))
+    late = np.array([each.effect.late for each in hypothesis.chosen for _ in each.effect.shapes], dtype=bool)
+    left, early = np.append(free, np.ones_like(late)), np.append(np.ones_like(free), ~late)
     windows = _known_windows(found, given)
     blocks = np.unique(np.concatenate([block for _, _, block in windows]))
     for place, (rows, known, block) in enumerate(windows):
@@ -201,19 +206,6 @@ def _sources(found: NamedFit, given: Instruments) -> list[_Told]:
             sources.append(_Told(products, numbers))
             left = left & ~numbers
     return sources
-
-
-def _movable(hypothesis: System, floor: Array) -> BoolArray:
-    """Mark numbers that are free, coefficients of the base and then shapes, shape (number,).
-
-    Of the vehicle only those of the config: where it is measured, and what couples the rates, shows where several axes
-    turn at once, which instruments hardly tell.
-    """
-    _, held = fit_within_bounds(hypothesis, np.tile(floor, (len(hypothesis.residual), 1)), of_vehicle=True)
-    free = ~held & hypothesis.base.any(axis=(0, 1))
-    of_vehicle = hypothesis.places[0][1]
-    free[of_vehicle] &= np.isin([each.name for each in hypothesis.free[0].effect.coefficients], list(NUMBERS))
-    return np.concatenate([free, np.ones(len(hypothesis.shapes), dtype=bool)])
 
 
 def _strong(crossed: Array, numbers: BoolArray) -> BoolArray:

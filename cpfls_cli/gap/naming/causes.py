@@ -74,6 +74,15 @@ def judge_effects(found: NamedFit, effects: Sequence[Effect], rng: np.random.Gen
     return judged
 
 
+def _frequency(chosen: Scored, ranking: Sequence[Scored]) -> float:
+    """Compute the share of blocks whose omission leaves the effect the best candidate."""
+    if not np.isfinite(chosen.gain):
+        return 0.0
+    error = np.array([each.block_error for each in [chosen, *ranking] if np.isfinite(each.gain)])
+    total = error.sum(axis=1, keepdims=True) - error
+    return float(at_most(total[0], total).all(axis=0).mean())
+
+
 def likely_sets(judged: Sequence[JudgedEffect]) -> tuple[LikelySet, ...]:
     """List the chosen set and those with others in the place of one of its effects, most likely first."""
     if not judged:
@@ -85,15 +94,6 @@ def likely_sets(judged: Sequence[JudgedEffect]) -> tuple[LikelySet, ...]:
     listed = zip([chosen, *(names for names, _ in others.values())], weights, strict=True)
     sets = ascending((LikelySet(names, weight) for names, weight in listed), lambda each: -each.likely)
     return tuple(each for each in sets if each.likely >= RARE)
-
-
-def _frequency(chosen: Scored, ranking: Sequence[Scored]) -> float:
-    """Compute the share of blocks whose omission leaves the effect the best candidate."""
-    if not np.isfinite(chosen.gain):
-        return 0.0
-    others = [scored.block_error for scored in ranking if np.isfinite(scored.gain)]
-    own, *total = (error.sum() - error for error in (chosen.block_error, *others))
-    return float(np.mean(np.all([at_most(own, other) for other in [own, *total]], axis=0)))
 
 
 def shares(found: NamedFit) -> Array:
@@ -130,37 +130,23 @@ def wrong_numbers(estimates: Estimates, effects: Sequence[NamedEffect], removed:
     """
     # Each shows in a channel of its own.
     shown = dict(zip(NUMBERS, (*removed[:3], removed[5]), strict=True))
-    wrong = [number for number in estimates.parameters if _is_wrong(number, effects) and shown[number.name] >= COUNTS]
+    named = [
+        (CATALOGUE[each.name].accounts, {number.name: number.value for number in each.coefficients}) for each in effects
+    ]
+    wrong = []
+    for number in (each for each in estimates.parameters if each.name in NUMBERS):
+        accounted = sum(accounts(number.name, values) for accounts, values in named if accounts is not None)
+        # At the rate of errors of names, over all numbers that are asked.
+        sure = len(NUMBERS) * _chance(number) <= RARE and abs(number.value) > max(_MATTERS, accounted)
+        if sure and shown[number.name] >= COUNTS:
+            wrong.append(number)
     if not wrong:
         return None
     share = float(max(shown[number.name] for number in wrong))
     p_value = min(_chance(number) for number in wrong)
-    name, sentence = VEHICLE_NUMBERS.name, VEHICLE_NUMBERS.sentence
-    return NamedEffect(name, None, np.zeros(0), tuple(wrong), p_value, share, 1.0, sentence)
-
-
-def impossible_ratios(numbers: Sequence[Estimate]) -> dict[str, float]:
-    """Give the numbers of the vehicle that no vehicle has, as ratios to the config.
-
-    Parameters
-    ----------
-    numbers : sequence of Estimate
-        Relative errors.
-    """
-    return {number.name: 1 + number.value for number in numbers if number.name in NUMBERS and number.impossible}
-
-
-def _is_wrong(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
-    """Tell whether a number is surely wrong, by as much as matters and more than named effects account for."""
-    if number.name not in NUMBERS:
-        return False
-    accounted = 0.0
-    for effect in effects:
-        accounts = CATALOGUE[effect.name].accounts
-        if accounts is not None:
-            accounted += accounts(number.name, {c.name: c.value for c in effect.coefficients})
-    # At the rate of errors of names, over all numbers that are asked.
-    return len(NUMBERS) * _chance(number) <= RARE and abs(number.value) > max(_MATTERS, accounted)
+    return NamedEffect(
+        VEHICLE_NUMBERS.name, None, np.zeros(0), tuple(wrong), p_value, share, 1.0, VEHICLE_NUMBERS.sentence
+    )
 
 
 def _chance(number: Estimate) -> float:
@@ -169,20 +155,19 @@ def _chance(number: Estimate) -> float:
     return 2 * float(ndtr(-1.96 * abs(number.value) / half)) if half > 0 else 0.0
 
 
+def impossible_ratios(numbers: Sequence[Estimate]) -> dict[str, float]:
+    """Give the numbers of the vehicle that no vehicle has, by their relative errors, as ratios to the config."""
+    return {number.name: 1 + number.value for number in numbers if number.name in NUMBERS and number.impossible}
+
+
 def sensor_fault(
     finding: AuditFinding, as_logged: Sequence[WeakFlight], as_repaired: Sequence[WeakFlight]
 ) -> NamedEffect:
-    """Name a fault of the sensors with the share of the gap that its repair removes.
-
-    Parameters
-    ----------
-    as_logged, as_repaired : sequence of WeakFlight
-        The training flights without and with the repair.
-    """
+    """Name a fault of the sensors with the share of the gap that its repair removes from the training flights."""
     logged, repaired = system(as_logged), system(as_repaired)
     weight = np.sqrt(np.mean(repaired.residual**2, axis=0)) + 1e-12
-    before, after = (s.left(fit(s, weight)) / weight for s in (logged, repaired))
-    share = float(np.clip(1 - (after**2).sum() / max((before**2).sum(), 1e-12), 0, 1))
+    before, after = (((each.left(fit(each, weight)) / weight) ** 2).sum() for each in (logged, repaired))
+    share = float(np.clip(1 - after / max(before, 1e-12), 0, 1))
     effect = CATALOGUE[finding.name]
     assert effect.test is not None, "the audit tests what has a test"
     by_label = dict(zip(effect.test.labels, effect.numbers, strict=True))

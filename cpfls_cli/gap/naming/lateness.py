@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain, combinations
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.gap.balance.balance_system import System
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.by_instruments import by_instruments, foretold_of_left, untold
 from cpfls_cli.gap.naming.estimate import NamedFit, fitted
 from cpfls_cli.gap.naming.odds import chance_of_ranks, more_left
-from cpfls_cli.gap.naming.ranking import candidates_of, rank_effects
+from cpfls_cli.gap.naming.ranking import rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate
 from cpfls_cli.gap.naming.search import alternative
 from cpfls_cli.gap.settings import CHANCE, ERRORS, OFF
@@ -60,7 +59,7 @@ def told_apart(found: NamedFit, effects: Sequence[Effect], given: Instruments) -
     effects : sequence of Effect
         That the search tried.
     """
-    tried = {each.effect.name: each.effect for each in candidates_of(effects) if _acts(each, found.hypothesis)}
+    tried = {each.name: each for each in effects if each.late and found.hypothesis.can(Candidate(each, {}))}
     if not tried:
         return Lateness(found, found, {}, ())
     sets = _Sets(found, tried, given)
@@ -70,26 +69,14 @@ def told_apart(found: NamedFit, effects: Sequence[Effect], given: Instruments) -
         if best and (sets.count(best) == count or sets.leaves(best)):
             rivals += sets.tell([names for names in sets.all if sets.count(names) == count and names not in sets.left])
             best = sets.least([best, *(names for names in rivals if sets.count(names) == count)])
+    alike = []
     # One with more numbers would have to leave less.
-    alike = [names for names in rivals if names != best and sets.count(names) <= sets.count(best)]
-    told = [sets.instead(best, names) for names in alike if not sets.surely_more(names, best)]
-    return Lateness(sets.fits[best], sets.fits[()], sets.chances(best), tuple(chain(*told)))
-
-
-def _acts(candidate: Candidate, hypothesis: System) -> bool:
-    """Tell whether a candidate makes rotors late of which flights know the commands alone."""
-    return candidate.effect.late and hypothesis.can(candidate)
-
-
-def _chance_of(number: Estimate, period: float) -> float:
-    """Compute how likely chance makes a time of its size if it is 0, by its interval and what a log is off by.
-
-    When a sample was taken is known to one sampling period, and where in it is anybody's guess.
-    """
-    from scipy.special import erfc
-
-    error = np.hypot((number.high - number.value) / ERRORS, period / np.sqrt(12))
-    return float(erfc(number.value / error / np.sqrt(2)))
+    for names in (each for each in rivals if each != best and sets.count(each) <= sets.count(best)):
+        gone, new = [name for name in best if name not in names], [name for name in names if name not in best]
+        if gone and new and not sets.surely_more(names, best):
+            *beside, last = new
+            alike.append(alternative(tried[gone[0]], tried[last], 1.0, *beside))
+    return Lateness(sets.fits[best], sets.fits[()], sets.chances(best), tuple(alike))
 
 
 @dataclass
@@ -139,9 +126,19 @@ class _Sets:
         """Fit sets; of those whose numbers instruments tell the names come back."""
         for names in tried:
             if (fit := self._fit(names)) is not None:
-                self.fits[names] = fit
-                self.left[names] = foretold_of_left(fit, self.given)
+                self.fits[names], self.left[names] = fit, foretold_of_left(fit, self.given)
         return [names for names in tried if names in self.fits]
+
+    def _fit(self, names: _Names) -> NamedFit | None:
+        hypothesis, _, floor, settings = self.found
+        flights = hypothesis.flights
+        chosen = [each for each in hypothesis.chosen if not each.effect.late]
+        for effect in (self.effects[name] for name in names):
+            (scored,) = rank_effects(flights, chosen, [effect], settings, None, floor=floor).ranking
+            chosen = list(refined(flights, scored.chosen, floor).chosen)
+        before = fitted(flights, chosen, floor, settings)
+        after = by_instruments(before, self.given)
+        return None if any(each.late for each in untold(before, after)) else after
 
     def leaves(self, names: _Names) -> bool:
         """Tell whether a set surely leaves something that was known before."""
@@ -166,13 +163,7 @@ class _Sets:
         """Compute how likely chance makes each effect: its number, or of several that so much less is left."""
         less = chance_of_ranks(more_left(self.left[()], self.left[best]))
         numbers = self._numbers(best).items()
-        return {name: _chance_of(own[0], self._period) if len(own) == 1 else less for name, own in numbers}
-
-    def instead(self, best: _Names, names: _Names) -> Iterator[Alternative]:
-        """Say what stands for what of a set."""
-        gone, new = [name for name in best if name not in names], [name for name in names if name not in best]
-        for *beside, last in [new] if gone and new else []:
-            yield alternative(self.effects[gone[0]], self.effects[last], 1.0, *beside)
+        return {name: self._chance_of(own[0]) if len(own) == 1 else less for name, own in numbers}
 
     def _numbers(self, names: _Names) -> dict[str, tuple[Estimate, ...]]:
         fit = self.fits[names]
@@ -184,26 +175,23 @@ class _Sets:
 
         Beside others it is enough of the usual effect that it is not less than anybody has.
         """
-        usual = next(iter(self.effects)) if len(names) > 1 else ""
-
-        def stands(name: str, number: Estimate) -> bool:
+        needed, usual = set(), next(iter(self.effects)) if len(names) > 1 else ""
+        for name, (number, *_) in self._numbers(names).items():
             if name == usual:
-                return number.value >= self.effects[name].shapes[0].grid[0]
-            return _chance_of(number, self._period) <= self.found.settings.significance
+                stands = number.value >= self.effects[name].shapes[0].grid[0]
+            else:
+                stands = self._chance_of(number) <= self.found.settings.significance
+            if stands and number.value < number.plausible[1]:
+                needed.add(name)
+        return needed
 
-        told = {name: number for name, (number, *_) in self._numbers(names).items()}
-        return {name for name, each in told.items() if stands(name, each) and each.value < each.plausible[1]}
+    def _chance_of(self, number: Estimate) -> float:
+        """Compute how likely chance makes a time of its size if it is 0, by its interval and what a log is off by.
 
-    @property
-    def _period(self) -> float:
-        return self.given.flown[0].motion.period
+        When a sample was taken is known to one sampling period, and where in it is anybody's guess.
+        """
+        from scipy.special import erfc
 
-    def _fit(self, names: _Names) -> NamedFit | None:
-        flights, floor, settings = self.found.hypothesis.flights, self.found.floor, self.found.settings
-        chosen = [each for each in self.found.hypothesis.chosen if not each.effect.late]
-        for effect in (self.effects[name] for name in names):
-            (scored,) = rank_effects(flights, chosen, [effect], settings, None, floor=floor).ranking
-            chosen = list(refined(flights, scored.chosen, floor).chosen)
-        before = fitted(flights, chosen, floor, settings)
-        after = by_instruments(before, self.given)
-        return None if any(each.late for each in untold(before, after)) else after
+        period = self.given.flown[0].motion.period
+        error = np.hypot((number.high - number.value) / ERRORS, period / np.sqrt(12))
+        return float(erfc(number.value / error / np.sqrt(2)))

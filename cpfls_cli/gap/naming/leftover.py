@@ -18,7 +18,7 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight, d
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted
 from cpfls_cli.gap.naming.odds import names_of
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
-from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect, NotExcited, Unexplained
+from cpfls_cli.gap.naming.results import Alternative, NamedEffect, NotExcited, Unexplained
 from cpfls_cli.gap.naming.search import of_motion
 from cpfls_cli.gap.residual.dependence import joined_states, rank_dependence, state_signals, without_actuation
 from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
@@ -126,9 +126,12 @@ def beside_the_unnamed(
     if len(chosen) == len(named):
         return found.estimates, ()
     wider = fitted(flights, chosen, found.floor, settings).estimates
-    pairs = zip(found.estimates.effects, wider.effects, strict=False)
-    held = tuple(tuple(_both(number, there) for number in numbers) for numbers, there in pairs)
-    return replace(found.estimates, effects=held), tuple(each.effect.name for each in chosen[len(named) :])
+    held = []
+    for numbers, others in zip(found.estimates.effects, wider.effects, strict=False):
+        there = {number.name: number for number in others}
+        pairs = [(number, there.get(number.name, number)) for number in numbers]
+        held.append(tuple(replace(n, low=min(n.low, o.low), high=max(n.high, o.high)) for n, o in pairs))
+    return replace(found.estimates, effects=tuple(held)), tuple(each.effect.name for each in chosen[len(named) :])
 
 
 def bends_of(named: Sequence[Candidate], flights: Sequence[WeakFlight]) -> list[Effect]:
@@ -168,12 +171,6 @@ def _beyond_chance(
         chosen.append(added)
         step = rank_effects(flights, chosen, effects, settings, rng)
     return chosen
-
-
-def _both(number: Estimate, others: Sequence[Estimate]) -> Estimate:
-    """Widen an interval until it holds that of the same number beside other effects."""
-    other = next((each for each in others if each.name == number.name), number)
-    return replace(number, low=min(number.low, other.low), high=max(number.high, other.high))
 
 
 def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> tuple[NotExcited, ...]:

@@ -81,7 +81,7 @@ def log_odds(more: Array, off: float) -> Array:
 
 def odds(own: Scored, other: Scored, above_floor: float) -> Array:
     """Compute the `log_odds` of another set, shape (block,), where no set at all leaves `above_floor`."""
-    off = min(OFF**2 * above_floor, max(above_floor - own.gain, 0.0))
+    off = off_by(above_floor, 0.0, above_floor - own.gain)
     return log_odds(more_left(other.block_error, own.block_error), off)
 
 
