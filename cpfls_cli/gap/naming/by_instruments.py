@@ -100,9 +100,10 @@ def _stepped(found: NamedFit, sources: Sequence[_Told]) -> tuple[Array, Array]:
 
 def untold_axes(found: NamedFit, given: Instruments) -> BoolArray:
     """Mark the body axes, shape (3,), of whose inertia instruments tell nothing: a fit shows that of the loop."""
-    first = found.hypothesis.places[0][1].start
-    told = [numbers[first : first + 3] for _, numbers in _sources(found, given)]
-    return np.logical_not(np.any([np.zeros(3, dtype=bool), *told], axis=0))
+    told, vehicle = np.zeros(3, dtype=bool), found.hypothesis.places[0][1]
+    for _, numbers in _sources(found, given):
+        told |= numbers[vehicle][:3]
+    return ~told
 
 
 def that_stand(found: NamedFit, given: Instruments) -> list[Candidate]:

@@ -6,7 +6,7 @@ Floors are of shape (6,), N m and N, by channel.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
 
@@ -25,30 +25,29 @@ from cpfls_cli.weak_form.resampling import Beside, blocks_of, folds, mirror_shif
 
 @dataclass(frozen=True)
 class Scored:
-    """A candidate with its cross-validated gain.
+    """A candidate, the last of its set, with its cross-validated gain.
 
     Attributes
     ----------
+    chosen : tuple of Candidate
+        What it stands beside, and itself.
     gain : float
         Sum of squares taken off the blocks that the fits did not see, in squared floors; minus infinity where refused.
     block_error : array, shape (block,)
         What is left on each block.
     coefficients : array, shape (coefficient,)
         Linear, of a fit on all blocks; 0 where a bound took one out.
-    others : tuple of Candidate
-        What it stands beside.
     """
 
-    candidate: Candidate
+    chosen: tuple[Candidate, ...]
     gain: float
     block_error: Array
     coefficients: Array
-    others: tuple[Candidate, ...] = ()
 
     @property
-    def chosen(self) -> tuple[Candidate, ...]:
-        """The whole set."""
-        return (*self.others, self.candidate)
+    def candidate(self) -> Candidate:
+        """The last of the set."""
+        return self.chosen[-1]
 
 
 @dataclass(frozen=True)
@@ -128,7 +127,7 @@ def rank_effects(
     above_floor = float(max(beside.before[:, 0].sum() - hypothesis.known.sum(), 1e-9))
     once: dict[str, Scored] = {}
     for each in scored:
-        once.setdefault(each.candidate.effect.name, replace(each, others=hypothesis.chosen))
+        once.setdefault(each.candidate.effect.name, each)
     return RankedStep(hypothesis, floor, tuple(once.values()), chance, above_floor)
 
 
@@ -225,7 +224,7 @@ def score(arranged: ScoringMatrix, beside: Beside, hypothesis: System) -> tuple[
     for candidate, columns, weight in arranged.candidates:
         error = _error(candidate, columns, weight, beside)
         chance = np.maximum(chance, (beside.before - error)[:, 1:].sum(axis=0))
-        scored.append(_scored(candidate, columns, weight, error[:, 0], beside, hypothesis.vehicle))
+        scored.append(_scored(hypothesis, candidate, columns, weight, error[:, 0], beside))
     return ascending(scored, lambda candidate: -candidate.gain), chance
 
 
@@ -238,23 +237,23 @@ def _error(candidate: Candidate, columns: IntArray, weight: Array, beside: Besid
 
 
 def _scored(
-    candidate: Candidate, columns: IntArray, weight: Array, error: Array, beside: Beside, vehicle: VehicleSettings
+    hypothesis: System, candidate: Candidate, columns: IntArray, weight: Array, error: Array, beside: Beside
 ) -> Scored:
     """Score a candidate that leaves `error` of the blocks with all its columns."""
-    before = beside.before[:, 0]
+    chosen, before = (*hypothesis.chosen, candidate), beside.before[:, 0]
     fitted, kept = np.ones(len(columns)), np.ones(len(columns), dtype=bool)
     while not candidate.effect.unit_coefficient:
         fitted, unsure = np.zeros(len(columns)), np.zeros(len(columns))
         fitted[kept], unsure[kept] = beside.fit(columns[kept])
-        keep, admissible = within_bounds(candidate.effect, fitted, unsure, vehicle)
+        keep, admissible = within_bounds(candidate.effect, fitted, unsure, hypothesis.vehicle)
         if not admissible or not (kept & keep).any():
-            return Scored(candidate, -np.inf, before, fitted)
+            return Scored(chosen, -np.inf, before, fitted)
         if keep[kept].all():
             break
         kept &= keep
     if not kept.all():
         error = _error(candidate, columns[kept], weight, beside)[:, 0]
-    return Scored(candidate, float((before - error).sum()), error, fitted)
+    return Scored(chosen, float((before - error).sum()), error, fitted)
 
 
 def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleSettings) -> tuple[BoolArray, bool]:

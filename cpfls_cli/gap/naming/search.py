@@ -82,7 +82,7 @@ def _grown(step: RankedStep, settings: GapSettings) -> list[Scored]:
     best = step.ranking[0]
     near = [scored for scored in step.ranking if scored.gain > 0]
     alike = [scored for scored in near if _late([scored.candidate])]
-    if best not in alike or not (_late(best.others) or len(alike) > 1):
+    if best not in alike or not (_late(best.chosen[:-1]) or len(alike) > 1):
         return near
     moved = [_moved(scored.chosen, step, settings) for scored in alike]
     return ascending(moved, lambda scored: -scored.gain)
@@ -201,8 +201,7 @@ def _rescored(hypothesis: System, step: RankedStep, settings: GapSettings) -> Sc
     # Shapes that are refined stay.
     error = _unseen(hypothesis, floor, settings, moving=not _late(hypothesis.chosen))
     gain = step.above_floor + hypothesis.known.sum() - error.sum()
-    *others, newest = hypothesis.chosen
-    return Scored(newest, float(gain), error, np.zeros(0), tuple(others))
+    return Scored(hypothesis.chosen, float(gain), error, np.zeros(0))
 
 
 def _unseen(hypothesis: System, floor: Array, settings: GapSettings, *, moving: bool = True) -> Array:
