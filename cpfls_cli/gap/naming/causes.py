@@ -53,7 +53,7 @@ def judge_effects(found: NamedFit, effects: Sequence[Effect], rng: np.random.Gen
         others = [*chosen[:index], *chosen[index + 1 :]]
         among = beside_its_like(candidate, others)
         step = rank_effects(flights, others, effects, settings, None if among else rng, also=(candidate,))
-        own, *ranking = in_place_of(candidate, step, settings)
+        own, *ranking = in_place_of(candidate, step)
         effect = NamedEffect(
             candidate.effect.name,
             candidate,

@@ -249,7 +249,7 @@ def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | No
     off by no more than an error of the floor hides.
     """
     floors = judgement.held_out.size(judgement.held_out.after).floors
-    beyond = OFF**2 * max((one.visibly for one in compared.values()), default=0.0)
+    beyond = OFF**2 * max(one.visibly for one in compared.values())
     for name in ascending(compared, lambda each: compared[each].visibly):
         channel, off = int(np.argmax(levelled(compared[name].seen))), compared[name].visibly
         left = float(floors[channel])

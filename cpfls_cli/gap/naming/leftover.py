@@ -31,8 +31,8 @@ _USUAL_OF_BOUND = 0.2
 
 def leftover(found: NamedFit, rng: np.random.Generator) -> tuple[Unexplained, ...]:
     """List the channels of which a fit leaves a gap: size, dependence on signals, narrow band, energy."""
-    hypothesis, linear, settings, block = found.hypothesis, found.estimates.linear, found.settings, found.block
-    residual = hypothesis.left(linear)
+    hypothesis, settings, block = found.hypothesis, found.settings, found.block
+    residual = hypothesis.left(found.estimates.linear)
     in_floors = residual / window_noise(hypothesis, residual, found.floor)
     sizes = np.sqrt(np.mean(in_floors**2, axis=0))
     states = joined_states([state_signals(f, s) for f, s in zip(hypothesis.flights, hypothesis.signals, strict=True)])
@@ -41,7 +41,7 @@ def leftover(found: NamedFit, rng: np.random.Generator) -> tuple[Unexplained, ..
     )
     # The largest of each channel.
     told = {d.channel: d for d in reversed(dependence) if d.p_value <= settings.significance and d.r2 > COUNTS}
-    band = _band(hypothesis, linear, settings, rng)
+    band = _band(found, rng)
     rates = hypothesis.by_flight(lambda flight, _: flight.windows.average(flight.signals.body_rate))
     # A force turns nothing.
     directions = [*energy_directions(residual[:, :3], rates, block), *["neither"] * 3]
@@ -57,11 +57,12 @@ def leftover(found: NamedFit, rng: np.random.Generator) -> tuple[Unexplained, ..
     return tuple(unexplained)
 
 
-def _band(hypothesis: System, linear: Array, settings: GapSettings, rng: np.random.Generator) -> NarrowBand | None:
+def _band(found: NamedFit, rng: np.random.Generator) -> NarrowBand | None:
     """Search for a narrow band that counts, with windows dense enough to exclude aliases."""
+    hypothesis, settings = found.hypothesis, found.settings
     windows, rows, rates = dense(hypothesis.flights[0].windows), [], []
     for number, flight in enumerate(hypothesis.flights):
-        rows.append(replace(flight, windows=windows).averaged(left_over(hypothesis, number, linear)))
+        rows.append(replace(flight, windows=windows).averaged(left_over(hypothesis, number, found.estimates.linear)))
         rates.append(windows.average(flight.signals.body_rate))
     band = narrow_band(rows, rates, windows.hop * windows.period, settings.shifts, rng, settings.significance)
     return band if band and band.p_value <= settings.significance and band.share > COUNTS else None
@@ -162,13 +163,12 @@ def _beyond_chance(
     """Add effects to the chosen ones as long as one explains more than chance, and more than noise."""
     flights, chosen = step.hypothesis.flights, list(step.hypothesis.chosen)
     for _ in range(settings.effects_max):
-        listed = (each for each in step.ranking if each.candidate.effect in effects)
-        more = (each for each in listed if step.p_value(each.gain) <= CHANCE)
-        moving = ((each, of_motion(each.gain, step, system(flights, each.chosen))) for each in more)
-        added = next((each.candidate for each, gain in moving if step.p_value(gain) <= CHANCE), None)
+        more = (each for each in step.ranking if each.candidate.effect in effects and step.p_value(each.gain) <= CHANCE)
+        gains = ((each, of_motion(each.gain, step, system(flights, each.chosen))) for each in more)
+        added = next((each for each, gain in gains if step.p_value(gain) <= CHANCE), None)
         if added is None:
             break
-        chosen.append(added)
+        chosen.append(added.candidate)
         step = rank_effects(flights, chosen, effects, settings, rng)
     return chosen
 
@@ -188,24 +188,30 @@ def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSetti
     """
     rivals = []
     for effect in named:
-        if CATALOGUE[effect.name].kind in ("parameter", "sensor"):
-            continue
         for name in (name for name in CATALOGUE[effect.name].rivals if name not in settings.ignore):
-            missing = [CATALOGUE[name].missing(signals) for signals in hypothesis.signals]
-            if all(missing) and not {"command", "measured_rotor_speed"} & set(missing[0]):
-                wanted = hypothesis.signals[0].to_log(missing[0])
-                lacking = " and ".join(signal.replace("_", " ") for signal in wanted)
-                rivals.append(Alternative(name, effect.name, np.nan, f"log {lacking}, without which it was not tried"))
+            missing = _lacked(hypothesis, CATALOGUE[name])
+            if missing and not {"command", "measured_rotor_speed"} & {*missing}:
+                told = f"log {' and '.join(_to_log(hypothesis, missing))}, without which it was not tried"
+                rivals.append(Alternative(name, effect.name, np.nan, told))
     return tuple(rivals)
 
 
-def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
+def _lacked(hypothesis: System, effect: Effect) -> tuple[str, ...]:
+    """Name the signals that an effect needs and the first flight lacks; none where another flight has them."""
     missing = [effect.missing(signals) for signals in hypothesis.signals]
-    if all(missing):
-        if "command" in missing[0]:
+    return missing[0] if all(missing) else ()
+
+
+def _to_log(hypothesis: System, missing: Sequence[str]) -> list[str]:
+    return [name.replace("_", " ") for name in hypothesis.signals[0].to_log(missing)]
+
+
+def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
+    missing = _lacked(hypothesis, effect)
+    if missing:
+        if "command" in missing:
             return "rotor speeds are measured, so nothing between command and speed shows"
-        wanted = hypothesis.signals[0].to_log(missing[0])
-        return f"the flights lack {', '.join(name.replace('_', ' ') for name in wanted)}"
+        return f"the flights lack {', '.join(_to_log(hypothesis, missing))}"
     if effect.columns is None:
         return ""
     shape = {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes}
@@ -222,7 +228,7 @@ def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
 def usual_size(effect: Effect, vehicle: VehicleSettings, width: int) -> Array:
     """Size linear coefficients, so many as `width`, that are large but not unheard of, shape (width,)."""
     bounds = [max(abs(bound) for bound in c.bounds(vehicle)) for c in effect.coefficients]
-    if effect.unit_coefficient or not bounds:
+    if not bounds:
         return np.ones(width)
     if effect.physical is not None:
         return np.abs(effect.physical.linear(_USUAL_OF_BOUND * np.array(bounds)))

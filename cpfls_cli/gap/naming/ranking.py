@@ -62,6 +62,8 @@ class RankedStep:
         What the best candidate explains of shifted residuals.
     above_floor : float
         Sum of squares that the hypothesis leaves above the floor, in squared floors.
+    block : array of int, shape (window,)
+        Of the cross-validation.
     """
 
     hypothesis: System
@@ -69,6 +71,7 @@ class RankedStep:
     ranking: tuple[Scored, ...]
     chance: Array
     above_floor: float
+    block: IntArray
 
     def worth_a_name(self, explained: float = 0.0) -> float:
         """Compute what an effect has to explain of what a part explained leaves of the gap, in squared floors."""
@@ -128,7 +131,7 @@ def rank_effects(
     once: dict[str, Scored] = {}
     for each in scored:
         once.setdefault(each.candidate.effect.name, each)
-    return RankedStep(hypothesis, floor, tuple(once.values()), chance, above_floor)
+    return RankedStep(hypothesis, floor, tuple(once.values()), chance, above_floor, block)
 
 
 def best_floor(hypothesis: System) -> Array:

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, floors, system
 from cpfls_cli.gap.balance.refine import compensation, fit, refined
@@ -53,7 +53,7 @@ def forward_selection(
         progress(len(steps))
         if len(chosen) >= settings.effects_max:
             return chosen, steps
-        grown = _grown(step, settings) if acceptable(step, settings) else []
+        grown = _grown(step) if acceptable(step, settings) else []
         grown += grown_elsewhere(beam[1:], step, effects, settings)
         if not grown:
             return chosen, steps
@@ -74,7 +74,7 @@ def acceptable(step: RankedStep, settings: GapSettings) -> bool:
     return best >= step.worth_a_name() and step.p_value(best) <= settings.significance
 
 
-def _grown(step: RankedStep, settings: GapSettings) -> list[Scored]:
+def _grown(step: RankedStep) -> list[Scored]:
     """List the candidates that explain something; those between command and rotors, if the best is, with shapes moved.
 
     Between the points of a grid an effect with more shapes comes closer to what one with fewer is.
@@ -84,7 +84,7 @@ def _grown(step: RankedStep, settings: GapSettings) -> list[Scored]:
     alike = [scored for scored in near if _late([scored.candidate])]
     if best not in alike or not (_late(best.chosen[:-1]) or len(alike) > 1):
         return near
-    moved = [_moved(scored.chosen, step, settings) for scored in alike]
+    moved = [_moved(scored.chosen, step) for scored in alike]
     return ascending(moved, lambda scored: -scored.gain)
 
 
@@ -99,7 +99,7 @@ def grown_elsewhere(
     two = bool(sets) and _stands_for_two(chosen[-1], chosen[:-1])
     if not sets or not (two or step.above_floor > step.worth_a_name()):
         return []
-    own, found = _rescored(step.hypothesis, step, settings), list[Scored]()
+    own, found = _rescored(step.hypothesis, step), list[Scored]()
     for other in sets:
         late = _late(other)
         like = [each for each in effects if each.actuation is not None] if late else effects
@@ -107,8 +107,7 @@ def grown_elsewhere(
         for scored in there.ranking[: _BEAM if late else 1]:
             grown = scored.chosen
             if names_of(grown) != names_of(chosen) and free_numbers(grown) <= free_numbers(chosen) + two:
-                moved = _moved(grown, step, settings) if late else _rescored(system(flights, grown), step, settings)
-                found.append(moved)
+                found.append(_moved(grown, step) if late else _rescored(system(flights, grown), step))
     return [scored for scored in found if _is_better(scored, own, step)]
 
 
@@ -132,7 +131,7 @@ def of_motion(gain: float, step: RankedStep, with_it: System) -> float:
     return gain - float((with_it.known.sum(axis=0) * np.maximum(1 - (after / step.floor) ** 2, 0.0)).sum())
 
 
-def in_place_of(candidate: Candidate, step: RankedStep, settings: GapSettings) -> list[Scored]:
+def in_place_of(candidate: Candidate, step: RankedStep) -> list[Scored]:
     """Score an effect, and behind it all that could stand in its place, beside the look at the others and it.
 
     What lies between command and rotors is scored with shapes moved, and two of these can stand for one with two
@@ -142,13 +141,13 @@ def in_place_of(candidate: Candidate, step: RankedStep, settings: GapSettings) -
     if not _late([candidate]):
         return ranked
     others = step.hypothesis.chosen
-    own = _rescored(system(step.hypothesis.flights, [*others, candidate]), step, settings)
+    own = _rescored(system(step.hypothesis.flights, [*others, candidate]), step)
     alike = [each.candidate for each in ranked[1:] if _late([each.candidate]) and np.isfinite(each.gain)]
     tried: list[tuple[Candidate, ...]] = [(*others, each) for each in alike]
     if _stands_for_two(candidate, others):
         tried += [(*others, *pair) for pair in combinations(alike, 2)]
     numbers, worth = free_numbers(own.chosen), step.above_floor - own.gain > step.worth_a_name(own.gain)
-    moved = [_moved(each, step, settings) for each in tried if worth or free_numbers(each) <= numbers]
+    moved = [_moved(each, step) for each in tried if worth or free_numbers(each) <= numbers]
     fair = [each for each in moved if free_numbers(each.chosen) <= numbers or _is_better(each, own, step)]
     return [own, *fair, *(scored for scored in ranked[1:] if not _late([scored.candidate]))]
 
@@ -182,33 +181,33 @@ def chance_beside_its_like(
     with all shapes moved, by the signed-rank test of Wilcoxon; times the number of effects that could have stood there.
     """
     together = system(flights, chosen)
-    floor = best_floor(together)
+    floor, block = best_floor(together), block_index(together, settings)
     without = refined(flights, [*chosen[:index], *chosen[index + 1 :]], floor)
-    margin = more_left(_unseen(without, floor, settings), _unseen(together, floor, settings))
+    margin = more_left(_unseen(without, floor, block), _unseen(together, floor, block))
     tried = sum(effect.actuation is not None for effect in effects)
     return min(1.0, tried * chance_of_ranks(margin)) if len(margin) > 1 else 1.0
 
 
-def _moved(chosen: Sequence[Candidate], step: RankedStep, settings: GapSettings) -> Scored:
+def _moved(chosen: Sequence[Candidate], step: RankedStep) -> Scored:
     """Score a set with its shapes refined."""
-    return _rescored(refined(step.hypothesis.flights, chosen, step.floor), step, settings)
+    return _rescored(refined(step.hypothesis.flights, chosen, step.floor), step)
 
 
-def _rescored(hypothesis: System, step: RankedStep, settings: GapSettings) -> Scored:
+def _rescored(hypothesis: System, step: RankedStep) -> Scored:
     """Score a set, with its shapes where they are, by what it leaves of each block that no fit saw."""
     # Beside the best set, whose rotor torque is what it is in the look.
     floor = step.floor * compensation(system(hypothesis.flights).rotor_wrench, step.hypothesis.rotor_wrench)
     # Shapes that are refined stay.
-    error = _unseen(hypothesis, floor, settings, moving=not _late(hypothesis.chosen))
+    error = _unseen(hypothesis, floor, step.block, moving=not _late(hypothesis.chosen))
     gain = step.above_floor + hypothesis.known.sum() - error.sum()
     return Scored(hypothesis.chosen, float(gain), error, np.zeros(0))
 
 
-def _unseen(hypothesis: System, floor: Array, settings: GapSettings, *, moving: bool = True) -> Array:
+def _unseen(hypothesis: System, floor: Array, block: IntArray, *, moving: bool = True) -> Array:
     """Compute what a hypothesis leaves of each block that a fit of coefficients, and of moving shapes, did not see."""
     weight = floor / compensation(system(hypothesis.flights).rotor_wrench, hypothesis.rotor_wrench)
     arranged = scoring_matrix(hypothesis, (), weight)
-    normal = folds(arranged.matrix, hypothesis.residual / weight, block_index(hypothesis, settings), arranged.prior)
+    normal = folds(arranged.matrix, hypothesis.residual / weight, block, arranged.prior)
     columns = arranged.base if moving else arranged.base[: hypothesis.base.shape[2]]
     return np.asarray(normal.solve(columns)[1][:, 0])
 

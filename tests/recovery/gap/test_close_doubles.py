@@ -152,7 +152,7 @@ def rivals_of(flights, chosen, name):
     others = [each for each in chosen if each.effect.name != name]
     effects = [CATALOGUE[each] for each in STILL]
     step = rank_effects(flights, others, effects, SETTINGS, None, also=(chosen[index],))
-    own, *ranking = in_place_of(chosen[index], step, SETTINGS)
+    own, *ranking = in_place_of(chosen[index], step)
     assert own.candidate.effect.name == name
     return {rival.name for rival in alternatives(own, ranking, step.above_floor, SETTINGS)}
 
@@ -179,7 +179,7 @@ def test_a_lag_with_a_short_delay_is_a_rival_as_the_pair_that_it_is():
     effects = [CATALOGUE[each] for each in (*STILL, "low_pass_filter")]
     step = rank_effects(flights, (), effects, SETTINGS, None, also=(low,))
     (moved,) = refined(flights, [low], step.floor).chosen
-    own, *ranking = in_place_of(moved, step, SETTINGS)
+    own, *ranking = in_place_of(moved, step)
     pairs = {frozenset((rival.name, rival.beside)) for rival in alternatives(own, ranking, step.above_floor, SETTINGS)}
     assert pairs == {frozenset(("motor_lag", "command_delay"))}
 

@@ -90,7 +90,7 @@ def test_what_is_chosen_is_not_looked_at_again_and_each_effect_is_listed_once():
 
 
 def step_of(chance):
-    return RankedStep(system([]), np.ones(6), (), chance, 1.0)
+    return RankedStep(system([]), np.ones(6), (), chance, 1.0, np.zeros(0, dtype=int))
 
 
 def test_p_value_is_the_share_of_shifts_that_do_as_well():
