@@ -16,8 +16,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit_within_bounds, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate, dense
-from cpfls_cli.gap.naming.confirmed import nothing_by_size
-from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of, places_of
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of, nothing_by_size, places_of
 from cpfls_cli.gap.naming.ranking import known_before
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.residual.air import foretold_rows
@@ -142,7 +141,7 @@ def _chance_of(sources: Sequence[_Told], own: IntArray, shapes: IntArray, values
     asked = np.isin(np.arange(len(values)), own)
     for products, numbers in sources:
         flown = products[products.any(axis=(1, 2))]
-        known, others = asked & (_strength(flown) > STRONG), numbers & ~asked
+        known, others = asked & (_strength(np.diagonal(flown, axis1=1, axis2=2)[:, :-1]) > STRONG), numbers & ~asked
         others[shapes] = False
         if known.any() and len(flown) >= ENOUGH_BLOCKS + known.sum():
             chances.append(_chance(flown, known, others, values))
@@ -212,34 +211,35 @@ def _sources(found: NamedFit, given: Instruments) -> list[_Told]:
 def _strong(crossed: Array, numbers: BoolArray) -> BoolArray:
     """Leave the numbers that are told each beside all others; of those that are not, the weakest goes first.
 
+    Of what is known of each number, and of what it moves, that counts which no other explains.
+
     References
     ----------
     Sanderson and Windmeijer 2016 (the strength of instruments of one number beside others).
     """
-    alone = _strength(crossed)
-    kept = numbers & (alone > STRONG)
-    while (unclear := kept & (_strength(_beside_others(crossed, kept)) <= STRONG)).any():
-        kept[np.argmin(np.where(unclear, alone, np.inf))] = False
-    return kept
+    alone = _strength(np.diagonal(crossed, axis1=1, axis2=2)[:, :-1])
+    kept = np.flatnonzero(numbers & (alone > STRONG))
+    while len(kept):
+        own = crossed[:, kept[:, None], kept]
+        scale = np.sqrt(np.diagonal(own.sum(axis=0)))
+        own = own / np.outer(scale, scale)
+        inverse = np.linalg.pinv(own.sum(axis=0))
+        inverse_alone = np.diag(inverse)
+        beside = np.einsum("ij,bjk,ki->bi", inverse / inverse_alone[:, None], own, inverse / inverse_alone)
+        unclear = kept[_strength(beside) <= STRONG]
+        if not len(unclear):
+            break
+        kept = kept[kept != unclear[np.argmin(alone[unclear])]]
+    return np.isin(np.arange(len(numbers)), kept)
 
 
-def _beside_others(crossed: Array, kept: BoolArray) -> Array:
-    """Keep of what is known of each number, and of what it moves, what no other explains: diagonals of the products."""
-    own = crossed[:, :-1, :-1][:, kept][:, :, kept]
-    scale = np.sqrt(np.diagonal(own.sum(axis=0)))
-    own = own / np.outer(scale, scale)
-    inverse = np.linalg.pinv(own.sum(axis=0))
-    alone = np.diag(inverse)
-    places, beside = np.flatnonzero(kept), np.zeros_like(crossed)
-    beside[:, places, places] = np.einsum("ij,bjk,ki->bi", inverse / alone[:, None], own, inverse / alone)
-    return beside
+def _strength(products: Array) -> Array:
+    """Compute how sure it is over blocks that each number goes with what is known of it, as F; 0 where it does not.
 
-
-def _strength(crossed: Array) -> Array:
-    """Compute how sure it is over blocks that each number goes with what is known of it, as F; 0 where it does not."""
-    each = np.diagonal(crossed[:, :-1, :-1], axis1=1, axis2=2)
-    error = np.sqrt(len(each)) * each.std(axis=0, ddof=1)
-    return np.asarray(np.square(np.maximum(each.sum(axis=0), 0.0) / np.where(error > 0, error, np.inf)))
+    Of the product of these two, shape (block, number).
+    """
+    error = np.sqrt(len(products)) * products.std(axis=0, ddof=1)
+    return np.asarray(np.square(np.maximum(products.sum(axis=0), 0.0) / np.where(error > 0, error, np.inf)))
 
 
 def _solved(sums: Array, values: Array, prior: Array) -> Array:

@@ -123,8 +123,6 @@ def wrong_numbers(estimates: Estimates, effects: Sequence[NamedEffect], removed:
 
     Parameters
     ----------
-    effects : sequence of NamedEffect
-        Already named.
     removed : array, shape (6,)
         Part of each channel's gap on unseen flights that refitting the numbers takes off.
     """

@@ -14,7 +14,15 @@ from cpfls_cli.blocks import mean_error
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
-from cpfls_cli.gap.naming.estimate import NamedFit, channel_weight, estimates, fitted, free_estimates, sized
+from cpfls_cli.gap.naming.estimate import (
+    NamedFit,
+    channel_weight,
+    estimates,
+    fitted,
+    free_estimates,
+    nothing_by_size,
+    sized,
+)
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out, share_removed
 from cpfls_cli.gap.naming.leftover import leftover
 from cpfls_cli.gap.naming.ranking import RankedStep, block_index
@@ -60,16 +68,6 @@ def earned(
             out = [refusal.name]
         found = found.without(out)
     return found, refusals
-
-
-def nothing_by_size(found: NamedFit) -> list[str]:
-    """Name the effects whose size does not differ from zero."""
-    names = []
-    for (effect, _), numbers in zip(found.hypothesis.chosen, found.estimates.effects, strict=True):
-        size = sized(effect, numbers)
-        if effect.numbers and not any(number.low > 0 or number.high < 0 for number in size):
-            names.append(effect.name)
-    return names
 
 
 def on_bound(found: NamedFit) -> Refusal | None:
@@ -267,17 +265,8 @@ def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | No
 def differences(first: Judgement, last: Judgement, start: RankedStep, judge: Judge) -> tuple[str, ...]:
     """Say what differs between the flights that were learned from and those held out, where one model cannot fit both.
 
-    Parameters
-    ----------
-    first, last : Judgement
-        Of all that was found in training, and of what the held-out flights confirm.
-    start : RankedStep
-        Without effects.
-
-    Returns
-    -------
-    tuple of str
-        Sentences; none where the flights agree, in a gap or in none.
+    First is all that was found in training, last what the held-out flights confirm, and start the look without
+    effects. No sentence comes where the flights agree, in a gap or in none.
     """
     if last.found.hypothesis.chosen:
         return _other_numbers(first, judge)

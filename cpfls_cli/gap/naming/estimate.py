@@ -218,6 +218,16 @@ def sized(effect: Effect, numbers: Sequence[Estimate]) -> list[Estimate]:
     return [number for number in numbers if (number.name in shapes) == effect.unit_coefficient]
 
 
+def nothing_by_size(found: NamedFit) -> list[str]:
+    """Name the effects whose size does not differ from zero."""
+    names = []
+    for (effect, _), numbers in zip(found.hypothesis.chosen, found.estimates.effects, strict=True):
+        size = sized(effect, numbers)
+        if effect.numbers and not any(number.low > 0 or number.high < 0 for number in size):
+            names.append(effect.name)
+    return names
+
+
 def effect_sentence(effect: Effect, numbers: Sequence[Estimate], vehicle: VehicleSettings) -> str:
     """Compose the sentence of the catalogue on an effect, and what the numbers that are surely not zero add to it."""
     sure = {number.name: number.value for number in numbers if number.low > 0 or number.high < 0}

@@ -55,12 +55,7 @@ class HeldOut:
     unlearned: Mapping[str, float]
 
     def size(self, residual: Array) -> GapSize:
-        """Compute the root mean square of a residual by channel.
-
-        Parameters
-        ----------
-        residual : array, shape (window, 6)
-        """
+        """Compute the root mean square of a residual, shape (window, 6), by channel."""
         return GapSize(known_size(residual, self.known), known_size(residual / self.noise, self.known))
 
     def shares(self, *, as_given: bool = False) -> dict[str, float]:
@@ -91,16 +86,9 @@ class HeldOut:
         return clear or {better: of_kind[better]}
 
     def removed_by_numbers(self, least: float) -> Array:
-        """Compute the share of each channel's gap that refitted numbers of the vehicle remove; 0 below visibility.
+        """Compute the share of each channel's gap that refitted numbers of the vehicle remove, shape (6,).
 
-        Parameters
-        ----------
-        least : float
-            Mean square in squared floors that is no gap yet.
-
-        Returns
-        -------
-        array, shape (6,)
+        0 below visibility, and where no gap is: a mean square of `least` squared floors.
         """
         before, after = self.before / self.noise, self.parameters / self.noise
         rows = np.maximum(self.known.sum(axis=0), 1)
@@ -111,17 +99,9 @@ class HeldOut:
 
 
 def share_removed(before: Array, after: Array, known: BoolArray) -> float:
-    """Compute the share of a gap above the noise floor that was removed.
+    """Compute the share of a gap, shape (window, channel), in floors, that was removed above the noise floor.
 
-    Parameters
-    ----------
-    before, after : array, shape (window, channel), floors
-    known : array of bool, shape (window, channel)
-
-    Returns
-    -------
-    float
-        0 where nothing is gained.
+    0 where nothing is gained; only what is known counts.
     """
     gone = float(((before**2 - after**2) * known).sum())
     remaining = _above(after, known)

@@ -26,14 +26,12 @@ _Names = tuple[str, ...]
 
 
 class Lateness(NamedTuple):
-    """What lies between command and rotors.
+    """What lies between command and rotors: fits with the set that leaves least, and with none.
 
     Attributes
     ----------
-    found, without : NamedFit
-        With the set that leaves least, and with none.
     chances : dict of str to float
-        How likely chance makes each of its effects.
+        How likely chance makes each effect of the set.
     alike : tuple of Alternative
         Sets that leave as little.
     """
@@ -50,14 +48,8 @@ def told_apart(found: NamedFit, effects: Sequence[Effect], given: Instruments) -
     In gusts a fit of all motion takes the loop for the rotors, and a lag for a delay. Effects of one number are tried
     alone and together: each stands that is surely not 0, beside the other too. Where these leave something that was
     known before, more numbers are tried: the right set leaves nothing. Of those that cannot be told apart the one with
-    the fewest numbers is named, and of as many the first of the catalogue, which is the usual one.
-
-    Parameters
-    ----------
-    found : NamedFit
-        By instruments.
-    effects : sequence of Effect
-        That the search tried.
+    the fewest numbers is named, and of as many the first of the catalogue, which is the usual one. Found is a fit by
+    instruments, and effects are those that the search tried.
     """
     tried = {each.name: each for each in effects if each.late and found.hypothesis.can(Candidate(each, {}))}
     if not tried:

@@ -69,18 +69,9 @@ def _band(found: NamedFit, rng: np.random.Generator) -> NarrowBand | None:
 
 
 def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[str]:
-    """Test the sign of the mean power ``M omega`` about each axis against its scatter over blocks.
+    """Tell of each axis whether torque and body rate, shape (window, 3), feed or drain energy, or surely neither.
 
-    Parameters
-    ----------
-    torque : array, shape (window, 3), N m or floors
-    body_rate : array, shape (window, 3), rad/s
-    block : array of int, shape (window,)
-
-    Returns
-    -------
-    list of str
-        ``feeds``, ``drains`` or ``neither`` by axis.
+    By the sign of the mean power ``M omega`` against its scatter over blocks of windows.
     """
     numbers = np.unique(block)
     if len(numbers) < FEWEST_BLOCKS:
@@ -101,18 +92,8 @@ def beside_the_unnamed(
     A drag of the fuselage that shows in no channel on its own still takes its part from the drag of the rotors. And a
     formula that is right in slow flight bends in fast flight: where a bend shows, its number is another one beside it.
 
-    Parameters
-    ----------
-    last : RankedStep
-        Of the search, with nothing to add.
-    effects : sequence of Effect
-        To be tried.
-
-    Returns
-    -------
-    estimates : Estimates
-        Intervals hold what the numbers are with the unnamed effects and without them.
-    unnamed : tuple of str
+    Of the effects those are tried that the last look of the search has nothing to add of. Intervals hold what the
+    numbers are with the unnamed effects, whose names come too, and without them.
     """
     flights, named, settings = found.hypothesis.flights, found.hypothesis.chosen, found.settings
     if not named:

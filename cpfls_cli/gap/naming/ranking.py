@@ -206,21 +206,10 @@ def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: A
 
 
 def score(arranged: ScoringMatrix, beside: Beside, hypothesis: System) -> tuple[list[Scored], Array]:
-    """Score every candidate, and the best of them on what is chance.
+    """Score every candidate, best first, and the best of them on what is chance, shape (shift,).
 
-    Signs and bounds are not used on chance, so that it is given more than its due.
-
-    Parameters
-    ----------
-    beside : Beside
-        Of the residual, and of shifted residuals behind it.
-
-    Returns
-    -------
-    list of Scored
-        Best first.
-    chance : array, shape (shift,)
-        Gain of the best candidate on each of the shifted residuals.
+    That are shifted residuals, which stand behind the residual. Signs and bounds are not used on them, so that chance
+    is given more than its due.
     """
     scored = []
     chance = np.full(beside.before.shape[1] - 1, -np.inf)

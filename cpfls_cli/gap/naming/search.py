@@ -32,16 +32,8 @@ def forward_selection(
 ) -> tuple[tuple[Candidate, ...], list[RankedStep]]:
     """Let sets grow by one effect at a time while the best explains more than chance and a relevant part of the gap.
 
-    Parameters
-    ----------
-    progress : callable
-        Takes the number of looks done.
-
-    Returns
-    -------
-    chosen : tuple of Candidate
-    steps : list of RankedStep
-        Of the best set of each size; the last one has nothing to add.
+    Beside the set come the looks at the best one of each size, of which the last has nothing to add. `progress` takes
+    the number of looks done.
     """
     beam: list[tuple[Candidate, ...]] = [()]
     steps: list[RankedStep] = []
