@@ -53,7 +53,7 @@ def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
     ----------
     Söderström and Stoica 2002 (instrumental variables in closed loop); Staiger and Stock 1997 (weak instruments).
     """
-    at, moved = found, np.zeros(len(_numbers(found)), dtype=bool)
+    at, moved = found, np.zeros(len(found.values), dtype=bool)
     # Shapes are followed where they go; a few steps are enough, and one where there are none.
     for _ in range(PER_WINDOW):
         sources = _sources(at, given)
@@ -61,7 +61,7 @@ def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
             break
         values, left_out = _stepped(at, sources)
         shapes = slice(len(at.estimates.linear), None)
-        step, error = np.abs(values - _numbers(at))[shapes], jackknife_error(left_out)[shapes]
+        step, error = np.abs(values - at.values)[shapes], jackknife_error(left_out)[shapes]
         hypothesis = at.hypothesis.with_shapes(values[shapes]) if len(step) else at.hypothesis
         moved = np.any([numbers for _, numbers in sources], axis=0)
         at = at._replace(hypothesis=hypothesis, estimates=estimates_of(hypothesis, values, left_out))
@@ -70,23 +70,22 @@ def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
     return at._replace(estimates=_with_untold(found, at.estimates, moved))
 
 
-def _numbers(found: NamedFit) -> Array:
-    """Give coefficients of the base, then shapes."""
-    return np.concatenate([found.estimates.linear, found.hypothesis.shape_values])
-
-
 def _stepped(found: NamedFit, sources: Sequence[_Told]) -> tuple[Array, Array]:
     """Move numbers to where what is left has nothing of what is known of them; and with each block left out."""
-    values, prior = _numbers(found), known_before(found.hypothesis)
+    values, prior = found.values, known_before(found.hypothesis)
     change, without = np.zeros(len(values)), np.zeros((len(sources[0].products), len(values)))
     for products, numbers in sources:
-        kept = products[:, np.append(numbers, False)]
+        kept = products[:, :-1][:, numbers]
         # What those before it have moved is no longer left.
         right = kept[:, :, -1] - kept[:, :, :-1] @ change
-        kept = np.concatenate([kept[:, :, np.append(numbers, False)], right[..., None]], axis=2)
-        whole = kept.sum(axis=0)
-        change[numbers] = _solved(whole, values[numbers], prior[numbers])
-        without[:, numbers] = [_solved(sums, values[numbers], prior[numbers]) for sums in whole - kept]
+        kept = np.concatenate([kept[:, :, :-1][:, :, numbers], right[..., None]], axis=2)
+        # Of all blocks, and without each.
+        sums = np.concatenate([kept.sum(axis=0, keepdims=True), kept.sum(axis=0) - kept])
+        matrix, right = sums[:, :, :-1] + np.diag(prior[numbers]), sums[:, :, -1] - (prior * values)[numbers]
+        scale = np.sqrt(np.abs(np.diagonal(matrix, axis1=1, axis2=2)))
+        matrix = matrix / (scale[:, :, None] * scale[:, None, :])
+        solved = np.linalg.solve(matrix, (right / scale)[..., None])[..., 0] / scale
+        change[numbers], without[:, numbers] = solved[0], solved[1:]
     # The only number of an effect may be 0: then there is none.
     shapes = [
         (0.0 if len(each.effect.shapes) == 1 else shape.grid[0], shape.grid[-1])
@@ -116,7 +115,7 @@ def that_stand(found: NamedFit, given: Instruments) -> list[Candidate]:
     ----------
     Anderson and Rubin 1949 (a test that weak instruments do not mislead); Hotelling 1931.
     """
-    sources, nothing, values = _sources(found, given), nothing_by_size(found), _numbers(found)
+    sources, nothing, values = _sources(found, given), nothing_by_size(found), found.values
     stand, every = list[Candidate](), np.arange(len(values))
     for candidate, places in zip(found.hypothesis.chosen, places_of(found.hypothesis), strict=True):
         effect, (linear, shapes) = candidate.effect, (every[place] for place in places)
@@ -240,13 +239,6 @@ def _strength(products: Array) -> Array:
     """
     error = np.sqrt(len(products)) * products.std(axis=0, ddof=1)
     return np.asarray(np.square(np.maximum(products.sum(axis=0), 0.0) / np.where(error > 0, error, np.inf)))
-
-
-def _solved(sums: Array, values: Array, prior: Array) -> Array:
-    """Solve for the change of numbers at values, of products, shape (number, number + 1)."""
-    matrix, right = sums[:, :-1] + np.diag(prior), sums[:, -1] - prior * values
-    scale = np.sqrt(np.abs(np.diag(matrix)))
-    return np.asarray(np.linalg.solve(matrix / np.outer(scale, scale), right / scale) / scale)
 
 
 def _with_untold(before: NamedFit, after: Estimates, moved: BoolArray) -> Estimates:

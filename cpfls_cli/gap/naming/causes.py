@@ -20,7 +20,7 @@ from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, effect_sentence
 from cpfls_cli.gap.naming.odds import likely, odds
 from cpfls_cli.gap.naming.ranking import Scored, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
-from cpfls_cli.gap.naming.search import alternatives, beside_its_like, chance_beside_its_like, in_place_of
+from cpfls_cli.gap.naming.search import alternatives, chance_beside_its_like, in_place_of
 from cpfls_cli.gap.settings import COUNTS, RARE
 from cpfls_cli.rounding import ascending, at_most
 
@@ -51,15 +51,15 @@ def judge_effects(found: NamedFit, effects: Sequence[Effect], rng: np.random.Gen
     for index, share in enumerate(shares(found).tolist()):
         candidate, numbers = chosen[index], estimates.effects[index]
         others = [*chosen[:index], *chosen[index + 1 :]]
-        among = beside_its_like(candidate, others)
-        step = rank_effects(flights, others, effects, settings, None if among else rng, also=(candidate,))
+        chance = chance_beside_its_like(flights, chosen, index, effects, settings)
+        step = rank_effects(flights, others, effects, settings, rng if chance is None else None, also=(candidate,))
         own, *ranking = in_place_of(candidate, step)
         effect = NamedEffect(
             candidate.effect.name,
             candidate,
             estimates.of_effect[index],
             numbers,
-            chance_beside_its_like(flights, chosen, index, effects, settings) if among else step.p_value(own.gain),
+            step.p_value(own.gain) if chance is None else chance,
             share,
             _frequency(own, ranking),
             effect_sentence(candidate.effect, numbers, hypothesis.vehicle),

@@ -65,6 +65,11 @@ class NamedFit(NamedTuple):
     settings: GapSettings
 
     @property
+    def values(self) -> Array:
+        """Coefficients of the base, then shapes, shape (number,)."""
+        return np.concatenate([self.estimates.linear, self.hypothesis.shape_values])
+
+    @property
     def block(self) -> IntArray:
         """Block of each window, shape (window,)."""
         return block_index(self.hypothesis, self.settings)

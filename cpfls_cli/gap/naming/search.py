@@ -144,11 +144,6 @@ def in_place_of(candidate: Candidate, step: RankedStep) -> list[Scored]:
     return [own, *fair, *(scored for scored in ranked[1:] if not _late([scored.candidate]))]
 
 
-def beside_its_like(candidate: Candidate, others: Sequence[Candidate]) -> bool:
-    """Tell whether an effect and another one lie between command and rotors, where each can stand for the other."""
-    return _late([candidate]) and _late(others)
-
-
 def _late(chosen: Sequence[Candidate]) -> bool:
     """Tell whether any effect lies between command and rotors."""
     return any(each.effect.actuation is not None for each in chosen)
@@ -165,16 +160,19 @@ def chance_beside_its_like(
     index: int,
     effects: Sequence[Effect],
     settings: GapSettings,
-) -> float:
-    """Compute how likely it is that an effect between command and rotors adds nothing to its like.
+) -> float | None:
+    """Compute how likely it is that an effect between command and rotors adds nothing to its like; None without any.
 
     Shifted residuals cannot tell: each of these effects moves with the command, and so does what the others leave.
     Compared is therefore what all effects, and the others without it, leave of blocks that their fits did not see, both
     with all shapes moved, by the signed-rank test of Wilcoxon; times the number of effects that could have stood there.
     """
+    others = [*chosen[:index], *chosen[index + 1 :]]
+    if not (_late([chosen[index]]) and _late(others)):
+        return None
     together = system(flights, chosen)
     floor, block = best_floor(together), block_index(together, settings)
-    without = refined(flights, [*chosen[:index], *chosen[index + 1 :]], floor)
+    without = refined(flights, others, floor)
     margin = more_left(_unseen(without, floor, block), _unseen(together, floor, block))
     tried = sum(effect.actuation is not None for effect in effects)
     return min(1.0, tried * chance_of_ranks(margin)) if len(margin) > 1 else 1.0
