@@ -21,6 +21,7 @@ from cpfls_cli.gap.naming.estimate import (
     fitted,
     free_estimates,
     nothing_by_size,
+    size_in_floors,
     sized,
 )
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out, share_removed
@@ -270,7 +271,7 @@ def differences(first: Judgement, last: Judgement, start: RankedStep, judge: Jud
     """
     if last.found.hypothesis.chosen:
         return _other_numbers(first, judge)
-    seen = _size(start.hypothesis.left(fit(start.hypothesis, start.floor)), start.floor)
+    seen = size_in_floors(start.hypothesis.left(fit(start.hypothesis, start.floor)), start.floor)
     held = last.held_out
     # Numbers of the vehicle that took up what only one of the roles has are wrong for the other.
     unseen = smallest(
@@ -306,7 +307,7 @@ def _other_numbers(first: Judgement, judge: Judge) -> tuple[str, ...]:
     own = estimates(refit, channel_weight(refit, unseen.floor), block_index(refit, settings))
     after = refit.left(own.linear)
     share = share_removed(unseen.parameters / unseen.noise, after / unseen.noise, unseen.known)
-    if share < settings.named_share or _size(after * unseen.known, unseen.floor).max() > CLEAR:
+    if share < settings.named_share or size_in_floors(after * unseen.known, unseen.floor).max() > CLEAR:
         return ()
     pairs = (zip(there, here, strict=False) for there, here in zip(trained.effects, own.effects, strict=True))
     return tuple(
@@ -315,8 +316,3 @@ def _other_numbers(first: Judgement, judge: Judge) -> tuple[str, ...]:
         for number, other in chain.from_iterable(pairs)
         if number.name == other.name and (number.high < other.low or other.high < number.low)
     )
-
-
-def _size(residual: Array, floor: Array) -> Array:
-    """Compute the root mean square of each channel in floors, shape (6,)."""
-    return np.asarray(np.sqrt(np.mean((residual / floor) ** 2, axis=0)))

@@ -109,7 +109,12 @@ def _left(hypothesis: System, floor: Array) -> tuple[Array, Array]:
     noise = window_noise(hypothesis, residual, floor)
     if (noise > floor).any():
         residual = hypothesis.left(fit(hypothesis, noise))
-    return noise, np.sqrt(np.mean((residual / noise) ** 2, axis=0))
+    return noise, size_in_floors(residual, noise)
+
+
+def size_in_floors(residual: Array, noise: Array) -> Array:
+    """Compute the root mean square of each channel of a residual, shape (window, 6), over its noise, shape (6,)."""
+    return np.asarray(np.sqrt(np.mean((residual / noise) ** 2, axis=0)))
 
 
 def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:

@@ -68,7 +68,10 @@ def told_apart(found: NamedFit, effects: Sequence[Effect], given: Instruments) -
         if gone and new and not sets.surely_more(names, best):
             *beside, last = new
             alike.append(alternative(tried[gone[0]], tried[last], 1.0, *beside))
-    return Lateness(sets.fits[best], sets.fits[()], sets.chances(best), tuple(alike))
+    # Of one number its own size tells, of several that so much less is left.
+    less = chance_of_ranks(more_left(sets.left[()], sets.left[best]))
+    chances = {name: sets.chance_of(own[0]) if len(own) == 1 else less for name, own in sets.numbers(best).items()}
+    return Lateness(sets.fits[best], sets.fits[()], chances, tuple(alike))
 
 
 @dataclass
@@ -151,13 +154,8 @@ class _Sets:
             first = names if self.surely_more(first, names) else first
         return first
 
-    def chances(self, best: _Names) -> dict[str, float]:
-        """Compute how likely chance makes each effect: its number, or of several that so much less is left."""
-        less = chance_of_ranks(more_left(self.left[()], self.left[best]))
-        numbers = self._numbers(best).items()
-        return {name: self._chance_of(own[0]) if len(own) == 1 else less for name, own in numbers}
-
-    def _numbers(self, names: _Names) -> dict[str, tuple[Estimate, ...]]:
+    def numbers(self, names: _Names) -> dict[str, tuple[Estimate, ...]]:
+        """Give the numbers of each effect of a set."""
         fit = self.fits[names]
         told = zip(fit.hypothesis.chosen, fit.estimates.effects, strict=True)
         return {candidate.effect.name: numbers for candidate, numbers in told if candidate.effect.name in names}
@@ -168,16 +166,16 @@ class _Sets:
         Beside others it is enough of the usual effect that it is not less than anybody has.
         """
         needed, usual = set(), next(iter(self.effects)) if len(names) > 1 else ""
-        for name, (number, *_) in self._numbers(names).items():
+        for name, (number, *_) in self.numbers(names).items():
             if name == usual:
                 stands = number.value >= self.effects[name].shapes[0].grid[0]
             else:
-                stands = self._chance_of(number) <= self.found.settings.significance
+                stands = self.chance_of(number) <= self.found.settings.significance
             if stands and number.value < number.plausible[1]:
                 needed.add(name)
         return needed
 
-    def _chance_of(self, number: Estimate) -> float:
+    def chance_of(self, number: Estimate) -> float:
         """Compute how likely chance makes a time of its size if it is 0, by its interval and what a log is off by.
 
         When a sample was taken is known to one sampling period, and where in it is anybody's guess.

@@ -15,7 +15,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import System, left_over, system, window_noise
 from cpfls_cli.gap.balance.refine import least_squares
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight, dense
-from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted, size_in_floors
 from cpfls_cli.gap.naming.odds import names_of
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, NamedEffect, NotExcited, Unexplained
@@ -33,11 +33,11 @@ def leftover(found: NamedFit, rng: np.random.Generator) -> tuple[Unexplained, ..
     """List the channels of which a fit leaves a gap: size, dependence on signals, narrow band, energy."""
     hypothesis, settings, block = found.hypothesis, found.settings, found.block
     residual = hypothesis.left(found.estimates.linear)
-    in_floors = residual / window_noise(hypothesis, residual, found.floor)
-    sizes = np.sqrt(np.mean(in_floors**2, axis=0))
+    noise = window_noise(hypothesis, residual, found.floor)
+    sizes = size_in_floors(residual, noise)
     states = joined_states([state_signals(f, s) for f, s in zip(hypothesis.flights, hypothesis.signals, strict=True)])
     dependence = rank_dependence(
-        in_floors, hypothesis.flight_index, block, without_actuation(states), settings.shifts, rng
+        residual / noise, hypothesis.flight_index, block, without_actuation(states), settings.shifts, rng
     )
     # The largest of each channel.
     told = {d.channel: d for d in reversed(dependence) if d.p_value <= settings.significance and d.r2 > COUNTS}
