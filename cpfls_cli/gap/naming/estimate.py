@@ -192,17 +192,19 @@ def estimates_of(hypothesis: System, values: Array, left_out: Array) -> Estimate
     """
     rows, vehicle = np.vstack([values, left_out]), hypothesis.vehicle
     (of_vehicle, own), *_ = hypothesis.places
-    parameters = _told(of_vehicle.effect, vehicle, rows[:, own], rows[:, :0])
+    parameters = _with_intervals(of_vehicle.effect, vehicle, rows[:, own], rows[:, :0])
     places = list(zip(hypothesis.chosen, places_of(hypothesis), strict=True))
     return Estimates(
         values[: hypothesis.base.shape[2]],
-        tuple(_told(each.effect, vehicle, rows[:, linear], rows[:, shapes]) for each, (linear, shapes) in places),
+        tuple(
+            _with_intervals(each.effect, vehicle, rows[:, linear], rows[:, shapes]) for each, (linear, shapes) in places
+        ),
         parameters,
         tuple(values[linear] for _, (linear, _) in places),
     )
 
 
-def _told(effect: Effect, vehicle: VehicleSettings, linear: Array, shapes: Array) -> tuple[Estimate, ...]:
+def _with_intervals(effect: Effect, vehicle: VehicleSettings, linear: Array, shapes: Array) -> tuple[Estimate, ...]:
     """Tell numbers of an effect with 95 % confidence intervals: by the jackknife, and what no flight tells.
 
     The first row is of all blocks, the others each of all but one.
