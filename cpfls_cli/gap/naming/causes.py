@@ -51,7 +51,7 @@ def judge_effects(found: NamedFit, effects: Sequence[Effect], rng: np.random.Gen
     for index, share in enumerate(shares(found).tolist()):
         candidate, numbers = chosen[index], estimates.effects[index]
         others = [*chosen[:index], *chosen[index + 1 :]]
-        chance = chance_beside_its_like(flights, chosen, index, effects, settings)
+        chance = chance_beside_its_like(hypothesis, index, effects, settings)
         step = rank_effects(flights, others, effects, settings, rng if chance is None else None, also=(candidate,))
         own, *ranking = in_place_of(candidate, step)
         effect = NamedEffect(

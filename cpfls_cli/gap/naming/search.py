@@ -155,11 +155,7 @@ def _stands_for_two(candidate: Candidate, others: Sequence[Candidate]) -> bool:
 
 
 def chance_beside_its_like(
-    flights: Sequence[WeakFlight],
-    chosen: Sequence[Candidate],
-    index: int,
-    effects: Sequence[Effect],
-    settings: GapSettings,
+    together: System, index: int, effects: Sequence[Effect], settings: GapSettings
 ) -> float | None:
     """Compute how likely it is that an effect between command and rotors adds nothing to its like; None without any.
 
@@ -167,12 +163,11 @@ def chance_beside_its_like(
     Compared is therefore what all effects, and the others without it, leave of blocks that their fits did not see, both
     with all shapes moved, by the signed-rank test of Wilcoxon; times the number of effects that could have stood there.
     """
-    others = [*chosen[:index], *chosen[index + 1 :]]
-    if not (_late([chosen[index]]) and _late(others)):
+    others = [*together.chosen[:index], *together.chosen[index + 1 :]]
+    if not (_late([together.chosen[index]]) and _late(others)):
         return None
-    together = system(flights, chosen)
     floor, block = best_floor(together), block_index(together, settings)
-    without = refined(flights, others, floor)
+    without = refined(together.flights, others, floor)
     margin = more_left(_unseen(without, floor, block), _unseen(together, floor, block))
     tried = sum(effect.actuation is not None for effect in effects)
     return min(1.0, tried * chance_of_ranks(margin)) if len(margin) > 1 else 1.0

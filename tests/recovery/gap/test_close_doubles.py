@@ -8,6 +8,7 @@ import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.ranking import rank_effects
@@ -202,8 +203,8 @@ def test_a_delay_that_is_not_there_is_chance_beside_a_lag():
 
 
 def chances(flights, chosen):
-    effects = [CATALOGUE[each] for each in STILL]
-    return [chance_beside_its_like(flights, chosen, index, effects, SETTINGS) for index in range(len(chosen))]
+    effects, together = [CATALOGUE[each] for each in STILL], system(flights, chosen)
+    return [chance_beside_its_like(together, index, effects, SETTINGS) for index in range(len(chosen))]
 
 
 @pytest.mark.parametrize(
