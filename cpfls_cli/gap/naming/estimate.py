@@ -17,7 +17,7 @@ from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Coefficient, Effect, Shape
 from cpfls_cli.gap.balance.balance_system import System, system, window_noise
-from cpfls_cli.gap.balance.refine import Equations, equations, fit, fit_within_bounds, refitted, shape_columns
+from cpfls_cli.gap.balance.refine import equations, fit, fit_within_bounds, refitted, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.naming.results import Estimate
@@ -146,18 +146,10 @@ def free_estimates(found: NamedFit) -> Estimates:
 
 
 def _estimated(hypothesis: System, weight: Array, block: IntArray, linear: Array, held: BoolArray) -> Estimates:
-    """Add confidence intervals to a fit."""
+    """Add confidence intervals to a fit: without each block all numbers change by one Gauss-Newton step."""
     shapes = hypothesis.shape_values
-    values = np.concatenate([linear, shapes])
     moving_shapes = shape_columns(hypothesis, linear, system(hypothesis.flights).rotor_wrench)
     rows = equations(hypothesis, weight).around(linear, ~held, moving_shapes / weight[..., None])
-    left_out = np.tile(values, (len(np.unique(block)), 1))
-    left_out[:, np.concatenate([~held, np.ones(len(shapes), dtype=bool)])] += _one_step(rows, block)
-    return estimates_of(hypothesis, values, left_out)
-
-
-def _one_step(rows: Equations, block: IntArray) -> Array:
-    """Compute the change of all numbers without each block by one Gauss-Newton step, shape (block, number)."""
     length = np.linalg.norm(rows.columns, axis=0)
     scale = np.where(length > 0, length, 1.0)
     scaled, noise = rows.columns / scale, rows.noise[:, :-1] / scale
@@ -168,7 +160,11 @@ def _one_step(rows: Equations, block: IntArray) -> Array:
         gram.append(x @ x.T - rows.trusted * (n @ n.T))
         moment.append(x @ rows.right[own] - rows.trusted * (n @ rows.noise[own, -1]))
     others = np.sum(gram, axis=0) - np.array(gram) + 1e-9 * np.eye(len(scale))
-    return -np.linalg.solve(others, np.array(moment)[..., None])[..., 0] / scale
+    values = np.concatenate([linear, shapes])
+    left_out = np.tile(values, (len(gram), 1))
+    moving = np.concatenate([~held, np.ones(len(shapes), dtype=bool)])
+    left_out[:, moving] -= np.linalg.solve(others, np.array(moment)[..., None])[..., 0] / scale
+    return estimates_of(hypothesis, values, left_out)
 
 
 def places_of(hypothesis: System) -> list[tuple[slice, slice]]:

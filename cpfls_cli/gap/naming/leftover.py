@@ -170,29 +170,27 @@ def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSetti
     rivals = []
     for effect in named:
         for name in (name for name in CATALOGUE[effect.name].rivals if name not in settings.ignore):
-            missing = _lacked(hypothesis, CATALOGUE[name])
+            missing, to_log = _lacked(hypothesis, CATALOGUE[name])
             if missing and not {"command", "measured_rotor_speed"} & {*missing}:
-                told = f"log {' and '.join(_to_log(hypothesis, missing))}, without which it was not tried"
+                told = f"log {' and '.join(to_log)}, without which it was not tried"
                 rivals.append(Alternative(name, effect.name, np.nan, told))
     return tuple(rivals)
 
 
-def _lacked(hypothesis: System, effect: Effect) -> tuple[str, ...]:
-    """Name the signals that an effect needs and the first flight lacks; none where another flight has them."""
+def _lacked(hypothesis: System, effect: Effect) -> tuple[Sequence[str], Sequence[str]]:
+    """Name the signals that an effect needs and no flight has, and what a log has to hold for them."""
     missing = [effect.missing(signals) for signals in hypothesis.signals]
-    return missing[0] if all(missing) else ()
-
-
-def _to_log(hypothesis: System, missing: Sequence[str]) -> list[str]:
-    return [name.replace("_", " ") for name in hypothesis.signals[0].to_log(missing)]
+    if not all(missing):
+        return (), ()
+    return missing[0], [name.replace("_", " ") for name in hypothesis.signals[0].to_log(missing[0])]
 
 
 def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
-    missing = _lacked(hypothesis, effect)
+    missing, to_log = _lacked(hypothesis, effect)
+    if "command" in missing:
+        return "rotor speeds are measured, so nothing between command and speed shows"
     if missing:
-        if "command" in missing:
-            return "rotor speeds are measured, so nothing between command and speed shows"
-        return f"the flights lack {', '.join(_to_log(hypothesis, missing))}"
+        return f"the flights lack {', '.join(to_log)}"
     if effect.columns is None:
         return ""
     shape = {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes}

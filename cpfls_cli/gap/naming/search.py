@@ -87,9 +87,11 @@ def grown_elsewhere(
 
     Where the best one leaves nothing, nothing is looked for. Two that a filter stands for may have a number more.
     """
+    if not sets:
+        return []
     flights, chosen = step.hypothesis.flights, step.hypothesis.chosen
-    two = bool(sets) and _stands_for_two(chosen[-1], chosen[:-1])
-    if not sets or not (two or step.above_floor > step.worth_a_name()):
+    two = _late(chosen[-1:]) and not _late(chosen[:-1]) and len(chosen[-1].effect.shapes) > 1
+    if not (two or step.above_floor > step.worth_a_name()):
         return []
     own, found = _rescored(step.hypothesis, step), list[Scored]()
     for other in sets:
@@ -136,7 +138,7 @@ def in_place_of(candidate: Candidate, step: RankedStep) -> list[Scored]:
     own = _rescored(system(step.hypothesis.flights, [*others, candidate]), step)
     alike = [each.candidate for each in ranked[1:] if _late([each.candidate]) and np.isfinite(each.gain)]
     tried: list[tuple[Candidate, ...]] = [(*others, each) for each in alike]
-    if _stands_for_two(candidate, others):
+    if len(candidate.effect.shapes) > 1 and not _late(others):
         tried += [(*others, *pair) for pair in combinations(alike, 2)]
     numbers, worth = free_numbers(own.chosen), step.above_floor - own.gain > step.worth_a_name(own.gain)
     moved = [_moved(each, step) for each in tried if worth or free_numbers(each) <= numbers]
@@ -147,11 +149,6 @@ def in_place_of(candidate: Candidate, step: RankedStep) -> list[Scored]:
 def _late(chosen: Sequence[Candidate]) -> bool:
     """Tell whether any effect lies between command and rotors."""
     return any(each.effect.actuation is not None for each in chosen)
-
-
-def _stands_for_two(candidate: Candidate, others: Sequence[Candidate]) -> bool:
-    """Tell whether an effect is the only one between command and rotors and has as many shapes as two others."""
-    return _late([candidate]) and len(candidate.effect.shapes) > 1 and not _late(others)
 
 
 def chance_beside_its_like(
