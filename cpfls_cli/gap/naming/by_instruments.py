@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain, product
 from typing import NamedTuple
 
 import numpy as np
@@ -171,9 +172,10 @@ def untold(before: NamedFit, after: NamedFit) -> list[Effect]:
 
 def foretold_of_left(found: NamedFit, given: Instruments) -> Array:
     """Multiply what is left with what was known of it before, by block: 0 but for chance where nothing is missing."""
-    _, (rows, known, block) = _known_windows(found, given)
-    products = (rows[..., -1] * known[..., -1]).sum(axis=1)
-    return np.bincount(np.unique(block, return_inverse=True)[1], weights=products).astype(np.float64)
+    _, runs = _known_windows(found, given)
+    products = np.concatenate([rows[..., -1] * known[..., -1] for rows, known, _ in runs])
+    block = np.concatenate([block for _, _, block in runs])
+    return np.array([products[block == number].sum() for number in np.unique(block)])
 
 
 def _sources(found: NamedFit, given: Instruments) -> list[_Told]:
@@ -190,13 +192,13 @@ def _sources(found: NamedFit, given: Instruments) -> list[_Told]:
     late = np.array([each.effect.late for each in hypothesis.chosen for _ in each.effect.shapes], dtype=bool)
     left, early = np.append(free, np.ones_like(late)), np.append(np.ones_like(free), ~late)
     windows = _known_windows(found, given)
-    blocks = np.unique(np.concatenate([block for _, _, block in windows]))
-    for place, (rows, known, block) in enumerate(windows):
+    blocks = np.unique(np.concatenate([run.block for run in chain(*windows)]))
+    for place, runs in enumerate(windows):
         products = np.zeros((len(blocks), len(left) + 1, len(left) + 1))
-        for row, number in enumerate(blocks):
+        for (row, number), (rows, known, block) in product(enumerate(blocks), runs):
             own = block == number
             # As of windows half of which overlap.
-            products[row] = np.einsum("wck,wcl->kl", known[own], rows[own], optimize=True) * (2 / PER_WINDOW)
+            products[row] += np.einsum("wck,wcl->kl", known[own], rows[own], optimize=True) * (2 / PER_WINDOW)
         flown = products[products.any(axis=(1, 2))]
         if len(flown) >= ENOUGH_BLOCKS:
             # What a bound tells better than these flights is not told by them.
@@ -264,7 +266,7 @@ def _told_numbers(
 
 
 class _Windows(NamedTuple):
-    """Windows of all runs in floors: what each number moves and last what is left, and what is known of that.
+    """Windows of a run in floors: what each number moves and last what is left, and what is known of that.
 
     Attributes
     ----------
@@ -277,7 +279,7 @@ class _Windows(NamedTuple):
     block: IntArray
 
 
-def _known_windows(found: NamedFit, given: Instruments) -> tuple[_Windows, _Windows]:
+def _known_windows(found: NamedFit, given: Instruments) -> tuple[list[_Windows], list[_Windows]]:
     """Lay windows over runs, and beside them what instruments know; and what was before."""
     hypothesis, linear = found.hypothesis, found.estimates.linear
     windows = dense(hypothesis.flights[0].windows)
@@ -297,15 +299,17 @@ def _known_windows(found: NamedFit, given: Instruments) -> tuple[_Windows, _Wind
         of_run.append(-1.0 - number - len(given.runs) * (middles[-1] // length))
     known = foretold_rows(given, windows, own) if given.kind == "setpoints" else _in_other_runs(given, own, middles)
     new, foretold, _ = news(own, [run[..., -1] for run in own], [run[..., :-1] for run in own])
-    return _joined(own, known, of_path), _joined(new, foretold, of_run)
+    return _told_of(own, known, of_path), _told_of(new, foretold, of_run)
 
 
-def _joined(rows: Sequence[Array], known: Sequence[Array], blocks: Sequence[Array]) -> _Windows:
-    """Join the windows of runs of which something is known; of a shorter list of windows these are the last."""
-    block = np.concatenate([own[len(own) - len(mine) :] for own, mine in zip(blocks, rows, strict=True)])
-    every, theirs = np.concatenate(rows), np.concatenate(known)
-    told = np.isfinite(theirs).all(axis=(1, 2)) & np.isfinite(block)
-    return _Windows(every[told], theirs[told], block[told].astype(np.int64))
+def _told_of(rows: Sequence[Array], known: Sequence[Array], blocks: Sequence[Array]) -> list[_Windows]:
+    """Take windows of which something is known, and their blocks; of a shorter list of windows these are the last."""
+    windows = []
+    for mine, theirs, block in zip(rows, known, blocks, strict=True):
+        last = block[len(block) - len(mine) :]
+        told = np.isfinite(theirs).all(axis=(1, 2)) & np.isfinite(last)
+        windows.append(_Windows(mine[told], theirs[told], last[told].astype(np.int64)))
+    return windows
 
 
 def _in_other_runs(given: Instruments, rows: Sequence[Array], middles: Sequence[IntArray]) -> list[Array]:
