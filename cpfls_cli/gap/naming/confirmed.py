@@ -266,8 +266,8 @@ def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | No
 def differences(first: Judgement, last: Judgement, start: RankedStep, judge: Judge) -> tuple[str, ...]:
     """Say what differs between the flights that were learned from and those held out, where one model cannot fit both.
 
-    First is all that was found in training, last what the held-out flights confirm, and start the look without
-    effects. No sentence comes where the flights agree, in a gap or in none.
+    `first` is all that was found in training, `last` what the held-out flights confirm, and `start` the look without
+    effects. There is no sentence where the flights agree, in a gap or in none.
     """
     if last.found.hypothesis.chosen:
         return _other_numbers(first, judge)

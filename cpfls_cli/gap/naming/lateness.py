@@ -48,8 +48,8 @@ def told_apart(found: NamedFit, effects: Sequence[Effect], given: Instruments) -
     In gusts a fit of all motion takes the loop for the rotors, and a lag for a delay. Effects of one number are tried
     alone and together: each stands that is surely not 0, beside the other too. Where these leave something that was
     known before, more numbers are tried: the right set leaves nothing. Of those that cannot be told apart the one with
-    the fewest numbers is named, and of as many the first of the catalogue, which is the usual one. Found is a fit by
-    instruments, and effects are those that the search tried.
+    the fewest numbers is named, and of as many the first of the catalogue, which is the usual one. `found` is a fit
+    by instruments, and `effects` are those that the search tried.
     """
     tried = {each.name: each for each in effects if each.late and found.hypothesis.can(Candidate(each, {}))}
     if not tried:

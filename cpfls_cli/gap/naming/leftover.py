@@ -92,8 +92,8 @@ def beside_the_unnamed(
     A drag of the fuselage that shows in no channel on its own still takes its part from the drag of the rotors. And a
     formula that is right in slow flight bends in fast flight: where a bend shows, its number is another one beside it.
 
-    Of the effects those are tried that the last look of the search has nothing to add of. Intervals hold what the
-    numbers are with the unnamed effects, whose names come too, and without them.
+    `last` is the look that ended the search, and `effects` are those to be tried. The intervals hold what the numbers
+    are with the unnamed effects, whose names come too, and without them.
     """
     flights, named, settings = found.hypothesis.flights, found.hypothesis.chosen, found.settings
     if not named:

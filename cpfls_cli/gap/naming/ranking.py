@@ -208,8 +208,8 @@ def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: A
 def score(arranged: ScoringMatrix, beside: Beside, hypothesis: System) -> tuple[list[Scored], Array]:
     """Score every candidate, best first, and the best of them on what is chance, shape (shift,).
 
-    That are shifted residuals, which stand behind the residual. Signs and bounds are not used on them, so that chance
-    is given more than its due.
+    Chance is what stands behind the residual: the same, shifted. Signs and bounds are not used on it, so that chance is
+    given more than its due.
     """
     scored = []
     chance = np.full(beside.before.shape[1] - 1, -np.inf)

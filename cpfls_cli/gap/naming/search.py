@@ -32,8 +32,8 @@ def forward_selection(
 ) -> tuple[tuple[Candidate, ...], list[RankedStep]]:
     """Let sets grow by one effect at a time while the best explains more than chance and a relevant part of the gap.
 
-    Beside the set come the looks at the best one of each size, of which the last has nothing to add. `progress` takes
-    the number of looks done.
+    With the set come the looks at the best one of each size, the last of which has nothing to add. `progress` takes the
+    number of looks done.
     """
     beam: list[tuple[Candidate, ...]] = [()]
     steps: list[RankedStep] = []
