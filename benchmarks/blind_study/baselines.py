@@ -12,8 +12,7 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.diagnose import considered
-from cpfls_cli.gap.naming.ranking import best_floor, block_index
-from cpfls_cli.gap.naming.scoring import candidates_of, score, scoring_matrix
+from cpfls_cli.gap.naming.ranking import best_floor, block_index, candidates_of, score, scoring_matrix
 from cpfls_cli.weak_form.resampling import folds
 from cpfls_cli.weak_form.windows import common_windows
 
@@ -88,7 +87,9 @@ def _gains(flights, chosen, effects, settings):
     right = (hypothesis.residual / floor).reshape(-1)
     least = _Normal(matrix, right)
     rows = sum(len(flight) * int(flight.known.sum()) for flight in flights)
-    return [_gain(scored, arranged.base, least, rows) for scored in admitted], floor
+    columns = {candidate.key: own for candidate, own, _ in arranged.candidates}
+    kept = [columns[each.candidate.key][each.coefficients != 0] for each in admitted]
+    return [_gain(*pair, arranged.base, least, rows) for pair in zip(admitted, kept, strict=True)], floor
 
 
 class _Normal:
@@ -110,12 +111,12 @@ class _Normal:
         return square - moment[columns] @ np.linalg.solve(own, moment[columns])
 
 
-def _gain(scored, base, normal, rows):
+def _gain(scored, columns, base, normal, rows):
     effect = scored.candidate.effect
     if effect.unit_coefficient:
-        used, after = base, normal.left(base, int(scored.columns[0]))
+        used, after = base, normal.left(base, int(columns[0]))
     else:
-        used = np.concatenate([base, scored.columns])
+        used = np.concatenate([base, columns])
         after = normal.left(used)
     # An effect without numbers of its own still is one choice more.
     numbers = max(1, len(used) - len(base) + len(effect.shapes))

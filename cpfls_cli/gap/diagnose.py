@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import BoolArray
 from cpfls_cli.changes.judge import changed
 from cpfls_cli.changes.numbers import flight_numbers
 from cpfls_cli.consistency.audit import Audit, audit
@@ -22,19 +22,13 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, has_force
 from cpfls_cli.gap.balance.weak_flight import TURNING, Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
-from cpfls_cli.gap.naming.by_instruments import (
-    by_instruments,
-    that_stand,
-    untold,
-    untold_axes,
-)
+from cpfls_cli.gap.naming.by_instruments import by_instruments, that_stand, untold, untold_axes
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     impossible_ratios,
-    judge_effect,
+    judge_effects,
     likely_sets,
     sensor_fault,
-    shares,
     wrong_numbers,
 )
 from cpfls_cli.gap.naming.confirmed import Judge, Judgement, Refusal, differences, earned
@@ -116,31 +110,27 @@ def diagnose(
     flights = _Flights(prepared.repaired(training), prepared.logged(held), prepared.repaired(held))
     named = _named(flights, settings, rng, progress)
     gusts, quiet, told = None, named.judge.floor, -1
-    if named.judge.remainder(named.judgement.found).unexplained:
+    if named.judge.remainder(named.judgement.found):
         given = known_motion(training)
         gusts = _gusts(named, given, settings, rng)
         # Beside what is named then, more channels may turn out to be nothing but gusts.
         while gusts is not None and gusts.split.any() and gusts.told.sum() > told:
             told, quiet = int(gusts.told.sum()), np.minimum(quiet, gusts.noise(windows))
-            axes = untold_axes(named.judgement.found, given, named.judge.floor, settings)
+            axes = untold_axes(named.judgement.found, given)
             flights = flights.in_air(gusts, axes, known_motion(held))
             named = _by_instruments(_named(flights, settings, rng, progress), given, settings)
             gusts = _gusts(named, given, settings, rng)
-    weak, (hypothesis, _, estimates), held_out = flights.training, *named.judgement
+    weak, (found, held_out) = flights.training, named.judgement
+    hypothesis, estimates = found.hypothesis, found.estimates
     progress(0.75, "rivals")
-    effect_shares = shares(weak, hypothesis.chosen, estimates, named.judge.floor)
     # What makes rotors late in gusts instruments have decided.
     tried = [each for each in named.effects if gusts is None or not each.late]
-    wider, unnamed = beside_the_unnamed(named.judgement.found, named.steps[-1], tried, settings, rng)
+    wider, unnamed = beside_the_unnamed(found, named.steps[-1], tried, rng)
     pairs = zip(hypothesis.chosen, estimates.effects, wider.effects, strict=True)
     held_by = tuple(own if each.effect.name in named.sure else with_it for each, own, with_it in pairs)
     estimates = replace(wider, effects=held_by)
-    judged = [
-        named.in_gusts(
-            judge_effect(weak, hypothesis.chosen, index, estimates, float(share), named.effects, settings, rng)
-        )
-        for index, share in enumerate(effect_shares)
-    ]
+    told_of = judge_effects(found._replace(estimates=estimates), named.effects, rng)
+    judged = [named.in_gusts(each) for each in told_of]
     progress(0.9, "sensor faults")
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
     torque_alone = _torque_alone(weak, settings, named.effects)
@@ -224,14 +214,14 @@ def _named(
     judge = Judge(*flights[:3], steps[-1].floor, settings, rng, flights.given)
     first = judge.judge(found)
     judgement, unconfirmed = judge.confirmed(first)
-    differ = differences(first, judgement, steps[0], judge, settings)
+    differ = differences(first, judgement, steps[0], judge)
     return _Named(effects, steps, judge, first if differ else judgement, [*refusals, *unconfirmed], differ)
 
 
 def _gusts(named: _Named, given: Instruments, settings: GapSettings, rng: np.random.Generator) -> Air | None:
     """Find gusts in what is left of the training flights."""
-    hypothesis, block, estimates = named.judgement.found
-    return air(hypothesis, estimates.linear, block, given, settings, rng)
+    found = named.judgement.found
+    return air(found.hypothesis, found.estimates.linear, found.block, given, settings, rng)
 
 
 def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) -> _Named:
@@ -241,20 +231,20 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
     """
     judge, refusals, fit = named.judge, list(named.refusals), named.judgement.found
     while True:
-        found = by_instruments(fit, given, judge.floor, settings)
-        stand = that_stand(found, given, judge.floor, settings)
+        found = by_instruments(fit, given)
+        stand = that_stand(found, given)
         names = {each.effect.name for each in stand}
         out = [each.effect for each in found.hypothesis.chosen if each.effect.name not in names]
         fewer = fitted(judge.training, stand, judge.floor, settings)
         # A gap above the gusts is none of them: what it takes to explain it stands.
-        if not out or (_left(fewer, judge.floor) > np.maximum(_left(found, judge.floor), CLEAR)).any():
+        if not out or (fewer.left > np.maximum(found.left, CLEAR)).any():
             break
         for effect in out:
             what = "".join(f"all that it adds to {name}" for name in effect.holds & names) or "it"
             refusals.append(Refusal(effect.name, f"judged by what instruments tell, {what} may be 0"))
         fit = fewer
     loose = tuple(effect.name for effect in untold(fit, found))
-    late = told_apart(found, named.effects, given, judge.floor, settings)
+    late = told_apart(found, named.effects, given)
     judgement, without = judge.judge(late.found), judge.judge(late.without)
     left, more = (each.held_out.size(each.held_out.after).floors for each in (judgement, without))
     if not late.chances or np.nanmax(more**2 - left**2) < VISIBLE**2:
@@ -265,11 +255,6 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
             if each.effect.late
         ]
     return named._replace(judgement=judgement, refusals=refusals, alike=late.alike, sure=late.chances, untold=loose)
-
-
-def _left(found: NamedFit, floor: Array) -> Array:
-    """Compute the root mean square that a fit leaves of each channel, shape (6,), floors."""
-    return np.asarray(np.sqrt(np.mean((found.hypothesis.left(found.estimates.linear) / floor) ** 2, axis=0)))
 
 
 def _doubts(
@@ -351,7 +336,7 @@ def _concluded(
     flown: tuple[Sequence[Recording], Sequence[Recording]],
     settings: GapSettings,
 ) -> Diagnosis:
-    (hypothesis, _, estimates), held_out = found.judgement
+    (hypothesis, estimates, *_), held_out = found.judgement
     remainder = found.judge.remainder(found.judgement.found)
     named = ascending((each.effect for each in judged), lambda effect: -effect.share)
     effects = [*faults, *named]
@@ -366,14 +351,14 @@ def _concluded(
         # Faults and wrong numbers alone: of all the gap, where one is left, or numbers in still air are not most of it.
         removed = held_out.shares(as_given=True)
         by_numbers = numbers is not None and still and min(removed.values()) < settings.partial_share
-        removed = removed if effects and (remainder.unexplained or by_numbers) else {}
+        removed = removed if effects and (remainder or by_numbers) else {}
     share = min(removed.values(), default=1.0)
     told = [*found.alike, *(rival for each in judged for rival in each.alternatives)]
     once = {(rival.name, rival.instead_of, rival.beside): rival for rival in told}
     rivals = (*once.values(), *untried(hypothesis, named, settings))
     gap = held_out.size(held_out.before).floors
     least = settings.named_share
-    known = [each for each in remainder.unexplained if matters(each, gap, least)] if effects else remainder.unexplained
+    known = [each for each in remainder if matters(each, gap, least)] if effects else remainder
     stays = gap_stays(
         held_out.size(held_out.parameters).floors, held_out.size(held_out.after).floors, least, len(named)
     )
@@ -393,7 +378,7 @@ def _concluded(
         tuple(faults if refused else effects),
         tuple(named) if refused else (),
         rivals,
-        tuple(known) if verdict is GapVerdict.NAMED else remainder.unexplained,
+        tuple(known) if verdict is GapVerdict.NAMED else remainder,
         not_excited(hypothesis, [e for n, e in CATALOGUE.items() if n not in settings.ignore], floor),
         {number.name: number for number in estimates.parameters},
         share,

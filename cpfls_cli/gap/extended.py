@@ -170,10 +170,10 @@ def extend(
     found = fitted(flights, start.chosen, floor, settings)
     if gusty_floor is not None:
         given = known_motion(training)
-        untold = untold_axes(found, given, floor, settings)
+        untold = untold_axes(found, given)
         flights, logged, repaired = ([f.as_stated(untold) for f in each] for each in (flights, logged, repaired))
-        found = by_instruments(fitted(flights, start.chosen, floor, settings), given, floor, settings)
-    hypothesis, _, estimates = found
+        found = by_instruments(fitted(flights, start.chosen, floor, settings), given)
+    hypothesis, estimates, *_ = found
     unseen = held_out(logged, repaired, hypothesis, estimates.linear, floor)
     _require_smaller(unseen)
     model = ExtendedModel.of(base, hypothesis, estimates, audit)

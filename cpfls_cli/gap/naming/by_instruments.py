@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, product
 from typing import NamedTuple
 
 import numpy as np
@@ -14,30 +14,17 @@ from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance.balance_system import System, system
+from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit_within_bounds, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate, dense
-from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of, nothing_by_size
-from cpfls_cli.gap.naming.scoring import known_before
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of, nothing_by_size, places_of
+from cpfls_cli.gap.naming.ranking import known_before
+from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.residual.air import foretold_rows
-from cpfls_cli.gap.settings import CHANCE, GapSettings
+from cpfls_cli.gap.settings import CHANCE
 from cpfls_cli.playback.constants import ENOUGH_BLOCKS, STRONG
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.playback.newness import PER_WINDOW, news
-
-
-class _Run(NamedTuple):
-    """Windows of a run in floors: what each number moves and last what is left, and what is known of that.
-
-    Attributes
-    ----------
-    rows, known : array, shape (window, 6, number + 1)
-    block : array of int, shape (window,)
-    """
-
-    rows: Array
-    known: Array
-    block: IntArray
 
 
 class _Told(NamedTuple):
@@ -55,122 +42,91 @@ class _Told(NamedTuple):
     numbers: BoolArray
 
 
-def by_instruments(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> NamedFit:
+def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
     """Fit a hypothesis anew to what instruments know of its flights.
 
     With X what each number moves along a run, r what is left, and Z what instruments know of X, the numbers change by d
     with ``sum Z^T (r - X d) = 0``. A gust goes with X, which the loop moves to answer it, and not with Z. Numbers that
-    instruments hardly tell stay as they were. Bounds count as standard deviations of a normal prior, as in the search.
-
-    Parameters
-    ----------
-    given : Instruments
-        Of the same flights.
-    floor : array, shape (6,)
-
-    Returns
-    -------
-    NamedFit
-        The same effects; as it was where the flights are too short to tell errors.
+    instruments hardly tell stay as they were, and all do where the flights are too short to tell errors. Bounds count
+    as standard deviations of a normal prior, as in the search.
 
     References
     ----------
     Söderström and Stoica 2002 (instrumental variables in closed loop); Staiger and Stock 1997 (weak instruments).
     """
-    at, moved = found, np.zeros(len(_numbers(found)), dtype=bool)
+    at, moved = found, np.zeros(len(found.values), dtype=bool)
     # Shapes are followed where they go; a few steps are enough, and one where there are none.
     for _ in range(PER_WINDOW):
-        sources = _sources(at, given, floor, settings)
+        sources = _sources(at, given)
         if not sources:
             break
         values, left_out = _stepped(at, sources)
         shapes = slice(len(at.estimates.linear), None)
-        step, error = np.abs(values - _numbers(at))[shapes], jackknife_error(left_out)[shapes]
+        step, error = np.abs(values - at.values)[shapes], jackknife_error(left_out)[shapes]
         hypothesis = at.hypothesis.with_shapes(values[shapes]) if len(step) else at.hypothesis
         moved = np.any([numbers for _, numbers in sources], axis=0)
-        at = NamedFit(hypothesis, found.block, estimates_of(hypothesis, values, left_out))
+        at = at._replace(hypothesis=hypothesis, estimates=estimates_of(hypothesis, values, left_out))
         if np.all(10 * step <= error):
             break
-    return at._replace(estimates=_told(found, at.estimates, moved))
-
-
-def _numbers(found: NamedFit) -> Array:
-    """Give coefficients of the base, then shapes."""
-    return np.concatenate([found.estimates.linear, found.hypothesis.shape_values])
+    return at._replace(estimates=_with_untold(found, at.estimates, moved))
 
 
 def _stepped(found: NamedFit, sources: Sequence[_Told]) -> tuple[Array, Array]:
     """Move numbers to where what is left has nothing of what is known of them; and with each block left out."""
-    values, prior = _numbers(found), known_before(found.hypothesis)
+    values, prior = found.values, known_before(found.hypothesis)
     change, without = np.zeros(len(values)), np.zeros((len(sources[0].products), len(values)))
     for products, numbers in sources:
-        kept = products[:, np.append(numbers, False)]
+        kept = products[:, :-1][:, numbers]
         # What those before it have moved is no longer left.
         right = kept[:, :, -1] - kept[:, :, :-1] @ change
-        kept = np.concatenate([kept[:, :, np.append(numbers, False)], right[..., None]], axis=2)
-        whole = kept.sum(axis=0)
-        change[numbers] = _solved(whole, values[numbers], prior[numbers])
-        without[:, numbers] = [_solved(sums, values[numbers], prior[numbers]) for sums in whole - kept]
+        kept = np.concatenate([kept[:, :, :-1][:, :, numbers], right[..., None]], axis=2)
+        # Of all blocks, and without each.
+        sums = np.concatenate([kept.sum(axis=0, keepdims=True), kept.sum(axis=0) - kept])
+        matrix, right = sums[:, :, :-1] + np.diag(prior[numbers]), sums[:, :, -1] - (prior * values)[numbers]
+        scale = np.sqrt(np.abs(np.diagonal(matrix, axis1=1, axis2=2)))
+        matrix = matrix / (scale[:, :, None] * scale[:, None, :])
+        solved = np.linalg.solve(matrix, (right / scale)[..., None])[..., 0] / scale
+        change[numbers], without[:, numbers] = solved[0], solved[1:]
     # The only number of an effect may be 0: then there is none.
     shapes = [
-        (0.0 if len(each.effect.shapes) == 1 else s.grid[0], s.grid[-1])
+        (0.0 if len(each.effect.shapes) == 1 else shape.grid[0], shape.grid[-1])
         for each in found.hypothesis.chosen
-        for s in each.effect.shapes
+        for shape in each.effect.shapes
     ]
     ends = np.array([(-np.inf, np.inf)] * len(found.estimates.linear) + shapes)
     return np.clip(values + change, *ends.T), np.clip(values + without, *ends.T)
 
 
-def untold_axes(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> BoolArray:
-    """Mark the body axes of whose inertia instruments tell nothing, shape (3,): in gusts a fit shows that of the loop.
-
-    Parameters
-    ----------
-    found : NamedFit
-    given : Instruments
-        Of the same flights.
-    floor : array, shape (6,)
-    """
+def untold_axes(found: NamedFit, given: Instruments) -> BoolArray:
+    """Mark the body axes, shape (3,), of whose inertia instruments tell nothing: a fit shows that of the loop."""
     told, vehicle = np.zeros(3, dtype=bool), found.hypothesis.places[0][1]
-    for _, numbers in _sources(found, given, floor, settings):
+    for _, numbers in _sources(found, given):
         told |= numbers[vehicle][:3]
     return ~told
 
 
-def that_stand(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> list[Candidate]:
+def that_stand(found: NamedFit, given: Instruments) -> list[Candidate]:
     """Keep the effects that are not 0 by what instruments tell, and what an effect holds where all else of it may be 0.
 
     Where an effect is 0, what is left without it does not go with what instruments know of it. That is asked at its
     shapes instead of whether its numbers may be 0, which instruments may tell badly from each other: a drag from the
     wind that it acts in. One that they do not tell is asked by its interval.
 
-    Parameters
-    ----------
-    found : NamedFit
-        By instruments.
-    given : Instruments
-        Of the same flights.
-    floor : array, shape (6,)
-
     References
     ----------
     Anderson and Rubin 1949 (a test that weak instruments do not mislead); Hotelling 1931.
     """
-    sources = _sources(found, given, floor, settings)
-    nothing, places = nothing_by_size(found), {candidate.key: place for candidate, place in found.hypothesis.places}
-    values = _numbers(found)
-    first, stand = len(found.estimates.linear), list[Candidate]()
-    for candidate in found.hypothesis.chosen:
-        effect, shapes = candidate.effect, np.arange(first, first := first + len(candidate.effect.shapes))
-        linear = np.arange(len(values))[places.get(candidate.key, slice(0))]
+    sources, nothing, values = _sources(found, given), nothing_by_size(found), found.values
+    stand, every = list[Candidate](), np.arange(len(values))
+    for candidate, places in zip(found.hypothesis.chosen, places_of(found.hypothesis), strict=True):
+        effect, (linear, shapes) = candidate.effect, (every[place] for place in places)
         chance = _chance_of(sources, linear, shapes, values)
         if chance > CHANCE if np.isfinite(chance) else effect.name in nothing:
             continue
         for held in (CATALOGUE[name] for name in effect.holds):
             known = {number.name for number in held.numbers}
-            own = [number.name not in known for number in effect.numbers]
-            beyond = np.concatenate([linear, shapes])[own]
-            if _chance_of(sources, beyond, shapes[:0], values) > settings.significance:
+            beyond = np.concatenate([linear, shapes])[[number.name not in known for number in effect.numbers]]
+            if _chance_of(sources, beyond, shapes[:0], values) > found.settings.significance:
                 candidate = Candidate(held, {shape.name: candidate.shape[shape.name] for shape in held.shapes})
         stand.append(candidate)
     return stand
@@ -181,10 +137,11 @@ def _chance_of(sources: Sequence[_Told], own: IntArray, shapes: IntArray, values
 
     A source is asked of a number that another one tells as well. NaN where none knows any of them.
     """
-    asked, chances = np.isin(np.arange(len(values)), own), list[float]()
+    chances = list[float]()
+    asked = np.isin(np.arange(len(values)), own)
     for products, numbers in sources:
         flown = products[products.any(axis=(1, 2))]
-        known, others = asked & (_strength(flown) > STRONG), numbers & ~asked
+        known, others = asked & (_strength(np.diagonal(flown, axis1=1, axis2=2)[:, :-1]) > STRONG), numbers & ~asked
         others[shapes] = False
         if known.any() and len(flown) >= ENOUGH_BLOCKS + known.sum():
             chances.append(_chance(flown, known, others, values))
@@ -213,46 +170,39 @@ def untold(before: NamedFit, after: NamedFit) -> list[Effect]:
     return [each.effect for each, was, now in numbers if was is now]
 
 
-def foretold_of_left(
-    hypothesis: System, linear: Array, given: Instruments, floor: Array, settings: GapSettings, *, late: bool
-) -> Array:
+def foretold_of_left(found: NamedFit, given: Instruments, *, late: bool) -> Array:
     """Multiply what is left with what is known of it, by block: 0 but for chance where nothing is missing.
 
-    Parameters
-    ----------
-    linear : array, shape (column,)
-        Coefficients of its base.
-    given : Instruments
-        Of the same flights.
-    floor : array, shape (6,)
-    late : bool
-        Whether it is asked what is late, which what was before tells by far better than what was asked.
+    What is `late` is told by far better by what was before than by what was asked.
     """
-    total: dict[int, float] = {}
-    asked, before = (list(runs) for runs in _runs(hypothesis, linear, given, floor, settings))
-    known = late or not any(len(run.block) for run in asked)
-    for run in before if known else asked:
-        for block in np.unique(run.block):
-            own = run.block == block
-            total[block] = total.get(block, 0.0) + float((run.rows[own, :, -1] * run.known[own, :, -1]).sum())
-    return np.array([total[block] for block in sorted(total)])
+    asked, before = _known_windows(found, given)
+    runs = before if late or not any(len(block) for _, _, block in asked) else asked
+    products = np.concatenate([rows[..., -1] * known[..., -1] for rows, known, _ in runs])
+    block = np.concatenate([block for _, _, block in runs])
+    return np.array([products[block == number].sum() for number in np.unique(block)])
 
 
-def _sources(found: NamedFit, given: Instruments, floor: Array, settings: GapSettings) -> list[_Told]:
+def _sources(found: NamedFit, given: Instruments) -> list[_Told]:
     """List what tells numbers: what was asked; and what was before those that this does not tell, and what is late.
 
-    A linear answer to setpoints tells lateness by far worse.
+    Of the vehicle only those of the config: where it is measured, and what couples the rates, shows where several axes
+    turn at once, which instruments hardly tell. A linear answer to setpoints tells lateness by far worse.
     """
-    hypothesis = found.hypothesis
-    left, prior, sources = _movable(hypothesis, floor), known_before(hypothesis), list[_Told]()
-    late = [each.effect.late for each in hypothesis.chosen for _ in each.effect.shapes]
-    early = np.append(np.ones(len(left) - len(late), dtype=bool), np.logical_not(late))
-    of_source = [list(runs) for runs in _runs(hypothesis, found.estimates.linear, given, floor, settings)]
-    blocks = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(run.block for run in chain(*of_source))]))
-    for place, runs in enumerate(of_source):
+    hypothesis, prior, sources = found.hypothesis, known_before(found.hypothesis), list[_Told]()
+    weight = np.tile(found.floor, (len(hypothesis.residual), 1))
+    free = ~fit_within_bounds(hypothesis, weight, of_vehicle=True)[1] & hypothesis.base.any(axis=(0, 1))
+    vehicle, of_vehicle = hypothesis.places[0]
+    free[of_vehicle] &= np.isin([each.name for each in vehicle.effect.coefficients], list(NUMBERS))
+    late = np.array([each.effect.late for each in hypothesis.chosen for _ in each.effect.shapes], dtype=bool)
+    left, early = np.append(free, np.ones_like(late)), np.append(np.ones_like(free), ~late)
+    windows = _known_windows(found, given)
+    blocks = np.unique(np.concatenate([run.block for run in chain(*windows)]))
+    for place, runs in enumerate(windows):
         products = np.zeros((len(blocks), len(left) + 1, len(left) + 1))
-        for row, block in enumerate(blocks):
-            products[row] = sum(_crossed(run, run.block == block) for run in runs)
+        for (row, number), (rows, known, block) in product(enumerate(blocks), runs):
+            own = block == number
+            # As of windows half of which overlap.
+            products[row] += np.einsum("wck,wcl->kl", known[own], rows[own], optimize=True) * (2 / PER_WINDOW)
         flown = products[products.any(axis=(1, 2))]
         if len(flown) >= ENOUGH_BLOCKS:
             # What a bound tells better than these flights is not told by them.
@@ -263,96 +213,85 @@ def _sources(found: NamedFit, given: Instruments, floor: Array, settings: GapSet
     return sources
 
 
-def _movable(hypothesis: System, floor: Array) -> BoolArray:
-    """Mark numbers that are free, coefficients of the base and then shapes, shape (number,).
-
-    Of the vehicle only those of the config: where it is measured, and what couples the rates, shows where several axes
-    turn at once, which instruments hardly tell.
-    """
-    _, held = fit_within_bounds(hypothesis, np.tile(floor, (len(hypothesis.residual), 1)), of_vehicle=True)
-    free = ~held & hypothesis.base.any(axis=(0, 1))
-    of_vehicle = hypothesis.places[0][1]
-    free[of_vehicle] &= np.isin([each.name for each in hypothesis.free[0].effect.coefficients], list(NUMBERS))
-    return np.concatenate([free, np.ones(len(hypothesis.shapes), dtype=bool)])
-
-
 def _strong(crossed: Array, numbers: BoolArray) -> BoolArray:
     """Leave the numbers that are told each beside all others; of those that are not, the weakest goes first.
+
+    Of what is known of each number, and of what it moves, that counts which no other explains.
 
     References
     ----------
     Sanderson and Windmeijer 2016 (the strength of instruments of one number beside others).
     """
-    alone = _strength(crossed)
-    kept = numbers & (alone > STRONG)
-    while (unclear := kept & (_strength(_beside_others(crossed, kept)) <= STRONG)).any():
-        kept[np.argmin(np.where(unclear, alone, np.inf))] = False
-    return kept
+    alone = _strength(np.diagonal(crossed, axis1=1, axis2=2)[:, :-1])
+    kept = np.flatnonzero(numbers & (alone > STRONG))
+    while len(kept):
+        own = crossed[:, kept[:, None], kept]
+        scale = np.sqrt(np.diagonal(own.sum(axis=0)))
+        own = own / np.outer(scale, scale)
+        inverse = np.linalg.pinv(own.sum(axis=0))
+        inverse_alone = np.diag(inverse)
+        beside = np.einsum("ij,bjk,ki->bi", inverse / inverse_alone[:, None], own, inverse / inverse_alone)
+        unclear = kept[_strength(beside) <= STRONG]
+        if not len(unclear):
+            break
+        kept = kept[kept != unclear[np.argmin(alone[unclear])]]
+    return np.isin(np.arange(len(numbers)), kept)
 
 
-def _beside_others(crossed: Array, kept: BoolArray) -> Array:
-    """Keep of what is known of each number, and of what it moves, what no other explains: diagonals of the products."""
-    own = crossed[:, :-1, :-1][:, kept][:, :, kept]
-    scale = np.sqrt(np.diagonal(own.sum(axis=0)))
-    own = own / np.outer(scale, scale)
-    inverse = np.linalg.pinv(own.sum(axis=0))
-    alone = np.diag(inverse)
-    places, beside = np.flatnonzero(kept), np.zeros_like(crossed)
-    beside[:, places, places] = np.einsum("ij,bjk,ki->bi", inverse / alone[:, None], own, inverse / alone)
-    return beside
+def _strength(products: Array) -> Array:
+    """Compute how sure it is over blocks that each number goes with what is known of it, as F; 0 where it does not.
+
+    Of the product of these two, shape (block, number).
+    """
+    error = np.sqrt(len(products)) * products.std(axis=0, ddof=1)
+    return np.asarray(np.square(np.maximum(products.sum(axis=0), 0.0) / np.where(error > 0, error, np.inf)))
 
 
-def _strength(crossed: Array) -> Array:
-    """Compute how sure it is over blocks that each number goes with what is known of it, as F; 0 where it does not."""
-    each = np.diagonal(crossed[:, :-1, :-1], axis1=1, axis2=2)
-    error = np.sqrt(len(each)) * each.std(axis=0, ddof=1)
-    return np.asarray(np.square(np.maximum(each.sum(axis=0), 0.0) / np.where(error > 0, error, np.inf)))
-
-
-def _solved(sums: Array, values: Array, prior: Array) -> Array:
-    """Solve for the change of numbers at values, of products, shape (number, number + 1)."""
-    matrix, right = sums[:, :-1] + np.diag(prior), sums[:, -1] - prior * values
-    scale = np.sqrt(np.abs(np.diag(matrix)))
-    return np.asarray(np.linalg.solve(matrix / np.outer(scale, scale), right / scale) / scale)
-
-
-def _crossed(run: _Run, of_block: BoolArray) -> Array:
-    """Sum products of what is known of each number and what all of them move, as of windows half of which overlap."""
-    known, rows = run.known[of_block], run.rows[of_block]
-    return np.asarray(np.einsum("wck,wcl->kl", known, rows, optimize=True) * (2 / PER_WINDOW))
-
-
-def _told(before: NamedFit, after: Estimates, moved: BoolArray) -> Estimates:
+def _with_untold(before: NamedFit, after: Estimates, moved: BoolArray) -> Estimates:
     """Keep the intervals of effects and numbers of the vehicle that instruments do not tell."""
-    hypothesis = before.hypothesis
-    places = {candidate.key: place for candidate, place in hypothesis.places}
-    first, effects = hypothesis.base.shape[2], []
-    for candidate, was, now in zip(hypothesis.chosen, before.estimates.effects, after.effects, strict=True):
-        effect, shapes = candidate.effect, slice(first, first := first + len(candidate.effect.shapes))
-        own = [*moved[places.get(candidate.key, slice(0))], *moved[shapes]]
-        if not any(own):
-            effects.append(was)
-            continue
-        told = {number.name for number, there in zip(effect.numbers, own, strict=False) if there}
-        stood = {} if effect.physical else {each.name: each for each in was if each.name not in told}
-        effects.append(tuple(stood.get(number.name, number) for number in now))
-    names = [each.name for each in hypothesis.free[0].effect.coefficients]
-    told = {name for name, there in zip(names, moved, strict=False) if there}
-    own_numbers = {each.name: each for each in before.estimates.parameters}
-    parameters = tuple(each if each.name in told else own_numbers.get(each.name, each) for each in after.parameters)
+    (vehicle, of_vehicle), *_ = before.hypothesis.places
+    parameters = _told_numbers(vehicle.effect, moved[of_vehicle], before.estimates.parameters, after.parameters)
+    effects, places = [], places_of(before.hypothesis)
+    pairs = zip(before.hypothesis.chosen, places, before.estimates.effects, after.effects, strict=True)
+    for (effect, _), (linear, shapes), was, now in pairs:
+        own = np.concatenate([moved[linear], moved[shapes]])
+        of_columns = now if effect.physical else _told_numbers(effect, own, was, now)
+        effects.append(of_columns if own.any() else was)
     return replace(after, effects=tuple(effects), parameters=parameters)
 
 
-def _runs(
-    hypothesis: System, linear: Array, given: Instruments, floor: Array, settings: GapSettings
-) -> tuple[Iterator[_Run], Iterator[_Run]]:
+def _told_numbers(
+    effect: Effect, told: BoolArray, was: Sequence[Estimate], now: Sequence[Estimate]
+) -> tuple[Estimate, ...]:
+    """Take the numbers of an effect that are told, and leave the others as they were."""
+    names = {number.name for number, there in zip(effect.numbers, told, strict=False) if there}
+    stood = {number.name: number for number in was if number.name not in names}
+    return tuple(stood.get(number.name, number) for number in now)
+
+
+class _Windows(NamedTuple):
+    """Windows of a run in floors: what each number moves and last what is left, and what is known of that.
+
+    Attributes
+    ----------
+    rows, known : array, shape (window, 6, number + 1)
+    block : array of int, shape (window,)
+    """
+
+    rows: Array
+    known: Array
+    block: IntArray
+
+
+def _known_windows(found: NamedFit, given: Instruments) -> tuple[list[_Windows], list[_Windows]]:
     """Lay windows over runs, and beside them what instruments know; and what was before."""
+    hypothesis, linear = found.hypothesis, found.estimates.linear
     windows = dense(hypothesis.flights[0].windows)
     there = system([replace(flight, windows=windows, seen={}) for flight in hypothesis.flights], hypothesis.chosen)
     columns = [there.base, shape_columns(there, linear), there.left(linear)[..., None]]
-    rows = np.concatenate(columns, axis=2) / floor[:, None]
+    rows = np.concatenate(columns, axis=2) / found.floor[:, None]
     own, middles, of_path, of_run = [], [], [], []
-    length = settings.block_s / windows.period
+    length = found.settings.block_s / windows.period
     for number, run in enumerate(given.runs):
         begins = windows.hop * np.arange((there.flight_index == run.flight).sum())
         inside = (begins >= run.part.start) & (begins + len(windows.weight) <= run.part.stop)
@@ -364,19 +303,22 @@ def _runs(
         of_run.append(-1.0 - number - len(given.runs) * (middles[-1] // length))
     known = foretold_rows(given, windows, own) if given.kind == "setpoints" else _in_other_runs(given, own, middles)
     new, foretold, _ = news(own, [run[..., -1] for run in own], [run[..., :-1] for run in own])
-    return _of_blocks(own, known, of_path), _of_blocks(new, foretold, of_run)
+    return _told_of(own, known, of_path), _told_of(new, foretold, of_run)
 
 
-def _of_blocks(rows: Sequence[Array], known: Iterable[Array], blocks: Sequence[Array]) -> Iterator[_Run]:
+def _told_of(rows: Sequence[Array], known: Sequence[Array], blocks: Sequence[Array]) -> list[_Windows]:
     """Take windows of which something is known, and their blocks; of a shorter list of windows these are the last."""
+    windows = []
     for mine, theirs, block in zip(rows, known, blocks, strict=True):
         last = block[len(block) - len(mine) :]
         told = np.isfinite(theirs).all(axis=(1, 2)) & np.isfinite(last)
-        yield _Run(mine[told], theirs[told], last[told].astype(np.int64))
+        windows.append(_Windows(mine[told], theirs[told], last[told].astype(np.int64)))
+    return windows
 
 
-def _in_other_runs(given: Instruments, rows: Sequence[Array], middles: Sequence[IntArray]) -> Iterator[Array]:
+def _in_other_runs(given: Instruments, rows: Sequence[Array], middles: Sequence[IntArray]) -> list[Array]:
     """Average what the other runs have at the same places of the path, shape (window, ...); NaN where there is none."""
+    known = []
     for number, (own, middle) in enumerate(zip(rows, middles, strict=True)):
         total, count = np.zeros_like(own), np.zeros(len(own))
         for other, places in given.repeats.beside[number].items():
@@ -385,4 +327,5 @@ def _in_other_runs(given: Instruments, rows: Sequence[Array], middles: Sequence[
             moved = [np.interp(place[inside], middles[other], column) for column in flat.T]
             total[inside] += np.stack(moved, axis=1).reshape(-1, *own.shape[1:])
             count += inside
-        yield np.where(count[:, None, None] > 0, total / np.maximum(count, 1)[:, None, None], np.nan)
+        known.append(np.where(count[:, None, None] > 0, total / np.maximum(count, 1)[:, None, None], np.nan))
+    return known

@@ -15,13 +15,13 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.gap.balance.balance_system import is_free, system
 from cpfls_cli.gap.balance.refine import fit
-from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence
-from cpfls_cli.gap.naming.ranking import likely, rank_effects
+from cpfls_cli.gap.balance.weak_flight import WeakFlight
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, effect_sentence
+from cpfls_cli.gap.naming.odds import likely, odds
+from cpfls_cli.gap.naming.ranking import Scored, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
-from cpfls_cli.gap.naming.scoring import Scored
-from cpfls_cli.gap.naming.search import alternatives, beside_its_like, chance_beside_its_like, in_place_of, odds
-from cpfls_cli.gap.settings import COUNTS, RARE, GapSettings
+from cpfls_cli.gap.naming.search import alternatives, chance_beside_its_like, in_place_of
+from cpfls_cli.gap.settings import COUNTS, RARE
 from cpfls_cli.rounding import ascending, at_most
 
 _MATTERS = 0.02
@@ -43,47 +43,44 @@ class JudgedEffect:
     odds: Mapping[tuple[str, ...], Array]
 
 
-def judge_effect(
-    flights: Sequence[WeakFlight],
-    chosen: Sequence[Candidate],
-    index: int,
-    estimates: Estimates,
-    share: float,
-    effects: Sequence[Effect],
-    settings: GapSettings,
-    rng: np.random.Generator,
-) -> JudgedEffect:
-    """Judge a chosen effect as if it were the last one to be found.
+def judge_effects(found: NamedFit, effects: Sequence[Effect], rng: np.random.Generator) -> list[JudgedEffect]:
+    """Judge each named effect as if it were the last one to be found."""
+    hypothesis, estimates, settings = found.hypothesis, found.estimates, found.settings
+    flights, chosen = hypothesis.flights, hypothesis.chosen
+    judged = []
+    for index, share in enumerate(shares(found).tolist()):
+        candidate, numbers = chosen[index], estimates.effects[index]
+        others = [*chosen[:index], *chosen[index + 1 :]]
+        chance = chance_beside_its_like(hypothesis, index, effects, settings)
+        step = rank_effects(flights, others, effects, settings, rng if chance is None else None, also=(candidate,))
+        own, *ranking = in_place_of(candidate, step)
+        effect = NamedEffect(
+            candidate.effect.name,
+            candidate,
+            estimates.of_effect[index],
+            numbers,
+            step.p_value(own.gain) if chance is None else chance,
+            share,
+            _frequency(own, ranking),
+            effect_sentence(candidate.effect, numbers, hypothesis.vehicle),
+        )
+        compared = {
+            tuple(each.effect.name for each in other.chosen): odds(own, other, step.above_floor)
+            for other in ranking
+            if np.isfinite(other.gain) and candidate.effect.name not in other.candidate.effect.holds
+        }
+        rivals = tuple(alternatives(own, ranking, step.above_floor, settings))
+        judged.append(JudgedEffect(effect, rivals, compared))
+    return judged
 
-    Parameters
-    ----------
-    index : int
-        Of the effect among them.
-    share : float
-        Of what all effects explain.
-    """
-    candidate = chosen[index]
-    others = [other for other in chosen if other is not candidate]
-    among = beside_its_like(chosen, index)
-    step = rank_effects(flights, others, effects, settings, None if among else rng, also=(candidate,))
-    own, *ranking = in_place_of(flights, chosen, index, step, settings)
-    effect = NamedEffect(
-        candidate.effect.name,
-        candidate,
-        estimates.of_effect[index],
-        estimates.effects[index],
-        chance_beside_its_like(flights, chosen, index, effects, settings) if among else step.p_value(own.gain),
-        share,
-        _frequency(own, ranking),
-        effect_sentence(candidate.effect, estimates.effects[index], flights[0].signals.vehicle),
-    )
-    rivals = tuple(alternatives(own, ranking, step.above_floor, settings))
-    compared = {
-        tuple(each.effect.name for each in other.chosen): odds(own, other, step.above_floor)
-        for other in ranking
-        if np.isfinite(other.gain) and candidate.effect.name not in other.candidate.effect.holds
-    }
-    return JudgedEffect(effect, rivals, compared)
+
+def _frequency(chosen: Scored, ranking: Sequence[Scored]) -> float:
+    """Compute the share of blocks whose omission leaves the effect the best candidate."""
+    if not np.isfinite(chosen.gain):
+        return 0.0
+    error = np.array([each.block_error for each in [chosen, *ranking] if np.isfinite(each.gain)])
+    total = error.sum(axis=1, keepdims=True) - error
+    return float(at_most(total[0], total).all(axis=0).mean())
 
 
 def likely_sets(judged: Sequence[JudgedEffect]) -> tuple[LikelySet, ...]:
@@ -99,44 +96,26 @@ def likely_sets(judged: Sequence[JudgedEffect]) -> tuple[LikelySet, ...]:
     return tuple(each for each in sets if each.likely >= RARE)
 
 
-def _frequency(chosen: Scored, ranking: Sequence[Scored]) -> float:
-    """Compute the share of blocks whose omission leaves the effect the best candidate."""
-    if not np.isfinite(chosen.gain):
-        return 0.0
-    others = [scored.block_error for scored in ranking if np.isfinite(scored.gain)]
-    own, *total = (error.sum() - error for error in (chosen.block_error, *others))
-    return float(np.mean(np.all([at_most(own, other) for other in [own, *total]], axis=0)))
-
-
-def shares(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], estimates: Estimates, floor: Array) -> Array:
-    """Split the explained part of the residual among the effects.
+def shares(found: NamedFit) -> Array:
+    """Split the explained part of the residual among the effects, shape (effect,).
 
     The share of an effect is the part of the explained residual that points its way, in floors; the shares add up to
     1. Effects that work against each other can have more than 1, or less than 0.
-
-    Parameters
-    ----------
-    estimates : Estimates
-        Of the hypothesis with all of them.
-    floor : array, shape (6,)
-
-    Returns
-    -------
-    array, shape (effect,)
     """
+    chosen, estimates = found.hypothesis.chosen, found.estimates
 
     def remaining(kept: Sequence[int]) -> Array:
         """Compute the residual with some of the effects only, at the coefficients of all of them."""
         linear = [estimates.of_effect[index] for index in kept if is_free(chosen[index])]
-        hypothesis = system(flights, [chosen[index] for index in kept])
-        return hypothesis.left(np.concatenate([estimates.of_vehicle, *linear]))
+        hypothesis = system(found.hypothesis.flights, [chosen[index] for index in kept])
+        return hypothesis.left(np.concatenate([estimates.of_vehicle, *linear])) / found.floor
 
     indices = range(len(chosen))
     everything = remaining(indices)
-    total = (remaining(()) - everything) / floor
-    parts = ((remaining([p for p in indices if p != index]) - everything) / floor for index in indices)
+    total = remaining(()) - everything
+    parts = (remaining([other for other in indices if other != index]) - everything for index in indices)
     along = np.array([(part * total).sum() for part in parts])
-    return np.asarray(along / max(abs(along.sum()), 1e-12) if len(along) else along)
+    return np.asarray(along / max(abs(along.sum()), 1e-12))
 
 
 def wrong_numbers(estimates: Estimates, effects: Sequence[NamedEffect], removed: Array) -> NamedEffect | None:
@@ -144,44 +123,28 @@ def wrong_numbers(estimates: Estimates, effects: Sequence[NamedEffect], removed:
 
     Parameters
     ----------
-    effects : sequence of NamedEffect
-        Already named.
     removed : array, shape (6,)
         Part of each channel's gap on unseen flights that refitting the numbers takes off.
     """
     # Each shows in a channel of its own.
     shown = dict(zip(NUMBERS, (*removed[:3], removed[5]), strict=True))
-    wrong = [number for number in estimates.parameters if _is_wrong(number, effects) and shown[number.name] >= COUNTS]
+    named = [
+        (CATALOGUE[each.name].accounts, {number.name: number.value for number in each.coefficients}) for each in effects
+    ]
+    wrong = []
+    for number in (each for each in estimates.parameters if each.name in NUMBERS):
+        accounted = sum(accounts(number.name, values) for accounts, values in named if accounts is not None)
+        # At the rate of errors of names, over all numbers that are asked.
+        sure = len(NUMBERS) * _chance(number) <= RARE and abs(number.value) > max(_MATTERS, accounted)
+        if sure and shown[number.name] >= COUNTS:
+            wrong.append(number)
     if not wrong:
         return None
     share = float(max(shown[number.name] for number in wrong))
     p_value = min(_chance(number) for number in wrong)
-    name, sentence = VEHICLE_NUMBERS.name, VEHICLE_NUMBERS.sentence
-    return NamedEffect(name, None, np.zeros(0), tuple(wrong), p_value, share, 1.0, sentence)
-
-
-def impossible_ratios(numbers: Sequence[Estimate]) -> dict[str, float]:
-    """Give the numbers of the vehicle that no vehicle has, as ratios to the config.
-
-    Parameters
-    ----------
-    numbers : sequence of Estimate
-        Relative errors.
-    """
-    return {number.name: 1 + number.value for number in numbers if number.name in NUMBERS and number.impossible}
-
-
-def _is_wrong(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
-    """Tell whether a number is surely wrong, by as much as matters and more than named effects account for."""
-    if number.name not in NUMBERS:
-        return False
-    accounted = 0.0
-    for effect in effects:
-        accounts = CATALOGUE[effect.name].accounts
-        if accounts is not None:
-            accounted += accounts(number.name, {c.name: c.value for c in effect.coefficients})
-    # At the rate of errors of names, over all numbers that are asked.
-    return len(NUMBERS) * _chance(number) <= RARE and abs(number.value) > max(_MATTERS, accounted)
+    return NamedEffect(
+        VEHICLE_NUMBERS.name, None, np.zeros(0), tuple(wrong), p_value, share, 1.0, VEHICLE_NUMBERS.sentence
+    )
 
 
 def _chance(number: Estimate) -> float:
@@ -190,20 +153,19 @@ def _chance(number: Estimate) -> float:
     return 2 * float(ndtr(-1.96 * abs(number.value) / half)) if half > 0 else 0.0
 
 
+def impossible_ratios(numbers: Sequence[Estimate]) -> dict[str, float]:
+    """Give the numbers of the vehicle that no vehicle has, by their relative errors, as ratios to the config."""
+    return {number.name: 1 + number.value for number in numbers if number.name in NUMBERS and number.impossible}
+
+
 def sensor_fault(
     finding: AuditFinding, as_logged: Sequence[WeakFlight], as_repaired: Sequence[WeakFlight]
 ) -> NamedEffect:
-    """Name a fault of the sensors with the share of the gap that its repair removes.
-
-    Parameters
-    ----------
-    as_logged, as_repaired : sequence of WeakFlight
-        The training flights without and with the repair.
-    """
+    """Name a fault of the sensors with the share of the gap that its repair removes from the training flights."""
     logged, repaired = system(as_logged), system(as_repaired)
     weight = np.sqrt(np.mean(repaired.residual**2, axis=0)) + 1e-12
-    before, after = (s.left(fit(s, weight)) / weight for s in (logged, repaired))
-    share = float(np.clip(1 - (after**2).sum() / max((before**2).sum(), 1e-12), 0, 1))
+    before, after = (((each.left(fit(each, weight)) / weight) ** 2).sum() for each in (logged, repaired))
+    share = float(np.clip(1 - after / max(before, 1e-12), 0, 1))
     effect = CATALOGUE[finding.name]
     assert effect.test is not None, "the audit tests what has a test"
     by_label = dict(zip(effect.test.labels, effect.numbers, strict=True))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import NamedTuple
 
@@ -22,13 +22,15 @@ from cpfls_cli.gap.naming.estimate import (
     fitted,
     free_estimates,
     nothing_by_size,
+    size_in_floors,
     sized,
 )
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out
-from cpfls_cli.gap.naming.leftover import Leftover, leftover
-from cpfls_cli.gap.naming.ranking import RankedStep, block_index, more_left, surely
-from cpfls_cli.gap.naming.results import Estimate
-from cpfls_cli.gap.settings import CLEAR, ERRORS, NOISE, OFF, VISIBLE, GapSettings
+from cpfls_cli.gap.naming.leftover import leftover
+from cpfls_cli.gap.naming.odds import chance_of_ranks, more_left
+from cpfls_cli.gap.naming.ranking import RankedStep, block_index
+from cpfls_cli.gap.naming.results import Estimate, Unexplained
+from cpfls_cli.gap.settings import CHANCE, CLEAR, ERRORS, NOISE, OFF, VISIBLE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending, largest, levelled, smallest, tied
 
@@ -63,38 +65,33 @@ def earned(
     while found.hypothesis.chosen:
         out = nothing_by_size(found)
         if not out:
-            refusal = on_bound(found, floor)
+            refusal = on_bound(found)
             if refusal is None:
                 break
             refusals.append(refusal)
             out = [refusal.name]
-        found = found.without(out, floor, settings)
+        found = found.without(out)
     return found, refusals
 
 
-def on_bound(found: NamedFit, floor: Array) -> Refusal | None:
+def on_bound(found: NamedFit) -> Refusal | None:
     """Find an effect whose main number sits on a bound, or any number that is surely asked for beyond one.
 
     Zero is not such a bound: many coefficients cannot be less.
-
-    Parameters
-    ----------
-    floor : array, shape (6,)
     """
-    chosen = found.hypothesis.chosen
-    for candidate, numbers in zip(chosen, found.estimates.effects, strict=True):
-        names = [shape.name for shape in candidate.effect.shapes]
-        ends = (
+    chosen, effects = found.hypothesis.chosen, found.estimates.effects
+    for (effect, _), numbers in zip(chosen, effects, strict=True):
+        shapes = [shape.name for shape in effect.shapes]
+        at_ends = [
             any(bound and number.low <= bound <= number.high for bound in number.plausible)
             for number in numbers
-            if number.name in names
-        )
-        if len(names) > 1 and all(ends):
-            says = f"{' and '.join(names)} may all be at the bounds of what is possible"
-            return Refusal(candidate.effect.name, says, True)
+            if number.name in shapes
+        ]
+        if len(shapes) > 1 and all(at_ends):
+            return Refusal(effect.name, f"{' and '.join(shapes)} may all be at the bounds of what is possible", True)
     free = None
-    for index, candidate in enumerate(chosen):
-        sizes = sized(candidate.effect, found.estimates.effects[index])
+    for index, (effect, _) in enumerate(chosen):
+        sizes = sized(effect, effects[index])
         bounds = {
             number.name: f"{bound:.3g} {number.unit}"
             for number in sizes
@@ -103,28 +100,25 @@ def on_bound(found: NamedFit, floor: Array) -> Refusal | None:
         }
         if not bounds:
             continue
-        free = free or free_estimates(found.hypothesis, floor, found.block)
-        beyond = [number.name for number in free.effects[index] if number.name in bounds and number.impossible]
-        if beyond:
-            says = f"its {beyond[0]} would surely be beyond what is possible, {bounds[beyond[0]]}"
-            return Refusal(candidate.effect.name, says, True)
-        main = [number.name for number in _main(found, index, sizes, floor) if number.name in bounds]
-        if main:
-            says = f"its {main[0]} sits on the bound of what is possible, {bounds[main[0]]}"
-            return Refusal(candidate.effect.name, says, True)
+        free = free or free_estimates(found)
+        says = "would surely be beyond what is possible"
+        told = [number.name for number in free.effects[index] if number.name in bounds and number.impossible]
+        if not told:
+            says = "sits on the bound of what is possible"
+            told = [name for name in _main(found, index, sizes) if name in bounds]
+        if told:
+            return Refusal(effect.name, f"its {told[0]} {says}, {bounds[told[0]]}", True)
     return None
 
 
-def _main(found: NamedFit, index: int, numbers: Sequence[Estimate], floor: Array) -> Sequence[Estimate]:
-    """Keep the coefficient that explains most; all numbers where they are not coefficients of columns."""
-    candidate = found.hypothesis.chosen[index]
-    linear = found.estimates.of_effect[index]
+def _main(found: NamedFit, index: int, sizes: Sequence[Estimate]) -> list[str]:
+    """Name the coefficient that explains most; all numbers where they are not coefficients of columns."""
+    candidate, linear = found.hypothesis.chosen[index], found.estimates.of_effect[index]
     names = [coefficient.name for coefficient in candidate.effect.coefficients]
     if not names or candidate.effect.physical is not None or len(linear) != len(names):
-        return numbers
-    columns = found.hypothesis.columns(candidate) * linear / floor[:, None]
-    largest = names[int(np.argmax(levelled((columns**2).sum(axis=(0, 1)))))]
-    return [number for number in numbers if number.name == largest]
+        return [number.name for number in sizes]
+    columns = found.hypothesis.columns(candidate) * linear / found.floor[:, None]
+    return [names[int(np.argmax(levelled((columns**2).sum(axis=(0, 1)))))]]
 
 
 class Judgement(NamedTuple):
@@ -161,10 +155,9 @@ class Judge:
         linear = found.estimates.linear
         return Judgement(found, held_out(self.logged, self.repaired, found.hypothesis, linear, self.floor))
 
-    def remainder(self, found: NamedFit) -> Leftover:
+    def remainder(self, found: NamedFit) -> tuple[Unexplained, ...]:
         """Analyse what effects leave of the flights that they were found in."""
-        hypothesis, block, estimates = found
-        return leftover(hypothesis, estimates.linear, self.floor, block, self.settings, self.rng)
+        return leftover(found, self.rng)
 
     def confirmed(self, first: Judgement) -> tuple[Judgement, list[Refusal]]:
         """Drop effects one by one that the held-out flights do not confirm: first what harms, then what is not needed.
@@ -174,12 +167,12 @@ class Judge:
         judgement, refusals = first, []
         while (refusal := self._refused(judgement)) is not None:
             refusals.append(refusal)
-            judgement = self.judge(judgement.found.without([refusal.name], self.floor, self.settings))
+            judgement = self.judge(judgement.found.without([refusal.name]))
         return judgement, refusals
 
     def _refused(self, judgement: Judgement) -> Refusal | None:
         # What was dropped may have held another effect within what is possible.
-        beyond = on_bound(judgement.found, self.floor)
+        beyond = on_bound(judgement.found)
         names = [each.effect.name for each in judgement.found.hypothesis.chosen]
         if beyond is not None or not names:
             return beyond
@@ -195,33 +188,35 @@ class Judge:
                 f"{compared[worst].left[channel]:.2g} floors without it and {after[channel]:.2g} with it",
             )
         unseen = [name for name, one in compared.items() if one.visibly < VISIBLE**2]
-        needless = [name for name in unseen if not self._known_before(judgement, name)]
+        needless = [name for name in unseen if not self._known_before(judgement.found, name)]
         if needless:
             least = smallest(needless, lambda each: compared[each].visibly)
             return Refusal(least, "on the held-out flights the gap is as small without it")
         return _filling(judgement, {name: one for name, one in compared.items() if name not in unseen})
 
-    def _known_before(self, judgement: Judgement, name: str) -> bool:
-        """Tell whether held-out flights in gusts surely leave more that was known before without an effect.
+    def _known_before(self, found: NamedFit, name: str) -> bool:
+        """Tell whether held-out flights in gusts surely leave more that is known of them without an effect.
 
         Rotors answer gusts, so what they do takes squares off that gusts leave, where it is not in the model, too.
         """
         if self.given is None:
             return False
-        hypothesis, _, numbers = judgement.found
-        told = zip(hypothesis.chosen, numbers.of_effect, strict=True)
-        others = [(each, linear) for each, linear in told if each.effect.name != name]
-        without = np.concatenate([numbers.of_vehicle, *(linear for _, linear in others)])
-        kept = system(self.repaired, [each for each, _ in others]), system(self.repaired, hypothesis.chosen)
+        numbers, every = found.estimates, found.hypothesis.chosen
+        told = [(each, own) for each, own in zip(every, numbers.of_effect, strict=True) if each.effect.name != name]
+        without = np.concatenate([numbers.of_vehicle, *(own for _, own in told)])
         left = (
-            foretold_of_left(there, linear, self.given, self.floor, self.settings, late=False)
-            for there, linear in zip(kept, (without, numbers.linear), strict=True)
+            foretold_of_left(
+                found._replace(hypothesis=system(self.repaired, chosen), estimates=replace(numbers, linear=linear)),
+                self.given,
+                late=False,
+            )
+            for chosen, linear in (([each for each, _ in told], without), (every, numbers.linear))
         )
-        return surely(more_left(*left))
+        return chance_of_ranks(more_left(*left)) < CHANCE
 
     def _without(self, judgement: Judgement, name: str) -> Without:
         """Leave an effect out and refit the others."""
-        without = judgement.found.without([name], self.floor, self.settings)
+        without = judgement.found.without([name])
         there = system(self.repaired, without.hypothesis.chosen)
         residual, unseen = there.left(without.estimates.linear), judgement.held_out
         squares = [((each / unseen.noise) ** 2) * unseen.known for each in (residual, unseen.after)]
@@ -281,7 +276,7 @@ def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | No
     off by no more than an error of the floor hides.
     """
     floors = judgement.held_out.size(judgement.held_out.after).floors
-    beyond = OFF**2 * max((one.visibly for one in compared.values()), default=0.0)
+    beyond = OFF**2 * max(one.visibly for one in compared.values())
     for name in ascending(compared, lambda each: compared[each].visibly):
         channel, off = int(np.argmax(levelled(compared[name].seen))), compared[name].visibly
         left = float(floors[channel])
@@ -296,33 +291,22 @@ def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | No
     return None
 
 
-def differences(
-    first: Judgement, last: Judgement, start: RankedStep, judge: Judge, settings: GapSettings
-) -> tuple[str, ...]:
+def differences(first: Judgement, last: Judgement, start: RankedStep, judge: Judge) -> tuple[str, ...]:
     """Say what differs between the flights that were learned from and those held out, where one model cannot fit both.
 
-    Parameters
-    ----------
-    first, last : Judgement
-        Of all that was found in training, and of what the held-out flights confirm.
-    start : SearchStep
-        Without effects.
-
-    Returns
-    -------
-    tuple of str
-        Sentences; none where the flights agree, in a gap or in none.
+    `first` is all that was found in training, `last` what the held-out flights confirm, and `start` the look without
+    effects. There is no sentence where the flights agree, in a gap or in none.
     """
-    seen = _size(start.hypothesis.left(fit(start.hypothesis, start.floor)), start.floor)
+    if last.found.hypothesis.chosen:
+        return _other_numbers(first, judge)
+    seen = size_in_floors(start.hypothesis.left(fit(start.hypothesis, start.floor)), start.floor)
     held = last.held_out
     # Numbers of the vehicle that took up what only one of the roles has are wrong for the other.
     unseen = smallest(
         (held.size(each).floors for each in (held.before, held.parameters)), lambda each: float(np.nanmax(each))
     )
-    if last.found.hypothesis.chosen:
-        return _other_numbers(first, judge, settings)
-    there, here = _largest(seen), _largest(unseen)
     names = [each.effect.name for each in first.found.hypothesis.chosen]
+    there, here = (int(np.nan_to_num(each, nan=-1.0).argmax()) for each in (seen, unseen))
     if seen[there] > CLEAR and not unseen[here] > CLEAR:
         what = f" of what would be {' and '.join(names)}" if names else ""
         return (
@@ -330,18 +314,19 @@ def differences(
             f" held-out flights have none ({unseen[here]:.2g} floors at most): something changed between them, or the"
             " held-out flights do not move in a way that shows it",
         )
-    if unseen[here] > CLEAR and not seen[there] > CLEAR and not judge.remainder(last.found).unexplained:
+    if unseen[here] > CLEAR and not seen[there] > CLEAR and not judge.remainder(last.found):
         return (
             f"the held-out flights have a gap of {unseen[here]:.2g} floors in the {CHANNELS[here]}, and the training"
             f" flights have none ({seen[there]:.2g} floors at most): something changed between them, or only the"
             " held-out flights move in a way that shows it; learn from one of them",
         )
-    return _other_numbers(first, judge, settings) if names else ()
+    return _other_numbers(first, judge) if names else ()
 
 
-def _other_numbers(first: Judgement, judge: Judge, settings: GapSettings) -> tuple[str, ...]:
+def _other_numbers(first: Judgement, judge: Judge) -> tuple[str, ...]:
     """Say that the same effects explain the held-out flights with other numbers, if they do."""
-    hypothesis, unseen = first.found.hypothesis, first.held_out
+    hypothesis, trained, settings = first.found.hypothesis, first.found.estimates, first.found.settings
+    unseen = first.held_out
     # Where no flight was learned from, other numbers do not mean that the flights differ.
     if unseen.unlearned or min(unseen.shares().values()) >= settings.named_share:
         return ()
@@ -349,23 +334,13 @@ def _other_numbers(first: Judgement, judge: Judge, settings: GapSettings) -> tup
     refit = system(judge.repaired, hypothesis.chosen)
     own = estimates(refit, channel_weight(refit, unseen.floor), block_index(refit, settings))
     after = refit.left(own.linear)
-    if unseen.share_removed(unseen.parameters / unseen.noise, after / unseen.noise) < settings.named_share:
+    share = unseen.share_removed(unseen.parameters / unseen.noise, after / unseen.noise)
+    if share < settings.named_share or size_in_floors(after * unseen.known, unseen.floor).max() > CLEAR:
         return ()
-    if _size(after * unseen.known, unseen.floor).max() > CLEAR:
-        return ()
-    effects = zip(first.found.estimates.effects, own.effects, strict=True)
+    pairs = (zip(there, here, strict=False) for there, here in zip(trained.effects, own.effects, strict=True))
     return tuple(
         f"{number.name} is {number.value:.3g} [{number.low:.3g}, {number.high:.3g}] {number.unit} in the"
         f" training flights and {other.value:.3g} [{other.low:.3g}, {other.high:.3g}] in the held-out ones"
-        for number, other in chain.from_iterable(zip(there, here, strict=False) for there, here in effects)
+        for number, other in chain.from_iterable(pairs)
         if number.name == other.name and (number.high < other.low or other.high < number.low)
     )
-
-
-def _size(residual: Array, floor: Array) -> Array:
-    """Compute the root mean square of each channel in floors, shape (6,)."""
-    return np.asarray(np.sqrt(np.mean((residual / floor) ** 2, axis=0)))
-
-
-def _largest(floors: Array) -> int:
-    return int(np.nanargmax(np.where(np.isfinite(floors), floors, -1.0)))

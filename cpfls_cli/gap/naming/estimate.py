@@ -1,4 +1,8 @@
-"""Coefficients with confidence intervals by the jackknife over blocks of time, and their sentence."""
+"""Effects fitted together: numbers with confidence intervals by the jackknife over blocks of time, and their sentence.
+
+Floors are of shape (6,), N m and N, by channel; a weight is the standard deviation of each channel, of shape (6,) or
+(window, 6).
+"""
 
 from __future__ import annotations
 
@@ -13,14 +17,7 @@ from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Coefficient, Effect, Shape
 from cpfls_cli.gap.balance.balance_system import System, system, window_noise
-from cpfls_cli.gap.balance.refine import (
-    Equations,
-    equations,
-    fit,
-    fit_within_bounds,
-    refitted,
-    shape_columns,
-)
+from cpfls_cli.gap.balance.refine import equations, fit, fit_within_bounds, refitted, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.naming.results import Estimate
@@ -60,121 +57,46 @@ class Estimates:
 
 
 class NamedFit(NamedTuple):
-    """Effects fitted together to flights.
-
-    Attributes
-    ----------
-    block : array of int, shape (window,)
-    """
+    """Effects fitted together to flights above their floor."""
 
     hypothesis: System
-    block: IntArray
     estimates: Estimates
+    floor: Array
+    settings: GapSettings
 
-    def without(self, names: Collection[str], floor: Array, settings: GapSettings) -> NamedFit:
+    @property
+    def values(self) -> Array:
+        """Coefficients of the base, then shapes, shape (number,)."""
+        return np.concatenate([self.estimates.linear, self.hypothesis.shape_values])
+
+    @property
+    def block(self) -> IntArray:
+        """Block of each window, shape (window,)."""
+        return block_index(self.hypothesis, self.settings)
+
+    @property
+    def left(self) -> Array:
+        """Root mean square that is left of each channel, shape (6,), floors."""
+        return size_in_floors(self.hypothesis.left(self.estimates.linear), self.floor)
+
+    def without(self, names: Collection[str]) -> NamedFit:
         """Leave effects out and refit the others."""
         kept = [each for each in self.hypothesis.chosen if each.effect.name not in names]
-        return fitted(self.hypothesis.flights, kept, floor, settings)
-
-
-def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
-    """Fit a hypothesis and compute confidence intervals of its numbers by the jackknife.
-
-    The jackknife leaves out one block after another, so it holds for residuals that are correlated within blocks and
-    for noise of unequal size; what no flight tells is added (`_KNOWN_TO`). Shapes take part by their derivatives. The
-    numbers of the vehicle are within what a vehicle can have; only where free ones are surely beyond it, they are told,
-    because the log is wrong then.
-
-    Parameters
-    ----------
-    hypothesis : System
-        With refined shapes.
-    weight : array, shape (6,) or (window, 6), N m and N
-        Standard deviation of each channel.
-    block : array of int, shape (window,)
-
-    References
-    ----------
-    JCGM 100:2008, 4.3 (uncertainty of what is
-    assumed).
-    """
-    free = _estimated(hypothesis, weight, block, *fit_within_bounds(hypothesis, weight))
-    linear, held = fit_within_bounds(hypothesis, weight, of_vehicle=True)
-    if np.array_equal(linear, free.linear):
-        return free
-    bounded = _estimated(hypothesis, weight, block, linear, held)
-    wrong = any(number.impossible for number in free.parameters if number.name in NUMBERS)
-    return replace(bounded, parameters=free.parameters) if wrong else bounded
-
-
-def _estimated(hypothesis: System, weight: Array, block: IntArray, linear: Array, held: BoolArray) -> Estimates:
-    """Add confidence intervals to a fit."""
-    shapes = hypothesis.shape_values
-    values = np.concatenate([linear, shapes])
-    rotor_wrench = system(hypothesis.flights).rotor_wrench if len(shapes) else None
-    moving_shapes = shape_columns(hypothesis, linear, rotor_wrench)
-    moving = np.concatenate([~held, np.ones(len(shapes), dtype=bool)])
-    left_out = np.tile(values, (len(np.unique(block)), 1))
-    left_out[:, moving] += _one_step(
-        equations(hypothesis, weight).around(linear, ~held, moving_shapes / weight[..., None]), block
-    )
-    return estimates_of(hypothesis, values, left_out)
-
-
-def estimates_of(hypothesis: System, values: Array, left_out: Array) -> Estimates:
-    """Tell numbers from coefficients and shapes, with those of fits that each left one block out.
-
-    Parameters
-    ----------
-    values : array, shape (number,)
-        Coefficients of the base, then shapes.
-    left_out : array, shape (block, number)
-    """
-    linear = values[: hypothesis.base.shape[2]]
-    (vehicle, own), *_ = hypothesis.places
-    parameters = _of(vehicle, hypothesis, values[own], left_out[:, own], np.zeros(0), left_out[:, :0])
-    places = {candidate.key: place for candidate, place in hypothesis.places}
-    by_effect, linear_by_effect, first = [], [], len(linear)
-    for candidate in hypothesis.chosen:
-        place, shape_at = places.get(candidate.key, slice(0)), slice(first, first + len(candidate.effect.shapes))
-        numbers = (values[place], left_out[:, place], values[shape_at], left_out[:, shape_at])
-        by_effect.append(_of(candidate, hypothesis, *numbers))
-        linear_by_effect.append(linear[place])
-        first = shape_at.stop
-    return Estimates(linear, tuple(by_effect), parameters, tuple(linear_by_effect))
+        return fitted(self.hypothesis.flights, kept, self.floor, self.settings)
 
 
 def fitted(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, settings: GapSettings) -> NamedFit:
     """Fit effects together within their bounds, with the larger of floor and residual as weights.
 
-    Parameters
-    ----------
-    floor : array, shape (6,)
-
-    Returns
-    -------
-    NamedFit
-        With the shapes that fit best beside one another, where they fit to the noise.
+    Their shapes are those that fit best beside one another, where they fit to the noise.
     """
     start = system(flights, chosen)
-    block, there = block_index(start, settings), refitted(start, channel_weight(start, floor))
+    there = refitted(start, channel_weight(start, floor))
     if (_left(there, floor)[1] > CLEAR).any():
         # Formulas that do not fit to the noise would move to what is left: they stay where the search found them.
         there = start
-    return NamedFit(there, block, estimates(there, channel_weight(there, floor), block))
-
-
-def free_estimates(hypothesis: System, floor: Array, block: IntArray) -> Estimates:
-    """Fit alike without any bounds, which says what the flights ask for.
-
-    Parameters
-    ----------
-    floor : array, shape (6,)
-    block : array of int, shape (window,)
-    """
-    weight = channel_weight(hypothesis, floor)
-    linear = equations(hypothesis, weight).solve()
-    return _estimated(hypothesis, weight, block, linear, np.zeros(len(linear), dtype=bool))
+    numbers = estimates(there, channel_weight(there, floor), block_index(there, settings))
+    return NamedFit(there, numbers, floor, settings)
 
 
 def channel_weight(hypothesis: System, floor: Array) -> Array:
@@ -192,80 +114,135 @@ def _left(hypothesis: System, floor: Array) -> tuple[Array, Array]:
     noise = window_noise(hypothesis, residual, floor)
     if (noise > floor).any():
         residual = hypothesis.left(fit(hypothesis, noise))
-    return noise, np.sqrt(np.mean((residual / noise) ** 2, axis=0))
+    return noise, size_in_floors(residual, noise)
 
 
-def sized(effect: Effect, numbers: Sequence[Estimate]) -> list[Estimate]:
-    """Keep the numbers that set the size of an effect: its coefficients, or its shapes where it has none.
+def size_in_floors(residual: Array, noise: Array) -> Array:
+    """Compute the root mean square of each channel of a residual, shape (window, 6), over its noise, shape (6,)."""
+    return np.asarray(np.sqrt(np.mean((residual / noise) ** 2, axis=0)))
+
+
+def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
+    """Fit a hypothesis with refined shapes and compute confidence intervals of its numbers by the jackknife.
+
+    The jackknife leaves out one block, of those of windows, after another, so it holds for residuals that are
+    correlated within blocks and for noise of unequal size; what no flight tells is added (`_KNOWN_TO`). Shapes take
+    part by their derivatives. The numbers of the vehicle are within what a vehicle can have; only where free ones are
+    surely beyond it, they are told, because the log is wrong then.
+
+    References
+    ----------
+    JCGM 100:2008, 4.3 (uncertainty of what is assumed).
+    """
+    free = _estimated(hypothesis, weight, block, *fit_within_bounds(hypothesis, weight))
+    linear, held = fit_within_bounds(hypothesis, weight, of_vehicle=True)
+    if np.array_equal(linear, free.linear):
+        return free
+    bounded = _estimated(hypothesis, weight, block, linear, held)
+    wrong = any(number.impossible for number in free.parameters if number.name in NUMBERS)
+    return replace(bounded, parameters=free.parameters) if wrong else bounded
+
+
+def free_estimates(found: NamedFit) -> Estimates:
+    """Fit alike without any bounds, which says what the flights ask for."""
+    weight = channel_weight(found.hypothesis, found.floor)
+    linear = equations(found.hypothesis, weight).solve()
+    return _estimated(found.hypothesis, weight, found.block, linear, np.zeros(len(linear), dtype=bool))
+
+
+def _estimated(hypothesis: System, weight: Array, block: IntArray, linear: Array, held: BoolArray) -> Estimates:
+    """Add confidence intervals to a fit: without each block all numbers change by one Gauss-Newton step."""
+    shapes = hypothesis.shape_values
+    moving_shapes = shape_columns(hypothesis, linear, system(hypothesis.flights).rotor_wrench)
+    rows = equations(hypothesis, weight).around(linear, ~held, moving_shapes / weight[..., None])
+    length = np.linalg.norm(rows.columns, axis=0)
+    scale = np.where(length > 0, length, 1.0)
+    scaled, noise = rows.columns / scale, rows.noise[:, :-1] / scale
+    of_row = np.repeat(block, len(rows.right) // len(block))
+    gram, moment = [], []
+    for own in (of_row == number for number in np.unique(block)):
+        x, n = scaled[own].T, noise[own].T
+        gram.append(x @ x.T - rows.trusted * (n @ n.T))
+        moment.append(x @ rows.right[own] - rows.trusted * (n @ rows.noise[own, -1]))
+    others = np.sum(gram, axis=0) - np.array(gram) + 1e-9 * np.eye(len(scale))
+    values = np.concatenate([linear, shapes])
+    left_out = np.tile(values, (len(gram), 1))
+    moving = np.concatenate([~held, np.ones(len(shapes), dtype=bool)])
+    left_out[:, moving] -= np.linalg.solve(others, np.array(moment)[..., None])[..., 0] / scale
+    return estimates_of(hypothesis, values, left_out)
+
+
+def places_of(hypothesis: System) -> list[tuple[slice, slice]]:
+    """Say of each chosen effect where its coefficients stand in the base, and its shapes behind all of these."""
+    in_base = {candidate.key: place for candidate, place in hypothesis.places}
+    places, first = list[tuple[slice, slice]](), hypothesis.places[-1][1].stop
+    for candidate in hypothesis.chosen:
+        shapes = slice(first, first := first + len(candidate.effect.shapes))
+        places.append((in_base.get(candidate.key, slice(0)), shapes))
+    return places
+
+
+def estimates_of(hypothesis: System, values: Array, left_out: Array) -> Estimates:
+    """Tell numbers from coefficients and shapes, with those of fits that each left one block out.
 
     Parameters
     ----------
-    numbers : sequence of Estimate
-        Physical coefficients, then shapes.
+    values : array, shape (number,)
+        Coefficients of the base, then shapes.
+    left_out : array, shape (block, number)
     """
-    shapes = {shape.name for shape in effect.shapes}
-    return [number for number in numbers if (number.name in shapes) == effect.unit_coefficient]
+    rows, vehicle = np.vstack([values, left_out]), hypothesis.vehicle
+    (of_vehicle, own), *_ = hypothesis.places
+    parameters = _with_intervals(of_vehicle.effect, vehicle, rows[:, own], rows[:, :0])
+    places = list(zip(hypothesis.chosen, places_of(hypothesis), strict=True))
+    return Estimates(
+        values[: hypothesis.base.shape[2]],
+        tuple(
+            _with_intervals(each.effect, vehicle, rows[:, linear], rows[:, shapes]) for each, (linear, shapes) in places
+        ),
+        parameters,
+        tuple(values[linear] for _, (linear, _) in places),
+    )
 
 
-def _of(
-    candidate: Candidate, hypothesis: System, linear: Array, linear_out: Array, shape: Array, shape_out: Array
-) -> tuple[Estimate, ...]:
-    """Tell the numbers of an effect with 95 % confidence intervals: by the jackknife, and what no flight tells."""
-    effect = candidate.effect
-    if effect.physical and len(linear):
-        linear, linear_out = effect.physical.of(linear), np.array([effect.physical.of(row) for row in linear_out])
-    known: tuple[Coefficient | Shape, ...] = (*effect.coefficients[: len(linear)], *effect.shapes)
-    value, left_out = np.concatenate([linear, shape]), np.concatenate([linear_out, shape_out], axis=1)
+def _with_intervals(effect: Effect, vehicle: VehicleSettings, linear: Array, shapes: Array) -> tuple[Estimate, ...]:
+    """Tell numbers of an effect with 95 % confidence intervals: by the jackknife, and what no flight tells.
+
+    The first row is of all blocks, the others each of all but one.
+    """
+    if effect.physical and linear.shape[1]:
+        linear = np.array([effect.physical.of(row) for row in linear])
+    known: tuple[Coefficient | Shape, ...] = (*effect.coefficients[: linear.shape[1]], *effect.shapes)
+    value, *without = np.concatenate([linear, shapes], axis=1)
     half = np.full(len(value), np.inf)
-    if len(left_out) > 1:
-        half = np.hypot(half_width(jackknife_error(left_out), len(left_out)), _KNOWN_TO * value)
+    if len(without) > 1:
+        half = np.hypot(half_width(jackknife_error(np.array(without)), len(without)), _KNOWN_TO * value)
     return tuple(
-        Estimate(one.name, one.unit, float(v), float(v - h), float(v + h), one.bounds(hypothesis.vehicle))
+        Estimate(one.name, one.unit, float(v), float(v - h), float(v + h), one.bounds(vehicle))
         for one, v, h in zip(known, value, half, strict=True)
         # A column of zeros leaves its coefficient open: an offset along x, say, where only x is compared.
         if one in effect.shapes or (np.isfinite(v) and (v != 0 or h != 0 or effect.kind == "parameter"))
     )
 
 
-def _one_step(rows: Equations, block: IntArray) -> Array:
-    """Compute the change of all numbers without each block by one Gauss-Newton step, shape (block, number)."""
-    scale = np.linalg.norm(rows.columns, axis=0)
-    scaled, noise = (part / np.where(scale > 0, scale, 1.0) for part in (rows.columns, rows.noise[:, :-1]))
-    of_row = np.repeat(block, len(rows.right) // len(block))
-    parts = [
-        (scaled[own].T, noise[own].T, rows.right[own], rows.noise[own, -1])
-        for own in (of_row == b for b in np.unique(block))
-    ]
-    gram = np.array([x @ x.T - rows.trusted * (n @ n.T) for x, n, _, _ in parts])
-    moment = np.array([x @ right - rows.trusted * (n @ own) for x, n, right, own in parts])
-    ridge = 1e-9 * np.eye(gram.shape[1])
-    change = -np.linalg.solve(gram.sum(axis=0) - gram + ridge, moment[..., None])[..., 0]
-    return np.asarray(change / np.where(scale > 0, scale, 1.0))
-
-
-def effect_sentence(effect: Effect, numbers: Sequence[Estimate], vehicle: VehicleSettings) -> str:
-    """Compose the sentence on an effect and its significant numbers.
-
-    Parameters
-    ----------
-    numbers : sequence of Estimate
-        Coefficients, then shapes.
-
-    Returns
-    -------
-    str
-        The sentence of the catalogue, and what the numbers that are surely not zero add to it.
-    """
-    sure = {number.name: number.value for number in numbers if number.low > 0 or number.high < 0}
-    more = "" if effect.describe is None else effect.describe(vehicle, sure)
-    return f"{effect.sentence} {more}".rstrip()
+def sized(effect: Effect, numbers: Sequence[Estimate]) -> list[Estimate]:
+    """Keep the numbers that set the size of an effect: its coefficients, or its shapes where it has none."""
+    shapes = {shape.name for shape in effect.shapes}
+    return [number for number in numbers if (number.name in shapes) == effect.unit_coefficient]
 
 
 def nothing_by_size(found: NamedFit) -> list[str]:
     """Name the effects whose size does not differ from zero."""
     names = []
     for (effect, _), numbers in zip(found.hypothesis.chosen, found.estimates.effects, strict=True):
-        without_size = effect.unit_coefficient and not effect.shapes
-        if not (without_size or any(number.low > 0 or number.high < 0 for number in sized(effect, numbers))):
+        size = sized(effect, numbers)
+        if effect.numbers and not any(number.low > 0 or number.high < 0 for number in size):
             names.append(effect.name)
     return names
+
+
+def effect_sentence(effect: Effect, numbers: Sequence[Estimate], vehicle: VehicleSettings) -> str:
+    """Compose the sentence of the catalogue on an effect, and what the numbers that are surely not zero add to it."""
+    sure = {number.name: number.value for number in numbers if number.low > 0 or number.high < 0}
+    more = "" if effect.describe is None else effect.describe(vehicle, sure)
+    return f"{effect.sentence} {more}".rstrip()

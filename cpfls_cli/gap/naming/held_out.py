@@ -58,12 +58,7 @@ class HeldOut:
     unlearned: Mapping[str, float]
 
     def size(self, residual: Array) -> GapSize:
-        """Compute the root mean square of a residual by channel.
-
-        Parameters
-        ----------
-        residual : array, shape (window, 6)
-        """
+        """Compute the root mean square of a residual, shape (window, 6), by channel."""
         return GapSize(known_size(residual, self.known), known_size(residual / self.noise, self.known))
 
     def shares(self, *, as_given: bool = False) -> dict[str, float]:
@@ -94,11 +89,9 @@ class HeldOut:
         return clear or {better: of_kind[better]}
 
     def share_removed(self, before: Array, after: Array, channels: slice = slice(None)) -> float:
-        """Compute the share of a gap above the noise that was removed; 0 where nothing is gained.
+        """Compute the share of a gap, shape (window, 6), in floors, that was removed above the noise.
 
-        Parameters
-        ----------
-        before, after : array, shape (window, 6), floors
+        0 where nothing is gained; only what is known counts.
         """
         before, after, known = before[:, channels], after[:, channels], self.known[:, channels]
         gone = float(((before**2 - after**2) * known).sum())
@@ -106,16 +99,9 @@ class HeldOut:
         return max(0.0, gone / (gone + remaining)) if gone > 0 else 0.0
 
     def removed_by_numbers(self, least: float) -> Array:
-        """Compute the share of each channel's gap that refitted numbers of the vehicle remove; 0 below visibility.
+        """Compute the share of each channel's gap that refitted numbers of the vehicle remove, shape (6,).
 
-        Parameters
-        ----------
-        least : float
-            Mean square in squared floors that is no gap yet.
-
-        Returns
-        -------
-        array, shape (6,)
+        0 below visibility, and where no gap is: a mean square of `least` squared floors.
         """
         before, after = self.before / self.noise, self.parameters / self.noise
         rows = np.maximum(self.known.sum(axis=0), 1)

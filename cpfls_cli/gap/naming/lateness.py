@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain, combinations
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -12,27 +12,26 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.refine import refined
+from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.by_instruments import by_instruments, foretold_of_left, untold
 from cpfls_cli.gap.naming.estimate import NamedFit, fitted
-from cpfls_cli.gap.naming.ranking import chance_of_ranks, more_left, rank_effects, surely
+from cpfls_cli.gap.naming.odds import chance_of_ranks, more_left
+from cpfls_cli.gap.naming.ranking import rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate
-from cpfls_cli.gap.naming.scoring import candidates_of
 from cpfls_cli.gap.naming.search import alternative
-from cpfls_cli.gap.settings import ERRORS, OFF, GapSettings
+from cpfls_cli.gap.settings import CHANCE, ERRORS, OFF
 from cpfls_cli.playback.instruments import Instruments
 
 _Names = tuple[str, ...]
 
 
 class Lateness(NamedTuple):
-    """What lies between command and rotors.
+    """What lies between command and rotors: fits with the set that leaves least, and with none.
 
     Attributes
     ----------
-    found, without : NamedFit
-        With the set that leaves least, and with none.
     chances : dict of str to float
-        How likely chance makes each of its effects.
+        How likely chance makes each effect of the set.
     alike : tuple of Alternative
         Sets that leave as little.
     """
@@ -43,51 +42,39 @@ class Lateness(NamedTuple):
     alike: tuple[Alternative, ...]
 
 
-def told_apart(
-    found: NamedFit, effects: Sequence[Effect], given: Instruments, floor: Array, settings: GapSettings
-) -> Lateness:
+def told_apart(found: NamedFit, effects: Sequence[Effect], given: Instruments) -> Lateness:
     """Decide by instruments what lies between command and rotors.
 
     In gusts a fit of all motion takes the loop for the rotors, and a lag for a delay. Effects of one number are tried
     alone and together: each stands that is surely not 0, beside the other too. Where these leave something that was
     known before, more numbers are tried: the right set leaves nothing. Of those that cannot be told apart the one with
-    the fewest numbers is named, and of as many the first of the catalogue, which is the usual one.
-
-    Parameters
-    ----------
-    found : NamedFit
-        By instruments.
-    effects : sequence of Effect
-        That the search tried.
+    the fewest numbers is named, and of as many the first of the catalogue, which is the usual one. `found` is a fit
+    by instruments, and `effects` are those that the search tried.
     """
-    late = [each for each in candidates_of(effects) if each.effect.late and found.hypothesis.can(each)]
+    late = [each for each in effects if each.late and found.hypothesis.can(Candidate(each, {}))]
     # A clock is no part of the vehicle: its shift is asked where the search found one.
     shifted = {each.effect.name for each in found.hypothesis.chosen}
-    tried = {each.effect.name: each.effect for each in late if each.effect.actuation or each.effect.name in shifted}
+    tried = {each.name: each for each in late if each.actuation or each.name in shifted}
     if not tried:
         return Lateness(found, found, {}, ())
-    sets = _Sets(found, tried, given, floor, settings)
+    sets = _Sets(found, tried, given)
     best, rivals = sets.usual()
     more = sum(len(each.effect.shapes) for each in found.hypothesis.chosen if each.effect.late)
     for count in range(2, max(2, more) + 1):
         if best and (sets.count(best) == count or sets.leaves(best)):
             rivals += sets.tell([names for names in sets.all if sets.count(names) == count and names not in sets.left])
             best = sets.least([best, *(names for names in rivals if sets.count(names) == count)])
+    alike = []
     # One with more numbers would have to leave less.
-    alike = [names for names in rivals if names != best and sets.count(names) <= sets.count(best)]
-    told = [sets.instead(best, names) for names in alike if not sets.surely_more(names, best)]
-    return Lateness(sets.fits[best], sets.fits[()], sets.chances(best), tuple(chain(*told)))
-
-
-def _chance_of(number: Estimate, period: float) -> float:
-    """Compute how likely chance makes a time of its size if it is 0, by its interval and what a log is off by.
-
-    When a sample was taken is known to one sampling period, and where in it is anybody's guess.
-    """
-    from scipy.special import erfc
-
-    error = np.hypot((number.high - number.value) / ERRORS, period / np.sqrt(12))
-    return float(erfc(number.value / error / np.sqrt(2)))
+    for names in (each for each in rivals if each != best and sets.count(each) <= sets.count(best)):
+        gone, new = [name for name in best if name not in names], [name for name in names if name not in best]
+        if gone and new and not sets.surely_more(names, best):
+            *beside, last = new
+            alike.append(alternative(tried[gone[0]], tried[last], 1.0, *beside))
+    # Of one number its own size tells, of several that so much less is left.
+    less = chance_of_ranks(more_left(sets.left[()], sets.left[best]))
+    chances = {name: sets.chance_of(own[0]) if len(own) == 1 else less for name, own in sets.numbers(best).items()}
+    return Lateness(sets.fits[best], sets.fits[()], chances, tuple(alike))
 
 
 @dataclass
@@ -105,8 +92,6 @@ class _Sets:
     found: NamedFit
     effects: Mapping[str, Effect]
     given: Instruments
-    floor: Array
-    settings: GapSettings
     fits: dict[_Names, NamedFit] = field(default_factory=dict)
     left: dict[_Names, Array] = field(default_factory=dict)
 
@@ -139,14 +124,23 @@ class _Sets:
         """Fit sets; of those whose numbers instruments tell the names come back."""
         for names in tried:
             if (fit := self._fit(names)) is not None:
-                self.fits[names] = fit
-                numbers = fit.hypothesis, fit.estimates.linear
-                self.left[names] = foretold_of_left(*numbers, self.given, self.floor, self.settings, late=True)
+                self.fits[names], self.left[names] = fit, foretold_of_left(fit, self.given, late=True)
         return [names for names in tried if names in self.fits]
+
+    def _fit(self, names: _Names) -> NamedFit | None:
+        hypothesis, _, floor, settings = self.found
+        flights = hypothesis.flights
+        chosen = [each for each in hypothesis.chosen if not each.effect.late]
+        for effect in (self.effects[name] for name in names):
+            (scored,) = rank_effects(flights, chosen, [effect], settings, None, floor=floor).ranking
+            chosen = list(refined(flights, scored.chosen, floor).chosen)
+        before = fitted(flights, chosen, floor, settings)
+        after = by_instruments(before, self.given)
+        return None if any(each.late for each in untold(before, after)) else after
 
     def leaves(self, names: _Names) -> bool:
         """Tell whether a set surely leaves something that was known before."""
-        return surely(self.left[names])
+        return chance_of_ranks(self.left[names]) < CHANCE
 
     def surely_more(self, one: _Names, other: _Names) -> bool:
         """Tell whether one leaves surely more than another, beyond what formulas are off by.
@@ -154,7 +148,7 @@ class _Sets:
         The right one leaves 0 but for chance; what is too much is left as well.
         """
         margin = more_left(*(np.sign(left.sum()) * left for left in (self.left[one], self.left[other])))
-        return surely(margin) and bool(margin.sum() > OFF**2 * self.left[()].sum())
+        return chance_of_ranks(margin) < CHANCE and bool(margin.sum() > OFF**2 * self.left[()].sum())
 
     def least(self, tried: Sequence[_Names]) -> _Names:
         """Choose the first that no later one leaves surely less than."""
@@ -163,19 +157,8 @@ class _Sets:
             first = names if self.surely_more(first, names) else first
         return first
 
-    def chances(self, best: _Names) -> dict[str, float]:
-        """Compute how likely chance makes each effect: its number, or of several that so much less is left."""
-        less = chance_of_ranks(more_left(self.left[()], self.left[best]))
-        numbers = self._numbers(best).items()
-        return {name: _chance_of(own[0], self._period) if len(own) == 1 else less for name, own in numbers}
-
-    def instead(self, best: _Names, names: _Names) -> Iterator[Alternative]:
-        """Say what stands for what of a set."""
-        gone, new = [name for name in best if name not in names], [name for name in names if name not in best]
-        for *beside, last in [new] if gone and new else []:
-            yield alternative(self.effects[gone[0]], self.effects[last], 1.0, *beside)
-
-    def _numbers(self, names: _Names) -> dict[str, tuple[Estimate, ...]]:
+    def numbers(self, names: _Names) -> dict[str, tuple[Estimate, ...]]:
+        """Give the numbers of each effect of a set."""
         fit = self.fits[names]
         told = zip(fit.hypothesis.chosen, fit.estimates.effects, strict=True)
         return {candidate.effect.name: numbers for candidate, numbers in told if candidate.effect.name in names}
@@ -185,26 +168,23 @@ class _Sets:
 
         Beside others it is enough of the usual effect that it is not less than anybody has.
         """
-        usual = next(iter(self.effects)) if len(names) > 1 else ""
-
-        def stands(name: str, number: Estimate) -> bool:
+        needed, usual = set(), next(iter(self.effects)) if len(names) > 1 else ""
+        for name, (number, *_) in self.numbers(names).items():
             if name == usual:
-                return number.value >= self.effects[name].shapes[0].grid[0]
-            return _chance_of(number, self._period) <= self.settings.significance
+                stands = number.value >= self.effects[name].shapes[0].grid[0]
+            else:
+                stands = self.chance_of(number) <= self.found.settings.significance
+            if stands and number.value < number.plausible[1]:
+                needed.add(name)
+        return needed
 
-        told = {name: number for name, (number, *_) in self._numbers(names).items()}
-        return {name for name, each in told.items() if stands(name, each) and each.value < each.plausible[1]}
+    def chance_of(self, number: Estimate) -> float:
+        """Compute how likely chance makes a time of its size if it is 0, by its interval and what a log is off by.
 
-    @property
-    def _period(self) -> float:
-        return self.given.flown[0].motion.period
+        When a sample was taken is known to one sampling period, and where in it is anybody's guess.
+        """
+        from scipy.special import erfc
 
-    def _fit(self, names: _Names) -> NamedFit | None:
-        flights = self.found.hypothesis.flights
-        chosen = [each for each in self.found.hypothesis.chosen if not each.effect.late]
-        for effect in (self.effects[name] for name in names):
-            (scored,) = rank_effects(flights, chosen, [effect], self.settings, None, floor=self.floor).ranking
-            chosen = list(refined(flights, scored.chosen, self.floor).chosen)
-        before = fitted(flights, chosen, self.floor, self.settings)
-        after = by_instruments(before, self.given, self.floor, self.settings)
-        return None if any(each.late for each in untold(before, after)) else after
+        period = self.given.flown[0].motion.period
+        error = np.hypot((number.high - number.value) / ERRORS, period / np.sqrt(12))
+        return float(erfc(number.value / error / np.sqrt(2)))

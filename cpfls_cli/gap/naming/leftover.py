@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,16 +15,12 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import System, left_over, system, window_noise
 from cpfls_cli.gap.balance.refine import least_squares
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight, dense
-from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted, size_in_floors
+from cpfls_cli.gap.naming.odds import names_of
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
-from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect, NotExcited, Unexplained
+from cpfls_cli.gap.naming.results import Alternative, NamedEffect, NotExcited, Unexplained
 from cpfls_cli.gap.naming.search import of_motion
-from cpfls_cli.gap.residual.dependence import (
-    joined_states,
-    rank_dependence,
-    state_signals,
-    without_actuation,
-)
+from cpfls_cli.gap.residual.dependence import joined_states, rank_dependence, state_signals, without_actuation
 from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
 from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, RARE, VISIBLE, GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -33,80 +29,49 @@ _USUAL_OF_BOUND = 0.2
 """A coefficient that is large but not unheard of, as a share of its bound."""
 
 
-@dataclass(frozen=True)
-class Leftover:
-    """Channels of which a fit leaves a gap."""
-
-    unexplained: tuple[Unexplained, ...]
-
-
-def leftover(
-    hypothesis: System,
-    linear: Array,
-    floor: Array,
-    block: IntArray,
-    settings: GapSettings,
-    rng: np.random.Generator,
-) -> Leftover:
-    """Analyse the residual of a fit: size, dependence on signals, narrow band, energy.
-
-    Parameters
-    ----------
-    linear : array, shape (column,)
-        Coefficients of its base.
-    floor : array, shape (6,)
-    block : array of int, shape (window,)
-    """
-    residual = hypothesis.left(linear)
-    in_floors = residual / window_noise(hypothesis, residual, floor)
-    sizes = np.sqrt(np.mean(in_floors**2, axis=0))
+def leftover(found: NamedFit, rng: np.random.Generator) -> tuple[Unexplained, ...]:
+    """List the channels of which a fit leaves a gap: size, dependence on signals, narrow band, energy."""
+    hypothesis, settings, block = found.hypothesis, found.settings, found.block
+    residual = hypothesis.left(found.estimates.linear)
+    noise = window_noise(hypothesis, residual, found.floor)
+    sizes = size_in_floors(residual, noise)
     states = joined_states([state_signals(f, s) for f, s in zip(hypothesis.flights, hypothesis.signals, strict=True)])
     dependence = rank_dependence(
-        in_floors, hypothesis.flight_index, block, without_actuation(states), settings.shifts, rng
+        residual / noise, hypothesis.flight_index, block, without_actuation(states), settings.shifts, rng
     )
     # The largest of each channel.
     told = {d.channel: d for d in reversed(dependence) if d.p_value <= settings.significance and d.r2 > COUNTS}
-    band = _band(hypothesis, linear, settings, rng)
+    band = _band(found, rng)
     rates = hypothesis.by_flight(lambda flight, _: flight.windows.average(flight.signals.body_rate))
     # A force turns nothing.
     directions = [*energy_directions(residual[:, :3], rates, block), *["neither"] * 3]
     unexplained = []
-    for channel, size, noise, direction in zip(
-        CHANNELS, sizes.tolist(), hypothesis.most_noise, directions, strict=True
-    ):
+    for place, (channel, size, energy) in enumerate(zip(CHANNELS, sizes.tolist(), directions, strict=True)):
         follows, rings = told.get(channel), band if band and band.channel == channel else None
-        if size > CLEAR or (size**2 > noise and (follows or rings)):
-            signal, r2 = (follows.signal, follows.r2) if follows else (None, 0.0)
-            share, frequency, energy = 0.0, None, direction
+        if size > CLEAR or (size**2 > hypothesis.most_noise[place] and (follows or rings)):
+            signal, share = (follows.signal, follows.r2) if follows else (None, 0.0)
+            frequency = None
             if rings:
-                share, frequency, energy = rings.share, rings.frequency_hz, rings.energy
-            unexplained.append(Unexplained(channel, size, signal, max(r2, share), frequency, energy))
-    return Leftover(tuple(unexplained))
+                share, frequency, energy = max(share, rings.share), rings.frequency_hz, rings.energy
+            unexplained.append(Unexplained(channel, size, signal, share, frequency, energy))
+    return tuple(unexplained)
 
 
-def _band(hypothesis: System, linear: Array, settings: GapSettings, rng: np.random.Generator) -> NarrowBand | None:
+def _band(found: NamedFit, rng: np.random.Generator) -> NarrowBand | None:
     """Search for a narrow band that counts, with windows dense enough to exclude aliases."""
+    hypothesis, settings = found.hypothesis, found.settings
     windows, rows, rates = dense(hypothesis.flights[0].windows), [], []
     for number, flight in enumerate(hypothesis.flights):
-        rows.append(replace(flight, windows=windows).averaged(left_over(hypothesis, number, linear)))
+        rows.append(replace(flight, windows=windows).averaged(left_over(hypothesis, number, found.estimates.linear)))
         rates.append(windows.average(flight.signals.body_rate))
     band = narrow_band(rows, rates, windows.hop * windows.period, settings.shifts, rng, settings.significance)
     return band if band and band.p_value <= settings.significance and band.share > COUNTS else None
 
 
 def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[str]:
-    """Test the sign of the mean power ``M omega`` about each axis against its scatter over blocks.
+    """Tell of each axis whether torque and body rate, shape (window, 3), feed or drain energy, or surely neither.
 
-    Parameters
-    ----------
-    torque : array, shape (window, 3), N m or floors
-    body_rate : array, shape (window, 3), rad/s
-    block : array of int, shape (window,)
-
-    Returns
-    -------
-    list of str
-        ``feeds``, ``drains`` or ``neither`` by axis.
+    By the sign of the mean power ``M omega`` against its scatter over blocks of windows.
     """
     numbers = np.unique(block)
     if len(numbers) < FEWEST_BLOCKS:
@@ -120,34 +85,21 @@ def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[
 
 
 def beside_the_unnamed(
-    found: NamedFit, last: RankedStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
+    found: NamedFit, last: RankedStep, effects: Sequence[Effect], rng: np.random.Generator
 ) -> tuple[Estimates, tuple[str, ...]]:
     """Widen the intervals of named effects by what is more than chance and too small for a name.
 
     A drag of the fuselage that shows in no channel on its own still takes its part from the drag of the rotors. And a
     formula that is right in slow flight bends in fast flight: where a bend shows, its number is another one beside it.
 
-    Parameters
-    ----------
-    found : NamedFit
-        The named effects.
-    last : SearchStep
-        Of the search, with nothing to add.
-    effects : sequence of Effect
-        To be tried.
-
-    Returns
-    -------
-    estimates : Estimates
-        Intervals hold what the numbers are with the unnamed effects and without them.
-    unnamed : tuple of str
+    `last` is the look that ended the search, and `effects` are those to be tried. The intervals hold what the numbers
+    are with the unnamed effects, whose names come too, and without them.
     """
-    named = found.hypothesis.chosen
+    flights, named, settings = found.hypothesis.flights, found.hypothesis.chosen, found.settings
     if not named:
         return found.estimates, ()
-    flights = found.hypothesis.flights
     step = last
-    if {each.effect.name for each in named} != {each.effect.name for each in last.hypothesis.chosen}:
+    if names_of(named) != names_of(last.hypothesis.chosen):
         step = rank_effects(flights, named, effects, settings, rng)
     chosen = _beyond_chance(step, effects, settings, rng)
     bends = bends_of(named, flights)
@@ -155,10 +107,13 @@ def beside_the_unnamed(
         chosen = _beyond_chance(rank_effects(flights, chosen, bends, settings, rng), bends, settings, rng)
     if len(chosen) == len(named):
         return found.estimates, ()
-    wider = fitted(flights, chosen, last.floor, settings).estimates
-    pairs = zip(found.estimates.effects, wider.effects, strict=False)
-    held = tuple(tuple(_both(number, there) for number in numbers) for numbers, there in pairs)
-    return replace(found.estimates, effects=held), tuple(each.effect.name for each in chosen[len(named) :])
+    wider = fitted(flights, chosen, found.floor, settings).estimates
+    held = []
+    for numbers, others in zip(found.estimates.effects, wider.effects, strict=False):
+        there = {number.name: number for number in others}
+        pairs = [(number, there.get(number.name, number)) for number in numbers]
+        held.append(tuple(replace(n, low=min(n.low, o.low), high=max(n.high, o.high)) for n, o in pairs))
+    return replace(found.estimates, effects=tuple(held)), tuple(each.effect.name for each in chosen[len(named) :])
 
 
 def bends_of(named: Sequence[Candidate], flights: Sequence[WeakFlight]) -> list[Effect]:
@@ -169,9 +124,8 @@ def bends_of(named: Sequence[Candidate], flights: Sequence[WeakFlight]) -> list[
     flown = [flight.signals for flight in flights if "velocity" in flight.signals.available]
     squared = [(signals.air_velocity**2).sum(axis=1) for signals in flown]
     usual = float(np.sqrt(np.mean(np.concatenate(squared)))) if squared else np.inf
-    effects = (each.effect for each in named)
-    of_speed = (each for each in effects if each.kind == "wrench" and "velocity" in each.needs)
-    return [_bend(effect, usual) for effect in of_speed if not (effect.shapes or effect.physical)]
+    effects = (each.effect for each in named if each.effect.kind == "wrench" and "velocity" in each.effect.needs)
+    return [_bend(effect, usual) for effect in effects if not (effect.shapes or effect.physical)]
 
 
 def _bend(effect: Effect, usual: float) -> Effect:
@@ -190,32 +144,20 @@ def _beyond_chance(
     """Add effects to the chosen ones as long as one explains more than chance, and more than noise."""
     flights, chosen = step.hypothesis.flights, list(step.hypothesis.chosen)
     for _ in range(settings.effects_max):
-        listed = (each for each in step.ranking if each.candidate.effect in effects)
-        more = (each for each in listed if step.p_value(each.gain) <= CHANCE)
-        moving = ((each, of_motion(each.gain, step, system(flights, each.chosen))) for each in more)
-        added = next((each.candidate for each, gain in moving if step.p_value(gain) <= CHANCE), None)
+        more = (each for each in step.ranking if each.candidate.effect in effects and step.p_value(each.gain) <= CHANCE)
+        gains = ((each, of_motion(each.gain, step, system(flights, each.chosen))) for each in more)
+        added = next((each for each, gain in gains if step.p_value(gain) <= CHANCE), None)
         if added is None:
             break
-        chosen.append(added)
+        chosen.append(added.candidate)
         step = rank_effects(flights, chosen, effects, settings, rng)
     return chosen
 
 
-def _both(number: Estimate, others: Sequence[Estimate]) -> Estimate:
-    """Widen an interval until it holds that of the same number beside other effects."""
-    other = next((each for each in others if each.name == number.name), number)
-    return replace(number, low=min(number.low, other.low), high=max(number.high, other.high))
-
-
 def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> tuple[NotExcited, ...]:
-    """List the effects that could be present unseen, with the reason.
-
-    Parameters
-    ----------
-    floor : array, shape (6,)
-    """
+    """List the effects that could be present unseen above a floor, shape (6,), with the reason."""
     # The vehicle's own numbers are free in every fit, so beyond themselves they never show.
-    names = {candidate.effect.name for candidate in hypothesis.free} | {c.effect.name for c in hypothesis.chosen}
+    names = names_of([*hypothesis.free, *hypothesis.chosen])
     reasons = ((effect.name, _reason(hypothesis, effect, floor)) for effect in effects if effect.name not in names)
     return tuple(NotExcited(name, reason) for name, reason in reasons if reason)
 
@@ -227,24 +169,28 @@ def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSetti
     """
     rivals = []
     for effect in named:
-        if CATALOGUE[effect.name].kind in ("parameter", "sensor"):
-            continue
         for name in (name for name in CATALOGUE[effect.name].rivals if name not in settings.ignore):
-            missing = [CATALOGUE[name].missing(signals) for signals in hypothesis.signals]
-            if all(missing) and not {"command", "measured_rotor_speed"} & set(missing[0]):
-                wanted = hypothesis.signals[0].to_log(missing[0])
-                lacking = " and ".join(signal.replace("_", " ") for signal in wanted)
-                rivals.append(Alternative(name, effect.name, np.nan, f"log {lacking}, without which it was not tried"))
+            missing, to_log = _lacked(hypothesis, CATALOGUE[name])
+            if missing and not {"command", "measured_rotor_speed"} & {*missing}:
+                told = f"log {' and '.join(to_log)}, without which it was not tried"
+                rivals.append(Alternative(name, effect.name, np.nan, told))
     return tuple(rivals)
 
 
-def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
+def _lacked(hypothesis: System, effect: Effect) -> tuple[Sequence[str], Sequence[str]]:
+    """Name the signals that an effect needs and no flight has, and what a log has to hold for them."""
     missing = [effect.missing(signals) for signals in hypothesis.signals]
-    if all(missing):
-        if "command" in missing[0]:
-            return "rotor speeds are measured, so nothing between command and speed shows"
-        wanted = hypothesis.signals[0].to_log(missing[0])
-        return f"the flights lack {', '.join(name.replace('_', ' ') for name in wanted)}"
+    if not all(missing):
+        return (), ()
+    return missing[0], [name.replace("_", " ") for name in hypothesis.signals[0].to_log(missing[0])]
+
+
+def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
+    missing, to_log = _lacked(hypothesis, effect)
+    if "command" in missing:
+        return "rotor speeds are measured, so nothing between command and speed shows"
+    if missing:
+        return f"the flights lack {', '.join(to_log)}"
     if effect.columns is None:
         return ""
     shape = {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes}
@@ -259,19 +205,9 @@ def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
 
 
 def usual_size(effect: Effect, vehicle: VehicleSettings, width: int) -> Array:
-    """Size linear coefficients that are large but not unheard of.
-
-    Parameters
-    ----------
-    width : int
-        Number of the coefficients.
-
-    Returns
-    -------
-    array, shape (width,)
-    """
+    """Size linear coefficients, so many as `width`, that are large but not unheard of, shape (width,)."""
     bounds = [max(abs(bound) for bound in c.bounds(vehicle)) for c in effect.coefficients]
-    if effect.unit_coefficient or not bounds:
+    if not bounds:
         return np.ones(width)
     if effect.physical is not None:
         return np.abs(effect.physical.linear(_USUAL_OF_BOUND * np.array(bounds)))

@@ -1,22 +1,53 @@
-"""Effects ranked beside a hypothesis, by what they explain of blocks that they have not seen."""
+"""Effects ranked beside a hypothesis, by what they take off blocks that no fit saw, within physical bounds.
+
+Floors are of shape (6,), N m and N, by channel.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import dataclass
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, channel_size, floors, system
-from cpfls_cli.gap.balance.refine import fit
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
-from cpfls_cli.gap.naming.scoring import Scored, candidates_of, score, scoring_matrix
-from cpfls_cli.gap.settings import CHANCE, COUNTS, NOISE, OFF, RARE, VISIBLE, GapSettings
-from cpfls_cli.rounding import tied
-from cpfls_cli.weak_form.resampling import blocks_of, folds, mirror_shifted
+from cpfls_cli.gap.balance.refine import compensation, fit, shape_columns
+from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.gap.settings import COUNTS, ERRORS, VISIBLE, GapSettings
+from cpfls_cli.rounding import ascending
+from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.weak_form.resampling import Beside, blocks_of, folds, mirror_shifted
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A candidate, the last of its set, with its cross-validated gain.
+
+    Attributes
+    ----------
+    chosen : tuple of Candidate
+        What it stands beside, and itself.
+    gain : float
+        Sum of squares taken off the blocks that the fits did not see, in squared floors; minus infinity where refused.
+    block_error : array, shape (block,)
+        What is left on each block.
+    coefficients : array, shape (coefficient,)
+        Linear, of a fit on all blocks; 0 where a bound took one out.
+    """
+
+    chosen: tuple[Candidate, ...]
+    gain: float
+    block_error: Array
+    coefficients: Array
+
+    @property
+    def candidate(self) -> Candidate:
+        """The last of the set."""
+        return self.chosen[-1]
 
 
 @dataclass(frozen=True)
@@ -25,13 +56,14 @@ class RankedStep:
 
     Attributes
     ----------
-    floor : array, shape (6,)
     ranking : tuple of Scored
         Best first, each effect once, at its best shape.
     chance : array, shape (shift,)
         What the best candidate explains of shifted residuals.
     above_floor : float
         Sum of squares that the hypothesis leaves above the floor, in squared floors.
+    block : array of int, shape (window,)
+        Of the cross-validation.
     """
 
     hypothesis: System
@@ -39,6 +71,7 @@ class RankedStep:
     ranking: tuple[Scored, ...]
     chance: Array
     above_floor: float
+    block: IntArray
 
     def worth_a_name(self, explained: float = 0.0) -> float:
         """Compute what an effect has to explain of what a part explained leaves of the gap, in squared floors."""
@@ -74,8 +107,6 @@ def rank_effects(
 
     Parameters
     ----------
-    effects : sequence of Effect
-        To be scored.
     rng : numpy.random.Generator or None
         Of the shifts; None for none.
     also : sequence of Candidate
@@ -87,8 +118,7 @@ def rank_effects(
     floor = best_floor(hypothesis) if floor is None else floor
     names = {candidate.effect.name for candidate in chosen}
     listed = [*candidates_of([effect for effect in effects if effect.name not in names]), *also]
-    tried = [candidate for candidate in listed if hypothesis.can(candidate)]
-    arranged = scoring_matrix(hypothesis, tried, floor)
+    arranged = scoring_matrix(hypothesis, [each for each in listed if hypothesis.can(each)], floor)
     right = hypothesis.residual[..., None]
     if rng is not None:
         unexplained = hypothesis.left(fit(hypothesis, floor))
@@ -100,18 +130,14 @@ def rank_effects(
     above_floor = float(max(beside.before[:, 0].sum() - hypothesis.known.sum(), 1e-9))
     once: dict[str, Scored] = {}
     for each in scored:
-        once.setdefault(each.candidate.effect.name, replace(each, others=hypothesis.chosen))
-    return RankedStep(hypothesis, floor, tuple(once.values()), chance, above_floor)
+        once.setdefault(each.candidate.effect.name, each)
+    return RankedStep(hypothesis, floor, tuple(once.values()), chance, above_floor, block)
 
 
 def best_floor(hypothesis: System) -> Array:
-    """Estimate the noise floors from the residual of a hypothesis.
+    """Estimate the noise floors from the residual of a hypothesis, shape (6,).
 
     The fit and the floors depend on each other; starting from equal weights, a second round settles them.
-
-    Returns
-    -------
-    array, shape (6,)
     """
 
     def settled() -> Array:
@@ -130,99 +156,143 @@ def block_index(hypothesis: System, settings: GapSettings) -> IntArray:
     return blocks_of(hypothesis.flight_index, centres, settings.block_s)
 
 
-def surely(margin: Array) -> bool:
-    """Tell whether margins over blocks are above 0 by more than they scatter: by ranks, as sizes differ that much."""
-    return chance_of_ranks(margin) < CHANCE
+def candidates_of(effects: Sequence[Effect]) -> list[Candidate]:
+    """List effects at all points of their grids."""
+    return [
+        Candidate(effect, dict(zip((shape.name for shape in effect.shapes), values, strict=True)))
+        for effect in effects
+        for values in product(*(shape.tried for shape in effect.shapes))
+    ]
 
 
-def more_left(one: Array, other: Array) -> Array:
-    """Compute by how much more one explanation leaves of each block than another; 0 where that is rounding."""
-    return np.where(tied(one, other), 0.0, one - other)
+class ScoringMatrix(NamedTuple):
+    """Base columns and candidates side by side.
 
-
-def chance_of_ranks(margin: Array) -> float:
-    """Compute how likely chance makes such margins over blocks, by the exact signed-rank test of Wilcoxon.
-
-    Equal sizes share their ranks, and what is 0 has none.
+    Attributes
+    ----------
+    matrix : array, shape (window, 6, column), floors
+    base : array of int
+        Columns of the base, and behind them derivatives by the shapes of its effects.
+    candidates : list of (Candidate, array of int, array)
+        Each with its columns of the matrix, and a weight on the residual of each channel, shape (6,).
+    prior : array, shape (column,)
+        What bounds say of the coefficients before any data.
     """
-    differing = margin[margin != 0]
-    sizes = np.sort(np.abs(differing))
-    ranks = np.searchsorted(sizes, np.abs(differing)) + np.searchsorted(sizes, np.abs(differing), side="right") + 1
-    # How likely each smaller sum of the ranks of margins above 0 is where every sign is a throw of a coin.
-    smaller = np.zeros(ranks[differing > 0].sum())
-    smaller[:1] = 1.0
-    for rank in ranks:
-        smaller[rank:] += smaller[:-rank]
-        smaller /= 2
-    return float(1.0 - smaller.sum())
+
+    matrix: Array
+    base: IntArray
+    candidates: list[tuple[Candidate, IntArray, Array]]
+    prior: Array
 
 
-def off_by(explained: float, left: float, above: float = 0.0) -> float:
-    """Estimate how much formulas are off by at most, in squared floors.
+def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: Array) -> ScoringMatrix:
+    """Arrange base and candidates, in floors.
 
-    No formula is exact. Beside sensors and air it leaves noise of its own in proportion to its torque and force, the
-    same in all flights. By likelihood that is what is left above the floor, and an error of the floor in one channel;
-    before any flight it is known to be a tenth of torque and force at most, `OFF`.
+    The shapes of the chosen effects stand in the base by their derivatives, so that a candidate is judged by what it
+    adds after they have moved.
+    """
+    parts = [hypothesis.base, shape_columns(hypothesis, fit(hypothesis, floor))]
+    priors, placed = [known_before(hypothesis)], list[tuple[Candidate, IntArray, Array]]()
+    own_wrench, base = hypothesis.rotor_wrench, np.arange(parts[0].shape[2] + parts[1].shape[2])
+    first = len(base)
+    for candidate in candidates:
+        columns = hypothesis.columns(candidate)
+        actuator = candidate.effect.kind == "actuator"
+        weight = compensation(own_wrench, own_wrench + columns[..., 0]) if actuator else np.ones(6)
+        placed.append((candidate, np.arange(first, first := first + columns.shape[2]), weight))
+        parts.append(columns)
+        priors.append(_information(candidate.effect, columns.shape[2], hypothesis.vehicle))
+    return ScoringMatrix(np.concatenate(parts, axis=2) / floor[:, None], base, placed, np.concatenate(priors))
+
+
+def score(arranged: ScoringMatrix, beside: Beside, hypothesis: System) -> tuple[list[Scored], Array]:
+    """Score every candidate, best first, and the best of them on what is chance, shape (shift,).
+
+    Chance is what stands behind the residual: the same, shifted. Signs and bounds are not used on it, so that chance is
+    given more than its due.
+    """
+    scored = []
+    chance = np.full(beside.before.shape[1] - 1, -np.inf)
+    for candidate, columns, weight in arranged.candidates:
+        error = _error(candidate, columns, weight, beside)
+        chance = np.maximum(chance, (beside.before - error)[:, 1:].sum(axis=0))
+        scored.append(_scored(hypothesis, candidate, columns, weight, error[:, 0], beside))
+    return ascending(scored, lambda candidate: -candidate.gain), chance
+
+
+def _error(candidate: Candidate, columns: IntArray, weight: Array, beside: Beside) -> Array:
+    """Compute what a candidate leaves of each block; a block that alone shows it does not count against it."""
+    if candidate.effect.unit_coefficient:
+        return beside.subtracted(int(columns[0]), weight)
+    error = beside.unseen(columns)
+    return np.where(beside.normal.alone(columns)[:, None], np.minimum(beside.before, error), error)
+
+
+def _scored(
+    hypothesis: System, candidate: Candidate, columns: IntArray, weight: Array, error: Array, beside: Beside
+) -> Scored:
+    """Score a candidate that leaves `error` of the blocks with all its columns."""
+    chosen, before = (*hypothesis.chosen, candidate), beside.before[:, 0]
+    fitted, kept = np.ones(len(columns)), np.ones(len(columns), dtype=bool)
+    while not candidate.effect.unit_coefficient:
+        fitted, unsure = np.zeros(len(columns)), np.zeros(len(columns))
+        fitted[kept], unsure[kept] = beside.fit(columns[kept])
+        keep, admissible = within_bounds(candidate.effect, fitted, unsure, hypothesis.vehicle)
+        if not admissible or not (kept & keep).any():
+            return Scored(chosen, -np.inf, before, fitted)
+        if keep[kept].all():
+            break
+        kept &= keep
+    if not kept.all():
+        error = _error(candidate, columns[kept], weight, beside)[:, 0]
+    return Scored(chosen, float((before - error).sum()), error, fitted)
+
+
+def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleSettings) -> tuple[BoolArray, bool]:
+    """Check coefficients against the bounds of their effect: they are beyond one only by more than their uncertainty.
 
     Parameters
     ----------
-    explained : float
-        The gap that formulas are asked to explain, in squared floors.
-    left, above : float
-        What the better one leaves, and what of that is above the floor, in squared floors.
-    """
-    return min(OFF**2 * explained, max(above, 0.0) + (NOISE - 1) * left / len(CHANNELS))
-
-
-@cache
-def _weights(blocks: int) -> Array:
-    """Draw weights of blocks, so many that a rare probability is known as well as formulas are."""
-    draws = round(1 / (RARE * OFF**2))
-    return np.asarray(blocks * np.random.default_rng(0).dirichlet(np.ones(blocks), draws))
-
-
-def log_odds(more: Array, off: float) -> Array:
-    """Compute the logarithm of the predictive density of blocks under another set, less that under the first one.
-
-    Parameters
-    ----------
-    more : array, shape (block,)
-        By how much more the other one leaves, in squared floors.
-    off : float
-        What formulas are off by, in squared floors.
-    """
-    # A floor that is wrong scales what is left; only what is left above it is an error of formulas, one for all blocks.
-    density = -0.5 * more / (NOISE + off)
-    # In a rare block something else happens, which neither set knows: none says more than that.
-    return np.asarray(np.clip(density, np.log(RARE), -np.log(RARE)))
-
-
-def likely(odds: Sequence[Array]) -> Array:
-    """Compute how likely a set of effects is beside others, from how well each foretells blocks that no fit saw.
-
-    Sets differ in some blocks and not in others, and no formula is exact, so blocks are weighed at random.
-
-    Parameters
-    ----------
-    odds : sequence of array, shape (block,)
-        Logarithm of the predictive density of each block under another set, less that under the first one.
+    linear, error : array, shape (coefficient,)
+        Linear coefficients of a fit, and their standard errors.
 
     Returns
     -------
-    array, shape (1 + other,)
-        Of the first one and of the others; they add up to 1.
-
-    References
-    ----------
-    Yao, Vehtari, Simpson and Gelman 2018, Using stacking to average Bayesian predictive distributions (pseudo-BMA+).
+    keep : array of bool, shape (coefficient,)
+        False where a coefficient lies beyond a bound at 0, so that 0 is the best that is possible.
+    admissible : bool
+        False where one lies beyond another bound.
     """
-    blocks = len(odds[0]) if odds else 0
-    if blocks < 2:
-        # One block tells nothing of how far blocks differ.
-        return np.full(len(odds) + 1, 1 / (len(odds) + 1))
-    total = _weights(blocks) @ np.stack([np.zeros(blocks), *odds], axis=1)
-    # One set a row: what is taken of many short rows is a tenth as fast. Eight and more are added in pairs.
-    columns = np.ascontiguousarray(total.T)
-    density = np.exp(columns - columns.max(axis=0))
-    whole = density.sum(axis=0) if len(density) < 8 else np.ascontiguousarray(density.T).sum(axis=1)
-    return np.asarray(np.add.accumulate(density / whole, axis=1)[:, -1] / len(total))
+    low, high = np.array([each.bounds(vehicle) for each in effect.coefficients]).T
+    if effect.physical is not None:
+        ends = np.array([effect.physical.of(linear + way * ERRORS * error) for way in (-1, 1)])
+        physical = effect.physical.of(linear)
+        low, high = low[: len(physical)], high[: len(physical)]
+        unsure = np.isnan(ends).any(axis=0) | np.isnan(physical)
+        possible = unsure | ((ends.max(axis=0) >= low) & (ends.min(axis=0) <= high))
+        return np.ones(len(linear), dtype=bool), bool(possible.all())
+    at_zero = ((linear < low) & (low == 0)) | ((linear > high) & (high == 0))
+    beyond = (linear + ERRORS * error < low) | (linear - ERRORS * error > high)
+    # What is taken out changes the others first: a lever is judged in the round after.
+    if effect.lever is not None and not at_zero.any():
+        at_zero = ~effect.lever(linear, error, vehicle)
+    return ~at_zero, not (beyond & ~at_zero).any()
+
+
+def known_before(hypothesis: System) -> Array:
+    """Compute the prior information of the coefficients of a base and of the shapes behind them, shape (number,).
+
+    A coefficient that only one block of a flight determines would be anything where that block is left out; with its
+    bound as the standard deviation of a normal prior it is small there.
+    """
+    vehicle, places = hypothesis.vehicle, hypothesis.places
+    free = [_information(each.effect, place.stop - place.start, vehicle) for each, place in places]
+    return np.concatenate([*free, [1.0 / np.ptp(shape.grid) ** 2 for shape in hypothesis.shapes]])
+
+
+def _information(effect: Effect, columns: int, vehicle: VehicleSettings) -> Array:
+    """Compute one over the variance of linear coefficients by their bounds; 0 where these bound other numbers."""
+    listed = effect.coefficients
+    if effect.physical is not None or len(listed) != columns:
+        return np.zeros(columns)
+    return np.array([1.0 / max(abs(bound) for bound in each.bounds(vehicle)) ** 2 for each in listed])

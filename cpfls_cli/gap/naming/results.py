@@ -28,15 +28,7 @@ class GapVerdict(StrEnum):
 
 @dataclass(frozen=True)
 class Estimate:
-    """An estimated coefficient with its confidence interval.
-
-    Attributes
-    ----------
-    low, high : float
-        95 % confidence interval.
-    plausible : tuple of float
-        Range that is physically possible on the vehicle.
-    """
+    """An estimated coefficient with its 95 % confidence interval, and the range that is possible on the vehicle."""
 
     name: str
     unit: str
@@ -58,9 +50,9 @@ class NamedEffect:
     Attributes
     ----------
     candidate : Candidate or None
-        With its shapes; None for faults of sensors.
+        None for faults of sensors, and for numbers of the vehicle.
     linear : array, shape (coefficient,)
-        Linear coefficients; empty where the effect has none.
+        Of the columns; empty where the effect has none.
     coefficients : tuple of Estimate
         Physical coefficients, then shapes.
     """
@@ -96,13 +88,7 @@ class LikelySet:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """A channel with a gap that nothing in the catalogue explains; other fields are described at `UnexplainedGroup`.
-
-    Attributes
-    ----------
-    frequency_hz : float or None
-        Of a narrow band that stands out.
-    """
+    """A channel with a gap that nothing in the catalogue explains; its fields are described at `UnexplainedGroup`."""
 
     axis: str
     floors: float
@@ -122,12 +108,11 @@ class NotExcited:
 
 @dataclass(frozen=True)
 class GapSize:
-    """Gap of each channel on flights that the fit did not see.
+    """Gap of each channel on flights that the fit did not see: root mean square over windows, NaN where unknown.
 
     Attributes
     ----------
     value : array, shape (6,), N m and N
-        Root mean square over windows; NaN where unknown.
     floors : array, shape (6,)
     """
 
@@ -146,20 +131,16 @@ class Diagnosis:
     parameters : mapping of str to Estimate
         Relative errors of the vehicle's own numbers, refitted with the effects.
     share : float
-        Share of the gap above the floor that the effects take off the held-out flights.
+        Of the gap above the floor that the effects take off the held-out flights; the least of `shares`, which are
+        those of ``torque`` and of ``force``, where they have a gap.
     before, after : GapSize
         Of the model as it was and with the effects, on the held-out flights.
     floor : array, shape (6,), N m and N
     torque_alone : tuple of (str, float)
         First choices of a look at the torques alone, and the share that each would explain.
-    notes : tuple of str
-        What a reader should know, in sentences.
-    contradictions : tuple of str
-        What of the log contradicts itself or its vehicle, in sentences; numbers that no vehicle has among them.
-    differences : tuple of str
-        What differs between the flights that were learned from and those held out, in sentences.
-    shares : mapping of str to float
-        The share of ``torque`` and of ``force``, where they have a gap.
+    notes, contradictions, differences : tuple of str
+        Sentences: all that a reader should know; what of the log contradicts itself or its vehicle; and what differs
+        between the flights that were learned from and those held out.
     sets : tuple of LikelySet
         The set that the search chose, and those with another effect in the place of one of it; most likely first.
     """
@@ -223,18 +204,16 @@ def verdict_of(
 
 
 def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> bool:
-    """Tell whether a relevant gap about or along an axis is not reduced.
+    """Tell whether a relevant gap of the held-out flights about or along an axis is not reduced.
 
     Where several effects leave a clear gap, one may fill in for what the formula of another is off by.
 
     Parameters
     ----------
     before, after : array, shape (6,), floors
-        Of the held-out flights, with the vehicle's own numbers refitted.
+        With the vehicle's own numbers refitted, and with so many named effects.
     named_share : float
         Of the gap above the floor that has to go.
-    effects : int
-        How many were named.
     """
     filled = effects > 1 and bool((after > CLEAR).any())
     largest = np.repeat([np.nanmax(before[kind], initial=0.0) for kind in (slice(0, 3), slice(3, 6))], 3)
@@ -243,15 +222,8 @@ def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> 
     return filled or bool((clear & (_is_left(after, before, named_share) | large)).any())
 
 
-def _is_left(after: Array, before: Array, named_share: float) -> BoolArray:
-    """Tell of each channel whether it keeps a clear gap, and more of it than a name may leave."""
-    return np.asarray((after > CLEAR) & (after**2 - 1 > (1 - named_share) * np.maximum(before**2 - 1, 0.0)))
-
-
 def matters(unexplained: Unexplained, before: Array, named_share: float) -> bool:
-    """Tell whether an unexplained residual beside named effects is of relevant size.
-
-    It is a second cause, by what it follows, or more than a name may leave.
+    """Tell whether an unexplained residual is a second cause, by what it follows, or more than a name may leave.
 
     Parameters
     ----------
@@ -262,6 +234,11 @@ def matters(unexplained: Unexplained, before: Array, named_share: float) -> bool
     """
     follows = unexplained.signal is not None or unexplained.frequency_hz is not None
     kind = slice(0, 3) if unexplained.axis.startswith("torque") else slice(3, 6)
-    largest = float(np.nanmax(before[kind] ** 2, initial=1.0))
-    second = follows and unexplained.share * unexplained.floors**2 > COUNTS * largest
-    return second or bool(_is_left(np.array(unexplained.floors), np.sqrt(largest), named_share))
+    largest = float(np.nanmax(before[kind], initial=1.0))
+    second = follows and unexplained.share * unexplained.floors**2 > COUNTS * largest**2
+    return second or bool(_is_left(np.array(unexplained.floors), np.array(largest), named_share))
+
+
+def _is_left(after: Array, before: Array, named_share: float) -> BoolArray:
+    """Tell of each channel whether it keeps a clear gap, and more of it than a name may leave."""
+    return np.asarray((after > CLEAR) & (after**2 - 1 > (1 - named_share) * np.maximum(before**2 - 1, 0.0)))

@@ -15,8 +15,8 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit, least_squares, refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.leftover import usual_size
+from cpfls_cli.gap.naming.ranking import candidates_of, known_before
 from cpfls_cli.gap.naming.results import Alternative, NamedEffect
-from cpfls_cli.gap.naming.scoring import candidates_of, known_before
 from cpfls_cli.gap.next_flight.separation import Question, SizedEffect, answered, gathered, shared_noise
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rounding import smallest

@@ -14,8 +14,8 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, nuisance
-from cpfls_cli.gap.naming.ranking import block_index, likely, log_odds
-from cpfls_cli.gap.naming.scoring import candidates_of
+from cpfls_cli.gap.naming.odds import likely, log_odds
+from cpfls_cli.gap.naming.ranking import block_index, candidates_of
 from cpfls_cli.gap.settings import OFF, RARE, GapSettings
 from cpfls_cli.rounding import ROUNDING
 from cpfls_cli.weak_form.windows import Windows

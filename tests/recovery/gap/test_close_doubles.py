@@ -8,6 +8,7 @@ import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.ranking import rank_effects
@@ -152,7 +153,7 @@ def rivals_of(flights, chosen, name):
     others = [each for each in chosen if each.effect.name != name]
     effects = [CATALOGUE[each] for each in STILL]
     step = rank_effects(flights, others, effects, SETTINGS, None, also=(chosen[index],))
-    own, *ranking = in_place_of(flights, chosen, index, step, SETTINGS)
+    own, *ranking = in_place_of(chosen[index], step)
     assert own.candidate.effect.name == name
     return {rival.name for rival in alternatives(own, ranking, step.above_floor, SETTINGS)}
 
@@ -178,7 +179,8 @@ def test_a_lag_with_a_short_delay_is_a_rival_as_the_pair_that_it_is():
     low = Candidate(CATALOGUE["low_pass_filter"], {"frequency_hz": 6.0, "damping": 1.2})
     effects = [CATALOGUE[each] for each in (*STILL, "low_pass_filter")]
     step = rank_effects(flights, (), effects, SETTINGS, None, also=(low,))
-    own, *ranking = in_place_of(flights, refined(flights, [low], step.floor).chosen, 0, step, SETTINGS)
+    (moved,) = refined(flights, [low], step.floor).chosen
+    own, *ranking = in_place_of(moved, step)
     pairs = {frozenset((rival.name, rival.beside)) for rival in alternatives(own, ranking, step.above_floor, SETTINGS)}
     assert pairs == {frozenset(("motor_lag", "command_delay"))}
 
@@ -201,8 +203,8 @@ def test_a_delay_that_is_not_there_is_chance_beside_a_lag():
 
 
 def chances(flights, chosen):
-    effects = [CATALOGUE[each] for each in STILL]
-    return [chance_beside_its_like(flights, chosen, index, effects, SETTINGS) for index in range(len(chosen))]
+    effects, together = [CATALOGUE[each] for each in STILL], system(flights, chosen)
+    return [chance_beside_its_like(together, index, effects, SETTINGS) for index in range(len(chosen))]
 
 
 @pytest.mark.parametrize(

@@ -140,7 +140,7 @@ def judged(training, held, *names):
     first = there.judge(fitted(training, [candidate(name) for name in names], there.floor, SETTINGS))
     last, refusals = there.confirmed(first)
     start = rank_effects(training, (), [CATALOGUE["com_offset"]], SETTINGS, None)
-    return last, refusals, differences(first, last, start, there, SETTINGS)
+    return last, refusals, differences(first, last, start, there)
 
 
 def of_another_power(seeds):
@@ -179,8 +179,7 @@ def test_numbers_that_took_up_what_the_others_lack_hide_no_difference():
     worse = last._replace(held_out=replace(last.held_out, parameters=2 * last.held_out.parameters))
     assert kept(last.found) == []
     assert (
-        "of what would be rotor_drag, and the held-out flights have none"
-        in differences(first, worse, start, there, SETTINGS)[0]
+        "of what would be rotor_drag, and the held-out flights have none" in differences(first, worse, start, there)[0]
     )
 
 

@@ -242,7 +242,7 @@ def widened(hidden, named):
     effects = [CATALOGUE[name] for name in ("rotor_drag", "parasitic_drag", "inflow", "com_offset", "torque_bias")]
     last = rank_effects(flights, [named], effects, SETTINGS, np.random.default_rng(0))
     found = fitted(flights, [named], last.floor, SETTINGS)
-    return found, beside_the_unnamed(found, last, effects, SETTINGS, np.random.default_rng(0))
+    return found, beside_the_unnamed(found, last, effects, np.random.default_rng(0))
 
 
 def test_intervals_leave_room_for_what_is_too_small_for_a_name():

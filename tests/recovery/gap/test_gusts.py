@@ -9,7 +9,9 @@ from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming.by_instruments import foretold_of_left
-from cpfls_cli.gap.naming.ranking import block_index, surely
+from cpfls_cli.gap.naming.estimate import fitted
+from cpfls_cli.gap.naming.odds import chance_of_ranks
+from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.residual.air import air, known_motion
 from cpfls_cli.gap.settings import GapSettings
@@ -172,14 +174,14 @@ def test_of_what_a_wrong_inertia_leaves_more_is_known_than_of_gusts(flown, kind,
     recordings = recorded(flown[kind], heavier(TRUE.vehicle), setpoints=setpoints)
     windows, model = common_windows(recordings, FEW), plain(None)
     hypothesis = model.system([weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings])
+    wrong = fitted(hypothesis.flights, [], np.ones(6), FEW)
+    wrong = wrong._replace(estimates=replace(wrong.estimates, linear=model.linear))
     right = model.linear.copy()
     right[0] = 1 / HEAVY - 1
-    wrong_left, left = (
-        foretold_of_left(hypothesis, linear, known_motion(recordings), np.ones(6), FEW, late=False)
-        for linear in (model.linear, right)
-    )
-    assert surely(wrong_left - left)
-    assert not surely(left)
+    right = wrong._replace(estimates=replace(wrong.estimates, linear=right))
+    more, left = (foretold_of_left(found, known_motion(recordings), late=False) for found in (wrong, right))
+    assert chance_of_ranks(more - left) < 0.01
+    assert chance_of_ranks(left) > 0.05
 
 
 @pytest.mark.parametrize(("offset_m", "stands"), [(3e-3, True), (2e-4, False)], ids=["above the gusts", "among them"])

@@ -9,8 +9,7 @@ from cpfls_cli.effects.effect import Coefficient, Columns, Shape
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
-from cpfls_cli.gap.naming.ranking import block_index, rank_effects
-from cpfls_cli.gap.naming.scoring import candidates_of
+from cpfls_cli.gap.naming.ranking import block_index, candidates_of, rank_effects
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import candidate, fly, weak
 

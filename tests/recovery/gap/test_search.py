@@ -76,7 +76,7 @@ def test_as_many_effects_as_the_settings_allow():
 def test_a_poor_choice_is_replaced_by_what_serves_better():
     known = flights((candidate("com_offset"), [0.004, -0.003]), (candidate("linear_damping"), [0.1, 0.1, 0.05]))
     step = rank_effects(known, [candidate("torque_bias"), candidate("linear_damping")], TRIED, SETTINGS, None)
-    (better,) = grown_elsewhere(known, [[candidate("com_offset")]], step, TRIED, SETTINGS)
+    (better,) = grown_elsewhere([[candidate("com_offset")]], step, TRIED, SETTINGS)
     assert sorted(names(better.chosen)) == ["com_offset", "linear_damping"]
 
 
@@ -90,7 +90,7 @@ def test_what_is_chosen_is_not_looked_at_again_and_each_effect_is_listed_once():
 
 
 def step_of(chance):
-    return RankedStep(system([]), np.ones(6), (), chance, 1.0)
+    return RankedStep(system([]), np.ones(6), (), chance, 1.0, np.zeros(0, dtype=int))
 
 
 def test_p_value_is_the_share_of_shifts_that_do_as_well():

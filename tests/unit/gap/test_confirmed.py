@@ -25,7 +25,7 @@ def refused(raised, after, monkeypatch, beyond=None):
     chosen = [SimpleNamespace(effect=SimpleNamespace(name=name)) for name in raised]
     floors = np.full(6, after)
     held_out = SimpleNamespace(after=None, size=lambda _: SimpleNamespace(floors=floors))
-    monkeypatch.setattr(confirmed, "on_bound", lambda _found, _floor: beyond)
+    monkeypatch.setattr(confirmed, "on_bound", lambda _found: beyond)
     found = SimpleNamespace(hypothesis=SimpleNamespace(chosen=chosen))
     judgement = SimpleNamespace(found=found, held_out=held_out)
     without = {
@@ -89,13 +89,13 @@ def test_what_the_others_held_within_bounds_goes_without_them(monkeypatch):
 
 def test_what_no_flight_learned_from_shows_is_no_difference_between_flights():
     held_out = SimpleNamespace(unlearned={"vertical_descent": 0.2}, shares=lambda: {"force": 0.5})
-    judgement = SimpleNamespace(found=SimpleNamespace(hypothesis=SimpleNamespace(chosen=[None])), held_out=held_out)
+    found = SimpleNamespace(hypothesis=SimpleNamespace(chosen=[None]), estimates=None, settings=GapSettings())
     # Nothing else is asked for: no step, no judge.
-    assert confirmed._other_numbers(judgement, None, GapSettings()) == ()
+    assert confirmed._other_numbers(SimpleNamespace(found=found, held_out=held_out), None) == ()
 
 
 @pytest.mark.parametrize("known", [True, False])
 def test_a_name_stands_in_gusts_where_more_is_known_of_what_is_left_without_it(known, monkeypatch):
-    monkeypatch.setattr(Judge, "_known_before", lambda _self, _judgement, _name: known)
+    monkeypatch.setattr(Judge, "_known_before", lambda _self, _found, _name: known)
     found = refused({"through the rotors": -0.2, "large": 2500.0}, 1.1, monkeypatch)
     assert (found.name if found else None) == (None if known else "through the rotors")

@@ -31,7 +31,8 @@ def found_with(names, sizes):
         for each, (value, half) in zip(chosen, sizes, strict=True)
     ]
     hypothesis = SimpleNamespace(chosen=tuple(chosen), flights=(), can=lambda _candidate: True)
-    return SimpleNamespace(hypothesis=hypothesis, estimates=SimpleNamespace(effects=numbers))
+    estimates = SimpleNamespace(effects=numbers)
+    return SimpleNamespace(hypothesis=hypothesis, estimates=estimates, settings=GapSettings())
 
 
 def apart(monkeypatch, own, left, sizes=None):
@@ -46,10 +47,12 @@ def apart(monkeypatch, own, left, sizes=None):
     monkeypatch.setattr(
         lateness,
         "foretold_of_left",
-        lambda found, *_: left[tuple(each.effect.name for each in found.hypothesis.chosen)] * np.ones(BLOCKS),
+        lambda found, _given, late: (
+            late * left[tuple(each.effect.name for each in found.hypothesis.chosen)] * np.ones(BLOCKS)
+        ),
     )
     start = found_with(own, [SURE] * len(own))
-    told = told_apart(start, [CATALOGUE[name] for name in (*LATE, "com_offset")], GIVEN, np.ones(6), GapSettings())
+    told = told_apart(start, [CATALOGUE[name] for name in (*LATE, "com_offset")], GIVEN)
     names = tuple(each.effect.name for each in told.found.hypothesis.chosen)
     return names, {(each.name, each.instead_of, each.beside) for each in told.alike}, told, tried
 
@@ -137,7 +140,7 @@ def test_a_lateness_at_the_end_of_what_is_possible_is_none(monkeypatch):
 def test_rotors_that_are_measured_are_never_late():
     found = found_with((), [])
     found.hypothesis.can = lambda _candidate: False
-    told = told_apart(found, [CATALOGUE["motor_lag"]], None, np.ones(6), GapSettings())
+    told = told_apart(found, [CATALOGUE["motor_lag"]], None)
     assert told.found is told.without is found
 
 

@@ -8,7 +8,7 @@ import pytest
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ComputationError, InputError, SettingError
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.naming.ranking import likely
+from cpfls_cli.gap.naming.odds import likely
 from cpfls_cli.gap.naming.results import Alternative, NamedEffect
 from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, flown_signals, planned_signals
 from cpfls_cli.gap.next_flight.rivals import (

@@ -9,9 +9,9 @@ from cpfls_cli.effects.effect import Coefficient, Columns
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming.ranking import rank_effects
-from cpfls_cli.gap.naming.scoring import Scored
-from cpfls_cli.gap.naming.search import alternatives, simplest, unbeaten
+from cpfls_cli.gap.naming.odds import simplest, unbeaten
+from cpfls_cli.gap.naming.ranking import Scored, rank_effects
+from cpfls_cli.gap.naming.search import alternatives
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import fly, weak
 
@@ -89,7 +89,7 @@ def test_an_effect_with_next_to_no_gain_is_no_alternative(step):
 
 def with_errors(name, gain, errors):
     effect = hand_made(name, (1.3, 0))
-    return Scored(Candidate(effect, {}), gain, np.asarray(errors, dtype=float), np.ones(1))
+    return Scored((Candidate(effect, {}),), gain, np.asarray(errors, dtype=float), np.ones(1))
 
 
 BLOCKS = 12
@@ -120,7 +120,7 @@ def test_one_block_cannot_tell():
 def test_a_number_more_has_to_explain_something(less, wins):
     """Eight squared floors; six more are none, however certain they were."""
     to_and_fro = 20.0 * (-1.0) ** np.arange(BLOCKS)
-    two = Scored(Candidate(replace(GENERAL, name="two numbers"), {}), 100.0, OWN.block_error, np.ones(2))
+    two = Scored((Candidate(replace(GENERAL, name="two numbers"), {}),), 100.0, OWN.block_error, np.ones(2))
     one = with_errors("one number", 100.0 - BLOCKS * less, OWN.block_error + to_and_fro + less)
     assert simplest([two, one], 100.0, 8.0).candidate.effect.name == wins
 
@@ -131,7 +131,7 @@ def test_what_no_number_tells_apart_is_what_is_usual(less, wins):
     best = with_errors("best", 1e4, OWN.block_error)
     effect = replace(hand_made("usual", (1.3, 0)), order=SPECIAL.order - 1)
     gain, errors = 1e4 - BLOCKS * less, OWN.block_error + to_and_fro + less
-    usual = Scored(Candidate(effect, {}), gain, errors, np.ones(1))
+    usual = Scored((Candidate(effect, {}),), gain, errors, np.ones(1))
     assert simplest([best, usual], 1e4, 8.0).candidate.effect.name == wins
 
 

@@ -12,6 +12,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming import by_instruments
 from cpfls_cli.gap.naming.by_instruments import _chance, _strong, _Told, that_stand
+from cpfls_cli.gap.naming.estimate import NamedFit
 from cpfls_cli.gap.residual.air import _growing, _gusty
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.instruments import held as stays
@@ -84,12 +85,13 @@ def test_an_effect_stands_where_any_source_shows_it_and_what_it_holds_where_that
     found, stand = np.array(true) + 0.02, []
     wind = Candidate(CATALOGUE["wind"].exact, {"W_x": found[1], "W_y": found[2]})
     hypothesis = SimpleNamespace(chosen=[wind], places=((wind, slice(1)),), shape_values=found[1:])
-    fit = SimpleNamespace(hypothesis=hypothesis, estimates=SimpleNamespace(linear=found[:1], effects=[()]))
+    numbers = SimpleNamespace(linear=found[:1], effects=[()])
+    fit = NamedFit(hypothesis, numbers, np.ones(6), GapSettings())
     for seed in range(20):
         rng = np.random.default_rng(seed)
         sources = [told(true, found, 1.0 if knows else 0.03, rng), told(true, found, 1.0, rng)]
         monkeypatch.setattr(by_instruments, "_sources", lambda *_, those=sources: those)
-        stand.append([each.effect.name for each in that_stand(fit, None, np.ones(6), GapSettings())])
+        stand.append([each.effect.name for each in that_stand(fit, None)])
     assert stand.count(names) >= 17
 
 

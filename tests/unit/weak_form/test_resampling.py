@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming import scoring
+from cpfls_cli.gap.naming import ranking
 from cpfls_cli.weak_form.resampling import blocks_of, folds
 
 WINDOWS, CHANNELS, COLUMNS, BLOCKS = 60, 6, 5, 4
@@ -137,7 +137,7 @@ def test_a_block_that_alone_shows_a_candidate_is_no_evidence_against_it():
     normal, base, own = folds(columns, right, block), np.array([0]), np.array([3])
     candidate = Candidate(CATALOGUE["torque_bias"], {})
     before, plain = normal.solve(base)[1], normal.solve(np.array([0, 3]))[1]
-    error = scoring._error(candidate, own, np.ones(6), normal.beside(base))
+    error = ranking._error(candidate, own, np.ones(6), normal.beside(base))
     assert plain[2, 0] > before[2, 0] == error[2, 0]
     others = np.arange(normal.blocks) != 2
     np.testing.assert_allclose(error[others], plain[others])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.naming.scoring import within_bounds
+from cpfls_cli.gap.naming.ranking import within_bounds
 from tests.builders.gap_flights import VEHICLE
 
 DAMPING, OFFSET, WIND = (CATALOGUE[name] for name in ("linear_damping", "com_offset", "wind"))

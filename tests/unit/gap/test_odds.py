@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import permutation_test, wilcoxon
 
-from cpfls_cli.gap.naming.ranking import chance_of_ranks, likely, off_by
+from cpfls_cli.gap.naming.odds import chance_of_ranks, likely, off_by
 
 
 @pytest.mark.parametrize("blocks", [1, 2, 7, 40])
