@@ -117,7 +117,7 @@ def diagnose(
         while gusts is not None and gusts.split.any() and gusts.told.sum() > told:
             told, quiet = int(gusts.told.sum()), np.minimum(quiet, gusts.noise(windows))
             axes = untold_axes(named.judgement.found, given)
-            flights = flights.in_air(gusts, axes, known_motion(held))
+            flights = flights.in_air(gusts, axes)
             named = _by_instruments(_named(flights, settings, rng, progress), given, settings)
             gusts = _gusts(named, given, settings, rng)
     weak, (found, held_out) = flights.training, named.judgement
@@ -171,18 +171,16 @@ def _changed_between(training: Sequence[Recording], held: Sequence[Recording]) -
 
 
 class _Flights(NamedTuple):
-    """Flights that train, and those held out as logged and repaired; in gusts what instruments know of these."""
+    """Flights that train, and those held out as logged and repaired."""
 
     training: Sequence[WeakFlight]
     logged: Sequence[WeakFlight]
     repaired: Sequence[WeakFlight]
-    given: Instruments | None = None
 
-    def in_air(self, gusts: Air, axes: BoolArray, given: Instruments) -> _Flights:
+    def in_air(self, gusts: Air, axes: BoolArray) -> _Flights:
         """Give all of them the floor of their air; what fits show of axes untold by instruments is the loop's."""
-        in_gusts = (in_air(flights, gusts.floor(self.training, flights)) for flights in self[:3])
-        training, logged, repaired = ([flight.as_stated(axes) for flight in flights] for flights in in_gusts)
-        return _Flights(training, logged, repaired, given)
+        in_gusts = (in_air(flights, gusts.floor(self.training, flights)) for flights in self)
+        return _Flights(*([flight.as_stated(axes) for flight in flights] for flights in in_gusts))
 
 
 class _Named(NamedTuple):
@@ -211,7 +209,7 @@ def _named(
     """Search for effects, and judge them on the flights held out."""
     effects, steps, found, refusals = _searched(flights.training, settings, rng, progress)
     progress(0.65, "estimates")
-    judge = Judge(*flights[:3], steps[-1].floor, settings, rng, flights.given)
+    judge = Judge(*flights, steps[-1].floor, settings, rng)
     first = judge.judge(found)
     judgement, unconfirmed = judge.confirmed(first)
     differ = differences(first, judgement, steps[0], judge)

@@ -170,13 +170,9 @@ def untold(before: NamedFit, after: NamedFit) -> list[Effect]:
     return [each.effect for each, was, now in numbers if was is now]
 
 
-def foretold_of_left(found: NamedFit, given: Instruments, *, late: bool) -> Array:
-    """Multiply what is left with what is known of it, by block: 0 but for chance where nothing is missing.
-
-    What is `late` is told by far better by what was before than by what was asked.
-    """
-    asked, before = _known_windows(found, given)
-    runs = before if late or not any(len(block) for _, _, block in asked) else asked
+def foretold_of_left(found: NamedFit, given: Instruments) -> Array:
+    """Multiply what is left with what was known of it before, by block: 0 but for chance where nothing is missing."""
+    _, runs = _known_windows(found, given)
     products = np.concatenate([rows[..., -1] * known[..., -1] for rows, known, _ in runs])
     block = np.concatenate([block for _, _, block in runs])
     return np.array([products[block == number].sum() for number in np.unique(block)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
 
@@ -14,7 +14,6 @@ from cpfls_cli.blocks import mean_error
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
-from cpfls_cli.gap.naming.by_instruments import foretold_of_left
 from cpfls_cli.gap.naming.estimate import (
     NamedFit,
     channel_weight,
@@ -27,11 +26,9 @@ from cpfls_cli.gap.naming.estimate import (
 )
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out
 from cpfls_cli.gap.naming.leftover import leftover
-from cpfls_cli.gap.naming.odds import chance_of_ranks, more_left
 from cpfls_cli.gap.naming.ranking import RankedStep, block_index
 from cpfls_cli.gap.naming.results import Estimate, Unexplained
-from cpfls_cli.gap.settings import CHANCE, CLEAR, ERRORS, NOISE, OFF, VISIBLE, GapSettings
-from cpfls_cli.playback.instruments import Instruments
+from cpfls_cli.gap.settings import CLEAR, ERRORS, NOISE, OFF, VISIBLE, GapSettings
 from cpfls_cli.rounding import ascending, largest, levelled, smallest, tied
 
 
@@ -138,8 +135,6 @@ class Judge:
         The held-out flights as logged, and after repair of the sensors.
     floor : array, shape (6,)
         Of the training flights.
-    given : Instruments or None
-        Of the held-out flights; None in still air.
     """
 
     training: Sequence[WeakFlight]
@@ -148,7 +143,6 @@ class Judge:
     floor: Array
     settings: GapSettings
     rng: np.random.Generator
-    given: Instruments | None = None
 
     def judge(self, found: NamedFit) -> Judgement:
         """Evaluate effects on the held-out flights, beside the model with its own numbers refitted."""
@@ -187,32 +181,10 @@ class Judge:
                 f"on the held-out flights it makes the {CHANNELS[channel]} worse, "
                 f"{compared[worst].left[channel]:.2g} floors without it and {after[channel]:.2g} with it",
             )
-        unseen = [name for name, one in compared.items() if one.visibly < VISIBLE**2]
-        needless = [name for name in unseen if not self._known_before(judgement.found, name)]
-        if needless:
-            least = smallest(needless, lambda each: compared[each].visibly)
+        least = smallest(compared, lambda each: compared[each].visibly)
+        if compared[least].visibly < VISIBLE**2:
             return Refusal(least, "on the held-out flights the gap is as small without it")
-        return _filling(judgement, {name: one for name, one in compared.items() if name not in unseen})
-
-    def _known_before(self, found: NamedFit, name: str) -> bool:
-        """Tell whether held-out flights in gusts surely leave more that is known of them without an effect.
-
-        Rotors answer gusts, so what they do takes squares off that gusts leave, where it is not in the model, too.
-        """
-        if self.given is None:
-            return False
-        numbers, every = found.estimates, found.hypothesis.chosen
-        told = [(each, own) for each, own in zip(every, numbers.of_effect, strict=True) if each.effect.name != name]
-        without = np.concatenate([numbers.of_vehicle, *(own for _, own in told)])
-        left = (
-            foretold_of_left(
-                found._replace(hypothesis=system(self.repaired, chosen), estimates=replace(numbers, linear=linear)),
-                self.given,
-                late=False,
-            )
-            for chosen, linear in (([each for each, _ in told], without), (every, numbers.linear))
-        )
-        return chance_of_ranks(more_left(*left)) < CHANCE
+        return _filling(judgement, compared)
 
     def _without(self, judgement: Judgement, name: str) -> Without:
         """Leave an effect out and refit the others."""

@@ -124,7 +124,7 @@ class _Sets:
         """Fit sets; of those whose numbers instruments tell the names come back."""
         for names in tried:
             if (fit := self._fit(names)) is not None:
-                self.fits[names], self.left[names] = fit, foretold_of_left(fit, self.given, late=True)
+                self.fits[names], self.left[names] = fit, foretold_of_left(fit, self.given)
         return [names for names in tried if names in self.fits]
 
     def _fit(self, names: _Names) -> NamedFit | None:

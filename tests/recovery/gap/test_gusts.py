@@ -8,9 +8,6 @@ import pytest
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.extended import extend, plain
-from cpfls_cli.gap.naming.by_instruments import foretold_of_left
-from cpfls_cli.gap.naming.estimate import fitted
-from cpfls_cli.gap.naming.odds import chance_of_ranks
 from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.residual.air import air, known_motion
@@ -167,21 +164,6 @@ def test_what_does_not_come_again_is_noise_beside_what_does(flown):
     assert found.told[:3].tolist() == [False, True, True]
     assert found.split[:3].all()
     assert 0.5 < found.found.size[0] / INERTIA[0] / GUSTS[0] < 2.0
-
-
-@pytest.mark.parametrize(("kind", "setpoints"), [("asked", True), ("asked", False), ("again", False)])
-def test_of_what_a_wrong_inertia_leaves_more_is_known_than_of_gusts(flown, kind, setpoints):
-    recordings = recorded(flown[kind], heavier(TRUE.vehicle), setpoints=setpoints)
-    windows, model = common_windows(recordings, FEW), plain(None)
-    hypothesis = model.system([weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings])
-    wrong = fitted(hypothesis.flights, [], np.ones(6), FEW)
-    wrong = wrong._replace(estimates=replace(wrong.estimates, linear=model.linear))
-    right = model.linear.copy()
-    right[0] = 1 / HEAVY - 1
-    right = wrong._replace(estimates=replace(wrong.estimates, linear=right))
-    more, left = (foretold_of_left(found, known_motion(recordings), late=False) for found in (wrong, right))
-    assert chance_of_ranks(more - left) < 0.01
-    assert chance_of_ranks(left) > 0.05
 
 
 @pytest.mark.parametrize(("offset_m", "stands"), [(3e-3, True), (2e-4, False)], ids=["above the gusts", "among them"])

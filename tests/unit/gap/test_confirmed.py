@@ -92,10 +92,3 @@ def test_what_no_flight_learned_from_shows_is_no_difference_between_flights():
     found = SimpleNamespace(hypothesis=SimpleNamespace(chosen=[None]), estimates=None, settings=GapSettings())
     # Nothing else is asked for: no step, no judge.
     assert confirmed._other_numbers(SimpleNamespace(found=found, held_out=held_out), None) == ()
-
-
-@pytest.mark.parametrize("known", [True, False])
-def test_a_name_stands_in_gusts_where_more_is_known_of_what_is_left_without_it(known, monkeypatch):
-    monkeypatch.setattr(Judge, "_known_before", lambda _self, _found, _name: known)
-    found = refused({"through the rotors": -0.2, "large": 2500.0}, 1.1, monkeypatch)
-    assert (found.name if found else None) == (None if known else "through the rotors")

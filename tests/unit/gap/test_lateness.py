@@ -47,9 +47,7 @@ def apart(monkeypatch, own, left, sizes=None):
     monkeypatch.setattr(
         lateness,
         "foretold_of_left",
-        lambda found, _given, late: (
-            late * left[tuple(each.effect.name for each in found.hypothesis.chosen)] * np.ones(BLOCKS)
-        ),
+        lambda found, *_: left[tuple(each.effect.name for each in found.hypothesis.chosen)] * np.ones(BLOCKS),
     )
     start = found_with(own, [SURE] * len(own))
     told = told_apart(start, [CATALOGUE[name] for name in (*LATE, "com_offset")], GIVEN)
