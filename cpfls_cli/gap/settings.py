@@ -36,11 +36,12 @@ COUNTS = 0.05
 """Share of a gap, in squares, from which on a part of it counts: an effect, a channel, what follows a signal."""
 
 CHANCE = 0.05
-"""Probability of chance from which on something makes an answer more careful: an unnamed effect, an effect that may be
-0 by what instruments tell, air that would take a late name."""
+"""Probability of chance from which on something makes an answer more careful: an unnamed effect, a form of
+what is late."""
 
 RARE = 0.01
-"""The rate of errors that names are given at, gusts among them: of chance, and of a rival beside the chosen set."""
+"""The rate of errors that names are given at, gusts among them: of chance, of an effect that is 0 by what instruments
+tell, and of a rival beside the chosen set."""
 
 
 @dataclass(frozen=True, kw_only=True)

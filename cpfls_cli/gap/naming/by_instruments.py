@@ -21,7 +21,6 @@ from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of, not
 from cpfls_cli.gap.naming.ranking import known_before
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.residual.air import foretold_rows
-from cpfls_cli.gap.settings import CHANCE
 from cpfls_cli.playback.constants import ENOUGH_BLOCKS, STRONG
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.playback.newness import PER_WINDOW, news
@@ -121,7 +120,7 @@ def that_stand(found: NamedFit, given: Instruments) -> list[Candidate]:
     for candidate, places in zip(found.hypothesis.chosen, places_of(found.hypothesis), strict=True):
         effect, (linear, shapes) = candidate.effect, (every[place] for place in places)
         chance = _chance_of(sources, linear, shapes, values)
-        if chance > CHANCE if np.isfinite(chance) else effect.name in nothing:
+        if chance > found.settings.significance if np.isfinite(chance) else effect.name in nothing:
             continue
         for held in (CATALOGUE[name] for name in effect.holds):
             known = {number.name for number in held.numbers}
