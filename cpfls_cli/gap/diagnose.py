@@ -127,7 +127,7 @@ def diagnose(
     tried = [each for each in named.effects if gusts is None or not each.late]
     wider, unnamed = beside_the_unnamed(found, named.steps[-1], tried, rng)
     pairs = zip(hypothesis.chosen, estimates.effects, wider.effects, strict=True)
-    held_by = tuple(own if each.effect.name in named.sure else with_it for each, own, with_it in pairs)
+    held_by = tuple(own if each.effect.late and named.sure else with_it for each, own, with_it in pairs)
     estimates = replace(wider, effects=held_by)
     told_of = judge_effects(found._replace(estimates=estimates), named.effects, rng)
     judged = [named.in_gusts(each) for each in told_of]
@@ -197,10 +197,11 @@ class _Named(NamedTuple):
     untold: tuple[str, ...] = ()
 
     def in_gusts(self, judged: JudgedEffect) -> JudgedEffect:
-        """Take what instruments tell of an effect between command and rotors: a fit of all motion sees the loop."""
+        """Take what instruments tell of an effect, and of what is late of its rivals too: a fit sees the loop."""
         if judged.effect.name not in self.sure:
             return judged
-        return replace(judged, effect=replace(judged.effect, p_value=self.sure[judged.effect.name]), alternatives=())
+        effect = replace(judged.effect, p_value=self.sure[judged.effect.name])
+        return replace(judged, effect=effect, alternatives=() if CATALOGUE[effect.name].late else judged.alternatives)
 
 
 def _named(
@@ -231,11 +232,13 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
     while True:
         found = by_instruments(fit, given)
         stand = that_stand(found, given)
-        names = {each.effect.name for each in stand}
+        names = {each.effect.name for each, _ in stand}
         out = [each.effect for each in found.hypothesis.chosen if each.effect.name not in names]
-        fewer = fitted(judge.training, stand, judge.floor, settings)
+        if not out:
+            break
+        fewer = fitted(judge.training, [each for each, _ in stand], judge.floor, settings)
         # A gap above the gusts is none of them: what it takes to explain it stands.
-        if not out or (fewer.left > np.maximum(found.left, CLEAR)).any():
+        if (fewer.left > np.maximum(found.left, CLEAR)).any():
             break
         for effect in out:
             what = "".join(f"all that it adds to {name}" for name in effect.holds & names) or "it"
@@ -252,7 +255,8 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
             for each in found.hypothesis.chosen
             if each.effect.late
         ]
-    return named._replace(judgement=judgement, refusals=refusals, alike=late.alike, sure=late.chances, untold=loose)
+    sure = {each.effect.name: chance for each, chance in stand if np.isfinite(chance)} | late.chances
+    return named._replace(judgement=judgement, refusals=refusals, alike=late.alike, sure=sure, untold=loose)
 
 
 def _doubts(

@@ -104,19 +104,20 @@ def untold_axes(found: NamedFit, given: Instruments) -> BoolArray:
     return ~told
 
 
-def that_stand(found: NamedFit, given: Instruments) -> list[Candidate]:
+def that_stand(found: NamedFit, given: Instruments) -> list[tuple[Candidate, float]]:
     """Keep the effects that are not 0 by what instruments tell, and what an effect holds where all else of it may be 0.
 
     Where an effect is 0, what is left without it does not go with what instruments know of it. That is asked at its
     shapes instead of whether its numbers may be 0, which instruments may tell badly from each other: a drag from the
-    wind that it acts in. One that they do not tell is asked by its interval.
+    wind that it acts in. With each comes how likely chance makes what they show of it. One that they do not tell is
+    asked by its interval, and its chance is NaN.
 
     References
     ----------
     Anderson and Rubin 1949 (a test that weak instruments do not mislead); Hotelling 1931.
     """
     sources, nothing, values = _sources(found, given), nothing_by_size(found), found.values
-    stand, every = list[Candidate](), np.arange(len(values))
+    stand, every = list[tuple[Candidate, float]](), np.arange(len(values))
     for candidate, places in zip(found.hypothesis.chosen, places_of(found.hypothesis), strict=True):
         effect, (linear, shapes) = candidate.effect, (every[place] for place in places)
         chance = _chance_of(sources, linear, shapes, values)
@@ -127,7 +128,7 @@ def that_stand(found: NamedFit, given: Instruments) -> list[Candidate]:
             beyond = np.concatenate([linear, shapes])[[number.name not in known for number in effect.numbers]]
             if _chance_of(sources, beyond, shapes[:0], values) > found.settings.significance:
                 candidate = Candidate(held, {shape.name: candidate.shape[shape.name] for shape in held.shapes})
-        stand.append(candidate)
+        stand.append((candidate, chance))
     return stand
 
 

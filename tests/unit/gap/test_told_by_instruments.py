@@ -10,9 +10,12 @@ from scipy.stats import ttest_1samp
 from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.diagnose import _Named
 from cpfls_cli.gap.naming import by_instruments
 from cpfls_cli.gap.naming.by_instruments import _chance, _strong, _Told, that_stand
+from cpfls_cli.gap.naming.causes import JudgedEffect
 from cpfls_cli.gap.naming.estimate import NamedFit
+from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.residual.air import _growing, _gusty
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.instruments import held as stays
@@ -91,7 +94,7 @@ def test_an_effect_stands_where_any_source_shows_it_and_what_it_holds_where_that
         rng = np.random.default_rng(seed)
         sources = [told(true, found, 1.0 if knows else 0.03, rng), told(true, found, 1.0, rng)]
         monkeypatch.setattr(by_instruments, "_sources", lambda *_, those=sources: those)
-        stand.append([each.effect.name for each in that_stand(fit, None)])
+        stand.append([each.effect.name for each, _ in that_stand(fit, None)])
     assert stand.count(names) >= 17
 
 
@@ -160,3 +163,12 @@ def test_runs_that_are_too_short_tell_nothing_of_what_was_before():
     new, known, _ = news(rows, [each[..., -1] for each in rows], [each[..., :-1] for each in rows])
     assert [len(each) for each in new] == [len(each) for each in known]
     assert len(new[0]) == 0 < len(new[1])
+
+
+@pytest.mark.parametrize(("name", "rivals"), [("rotor_drag", ("wind",)), ("motor_lag", ())])
+def test_in_gusts_chance_is_what_instruments_say_and_rivals_of_what_is_late_too(name, rivals):
+    by_fit = NamedEffect(name, None, np.zeros(0), (), 1e-30, 1.0, 1.0, "")
+    named = _Named([], [], None, None, [], (), sure={name: 0.003})
+    told = named.in_gusts(JudgedEffect(by_fit, ("wind",), {}))
+    assert (told.effect.p_value, told.alternatives) == (0.003, rivals)
+    assert _Named([], [], None, None, [], ()).in_gusts(JudgedEffect(by_fit, ("wind",), {})).effect is by_fit
