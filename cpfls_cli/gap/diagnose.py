@@ -31,9 +31,8 @@ from cpfls_cli.gap.naming.causes import (
     sensor_fault,
     wrong_numbers,
 )
-from cpfls_cli.gap.naming.confirmed import Judge, Judgement, Refusal, differences, earned
-from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted
-from cpfls_cli.gap.naming.held_out import HeldOut
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, Refusal, earned, fitted
+from cpfls_cli.gap.naming.held_out import HeldOut, Judge, Judgement, differences
 from cpfls_cli.gap.naming.lateness import told_apart
 from cpfls_cli.gap.naming.leftover import beside_the_unnamed, not_excited, untried
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
@@ -109,7 +108,7 @@ def diagnose(
     prepared = Preparation(windows, model, settings, audited)
     flights = _Flights(prepared.repaired(training), prepared.logged(held), prepared.repaired(held))
     named = _named(flights, settings, rng, progress)
-    gusts, quiet, told = None, named.judge.floor, -1
+    gusts, quiet, told = None, named.judgement.found.floor, -1
     if named.judge.remainder(named.judgement.found):
         given = known_motion(training)
         gusts = _gusts(named, given, settings, rng)
@@ -210,7 +209,7 @@ def _named(
     """Search for effects, and judge them on the flights held out."""
     effects, steps, found, refusals = _searched(flights.training, settings, rng, progress)
     progress(0.65, "estimates")
-    judge = Judge(*flights, steps[-1].floor, settings, rng)
+    judge = Judge(*flights, rng)
     first = judge.judge(found)
     judgement, unconfirmed = judge.confirmed(first)
     differ = differences(first, judgement, steps[0], judge)
@@ -236,7 +235,7 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
         out = [each.effect for each in found.hypothesis.chosen if each.effect.name not in names]
         if not out:
             break
-        fewer = fitted(judge.training, [each for each, _ in stand], judge.floor, settings)
+        fewer = fitted(judge.training, [each for each, _ in stand], found.floor, settings)
         # A gap above the gusts is none of them: what it takes to explain it stands.
         if (fewer.left > np.maximum(found.left, CLEAR)).any():
             break

@@ -1,4 +1,4 @@
-"""Effects fitted together: numbers with confidence intervals by the jackknife over blocks of time, and their sentence.
+"""Effects fitted together: numbers with intervals by the jackknife over blocks of time, and which of them can stand.
 
 Floors are of shape (6,), N m and N, by channel; a weight is the standard deviation of each channel, of shape (6,) or
 (window, 6).
@@ -22,6 +22,7 @@ from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import CLEAR, GapSettings
+from cpfls_cli.rounding import levelled, tied
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _KNOWN_TO = 0.005
@@ -246,3 +247,89 @@ def effect_sentence(effect: Effect, numbers: Sequence[Estimate], vehicle: Vehicl
     sure = {number.name: number.value for number in numbers if number.low > 0 or number.high < 0}
     more = "" if effect.describe is None else effect.describe(vehicle, sure)
     return f"{effect.sentence} {more}".rstrip()
+
+
+class Refusal(NamedTuple):
+    """An effect that is no name, and why, as the end of a sentence.
+
+    Attributes
+    ----------
+    in_the_way : bool
+        Whether others are to be looked for without it: on a bound it may stand for what another one is.
+    """
+
+    name: str
+    reason: str
+    in_the_way: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """The whole sentence."""
+        return f"{self.name} explains part of the gap, but is not named: {self.reason}"
+
+
+def earned(
+    flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, settings: GapSettings
+) -> tuple[NamedFit, list[Refusal]]:
+    """Fit chosen effects, and refit without those that have not earned a name on the flights that they were found in.
+
+    These are effects whose size does not differ from zero, which are not told, and effects that sit on a bound.
+    """
+    found, refusals = fitted(flights, chosen, floor, settings), []
+    while found.hypothesis.chosen:
+        out = nothing_by_size(found)
+        if not out:
+            refusal = on_bound(found)
+            if refusal is None:
+                break
+            refusals.append(refusal)
+            out = [refusal.name]
+        found = found.without(out)
+    return found, refusals
+
+
+def on_bound(found: NamedFit) -> Refusal | None:
+    """Find an effect whose main number sits on a bound, or any number that is surely asked for beyond one.
+
+    Zero is not such a bound: many coefficients cannot be less.
+    """
+    chosen, effects = found.hypothesis.chosen, found.estimates.effects
+    for (effect, _), numbers in zip(chosen, effects, strict=True):
+        shapes = [shape.name for shape in effect.shapes]
+        at_ends = [
+            any(bound and number.low <= bound <= number.high for bound in number.plausible)
+            for number in numbers
+            if number.name in shapes
+        ]
+        if len(shapes) > 1 and all(at_ends):
+            return Refusal(effect.name, f"{' and '.join(shapes)} may all be at the bounds of what is possible", True)
+    free = None
+    for index, (effect, _) in enumerate(chosen):
+        sizes = sized(effect, effects[index])
+        bounds = {
+            number.name: f"{bound:.3g} {number.unit}"
+            for number in sizes
+            for bound in number.plausible
+            if bound and tied(np.array(number.value), np.array(bound))
+        }
+        if not bounds:
+            continue
+        free = free or free_estimates(found)
+        says = "would surely be beyond what is possible"
+        told = [number.name for number in free.effects[index] if number.name in bounds and number.impossible]
+        if not told:
+            says = "sits on the bound of what is possible"
+            told = [name for name in _main(found, index, sizes) if name in bounds]
+        if told:
+            return Refusal(effect.name, f"its {told[0]} {says}, {bounds[told[0]]}", True)
+    return None
+
+
+def _main(found: NamedFit, index: int, sizes: Sequence[Estimate]) -> list[str]:
+    """Name the coefficient that explains most; all numbers where they are not coefficients of columns."""
+    candidate, linear = found.hypothesis.chosen[index], found.estimates.of_effect[index]
+    names = [coefficient.name for coefficient in candidate.effect.coefficients]
+    if not names or candidate.effect.physical is not None or len(linear) != len(names):
+        return [number.name for number in sizes]
+    columns = found.hypothesis.columns(candidate) * linear / found.floor[:, None]
+    return [names[int(np.argmax(levelled((columns**2).sum(axis=(0, 1)))))]]

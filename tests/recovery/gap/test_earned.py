@@ -12,8 +12,8 @@ from cpfls_cli.gap import diagnose
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit_within_bounds
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming.confirmed import Judge, differences, earned
-from cpfls_cli.gap.naming.estimate import fitted
+from cpfls_cli.gap.naming.estimate import earned, fitted
+from cpfls_cli.gap.naming.held_out import Judge, differences
 from cpfls_cli.gap.naming.ranking import best_floor, rank_effects
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import candidate, fly, weak
@@ -131,13 +131,12 @@ def test_what_is_there_beside_another_is_no_bend_of_it():
 
 
 def judge(training, held):
-    floor = best_floor(system(training))
-    return Judge(training, held, held, floor, SETTINGS, np.random.default_rng(0))
+    return Judge(training, held, held, np.random.default_rng(0))
 
 
 def judged(training, held, *names):
     there = judge(training, held)
-    first = there.judge(fitted(training, [candidate(name) for name in names], there.floor, SETTINGS))
+    first = there.judge(fitted(training, [candidate(name) for name in names], best_floor(system(training)), SETTINGS))
     last, refusals = there.confirmed(first)
     start = rank_effects(training, (), [CATALOGUE["com_offset"]], SETTINGS, None)
     return last, refusals, differences(first, last, start, there)
@@ -173,7 +172,7 @@ def test_numbers_that_took_up_what_the_others_lack_hide_no_difference():
     """Refitted to flights with a drag, the vehicle's own numbers may leave the others worse than as given."""
     training = flights(DRAG, force=True)
     there = judge(training, flights(seeds=(3,), force=True))
-    first = there.judge(fitted(training, [DRAG[0]], there.floor, SETTINGS))
+    first = there.judge(fitted(training, [DRAG[0]], best_floor(system(training)), SETTINGS))
     last, _ = there.confirmed(first)
     start = rank_effects(training, (), [CATALOGUE["com_offset"]], SETTINGS, None)
     worse = last._replace(held_out=replace(last.held_out, parameters=2 * last.held_out.parameters))

@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cpfls_cli.gap.naming import confirmed
-from cpfls_cli.gap.naming.confirmed import Judge, Refusal, Without
+from cpfls_cli.gap.naming import held_out as unseen
+from cpfls_cli.gap.naming.estimate import Refusal
+from cpfls_cli.gap.naming.held_out import Judge, Without
 from cpfls_cli.gap.settings import GapSettings
 
 NOTHING = np.zeros(6)
@@ -25,7 +26,7 @@ def refused(raised, after, monkeypatch, beyond=None):
     chosen = [SimpleNamespace(effect=SimpleNamespace(name=name)) for name in raised]
     floors = np.full(6, after)
     held_out = SimpleNamespace(after=None, size=lambda _: SimpleNamespace(floors=floors))
-    monkeypatch.setattr(confirmed, "on_bound", lambda _found: beyond)
+    monkeypatch.setattr(unseen, "on_bound", lambda _found: beyond)
     found = SimpleNamespace(hypothesis=SimpleNamespace(chosen=chosen))
     judgement = SimpleNamespace(found=found, held_out=held_out)
     without = {
@@ -33,7 +34,7 @@ def refused(raised, after, monkeypatch, beyond=None):
         for name, value in raised.items()
     }
     monkeypatch.setattr(Judge, "_without", lambda _self, _judgement, name: without[name])
-    return Judge([], [], [], np.ones(6), GapSettings(), np.random.default_rng(0))._refused(judgement)
+    return Judge([], [], [], np.random.default_rng(0))._refused(judgement)
 
 
 @pytest.mark.parametrize(
@@ -91,4 +92,4 @@ def test_what_no_flight_learned_from_shows_is_no_difference_between_flights():
     held_out = SimpleNamespace(unlearned={"vertical_descent": 0.2}, shares=lambda: {"force": 0.5})
     found = SimpleNamespace(hypothesis=SimpleNamespace(chosen=[None]), estimates=None, settings=GapSettings())
     # Nothing else is asked for: no step, no judge.
-    assert confirmed._other_numbers(SimpleNamespace(found=found, held_out=held_out), None) == ()
+    assert unseen._other_numbers(SimpleNamespace(found=found, held_out=held_out), None) == ()
