@@ -116,7 +116,6 @@ def verdict_box(record: DiagnosisRecord) -> Box:
     named = named_sentences(record.effects.named)
     named += [closest_sentence(effect) for effect in record.effects.closest]
     named += [NO_EFFECT] if record.only_gusts else []
-    named += [left_to_gusts(record.gusts, record.disturbance.told_by)] if record.disturbance and record.gusts else []
     named = [*_of_model(record), *named]
     label = record.verdict.replace("_", " ")
     return Box(label, _headline(record), named, _TONES.get(record.verdict, "note"))
@@ -204,6 +203,8 @@ def _facts(record: DiagnosisRecord) -> Iterator[tuple[str, str]]:
     left = [_unexplained(each) for each in record.unexplained.unexplained()]
     if left:
         yield "Left", sentence(f"in what it was fitted to: {'; '.join(left)}")
+    if record.disturbance and record.gusts:
+        yield "Gusts", left_to_gusts(record.gusts, record.disturbance.told_by)
     yield "Next", " ".join(next_steps(record))
 
 

@@ -5,12 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disturbance import DisturbanceGroup
 from cpfls_cli.pages.disturbance import gust_blocks
+from cpfls_cli.pages.first_screen import first_lines
 from cpfls_cli.pages.model import answer
 from cpfls_cli.playback.disturbance import FoundGusts
-from cpfls_cli.report.content import Table, Text, unfolded
+from cpfls_cli.report.content import Facts, Table, Text, unfolded
 from cpfls_cli.report.outcome import as_json
+from tests.builders import gap_artifacts as made
 from tests.builders.forms import source_of_record
 from tests.builders.vehicle_models import QUAD, record_of, whole
 
@@ -82,3 +85,12 @@ def test_machines_read_sizes_and_accelerations():
     assert axes["pitch"]["low"] == 0
     assert axes["yaw"]["high"] is None
     assert record().summary["gusts"]["force_n"] == pytest.approx([0.3 * QUAD.mass_kg, 0.0, 0.0])
+
+
+def test_gusts_stand_on_a_small_screen_beside_however_many_effects():
+    given = made.diagnosis(named=({},) * 3)
+    told = DisturbanceGroup.of(FOUND, np.isfinite(FOUND.size))
+    diagnosed = replace(DiagnosisRecord.of_data(given.header, given.data), disturbance=told)
+    rows = [row for block in first_lines(diagnosed, 1) if isinstance(block, Facts) for row in block.rows]
+    (words,) = [words for name, words in rows if name == "Gusts"]
+    assert words.startswith("What is left is gusts, ")
