@@ -22,7 +22,8 @@ _MOST_NOISE = 0.5
 """Share of the squares of any combination of columns that is believed to be noise at most: beyond it, what is left of
 it is uncertain."""
 _SETTLED = 1e-2
-"""Change of the sum of squares, in variances, below which a fit stands still: a tenth of a standard error."""
+"""Change of the sum of squares, in variances, below which a fit stands still: a tenth of a standard error; and share of
+a step, or of what it takes off, below which it is none."""
 
 
 def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> System:
@@ -287,8 +288,10 @@ def refitted(hypothesis: System, weight: Array) -> System:
         rows = equations(hypothesis, own).around(linear, ~held, moving / own[..., None])
         step, (columns, right) = rows.solve(), rows.root
         step, gain = step[-moving.shape[2] :], float(right @ columns @ step)
-        # Half of a step that goes too far.
-        while gain >= _SETTLED:
+        # Half of a step that goes too far. Where a hundredth of what the linear system asks for is too far yet, it holds
+        # for no step: a filter and a lag that nothing tells apart would creep along for hours.
+        least = max(_SETTLED, _SETTLED * gain)
+        while gain >= least:
             ahead = hypothesis.with_shapes(np.clip(hypothesis.shape_values + step, low, high))
             left, there = fitted(ahead)
             if error - left >= _SETTLED:
