@@ -1,6 +1,7 @@
 """A small part of the blind study: right names, no names where nothing is hidden, and a gap that shrinks."""
 
 import json
+from collections import Counter
 from dataclasses import replace
 
 import pytest
@@ -132,6 +133,18 @@ def test_a_part_of_a_study_holds_as_many_different_things_as_it_can():
     assert len({tuple(case.hidden) for case in found["outside"]}) == 5
     assert {case.attack for case in found["attack"]} == set(ATTACKS)
     assert part == sets(Size(31, 2, ("mid",), ("white",), ("single", "none", "outside", "attack"), each=each))
+
+
+def test_in_turn_each_case_is_flown_in_one_air_and_all_airs_come_up_alike():
+    airs = {"gusts": (0, 1, 2), "instruments": ("none", "repeats")}
+    size = Size(31, 1, ("mid",), ("white",), ("single",), vehicles=("crazyflie",), **airs)
+    every, dealt = sets(size), sets(replace(size, in_turn=True))
+    assert [own[0].case.name for own in dealt] == list(dict.fromkeys(own[0].case.name for own in every))
+    assert all(own in every for own in dealt)
+    counts = Counter((own[0].case.gusts, own[0].case.instruments) for own in dealt)
+    assert len(counts) == 6
+    assert max(counts.values()) - min(counts.values()) <= 1
+    assert dealt == sets(replace(size, in_turn=True))
 
 
 def test_each_case_is_flown_in_each_air_and_the_usual_study_stays_as_it_is():
