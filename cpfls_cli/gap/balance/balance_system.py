@@ -153,7 +153,7 @@ class System:
     def most_noise(self) -> Array:
         """Mean square in squared floors up to which what is left of each channel is noise, shape (6,).
 
-        In gusts no less than a gap begins at: they are drawn anew in each flight, and known to a third.
+        In gusts it is as much as a gap begins at: they are drawn anew in each flight, and known to a third.
         """
         return np.where(self.gusty, CLEAR**2, NOISE)
 

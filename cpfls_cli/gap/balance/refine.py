@@ -289,7 +289,7 @@ def refitted(hypothesis: System, weight: Array) -> System:
         step, (columns, right) = rows.solve(), rows.root
         step, gain = step[-moving.shape[2] :], float(right @ columns @ step)
         # Half of a step that goes too far. Where a hundredth of what the linear system asks for is too far yet, it
-        # holds for no step: a filter and a lag that nothing tells apart would creep along for hours.
+        # holds for no step: a filter and a lag that nothing tells apart would creep along with no end in sight.
         least = max(_SETTLED, _SETTLED * gain)
         while gain >= least:
             ahead = hypothesis.with_shapes(np.clip(hypothesis.shape_values + step, low, high))
