@@ -15,6 +15,7 @@ from cpfls_cli.flightlog.alignment import estimate_delay
 from cpfls_cli.flightlog.results import DelayEstimate
 from cpfls_cli.rounding import levelled
 from cpfls_cli.weak_form.windows import Windows
+from cpfls_cli.words import capitalised
 
 # The gyroscope is shifted against rotors as far as against the attitude, by 5 ms.
 _STEPS = 41
@@ -39,7 +40,7 @@ _FEWEST_SHIFTS = 4
 # Share of the torque that is left where no shift can do better, and share of that which a shift has to leave at most.
 _NEXT_TO_NOTHING, _HALF = 0.01, 0.5
 _DONE = "corrected before the balance"
-_UNDECIDED = "These flights do not show whether the gyroscope or the attitude is late; the gyroscope is shifted."
+_UNDECIDED = "these flights do not show whether the gyroscope or the attitude is late, and a log is late, not early"
 
 
 def actuation_delay(flights: Sequence[Signals]) -> tuple[str, ...]:
@@ -73,7 +74,10 @@ def _estimate(signals: Signals) -> DelayEstimate | None:
 def attitude_on_clock(
     gyro_delay: float, flights: Sequence[Signals], windows: Windows
 ) -> tuple[tuple[ChannelRepair, ...], tuple[str, ...]]:
-    """Put an attitude that is late against gyroscope and rotors onto their clock.
+    """Put an attitude that is late against the gyroscope onto its clock.
+
+    Which of the two is late the rotors say. Where they do not, as commands or a loop that answers gusts, it is the one
+    that comes after the other: a sensor, a filter or a wire makes a log late, and nothing makes it early.
 
     Parameters
     ----------
@@ -83,20 +87,21 @@ def attitude_on_clock(
     Returns
     -------
     repairs : tuple of ChannelRepair
-        Empty where the gyroscope is late, or where nobody knows.
+        Empty where the gyroscope is late.
     notes : tuple of str
-        That nobody knows.
+        That only this makes the gyroscope late.
     """
     behind = np.array([delay for half in _halves(flights, windows) if (delay := _behind(half)) is not None])
-    if len(behind) < _FEWEST_HALVES:
-        return (), (_UNDECIDED,)
-    delay, unsure = np.median(behind), max(_SURE_S, 2 * behind.std(ddof=1) / np.sqrt(len(behind)))
-    if abs(delay - gyro_delay) + unsure < 0.5 * abs(gyro_delay):
-        return (), ()
-    if abs(delay) + unsure >= 0.5 * abs(gyro_delay):
-        return (), (_UNDECIDED,)
-    what = f"the attitude is {off_clock(-gyro_delay)}, judged by the gyroscope and the rotors, whose clocks agree"
-    finding = _late(what, "correct its clock in the log", ("attitude", "gyroscope", "rotors"), -gyro_delay)
+    agrees, lags = False, False
+    if len(behind) >= _FEWEST_HALVES:
+        delay, unsure = np.median(behind), max(_SURE_S, 2 * behind.std(ddof=1) / np.sqrt(len(behind)))
+        agrees, lags = (abs(delay - late) + unsure < 0.5 * abs(gyro_delay) for late in (0.0, gyro_delay))
+    if lags or (gyro_delay > 0 and not agrees):
+        return (), () if lags else (f"{capitalised(_UNDECIDED)}, so the gyroscope is shifted.",)
+    channels = ("gyroscope", "rotors") if agrees else ("gyroscope",)
+    judged = "the gyroscope and the rotors, whose clocks agree" if agrees else f"the gyroscope: {_UNDECIDED}"
+    what = f"the attitude is {off_clock(-gyro_delay)}, judged by {judged}"
+    finding = _late(what, "correct its clock in the log", ("attitude", *channels), -gyro_delay)
     return (ChannelRepair("attitude", delay_s=-gyro_delay).told(finding, f"It is {_DONE}"),), ()
 
 

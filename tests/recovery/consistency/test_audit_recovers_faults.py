@@ -27,7 +27,6 @@ def names(found):
         (Faults(scale=np.array([0, -0.02, 0])), "gyro_scale"),
         (Faults(misalignment=np.array([0, 0, 0.01])), "imu_misalignment"),
         (Faults(delay=0.005), "channel_delay"),
-        (Faults(delay=-0.02), "channel_delay"),
     ],
 )
 def test_a_single_fault_is_named_alone(faults, name):
@@ -37,6 +36,13 @@ def test_a_single_fault_is_named_alone(faults, name):
     [(each, value)] = [pair for pair in zip(own.coefficients, _own(faults, name), strict=True) if pair[0].named]
     assert value != 0
     assert each.low <= value <= each.high
+
+
+def test_nothing_makes_a_gyroscope_early_so_the_attitude_behind_it_is_late():
+    found = audit(faulty_flights(np.random.default_rng(1), Faults(delay=-0.02), level=LEVELS["mid"]), WINDOWS)
+    [repair] = found.repairs
+    assert (repair.channel, names(found)) == ("attitude", set())
+    assert repair.delay_s == pytest.approx(0.02, abs=0.0002)
 
 
 def _own(faults, name):

@@ -204,11 +204,20 @@ def test_velocity_and_accelerometer_know_better_than_gyroscope_and_rotors(lively
     assert "check the clocks of attitude, gyroscope and rotors" in said
 
 
-def test_commands_do_not_tell_whose_clock_is_wrong(flights):
-    commanded = [replace(s, commanded=True, attitude=late(s.attitude, 0.03)) for s in flights]
+@pytest.mark.parametrize("channel", ["attitude", "body_rate"])
+def test_where_rotors_do_not_tell_whose_clock_is_wrong_the_one_behind_is_late(flights, channel):
+    """Commands tell no clock; nothing makes a log early."""
+    commanded = [replace(s, commanded=True, **{channel: late(getattr(s, channel), 0.03)}) for s in flights]
     found = audit(commanded, WINDOWS)
-    assert not any(repair.channel == "attitude" for repair in found.repairs)
-    assert any("gyroscope or the attitude is late" in note for note in found.notes)
+    said = "hese flights do not show whether the gyroscope or the attitude is late"
+    if channel == "attitude":
+        [sentence] = found.settled
+        assert "The attitude is late by 30 ms" in sentence
+        assert said in sentence
+        assert found.named == ()
+    else:
+        assert (found.repairs, [fault.name for fault in found.named]) == ((), ["channel_delay"])
+        assert any(said in note for note in found.notes)
 
 
 def with_rotors_late(flights, *delays):
