@@ -46,10 +46,10 @@ def told_apart(found: NamedFit, effects: Sequence[Effect], given: Instruments) -
     """Decide by instruments what lies between command and rotors.
 
     In gusts a fit of all motion takes the loop for the rotors, and a lag for a delay. Effects of one number are tried
-    alone and together: each stands that is surely not 0, beside the other too. Where these leave something that was
-    known before, more numbers are tried: the right set leaves nothing. Of those that cannot be told apart the one with
-    the fewest numbers is named, and of as many the first of the catalogue, which is the usual one. `found` is a fit
-    by instruments, and `effects` are those that the search tried.
+    alone and together: both stand where each is surely not 0 beside the other, else one that is surely not 0. Where
+    these leave something that was known before, more numbers are tried: the right set leaves nothing. Of those that
+    cannot be told apart the one with the fewest numbers is named, and of as many the first of the catalogue, which is
+    the usual one. `found` is a fit by instruments, and `effects` are those that the search tried.
     """
     late = [each for each in effects if each.late and found.hypothesis.can(Candidate(each, {}))]
     # A clock is no part of the vehicle: its shift is asked where the search found one.
@@ -65,8 +65,10 @@ def told_apart(found: NamedFit, effects: Sequence[Effect], given: Instruments) -
             rivals += sets.tell([names for names in sets.all if sets.count(names) == count and names not in sets.left])
             best = sets.least([best, *(names for names in rivals if sets.count(names) == count)])
     alike = []
-    # One with more numbers would have to leave less.
-    for names in (each for each in rivals if each != best and sets.count(each) <= sets.count(best)):
+    for names in rivals:
+        # One with more numbers has to leave nothing where this leaves something.
+        if sets.count(names) > sets.count(best) and sets.leaves(best) <= sets.leaves(names):
+            continue
         gone, new = [name for name in best if name not in names], [name for name in names if name not in best]
         if gone and new and not sets.surely_more(names, best):
             *beside, last = new
@@ -111,14 +113,13 @@ class _Sets:
         plain = [names for names in self.all if self.count(names) == len(names)]
         told = [names for names in self.tell(plain) if set(names) == self._needed(names)]
         together = [names for names in told if len(names) > 1]
+        if together:
+            # Beside the right one alone any other is 0.
+            return together[0], together
         # What is needed beside the others does without them.
         beside = {name for names in self.fits if len(names) > 1 for name in self._needed(names)}
-        alone: list[_Names] = [names for names in told if len(names) == 1]
-        rivals = [names for names in alone if beside.issuperset(names)] or alone or together
-        best = self.least(rivals or [()])
-        # No rotor is where it is commanded to be at once: what does without the usual effect has to show that.
-        lacking = best and next(iter(self.effects)) not in best
-        return (together[0], together) if together and (lacking or self.leaves(best)) else (best, rivals)
+        rivals = [names for names in told if beside.issuperset(names)] or told
+        return self.least(rivals or [()]), rivals
 
     def tell(self, tried: Sequence[_Names]) -> list[_Names]:
         """Fit sets; of those whose numbers instruments tell the names come back."""
@@ -139,16 +140,17 @@ class _Sets:
         return None if any(each.late for each in untold(before, after)) else after
 
     def leaves(self, names: _Names) -> bool:
-        """Tell whether a set surely leaves something that was known before."""
-        return chance_of_ranks(self.left[names]) < CHANCE
+        """Tell whether a set leaves something that was known before, which makes an answer more careful."""
+        return self._more(self.left[names], CHANCE)
 
     def surely_more(self, one: _Names, other: _Names) -> bool:
-        """Tell whether one leaves surely more than another, beyond what formulas are off by.
+        """Tell whether one leaves surely more than another; the right one leaves nothing, and less than that chance."""
+        left = (self.left[names] * (self.left[names].sum() > 0) for names in (one, other))
+        return self._more(more_left(*left), self.found.settings.significance)
 
-        The right one leaves 0 but for chance; what is too much is left as well.
-        """
-        margin = more_left(*(np.sign(left.sum()) * left for left in (self.left[one], self.left[other])))
-        return chance_of_ranks(margin) < CHANCE and bool(margin.sum() > OFF**2 * self.left[()].sum())
+    def _more(self, left: Array, rate: float) -> bool:
+        """Tell whether what is left is more than nothing, and more than formulas are off by."""
+        return chance_of_ranks(left) < rate and bool(left.sum() > OFF**2 * self.left[()].sum())
 
     def least(self, tried: Sequence[_Names]) -> _Names:
         """Choose the first that no later one leaves surely less than."""

@@ -62,9 +62,8 @@ def apart(monkeypatch, own, left, sizes=None):
         ([SURE, ABSENT], LAG, set()),
         ([ABSENT, SURE], DELAY, set()),
         ([ABSENT, ABSENT], LAG, {("command_delay", "motor_lag", "")}),
-        ([SURE, SURE], LAG, {("command_delay", "motor_lag", "")}),
     ],
-    ids=["it is the lag", "it is the delay", "the usual one of two", "one alone leaves nothing"],
+    ids=["it is the lag", "it is the delay", "the usual one of two"],
 )
 def test_what_is_needed_beside_the_other_is_named_whatever_was_found(own, together, names, rivals, monkeypatch):
     left = {(): 90.0, LAG: LITTLE, DELAY: LITTLE[::-1], BOTH: LITTLE}
@@ -94,9 +93,22 @@ def test_a_lag_that_is_surely_not_0_stands_however_little_what_is_left_without_i
     assert apart(monkeypatch, LAG, {(): LITTLE, LAG: LITTLE[::-1]})[0] == LAG
 
 
-def test_what_a_set_takes_too_much_of_is_left_as_well(monkeypatch):
-    left = {(): 90.0, LAG: 30.0, DELAY: 31.0, BOTH: LITTLE, ("notch_filter",): -30.0}
+def test_both_stand_where_each_is_surely_not_0_beside_the_other_though_one_alone_leaves_nothing(monkeypatch):
+    left = {(): 90.0, LAG: LITTLE, DELAY: LITTLE[::-1], BOTH: LITTLE}
     assert apart(monkeypatch, LAG, left, {BOTH: [SURE, SURE]})[:2] == (BOTH, set())
+
+
+def test_less_than_nothing_is_nothing(monkeypatch):
+    left = {(): 90.0, LAG: -2.0, DELAY: LITTLE, BOTH: LITTLE}
+    names, rivals, *_ = apart(monkeypatch, LAG, left, {BOTH: [ABSENT, ABSENT]})
+    assert (names, rivals) == (LAG, {("command_delay", "motor_lag", "")})
+
+
+def test_a_filter_that_leaves_nothing_is_a_rival_of_one_that_surely_leaves_something(monkeypatch):
+    some = np.where(np.arange(BLOCKS) < 10, 3.0, -2.0)
+    left = {(): 90.0, DELAY: some, ("low_pass_filter",): 4.5 * LITTLE + 0.5, ("notch_filter",): 30.0}
+    names, rivals, *_ = apart(monkeypatch, DELAY, left)
+    assert (names, rivals) == (DELAY, {("low_pass_filter", "command_delay", "")})
 
 
 def test_a_delay_of_a_third_of_a_sample_is_none(monkeypatch):
