@@ -65,14 +65,13 @@ def told_apart(found: NamedFit, effects: Sequence[Effect], given: Instruments) -
             rivals += sets.tell([names for names in sets.all if sets.count(names) == count and names not in sets.left])
             best = sets.least([best, *(names for names in rivals if sets.count(names) == count)])
     alike = []
-    for names in rivals:
-        # One with more numbers has to leave nothing where this leaves something.
-        if sets.count(names) > sets.count(best) and sets.leaves(best) <= sets.leaves(names):
+    for names in [*rivals, *sets.beside(best)]:
+        if sets.count(names) > sets.count(best) and not sets.lacks(best, names):
             continue
         gone, new = [name for name in best if name not in names], [name for name in names if name not in best]
-        if gone and new and not sets.surely_more(names, best):
-            *beside, last = new
-            alike.append(alternative(tried[gone[0]], tried[last], 1.0, *beside))
+        if best and new and not sets.surely_more(names, best):
+            *beside, last = new if gone else names
+            alike.append(alternative(tried[(gone or best)[0]], tried[last], 1.0, *beside))
     # Of one number its own size tells, of several that so much less is left.
     less = chance_of_ranks(more_left(sets.left[()], sets.left[best]))
     chances = {name: sets.chance_of(own[0]) if len(own) == 1 else less for name, own in sets.numbers(best).items()}
@@ -111,13 +110,14 @@ class _Sets:
         """Choose among effects of one number: none where none is surely not 0, all where one leaves something."""
         self.tell([()])
         plain = [names for names in self.all if self.count(names) == len(names)]
-        told = [names for names in self.tell(plain) if set(names) == self._needed(names)]
+        rate = self.found.settings.significance
+        told = [names for names in self.tell(plain) if set(names) == self._needed(names, rate)]
         together = [names for names in told if len(names) > 1]
         if together:
             # Beside the right one alone any other is 0.
             return together[0], together
         # What is needed beside the others does without them.
-        beside = {name for names in self.fits if len(names) > 1 for name in self._needed(names)}
+        beside = {name for names in self.fits if len(names) > 1 for name in self._needed(names, rate)}
         rivals = [names for names in told if beside.issuperset(names)] or told
         return self.least(rivals or [()]), rivals
 
@@ -143,6 +143,16 @@ class _Sets:
         """Tell whether a set leaves something that was known before, which makes an answer more careful."""
         return self._more(self.left[names], CHANCE)
 
+    def beside(self, best: _Names) -> list[_Names]:
+        """List sets of effects of one number that hold a set and another effect."""
+        return [names for names in self.fits if set(best) < set(names) and self.count(names) == len(names)]
+
+    def lacks(self, best: _Names, names: _Names) -> bool:
+        """Tell whether a set may lack what one with more numbers has: what it leaves, or a number beside its own."""
+        if set(best) < set(names):
+            return self._needed(names, CHANCE) == set(names)
+        return self.leaves(best) and not self.leaves(names)
+
     def surely_more(self, one: _Names, other: _Names) -> bool:
         """Tell whether one leaves surely more than another; the right one leaves nothing, and less than that chance."""
         left = (self.left[names] * (self.left[names].sum() > 0) for names in (one, other))
@@ -165,8 +175,8 @@ class _Sets:
         told = zip(fit.hypothesis.chosen, fit.estimates.effects, strict=True)
         return {candidate.effect.name: numbers for candidate, numbers in told if candidate.effect.name in names}
 
-    def _needed(self, names: _Names) -> set[str]:
-        """Name the effects whose only number is surely not 0, and within its bounds.
+    def _needed(self, names: _Names, rate: float) -> set[str]:
+        """Name the effects whose only number chance makes at most at a rate if it is 0, and within its bounds.
 
         Beside others it is enough of the usual effect that it is not less than anybody has.
         """
@@ -175,7 +185,7 @@ class _Sets:
             if name == usual:
                 stands = number.value >= self.effects[name].shapes[0].grid[0]
             else:
-                stands = self.chance_of(number) <= self.found.settings.significance
+                stands = self.chance_of(number) <= rate
             if stands and number.value < number.plausible[1]:
                 needed.add(name)
         return needed
