@@ -107,7 +107,7 @@ class _Sets:
         return sum(len(self.effects[name].shapes) for name in names)
 
     def usual(self) -> tuple[_Names, list[_Names]]:
-        """Choose among effects of one number: those that are surely not 0 beside each other, else one alone, or none."""
+        """Choose among effects of one number: those that are surely not 0 beside each other, else one, or none."""
         self.tell([()])
         plain = [names for names in self.all if self.count(names) == len(names)]
         rate = self.found.settings.significance
