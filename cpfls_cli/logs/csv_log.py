@@ -1,16 +1,19 @@
-"""Reader of CSV: plain or gzip-compressed, comma, semicolon or tab, every field a number."""
+"""Reader of CSV: plain or gzip-compressed; comma, semicolon, tab or spaces; every field a number or a time."""
 
 import csv
 import gzip
 import io
+import re
 import zlib
 from array import array
 from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from functools import partial
+from itertools import chain
 from pathlib import Path
-from typing import TextIO
+from typing import Final, NamedTuple, TextIO
 
 import numpy as np
 
@@ -23,30 +26,38 @@ from cpfls_cli.words import some
 _LONGEST_LINE = 1 << 20
 """Characters of a line, which may hold thousands of columns; compressed, a longer one may fill the memory."""
 
+_REMARKS: Final = ("#", "%", "//")
+"""With which a remark before the column names begins."""
+
+_DECIMAL_COMMA: Final = re.compile(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*")
+"""A number as it is written in much of Europe, where semicolons separate columns."""
+
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
-    """Read columns of a log; without a wish, those whose first value is a number or absent."""
+    """Read columns of a log; without a wish, those whose first value is a number, a time or absent."""
+    with _opened(path) as table:
+        names, first = table.names, dict(zip(table.names, table.first, strict=False))
+    numeric = [name for name in names if name in first and (_is_number(first[name]) or _is_time(first[name]))]
+    units = {name: "s" for name in numeric if _is_time(first[name])}
     if wanted is not None:
-        return LogContents({"": read_csv(path, set(wanted))})
-    with _rows(path) as (names, rows):
-        first = next((row for row in rows if row), [])
-    numeric = [name for name, text in zip(names, first, strict=False) if _is_number(text)]
+        return LogContents({"": read_csv(path, set(wanted))}, units)
     left_out = sorted(set(names) - set(numeric))
     warnings = (f"columns that hold text are left out: {some(left_out, MOST_LISTED)}",) if left_out else ()
     columns = read_csv(path, set(numeric))
-    return LogContents({"": {name: columns[name] for name in numeric}}, warnings=warnings)
+    return LogContents({"": {name: columns[name] for name in numeric}}, units, warnings=warnings)
 
 
 def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
     """Read columns of a CSV, empty fields as NaN; those that are not wanted by name only, for a message to suggest."""
-    with _rows(path) as (names, lines):
+    with _opened(path) as table:
+        names = table.names
         repeated = sorted(name for name, count in Counter(names).items() if count > 1 and name in wanted)
         if repeated:
             raise InputError(f"{path}: column '{repeated[0]}' appears twice")
         kept = [index for index, name in enumerate(names) if name in wanted]
         # Lists of numbers would take ten times as much.
         numbers, count = array("d"), 0
-        for number, row in enumerate(lines, start=2):
+        for number, row in enumerate(table.rows, start=table.line):
             if not row:
                 continue
             if len(row) != len(names):
@@ -63,26 +74,74 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
     return columns | {names[index]: values[:, position] for position, index in enumerate(kept)}
 
 
+class _Table(NamedTuple):
+    """A CSV that is open: column names, the first row that is not empty, all rows, the line of the first row."""
+
+    names: list[str]
+    first: list[str]
+    rows: Iterator[list[str]]
+    line: int
+
+
 @contextmanager
-def _rows(path: Path) -> Iterator[tuple[list[str], Iterator[list[str]]]]:
-    """Open a CSV: its column names, and its rows."""
+def _opened(path: Path) -> Iterator[_Table]:
+    """Open a CSV, of commas, semicolons, tabs or spaces; remarks before the column names are skipped."""
     try:
         if path.suffix == ".gz":
             _refuse_inflated(path)
         with _open(path) as stream:
-            first = stream.readline(_LONGEST_LINE)
-            if len(first) == _LONGEST_LINE:
-                raise InputError(f"{path}: not a CSV file: its first line, the column names, does not end")
-            if not first.strip():
-                raise InputError(f"{path}: is empty; a log starts with a line of column names")
-            delimiter = max(",;\t", key=first.count)
-            names = [name.strip() for name in next(csv.reader([first], delimiter=delimiter))]
             # Of a line without an end a part is a row, of another length than all others.
-            yield names, csv.reader(iter(partial(stream.readline, _LONGEST_LINE), ""), delimiter=delimiter)
+            yield _table(path, iter(partial(stream.readline, _LONGEST_LINE), ""))
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: not a CSV file: {error}") from None
+
+
+def _table(path: Path, lines: Iterator[str]) -> _Table:
+    remark, header, line = "", next(lines, ""), 1
+    while header.startswith(_REMARKS):
+        remark, header, line = header.lstrip("#%/ "), next(lines, ""), line + 1
+    if len(header) == _LONGEST_LINE:
+        raise InputError(f"{path}: not a CSV file: its first line, the column names, does not end")
+    if not header.strip():
+        raise InputError(f"{path}: is empty; a log starts with a line of column names")
+    if remark and all(_is_number(field) or _is_time(field) for field in _fields(header)):
+        # What writes numbers only has its column names in the last remark.
+        header, lines, line = remark, chain([header], lines), line - 1
+    names = [name.strip() for name in _fields(header)]
+    if len(names) > 1 and all(map(_is_number, names)):
+        raise InputError(
+            f"{path}: has no line of column names, line {line} holds {len(names)} numbers: put a line above it that"
+            " names each column, such as time,roll,pitch,yaw,p,q,r,m1,m2,m3,m4"
+        )
+    begun = []
+    for text in lines:
+        begun.append(text)
+        if text.strip():
+            break
+    first = _fields(begun[-1]) if begun else []
+    rows = _rows(chain(begun, lines), _delimiter(begun[-1] if begun else header))
+    if any(map(_DECIMAL_COMMA.fullmatch, first)):
+        rows, first = map(_with_points, rows), _with_points(first)
+    return _Table(names, first, rows, line + 1)
+
+
+def _delimiter(line: str) -> str:
+    """Tell what parts the fields of a line; numbers with a decimal comma are parted by the others."""
+    return next((each for each in ";\t," if each in line), " ")
+
+
+def _rows(lines: Iterator[str], delimiter: str) -> Iterator[list[str]]:
+    return map(str.split, lines) if delimiter == " " else csv.reader(lines, delimiter=delimiter)
+
+
+def _fields(line: str) -> list[str]:
+    return next(_rows(iter([line]), _delimiter(line)), [])
+
+
+def _with_points(fields: list[str]) -> list[str]:
+    return [field.replace(",", ".") for field in fields]
 
 
 def _refuse_inflated(path: Path) -> None:
@@ -105,9 +164,8 @@ def _open(path: Path) -> Iterator[TextIO]:
 
 def row_lines(path: Path) -> list[int]:
     """List the line number, from 1, of each row of values in a CSV; empty lines hold none."""
-    with _open(path) as stream:
-        lines = [number for number, line in enumerate(stream, start=1) if line.strip()]
-    return lines[1:]
+    with _opened(path) as table:
+        return [number for number, row in enumerate(table.rows, start=table.line) if row]
 
 
 def _is_number(text: str) -> bool:
@@ -118,12 +176,28 @@ def _is_number(text: str) -> bool:
     return True
 
 
+def _is_time(text: str) -> bool:
+    try:
+        _seconds(text.strip())
+    except ValueError:
+        return False
+    return True
+
+
+def _seconds(text: str) -> float:
+    """Read a date with a time, or a time of day, as ISO 8601 writes it; where no zone is named, as one of UTC."""
+    if ":" not in text:
+        raise ValueError(text)
+    stamp = datetime.fromisoformat(text if text[4:5] == "-" else f"1970-01-01T{text}")
+    return (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
+
+
 def _number(field: str, path: Path, row: int, column: str) -> float:
     text = field.strip()
     if not text:
         return float("nan")
     try:
-        return _plain_numbers([text])[0]
+        return _seconds(text) if ":" in text else _plain_numbers([text])[0]
     except ValueError:
         raise InputError(f"{path}:{row}: column '{column}' = {text[:40]!r}: not a number") from None
 

@@ -110,7 +110,7 @@ def test_a_log_of_another_tool_is_listed_once_and_shortened(wrong):
         (",".join(NAMES) + "\n0,0,\x00,0,0,0,0\n", "LOG:2: column 'pitch' = '\\x00': not a number"),
         (",".join(NAMES) + "\n0,0,1_000,0,0,0,0\n", "LOG:2: column 'pitch' = '1_000': not a number"),
         (",".join(NAMES) + "\n0,0,\uff11,0,0,0,0\n", "LOG:2: column 'pitch' = '\uff11': not a number"),
-        (";".join(NAMES) + "\n0;0,5;0;0;0;0;0\n", "LOG:2: column 'roll' = '0,5': not a number"),
+        (";".join(NAMES) + "\n0;0.5;0;0;0;0;0\n1;0,5;0;0;0;0;0\n", "LOG:3: column 'roll' = '0,5': not a number"),
     ],
 )
 def test_wrong_table(wrong, content, message):
