@@ -1,7 +1,7 @@
-"""Reader of ArduPilot's DataFlash logs: messages that describe themselves, each kind with stamps of its own."""
+"""Reader of ArduPilot's DataFlash logs, binary or text: messages that describe themselves, each with own stamps."""
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import nan
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP
-from cpfls_cli.logs.formats import DATAFLASH_MAGIC, LogContents
+from cpfls_cli.logs.formats import DATAFLASH_MAGIC, DATAFLASH_TEXT_MAGIC, LogContents
 from cpfls_cli.logs.records import bytes_of, date, numbers, seconds, table
 
 _HEAD = b"\xa3\x95"
@@ -27,6 +27,8 @@ _NUMBERS = {
     **{own[0]: (own[1:], 0.01) for own in ("ci2", "Cu2", "ei4", "Eu4")},
     "L": ("i4", 1e-7),
 }
+_WHOLE = "bBhHiIqQ"
+_OF_TEXT: dict[str, Callable[[str], float | bytes]] = {"i": int, "f": float, "S": lambda text: text.encode("latin-1")}
 _OTHERS = {"n": "S4", "N": "S16", "Z": "S64", "a": "V64"}
 _STAMPS = {"TimeUS": 10**6, "TimeMS": 10**3}
 # Of 1980-01-06, less the 18 leap seconds since.
@@ -46,6 +48,11 @@ class _Kind:
     letters: dict[str, str]
     record: np.dtype
     begins: list[int] = field(default_factory=list)
+    text: bool = False
+
+    def factor(self, field_of: str) -> float:
+        """Give the factor that the letter of a field implies; text has it in its numbers."""
+        return 1.0 if self.text else _NUMBERS[self.letters[field_of]][1]
 
     @property
     def stamp(self) -> str:
@@ -57,15 +64,18 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     """Read all messages, ``MESSAGE.field`` or ``MESSAGE[instance].field``; a part of them takes no less time."""
     del wanted
     content = bytes_of(path)
-    if not content.startswith(DATAFLASH_MAGIC):
+    if content.startswith(DATAFLASH_MAGIC):
+        kinds, lost = _find_messages(content)
+        tables = {kind.name: table(content, kind.begins, kind.record) for kind in kinds.values() if kind.begins}
+    elif content.startswith(DATAFLASH_TEXT_MAGIC):
+        kinds, tables, lost = _read_lines(content)
+    else:
         raise InputError(f"{path}: not a DataFlash log: it does not start like one (encrypted, or of another kind?)")
-    kinds, lost = _find_messages(content)
-    tables = {kind.name: table(content, kind.begins, kind.record) for kind in kinds.values() if kind.begins}
     stated = _stated_units(tables, kinds)
     topics = {
         topic: fields
         for kind in kinds.values()
-        if kind.begins and kind.stamp
+        if kind.name in tables and kind.stamp
         for topic, fields in _topics(kind, tables[kind.name], stated.get(kind.name, {}))
     }
     if not topics:
@@ -126,6 +136,53 @@ def _describe(message: bytes, kinds: dict[int, _Kind]) -> None:
         kinds[int(own["kind"])] = _Kind(own["name"].decode("latin-1"), dict(zip(names, letters, strict=True)), record)
 
 
+def _read_lines(content: bytes) -> tuple[dict[int, _Kind], dict[str, np.ndarray], int]:
+    """Read a log that was written or turned into text: its kinds, their messages as tables, and the bytes of others."""
+    kinds: dict[int, _Kind] = {}
+    rows: dict[str, list[tuple[float | bytes, ...]]] = {}
+    named: dict[str, _Kind] = {}
+    lost = 0
+    for line in content.decode("latin-1").splitlines():
+        name, *fields = (each.strip() for each in line.split(","))
+        kind = named.get(name)
+        if name == "FMT" and len(fields) > 4 and fields[0].isdecimal():
+            described = _described(int(fields[0]), fields[2], fields[3], fields[4:])
+            if described is not None and described.name not in named:
+                kinds[int(fields[0])] = named[described.name] = described
+        elif kind is None or (values := _values(kind, fields)) is None:
+            lost += len(line)
+        else:
+            rows.setdefault(name, []).append(values)
+    tables = {name: np.array(own, dtype=named[name].record) for name, own in rows.items()}
+    return kinds, tables, lost
+
+
+def _described(number: int, name: str, letters: str, names: list[str]) -> _Kind | None:
+    """Take up the kind of message that a line describes; none for the description itself, or a wrong one."""
+    if number == _OF_FORMATS or len(names) != len(letters) or not set(letters) <= {*_NUMBERS, *_OTHERS}:
+        return None
+    if len({"", *names}) != len(names) + 1:
+        return None
+    # A mode is written as its name.
+    places = ["S64" if letter in {*_OTHERS, "M"} else "i8" if letter in _WHOLE else "f8" for letter in letters]
+    return _Kind(
+        name, dict(zip(names, letters, strict=True)), np.dtype(list(zip(names, places, strict=True))), text=True
+    )
+
+
+def _values(kind: _Kind, fields: list[str]) -> tuple[float | bytes, ...] | None:
+    """Read the fields of a line; a comma in the text at its end is part of the text."""
+    places = [place.kind for place, *_ in (kind.record.fields or {}).values()]
+    if places[-1] == "S" and len(fields) > len(places):
+        fields = [*fields[: len(places) - 1], ", ".join(fields[len(places) - 1 :])]
+    if len(fields) != len(places):
+        return None
+    try:
+        return tuple(_OF_TEXT[place](text) for place, text in zip(places, fields, strict=True))
+    except ValueError:
+        return None
+
+
 def _topics(kind: _Kind, samples: np.ndarray, units: Mapping[str, str]) -> Iterator[tuple[str, dict[str, Array]]]:
     """Give the numbers of one kind of message, each instance of it a topic."""
     instance = next((each for each, unit in units.items() if unit == _INSTANCE), None)
@@ -136,9 +193,9 @@ def _topics(kind: _Kind, samples: np.ndarray, units: Mapping[str, str]) -> Itera
             {
                 STAMP: seconds(own[kind.stamp], 0, _STAMPS[kind.stamp]),
                 **{
-                    each: _NUMBERS[letter][1] * numbers(own[each])
+                    each: kind.factor(each) * numbers(own[each])
                     for each, letter in kind.letters.items()
-                    if letter in _NUMBERS and each != kind.stamp
+                    if letter in _NUMBERS and each != kind.stamp and samples.dtype[each].kind != "S"
                 },
             },
         )

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 ULOG_MAGIC = b"ULog\x01\x12\x35"
 _ENCRYPTED_MAGIC = b"ULogEnc"
 DATAFLASH_MAGIC = b"\xa3\x95\x80\x80"
+DATAFLASH_TEXT_MAGIC = b"FMT, 128, "
 BLACKBOX_MAGIC = b"H Product:Blackbox flight data recorder"
 USD_MAGIC = b"\xbc"
 GZIP_MAGIC = b"\x1f\x8b"
@@ -141,6 +142,7 @@ _TABLE: tuple[tuple[str, str, str, bytes, str, dict[str, Any]], ...] = (
     (".parquet", "Parquet", "Parquet", b"PAR1", "parquet_log", _PYARROW),
     (".ulg", "ULog", "ULog", ULOG_MAGIC, "ulog", _PYULOG),
     (".bin", "ArduPilot DataFlash", "a DataFlash log", DATAFLASH_MAGIC, "dataflash", {}),
+    (".log", "ArduPilot DataFlash", "a DataFlash log in text", DATAFLASH_TEXT_MAGIC, "dataflash", {}),
     (".bbl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, "blackbox", {}),
     (".bfl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, "blackbox", {}),
     ("", "Crazyflie uSD", "a log of a Crazyflie's uSD card", USD_MAGIC, "crazyflie_usd", {}),

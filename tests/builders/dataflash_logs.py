@@ -20,8 +20,22 @@ def definition(number, name, letters, columns):
     return message(0x80, "BBnNZ", (number, length, name.encode(), letters.encode(), columns.encode()))
 
 
-def dataflash(kinds, rows, parameters=None, said=(), units=None):
-    """Write a log.
+_FACTORS = {"c": 0.01, "C": 0.01, "e": 0.01, "E": 0.01, "L": 1e-7}
+
+
+def line(name, letters, values):
+    """Write a message as ground stations turn it into text: numbers with the factor of their letter."""
+    texts = (
+        each.decode()
+        if isinstance(each, bytes)
+        else repr(round(_FACTORS[letter] * each, 9) if letter in _FACTORS else each)
+        for letter, each in zip(letters, values, strict=True)
+    )
+    return f"{', '.join((name, *texts))}\n".encode()
+
+
+def dataflash(kinds, rows, parameters=None, said=(), units=None, *, text=False):
+    """Write a log, in bytes or as text.
 
     Parameters
     ----------
@@ -42,9 +56,14 @@ def dataflash(kinds, rows, parameters=None, said=(), units=None):
     numbers = {name: 129 + place for place, name in enumerate(kinds)}
     parts = [definition(0x80, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns")]
     parts += [definition(numbers[name], name, *own) for name, own in kinds.items()]
+    if text:
+        formats = {"FMT": (0x80, "BBnNZ", "Type,Length,Name,Format,Columns")}
+        formats |= {name: (numbers[name], *own) for name, own in kinds.items()}
+        parts = [f"FMT, {own[0]}, 89, {name}, {own[1]}, {own[2]}\n".encode() for name, own in formats.items()]
 
     def put(name, *values):
-        parts.append(message(numbers[name], kinds[name][0], values))
+        letters = kinds[name][0]
+        parts.append(line(name, letters, values) if text else message(numbers[name], letters, values))
 
     for letter, label in (("s", "s"), ("E", "rad/s"), ("o", "m/s/s"), ("d", "deg"), ("Y", "us"), ("#", "instance")):
         if units is not None:
@@ -53,8 +72,8 @@ def dataflash(kinds, rows, parameters=None, said=(), units=None):
         put("FMTU", 1, numbers[name], ids.encode(), factors.encode())
     for name, value in (parameters or {}).items():
         put("PARM", 1, name.encode(), value)
-    for text in said:
-        put("MSG", 1, text.encode())
+    for words in said:
+        put("MSG", 1, words.encode())
     for name, values in rows:
         put(name, *values)
     return b"".join(parts)

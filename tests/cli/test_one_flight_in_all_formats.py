@@ -1,6 +1,7 @@
 """One flight, written in every format: what is imported is the same."""
 
 import gzip
+from functools import partial
 
 import h5py
 import numpy as np
@@ -64,9 +65,10 @@ def ulog(path):
     path.write_bytes(ulogs.ulog([(stamp, 0, row) for stamp, row in ROWS], fields))
 
 
-def ardupilot(path):
+def ardupilot(path, *, text=False):
     names = ",".join(["TimeUS", *(f"{name[-1]}{name[5]}{axis}" for name in SIGNALS for axis in range(3))])
-    path.write_bytes(dataflash({"FLT": ("Q" + "f" * 9, names)}, [("FLT", (stamp + 9, *row)) for stamp, row in ROWS]))
+    rows = [("FLT", (stamp + 9, *map(float, row))) for stamp, row in ROWS]
+    path.write_bytes(dataflash({"FLT": ("Q" + "f" * 9, names)}, rows, text=text))
 
 
 def crazyflie(path):
@@ -95,6 +97,7 @@ WRITERS = {
     "log.parquet": (table, "t", PLAIN),
     "log.ulg": (ulog, None, below("flight", INDEXED)),
     "log.bin": (ardupilot, None, ARDUPILOT),
+    "log.log": (partial(ardupilot, text=True), None, ARDUPILOT),
     "log00": (crazyflie, None, below("fixed.log", PLAIN)),
     "log.db3": (bag, None, OF_TOPICS),
     "log.mcap": (bag, None, OF_TOPICS),
@@ -105,6 +108,7 @@ WRITERS = {
 BEGINS = {
     "log.ulg": 1e-6 * ulogs.BEGIN,
     "log.bin": 9e-6,
+    "log.log": 9e-6,
     "log.db3": 1e-9 * ros_bags.BEGIN_NS,
     "log.mcap": 1e-9 * ros_bags.BEGIN_NS,
 }

@@ -64,5 +64,5 @@ def test_lines_are_counted_past_remarks_and_empty_lines(tmp_path: Path) -> None:
     path = _written(tmp_path / "log.csv", "# remark\ntime,p\n0,1\n\n1,2\n")
     assert row_lines(path) == [3, 5]
     path.write_text("# remark\ntime,p\n0,1\n\n1,x\n", encoding="utf-8")
-    with pytest.raises(InputError, match="log.csv:5: column 'p' = 'x': not a number"):
+    with pytest.raises(InputError, match=r"log\.csv:5: column 'p' = 'x': not a number"):
         contents(path, {"time", "p"})

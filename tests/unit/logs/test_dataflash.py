@@ -27,8 +27,8 @@ ROWS = [
 PARAMETERS = {"FRAME_CLASS": 1.0, "MOT_THST_EXPO": 0.5}
 
 
-def log(rows=ROWS, units=UNITS, said=("ArduCopter V4.5.7 (2a3dc4b7)",)):
-    return dataflash(KINDS, rows, PARAMETERS, said, units)
+def log(rows=ROWS, units=UNITS, said=("ArduCopter V4.5.7 (2a3dc4b7)",), *, text=False):
+    return dataflash(KINDS, rows, PARAMETERS, said, units, text=text)
 
 
 @pytest.fixture
@@ -136,3 +136,27 @@ def test_kinds_that_contradict_themselves_are_left_out(read):
 def test_a_field_may_have_any_name(read):
     content = dataflash({"OWN": ("Qf", "TimeUS,f0")}, [("OWN", (1_000_000, 1.5))])
     assert read(content).topics["OWN"]["f0"].tolist() == [1.5]
+
+
+def test_a_log_in_text_holds_the_same(read):
+    as_bytes, as_text = read(log()), read(log(text=True, said=("ArduCopter V4.5.7 (2a3dc4b7), on the ground",)))
+    assert as_text.topics.keys() == as_bytes.topics.keys()
+    for topic, fields in as_bytes.topics.items():
+        # A mode has a name there.
+        kept = fields.keys() - {"Mode"}
+        assert as_text.topics[topic].keys() == kept
+        for name in kept:
+            np.testing.assert_allclose(as_text.topics[topic][name], fields[name], rtol=1e-9)
+    assert as_text.units == {name: unit for name, unit in as_bytes.units.items() if name.partition(".")[2] != "Mode"}
+    assert (as_text.parameters, as_text.system, as_text.warnings) == (as_bytes.parameters, as_bytes.system, ())
+
+
+def test_broken_lines_of_text_are_counted_and_left_out(read):
+    whole = log(text=True)
+    broken = (
+        whole.replace(b"IMU, 5000000, 0, 0.5, 9.5", b"IMU, 5000000, 0, 0.5").replace(b", 0.75,", b", 0.7x,") + b"IMU, 5"
+    )
+    contents = read(broken)
+    assert "IMU" not in contents.topics
+    assert "IMU[1]" in contents.topics
+    assert contents.warnings[0].endswith("the file is damaged in places; what could be read is used")

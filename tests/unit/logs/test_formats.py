@@ -70,7 +70,7 @@ def test_the_page_on_import_describes_every_format():
 
 
 def test_words():
-    suffixes = ".csv, .csv.gz, .parquet, .ulg, .bin, .bbl, .bfl, Crazyflie uSD, .db3, .mcap, .h5, .hdf5 or .mat"
+    suffixes = ".csv, .csv.gz, .parquet, .ulg, .bin, .log, .bbl, .bfl, Crazyflie uSD, .db3, .mcap, .h5, .hdf5 or .mat"
     assert suffixes_in_words() == suffixes
     formats = "CSV, Parquet, ULog, ArduPilot DataFlash, Betaflight blackbox, Crazyflie uSD, ROS 2 bag, HDF5, MATLAB"
     assert formats_in_words() == formats
