@@ -303,7 +303,7 @@ def csv_case(rng, good):
         else:
             table = [[*line, field] for line in table]
         table = [line for line in table if line] or [[""]]
-    text = "\n".join(str(rng.choice([",", ",", ",", ";", "\t"])).join(line) for line in table) + "\n"
+    text = "\n".join(str(rng.choice([",", ",", ",", ";", "\t", " ", "\n# "])).join(line) for line in table) + "\n"
     content = text.encode("utf-8", "replace")
     path = good.folder / "hostile.csv"
     path.write_bytes(_bytes_changed(rng, content) if rng.random() < 0.2 else content)
@@ -501,9 +501,10 @@ def damaged_case(rng, good, *, kind):
 @cache
 def _good_log(kind):
     rows = _rows(np.random.default_rng(1))
-    if kind == "DataFlash":
-        sent = [("FLT", (int(1e6 * abs(row[0])), *row[1:])) for row in rows]
-        return dataflash({"FLT": ("Qffffff", "TimeUS,R,P,Y,X,V,W")}, sent, {"MOT_PWM_MAX": 2000.0}, ("on",), {})
+    if kind.startswith("DataFlash"):
+        sent = [("FLT", (int(1e6 * abs(row[0])), *map(float, row[1:]))) for row in rows]
+        kinds, stated = {"FLT": ("Qffffff", "TimeUS,R,P,Y,X,V,W")}, {"MOT_PWM_MAX": 2000.0}
+        return dataflash(kinds, sent, stated, ("on",), {}, text=kind.endswith("text"))
     if kind == "uSD":
         events = {"fixed": {f"log.{name}": "f" for name in COLUMNS[1:]}}
         return usd(events, [("fixed", int(1e6 * abs(row[0])), row[1:]) for row in rows])
@@ -530,6 +531,7 @@ DAMAGED = {
     ),
     "Betaflight": (".bbl", _mapped("time", "attitude", [f"axisI[{axis}]" for axis in range(3)], "deg")),
     "DataFlash": (".bin", _mapped("FLT.timestamp", "attitude", ["FLT.R", "FLT.P", "FLT.Y"], "rad")),
+    "DataFlash text": (".log", _mapped("FLT.timestamp", "attitude", ["FLT.R", "FLT.P", "FLT.Y"], "rad")),
     "uSD": ("", _mapped("fixed.timestamp", "attitude", [f"fixed.log.{name}" for name in COLUMNS[1:4]], "rad")),
 }
 
