@@ -151,8 +151,8 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
         cut_off_hz=filtered,
         updated_hz={signal.name: signal.rate_hz for signal in slow},
         warnings=(
-            *broken,
             *cut,
+            *broken,
             *warn_of_values(counts),
             *warn_of_dead(table, tuple(counts.saturated), settings),
             *warn_of_rest(table, resting, settings),

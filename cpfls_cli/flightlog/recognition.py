@@ -12,7 +12,8 @@ from cpfls_cli.flightlog.agreement import first_derivative, slow
 from cpfls_cli.flightlog.airframe import MovedBy, Parameters, airframe_from_motion
 from cpfls_cli.flightlog.attitude_columns import BODY_OF, doubt_reading, read_attitude
 from cpfls_cli.flightlog.conversion import as_mapped
-from cpfls_cli.flightlog.flown import FlownPart, find_flown, rotor_level, turning_size
+from cpfls_cli.flightlog.crash import Signs, upright_of
+from cpfls_cli.flightlog.flown import FlownPart, find_flown, rotor_shares
 from cpfls_cli.flightlog.log_table import LogTable, holding_values, make_grid, refuse_dead_rotors
 from cpfls_cli.flightlog.motion_columns import (
     gyroscope_first,
@@ -53,6 +54,9 @@ _ORDER: Final[tuple[SignalName, ...]] = (
     "thrust",
     "voltage",
 )
+_SIGNS = {"position", "body_rate", "acceleration", "attitude", "quaternion"}
+"""What tells flight, beside the rotors."""
+
 _WITH_BODY = {"body_rate", "acceleration", "attitude", "quaternion"}
 _SHOWN = 4
 """Groups of columns that are named where others are taken for the same."""
@@ -91,12 +95,12 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     make_grid(log, candidates)
     rotors = find_rotors({name: _with_values(log, candidates.get(name, ())) for name in ROTORS}, parameters, system)
     rotors = rotors if rotors.speed or rotors.command else find_mixed(log) or rotors
-    level = _level(log, rotors)
-    flown = _find_flown(log, candidates, level)
+    shares = _shares(log, rotors)
+    flown = find_flown(_signs(log, candidates, shares))
     if not flown.flies:
         raise InputError(flown.reasons[0])
-    seen = Seen(log, candidates, _part(log, flown), level)
-    seen.warnings += [] if log.time_doubt is None else [log.time_doubt]
+    seen = Seen(log, candidates, _part(log, flown), None if shares is None else shares.mean(axis=1))
+    seen.warnings += filter(None, (flown.ended, log.time_doubt))
     position_by_velocity(seen)
     verdict = read_attitude(seen)
     if verdict is not None and gyroscope_first(seen, verdict.best, _flown_rotors(seen, rotors)):
@@ -123,13 +127,13 @@ def _with_values(log: LogTable, candidates: Sequence[Named]) -> list[tuple[Named
     return [(named, log.values(columns)[0], log.without_spikes(columns)) for named, columns in groups]
 
 
-def _level(log: LogTable, rotors: RotorColumns) -> Array | None:
-    """Give the mean of the rotors' commands or speeds on the clock; 0 where they stand."""
+def _shares(log: LogTable, rotors: RotorColumns) -> Array | None:
+    """Give the rotors' commands or speeds on the clock, shape (time, rotor), as shares; 0 where they stand."""
     found = rotors.command or rotors.speed
     if found is None:
         return None
     values = log.on_grid(found.columns.columns, spikes=False)
-    return rotor_level(as_mapped(values, found.columns), shares=found is rotors.command)
+    return rotor_shares(as_mapped(values, found.columns), shares=found is rotors.command)
 
 
 def _flown_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array, bool] | None:
@@ -138,16 +142,27 @@ def _flown_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array, bool] | None
     return None if found is None else (seen.mapped(found.guess), rotors.speed is None)
 
 
-def _find_flown(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], level: Array | None) -> FlownPart:
-    position, gyro = (next(iter(candidates.get(name, ())), None) for name in ("position", "body_rate"))
+def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], rotors: Array | None) -> Signs:
+    """Gather what tells flight by the names of columns, before axes and frames are known."""
+    first = {name: found[0] for name, found in candidates.items() if found}
+    values = {name: named.scale * log.on_grid(named.group.columns) for name, named in first.items() if name in _SIGNS}
     height = rate = None
-    if position is not None:
-        height = position.scale * log.on_grid(position.group.columns)[:, 2] / (1000 if position.unit == "mm" else 1)
-    if gyro is not None:
-        values = log.on_grid(gyro.group.columns)
-        factor = gyro.scale / (_DEGREES if gyro.unit == "deg/s" else 1.0)
-        rate = factor * turning_size(values)
-    return find_flown(log.grid - log.grid[0], level, height, rate)
+    if "position" in values:
+        height = values["position"][:, 2] / (1000 if first["position"].unit == "mm" else 1)
+    if "body_rate" in values:
+        rate = values["body_rate"] / (_DEGREES if first["body_rate"].unit == "deg/s" else 1.0)
+    angles = values.get("attitude")
+    if angles is not None and float(np.abs(angles[:, :2]).max()) > np.pi:
+        angles = angles / _DEGREES
+    ordered = "quaternion" in first and (first["quaternion"].group.kind == "wxyz" or first["quaternion"].known)
+    return Signs(
+        time=log.grid - log.grid[0],
+        rotors=rotors,
+        height=height,
+        body_rate=rate,
+        upright=upright_of(angles, values["quaternion"] if ordered else None, "wxyz"),
+        force=values.get("acceleration"),
+    )
 
 
 def _part(log: LogTable, flown: FlownPart) -> slice:
