@@ -16,7 +16,7 @@ ALIVE = 0.02
 _REST_S, _CALM_RAD_S, _LIVELY_RAD_S = 1.5, 0.5, 0.05
 """For how long it rests at least, the rate below which it does, and that above which it surely flies."""
 
-_SLOW_S = 0.5
+SLOW_S = 0.5
 """Means over so long hold no vibration."""
 
 _WEIGHT, _OFF_THRUST = (0.8, 1.2), 0.5
@@ -36,6 +36,10 @@ the time from its last wild motion to the end, in which no pilot has recovered."
 
 _BEYOND, _WILD_RAD_S, _WILD_RAD_S2, _HARD = 1.5, 5.0, 100.0, 3.0
 """Times the largest of the flight before, and sizes at least, the last in gravity, that neither rotors nor pilot make."""
+
+_TURN_S, _NOT_FOLLOWED = 0.1, 0.7
+"""Over which the turning of a vehicle is held against its rotors, and the share of it that they leave where it does
+not follow them."""
 
 _FALLS, _FALL_S, _DROP_M = 0.3, 0.2, 1.0
 """Force in gravity that a vehicle feels in free fall at most, for how long, and the height that it loses in a second."""
@@ -90,7 +94,7 @@ class Signs:
         if self.body_rate is None:
             return None
         rate = self.body_rate - np.median(self.body_rate, axis=0)
-        return np.asarray(np.linalg.norm(averaged(rate, self.period, _SLOW_S), axis=1))
+        return np.asarray(np.linalg.norm(averaged(rate, self.period, SLOW_S), axis=1))
 
     @cached_property
     def felt(self) -> Array | None:
@@ -203,7 +207,9 @@ def ended_early(signs: Signs, rests: BoolArray, part: tuple[int, int]) -> EarlyE
     time = signs.time
     wild, hard = _beyond_flight(signs, part, rests_then=rests_then)
     troubled = first + np.flatnonzero(wild)
-    if len(troubled) and (after - troubled[-1]) * signs.period < _AT_ONCE_S:
+    lost = len(troubled) > 0 and (after - troubled[-1]) * signs.period < _AT_ONCE_S
+    # Who ends the log in a flip has lost nothing.
+    if lost and (after < len(time) or hard.any() or _ignores_rotors(signs, part, int(troubled[0]))):
         apart = np.flatnonzero(np.diff(troubled) * signs.period > _AT_ONCE_S)
         begin = int(troubled[apart[-1] + 1 if len(apart) else 0])
         hits = first + np.flatnonzero(hard)
@@ -240,8 +246,23 @@ def _beyond_flight(signs: Signs, part: tuple[int, int], *, rests_then: bool) -> 
         wild |= late & (up[first:after] < 0) & bool((up[before] > 0).all())
     hard = nothing if signs.felt is None else beyond(np.linalg.norm(signs.felt, axis=1), _HARD)
     # A touchdown jolts too; but then the vehicle stands on its feet.
-    jolts = hard | beyond(spins, _WILD_RAD_S2)
-    return (wild | jolts if rests_then else wild), jolts
+    return (wild | hard | beyond(spins, _WILD_RAD_S2) if rests_then else wild), hard
+
+
+def _ignores_rotors(signs: Signs, part: tuple[int, int], troubled: int) -> bool:
+    """Tell whether a vehicle turns near the end of a stretch otherwise than its rotors turned it before."""
+    if signs.rotors is None or signs.body_rate is None:
+        return False
+    first, after = part
+    begin = max(first, troubled - round(_AT_ONCE_S / signs.period))
+    turned = np.gradient(averaged(signs.body_rate, signs.period, _TURN_S), signs.period, axis=0)
+    driven = averaged(np.nan_to_num(signs.rotors) ** 2, signs.period, _TURN_S)
+    # Motors and propellers follow a command late.
+    late = np.vstack([driven[:1]] * round(_TURN_S / signs.period) + [driven])[: len(driven)]
+    columns = np.column_stack([np.ones(len(driven)), driven, late])
+    found = np.linalg.lstsq(columns[first:begin], turned[first:begin], rcond=None)[0]
+    left = turned[begin:after] - columns[begin:after] @ found
+    return bool((left**2).sum() > _NOT_FOLLOWED * (turned[begin:after] ** 2).sum())
 
 
 def _stops_in_the_air(signs: Signs, after: int) -> bool:

@@ -7,7 +7,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.errors import SettingError
 from cpfls_cli.flightlog.clock import increasing_rows
-from cpfls_cli.flightlog.crash import ALIVE, Signs, averaged, ended_early, resting, smoothed, upright_of
+from cpfls_cli.flightlog.crash import ALIVE, SLOW_S, Signs, averaged, ended_early, resting, smoothed, upright_of
 from cpfls_cli.flightlog.names import BY_HAND
 from cpfls_cli.flightlog.repair import SignalTable, fill
 from cpfls_cli.flightlog.settings import ROTORS, ImportSettings
@@ -29,6 +29,10 @@ _MARGIN_S = 0.5
 
 _STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
 """Below the first a vehicle stands, whatever an estimate of its height does; below the second it has to move."""
+
+_SHAKES_RAD_S, _OF_NOISE, _LEANS_RAD = 0.3, 1.3, 0.01
+"""Vibration on a bench at most, how far the mean of noise may be beyond what its number of samples makes it, and the
+range of leans above which a vehicle moves."""
 
 _TURNS_RAD_S, _OF_TURNING = 0.2, 0.3
 """Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand."""
@@ -207,9 +211,15 @@ def _still(signs: Signs, active: BoolArray) -> bool:
     if signs.turning is None or signs.slow is None:
         return height is not None and not moves
     turning = float(np.sqrt(np.mean(signs.turning[active] ** 2)))
-    # Vibration of the rotors is no turning, and its mean is none.
+    # Vibration of the rotors is no turning: its mean is that of noise.
     slow = float(np.sqrt(np.mean(signs.slow[active] ** 2)))
-    return slow < _STILL_RAD_S and not moves or (turning < _SOFT_RAD_S and height is not None and not moves)
+    shakes = turning < _SHAKES_RAD_S and slow < _OF_NOISE * turning / np.sqrt(SLOW_S / signs.period)
+    if signs.upright is not None:
+        upright = np.clip(np.abs(averaged(signs.upright, signs.period, SLOW_S)[active]), 0.0, 1.0)
+        shakes = shakes and float(np.ptp(np.quantile(np.arccos(upright), [0.05, 0.95]))) < _LEANS_RAD
+    if turning < _STILL_RAD_S:
+        return True
+    return not moves and (shakes or (turning < _SOFT_RAD_S and height is not None))
 
 
 def _longest(signs: Signs, active: BoolArray, rests: BoolArray, told: str) -> FlownPart:
@@ -222,7 +232,8 @@ def _longest(signs: Signs, active: BoolArray, rests: BoolArray, told: str) -> Fl
     chosen = max(range(len(cut)), key=lambda index: cut[index][1] - cut[index][0])
     (first, after), (begin, end) = stretches[chosen], cut[chosen]
     reasons = []
-    if first > 0:
+    early = [(index, each) for index, each in enumerate(ends) if each is not None]
+    if first > 0 and not any(index < chosen for index, _ in early):
         reasons.append(f"the first {begin:.1f} s are cut: {_how(signs, slice(0, first), told)}")
     if after < len(time) and ends[chosen] is None:
         last = float(time[-1]) - end
@@ -232,7 +243,6 @@ def _longest(signs: Signs, active: BoolArray, rests: BoolArray, told: str) -> Fl
         words = ", ".join(f"{a:.1f} to {b:.1f} s" for a, b in others)
         reasons.append(f"it also flies at {words}; import.crop_s takes one stretch, the longest")
     whole = first == 0 and after == len(time) and ends[chosen] is None
-    early = [(index, each) for index, each in enumerate(ends) if each is not None]
     # How the stretch that is used ended matters more than how another one did.
     index, why = max(early, key=lambda each: each[0] == chosen, default=(chosen, None))
     used = f"the {end - begin:.0f} s before it are used" if index == chosen else f"{begin:.1f} to {end:.1f} s are used"

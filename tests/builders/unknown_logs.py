@@ -52,7 +52,7 @@ def flight(seconds=30.0, rate_hz=100.0, seed=3, noise=1.0, push=0.0, angle=0.25,
     position = cumulative_trapezoid(velocity, time, axis=0, initial=0)
     spin = CubicSpline(time, rate).derivative()(time)
     torque = INERTIA * spin + np.cross(rate, INERTIA * rate)
-    squared = np.column_stack([MASS * lift, torque]) @ np.linalg.inv(_mixer()).T
+    squared = np.column_stack([MASS * lift, torque]) @ np.linalg.inv(mixer()).T
 
     def noisy(values, size):
         return values + noise * size * rng.standard_normal(values.shape)
@@ -70,7 +70,7 @@ def flight(seconds=30.0, rate_hz=100.0, seed=3, noise=1.0, push=0.0, angle=0.25,
     )
 
 
-def _mixer():
+def mixer():
     hubs = np.array(HUBS, dtype=float)
     x, y = (hubs[:, axis] * ARM / np.sqrt(2) for axis in (0, 1))
     return np.array(
