@@ -40,7 +40,10 @@ def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
     wrong = _contradictions(text, logs[0], whole=not asked_keys(proposal, stated))
     if not job.dry_run:
         write_text(job.output, text)
-    said = (Text(contradicted(each), "warning", always=True) for each in wrong)
+    flown = ((one.name, one.recognition.flown) for one in proposal.logs)
+    ended = (f"{name}: {own.cut[0]}" for name, own in flown if own.ended)
+    sentences = (*ended, *map(contradicted, wrong))
+    said = (Text(each, "warning", always=True) for each in sentences)
     told = summary(proposal, stated, output) | {"contradictions": list(wrong)}
     return Outcome(told, (*said, *answer(proposal, stated, output)), next=tuple(_next(job, proposal)))
 

@@ -1,6 +1,7 @@
 """The part of a log in which the vehicle flies: not on the ground, not idling, not disarmed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from cpfls_cli.flightlog.crash import ALIVE, SLOW_S, Signs, averaged, ended_earl
 from cpfls_cli.flightlog.names import BY_HAND
 from cpfls_cli.flightlog.repair import SignalTable, fill
 from cpfls_cli.flightlog.settings import ROTORS, ImportSettings
+from cpfls_cli.flightlog.stretches import live_rows
 
 _OF_HOVER = 0.6
 """Share of the level at hover below which rotors idle."""
@@ -61,7 +63,7 @@ class FlownPart:
         False where nothing in it flies.
     stretches_s : tuple of tuple of float
         Begin and end of each stretch that flies, in order.
-    ended : str
+    ended, used : str
         How flight ended before its time, and what is used; empty where nothing ended it.
     """
 
@@ -70,6 +72,25 @@ class FlownPart:
     flies: bool = True
     stretches_s: tuple[tuple[float, float], ...] = ()
     ended: str = ""
+    used: str = ""
+
+    def within(self, ended: str, seconds: float) -> Self:
+        """Say that a part of so many s was looked at alone, since sources of the log ended there."""
+        if not ended or not self.flies:
+            return self
+        span = self.span_s or (0.0, round(seconds, 2))
+        words = f"the {span[1] - span[0]:.0f} s of flight in between are used"
+        return replace(
+            self,
+            span_s=span,
+            ended="; ".join(filter(None, (ended, self.ended))),
+            used=self.used if self.ended else words,
+        )
+
+    @property
+    def cut(self) -> tuple[str, ...]:
+        """What ended the flight, and what else was cut."""
+        return (*([f"{self.ended}; {self.used}"] if self.ended else []), *self.reasons)
 
 
 def rotor_shares(speeds: Array, *, shares: bool) -> Array:
@@ -85,12 +106,32 @@ def flown_crop(table: SignalTable, settings: ImportSettings) -> tuple[tuple[floa
     SettingError
         If nothing in it flies.
     """
+    flown, off = _flown_of(table, settings)
+    if not flown.flies:
+        raise SettingError("crop_s", f"flown: {flown.reasons[0]}")
+    span = None if flown.span_s is None else (flown.span_s[0] + off, flown.span_s[1] + off)
+    return span, flown.cut
+
+
+def warn_of_end(table: SignalTable, settings: ImportSettings) -> tuple[str, ...]:
+    """Say how flight ends early in what a crop keeps."""
+    flown, _ = _flown_of(table, settings)
+    ended = flown.ended
+    return (f"{ended}, and import.crop_s keeps what comes after; import.crop_s: flown cuts it",) if ended else ()
+
+
+def _flown_of(table: SignalTable, settings: ImportSettings) -> tuple[FlownPart, float]:
+    """Find what flies by the signals that a config maps, and the stamp that its spans count from."""
     rows, _ = increasing_rows(table.time)
     table = table.rows(rows)
+    live = live_rows(table)
+    table = table.rows(live.rows)
     if len(table.time) < _FEWEST_ROWS:
-        return None, ()
+        return FlownPart(None, ()), 0.0
     step = max(float(np.median(np.diff(table.time))), 1 / _MOST_CLOCK_HZ)
     clock = np.arange(table.time[0], table.time[-1], step)
+    if len(clock) < _FEWEST_ROWS:
+        return FlownPart(None, ()), 0.0
     known = {
         name: fill(table.time, table.signals[name], clock)
         for name in ("rotor_command", "rotor_speed", "position", "body_rate", "acceleration", "quaternion", "attitude")
@@ -110,11 +151,7 @@ def flown_crop(table: SignalTable, settings: ImportSettings) -> tuple[tuple[floa
             force=known.get("acceleration") if senses else None,
         )
     )
-    if not flown.flies:
-        raise SettingError("crop_s", f"flown: {flown.reasons[0]}")
-    off = float(clock[0])
-    span = None if flown.span_s is None else (flown.span_s[0] + off, flown.span_s[1] + off)
-    return span, tuple(filter(None, (flown.ended, *flown.reasons)))
+    return flown.within(live.ended, float(clock[-1] - clock[0])), float(clock[0])
 
 
 def find_flown(signs: Signs) -> FlownPart:
@@ -247,7 +284,7 @@ def _longest(signs: Signs, active: BoolArray, rests: BoolArray, told: str) -> Fl
     index, why = max(early, key=lambda each: each[0] == chosen, default=(chosen, None))
     used = f"the {end - begin:.0f} s before it are used" if index == chosen else f"{begin:.1f} to {end:.1f} s are used"
     span = None if whole else (round(begin, 2), round(end, 2))
-    return FlownPart(span, tuple(reasons), True, tuple(cut), "" if why is None else f"{why.what}; {used}")
+    return FlownPart(span, tuple(reasons), True, tuple(cut), "" if why is None else why.what, used)
 
 
 def _clear_of_ground(time: Array, first: int, after: int, *, early: bool) -> tuple[float, float]:

@@ -26,9 +26,11 @@ from cpfls_cli.flightlog.nameless import nameless_signals
 from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals
 from cpfls_cli.flightlog.readings import Reading
 from cpfls_cli.flightlog.recognised import Load, Recognition, Rival, Seen, called
+from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_mixed, find_rotors
 from cpfls_cli.flightlog.setpoint_columns import tell_setpoints
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, SignalName
+from cpfls_cli.flightlog.stretches import live_rows
 from cpfls_cli.flightlog.topics import STAMP, Topics
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
@@ -37,6 +39,9 @@ from cpfls_cli.words import some
 _DEGREES = 180 / np.pi
 _TORQUE_HZ, _FOLLOWS = 6.0, 0.3
 """Below which a torque is compared with the angular acceleration, and the correlation from which on that follows it."""
+
+_FASTEST_RAD_S = 40.0
+"""Rate that no gyroscope of a multirotor reads: 2000 deg/s are 35 rad/s."""
 
 _LATE_S = (0.0, 0.03, 0.06, 0.09)
 """By which motors and propellers follow a command, s."""
@@ -92,15 +97,16 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
         raise InputError(f"no column is recognised as a signal of a flight (columns: {shown}): {BY_HAND}")
     refuse_dead_rotors(log, named, candidates)
+    log, candidates, ended = _live_part(log, candidates)
     make_grid(log, candidates)
     rotors = find_rotors({name: _with_values(log, candidates.get(name, ())) for name in ROTORS}, parameters, system)
     rotors = rotors if rotors.speed or rotors.command else find_mixed(log) or rotors
     shares = _shares(log, rotors)
-    flown = find_flown(_signs(log, candidates, shares))
+    flown = find_flown(_signs(log, candidates, shares)).within(ended, float(log.grid[-1] - log.grid[0]))
     if not flown.flies:
         raise InputError(flown.reasons[0])
     seen = Seen(log, candidates, _part(log, flown), None if shares is None else shares.mean(axis=1))
-    seen.warnings += filter(None, (flown.ended, log.time_doubt))
+    seen.warnings += [] if log.time_doubt is None else [log.time_doubt]
     position_by_velocity(seen)
     verdict = read_attitude(seen)
     if verdict is not None and gyroscope_first(seen, verdict.best, _flown_rotors(seen, rotors)):
@@ -120,6 +126,25 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     _list_unused(seen)
     driving = rotors.speed or rotors.command
     return _gathered(seen, flown, speeds, moved, "" if driving is None else driving.kind)
+
+
+def _live_part(
+    log: LogTable, candidates: dict[SignalName, list[Named]]
+) -> tuple[LogTable, dict[SignalName, list[Named]], str]:
+    """Leave out where sources of a flat log have ended and their columns go on in straight lines; say so."""
+    if not log.flat:
+        return log, candidates, ""
+    fields = log.topics[""]
+    leading = {
+        name: np.column_stack([np.asarray(fields[column], dtype=float) for column in found[0].group.columns])
+        for name, found in candidates.items()
+    }
+    live = live_rows(SignalTable(log.clock(""), {str(name): values for name, values in leading.items()}))
+    if not live.ended:
+        return log, candidates, ""
+    part = LogTable({"": {name: values[live.rows] for name, values in fields.items()}}, log.units)
+    part.origin = log.origin
+    return part, holding_values(part, [named for found in candidates.values() for named in found]), live.ended
 
 
 def _with_values(log: LogTable, candidates: Sequence[Named]) -> list[tuple[Named, Array, Array]]:
@@ -150,7 +175,8 @@ def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], roto
     if "position" in values:
         height = values["position"][:, 2] / (1000 if first["position"].unit == "mm" else 1)
     if "body_rate" in values:
-        rate = values["body_rate"] / (_DEGREES if first["body_rate"].unit == "deg/s" else 1.0)
+        unit, fast = first["body_rate"].unit, float(np.quantile(np.abs(values["body_rate"]), 0.99)) > _FASTEST_RAD_S
+        rate = values["body_rate"] / (_DEGREES if unit == "deg/s" or (unit is None and fast) else 1.0)
     angles = values.get("attitude")
     if angles is not None and float(np.abs(angles[:, :2]).max()) > np.pi:
         angles = angles / _DEGREES
@@ -320,7 +346,7 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
     clocked = [guess for guess in signals if guess.signal not in ("voltage", "acceleration")] or list(signals)
     base = largest(clocked, lambda guess: rates[guess.signal])
     time_column, unit = log.time_column, log.time_unit
-    begin = log.clock("")[0] if log.flat else 0.0
+    begin = log.origin
     if not log.flat:
         topic = log.parts(base.columns.columns[0])[0]
         time_column, unit = f"{topic}.{STAMP}", "us"

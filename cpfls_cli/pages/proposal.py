@@ -73,7 +73,7 @@ def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
     cut: list[Text] = []
     for one in proposal.logs:
         prefix = f"{one.name}: " if several else ""
-        reasons = one.recognition.flown.reasons or ("all of it is flight, nothing is cut",)
+        reasons = one.recognition.flown.cut or ("all of it is flight, nothing is cut",)
         cut += [Text(f"{prefix}{reason}") for reason in reasons]
         cut += [Text(f"{prefix}not mapped: {words}", "note") for words in one.recognition.left_out]
     yield Folded("what is cut or not mapped", cut)
@@ -183,7 +183,7 @@ def summary(proposal: Proposal, stated: Stated, output: str) -> dict[str, Any]:
         "choices": {choice.key: {"value": choice.value, **_grounds(choice)} for choice in proposal.choices},
         "crop_s": proposal.crop_s,
         "crops_s": dict(proposal.crops),
-        "cut": {one.name: list(one.recognition.flown.reasons) for one in proposal.logs},
+        "cut": {one.name: list(one.recognition.flown.cut) for one in proposal.logs},
         "left_out": {one.name: list(one.recognition.left_out) for one in proposal.logs},
         "rotors": [
             {"name": rotor.name, "spin": rotor.spin, "position_m": _position(rotor, proposal.airframe)}
@@ -340,7 +340,7 @@ def _import(proposal: Proposal) -> Iterator[str]:
         yield "  torque_source: null"
     alone = len(proposal.logs) == 1
     for one in proposal.logs:
-        for reason in one.recognition.flown.reasons:
+        for reason in one.recognition.flown.cut:
             yield from _comment(reason if alone else f"{one.name}: {reason}", 2)
     if proposal.crop_s == "flown":
         yield from _comment("Each log is cut to what flies in it, a later one too; to s from the first stamp now:", 2)
