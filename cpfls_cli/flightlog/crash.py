@@ -1,8 +1,8 @@
-"""How a flight ends before its time: impact, tumble, upside down, rotors that stop in the air; by what no flight does."""
+"""How a flight ends before its time: impact, tumble, on its back, rotors that stop in the air."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from scipy.ndimage import binary_closing, binary_dilation, binary_opening
@@ -35,14 +35,15 @@ _LAST_S, _FEWEST_S, _AT_ONCE_S = 10.0, 5.0, 2.0
 the time from its last wild motion to the end, in which no pilot has recovered."""
 
 _BEYOND, _WILD_RAD_S, _WILD_RAD_S2, _HARD = 1.5, 5.0, 100.0, 3.0
-"""Times the largest of the flight before, and sizes at least, the last in gravity, that neither rotors nor pilot make."""
+"""Times the largest of the flight before, and sizes at least, the last in gravity, that no rotor makes."""
 
 _TURN_S, _NOT_FOLLOWED = 0.1, 0.7
 """Over which the turning of a vehicle is held against its rotors, and the share of it that they leave where it does
 not follow them."""
 
 _FALLS, _FALL_S, _DROP_M = 0.3, 0.2, 1.0
-"""Force in gravity that a vehicle feels in free fall at most, for how long, and the height that it loses in a second."""
+"""Force in gravity that a vehicle feels in free fall at most, for how long, and the height that it loses in a second,
+m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,11 +109,8 @@ class Signs:
     def slower(self, most_hz: float) -> "Signs":
         """Take no more samples a second than are asked for; of each few the first."""
         every = max(1, int(1 / (most_hz * self.period)))
-        rest = {name: None if value is None else value[::every] for name, value in vars(self).items() if name in _NAMES}
-        return Signs(**rest)
-
-
-_NAMES = tuple(Signs.__dataclass_fields__)
+        signs: dict[str, Any] = {each.name: getattr(self, each.name) for each in fields(self)}
+        return Signs(**{name: None if value is None else value[::every] for name, value in signs.items()})
 
 
 class EarlyEnd(NamedTuple):
@@ -123,7 +121,7 @@ class EarlyEnd(NamedTuple):
 
 
 def upright_of(attitude: Array | None, quaternion: Array | None, order: Literal["wxyz", "xyzw"]) -> Array | None:
-    """Give the cosine of the lean by roll, pitch, yaw, rad, or else by a quaternion of any length; None without both."""
+    """Give the cosine of the lean by roll, pitch, yaw, rad, or else by a quaternion; None without both."""
     if attitude is not None:
         return np.asarray(np.cos(attitude[:, 0]) * np.cos(attitude[:, 1]))
     if quaternion is None:

@@ -94,7 +94,7 @@ class FlownPart:
 
 
 def rotor_shares(speeds: Array, *, shares: bool) -> Array:
-    """Give speeds or commands of rotors, shape (time, rotor), as shares of their largest mean unless they are shares."""
+    """Give speeds or commands of rotors, shape (time, rotor), as shares of the largest mean unless they are so."""
     return np.asarray(speeds if shares else speeds / max(1.0, float(np.quantile(speeds.mean(axis=1), 0.98))))
 
 

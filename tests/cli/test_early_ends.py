@@ -26,7 +26,7 @@ def imported(cpfls, config, log, crop):
 @pytest.fixture
 def crashed():
     own = flight(ended.SECONDS)
-    own.position = own.position + [0.0, 0.0, 30.0]
+    own.position[:, 2] += 30.0
     return flat_log(ended.hits(own))
 
 
