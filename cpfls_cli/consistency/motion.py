@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.consistency.axes import AXES, SAME, TWICE, axes_apart
 from cpfls_cli.consistency.findings import Finding, off_clock
@@ -32,6 +32,11 @@ _SHARED, _ONE_SCALE = 0.5, 1.05
 _ANOTHER_LENGTH, _LEAST_OF_LEAN_S = 10.0, 5.0
 """Ratio to what the lean makes of gravity that wind and noise never make, and the length of a flight that tells it."""
 
+_COULD_BE_LATE, _LATEST_S, _PER_HOP = 0.5, 0.4, 4
+"""Share of a turn that a delay could be, the longest delay of an estimator or of telemetry, and delays that are tried
+from one window to the next."""
+
+_QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])
 _UP = np.array([0.0, 0.0, 1.0])
 TINY = 1e-100
 """Square of what does not move."""
@@ -145,6 +150,8 @@ class PairCheck:
         Of the second against the first, s.
     turn : Sure
         Of the second against the first about the vertical, rad.
+    hop_s : float
+        From one window to the next, s.
     problems : tuple of Finding
         What is wrong between the two; empty where nothing is.
     agrees : bool
@@ -158,8 +165,19 @@ class PairCheck:
     r2: Array
     delay: Sure
     turn: Sure
+    hop_s: float
     problems: tuple[Finding, ...] = field(default=())
     agrees: bool = False
+
+    @property
+    def moving(self) -> BoolArray:
+        """The axes along which the first moves by more than noise, shape (3,)."""
+        return np.asarray(self.first.std(axis=0) > self.pair.floor)
+
+    @property
+    def visible(self) -> BoolArray:
+        """The axes along which one of the two moves by more than noise, shape (3,)."""
+        return np.asarray(self.moving | (self.second.std(axis=0) > self.pair.floor))
 
 
 _PAIRS = (
@@ -225,11 +243,11 @@ def _checked(pair: Pair, flights: Sequence[Signals], windows: Windows) -> PairCh
         scale=np.sign(shared) * np.sqrt(np.divide(other_power, power, out=np.zeros(3), where=moves)),
         r2=np.divide(shared**2, power * other_power, out=np.zeros(3), where=moves),
         delay=_ratio(((a - b) * slope).sum(axis=1), (slope**2).sum(axis=1), block),
-        turn=_ratio(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a[:, :2] * b[:, :2]).sum(axis=1), block),
+        turn=_turned(a, b, slope, block),
+        hop_s=windows.hop * windows.period,
     )
     problems = tuple(_problems(check))
-    moving = first.std(axis=0) > pair.floor
-    together = bool(moving.any() and (check.r2[moving] > _SHARED).all())
+    together = bool(check.moving.any() and (check.r2[check.moving] > _SHARED).all())
     return replace(check, problems=problems, agrees=together and not problems)
 
 
@@ -289,10 +307,36 @@ def _ratio(top: Array, bottom: Array, block: IntArray) -> Sure:
     return Sure(float(tops.sum() / bottoms.sum()), float(jackknife_error(left_out)))
 
 
+def _turned(a: Array, b: Array, slope: Array, block: IntArray) -> Sure:
+    """Fit the turn of one about the vertical against the other, beside what is late of it; a jackknife over blocks.
+
+    In a steady circle what is late is turned: where most of a turn could be a delay, nothing is known of it.
+    """
+    ahead, across, late, seen = a[:, :2], a[:, :2] @ _QUARTER, slope[:, :2], b[:, :2]
+    columns = np.stack([ahead, across, late], axis=2)
+    both = np.concatenate([columns, seen[:, :, None]], axis=2)
+    products = np.einsum("wax,way->wxy", both, both)
+    sums = np.stack([np.bincount(block, entry) for entry in products.reshape(len(a), -1).T], axis=1).reshape(-1, 4, 4)
+    total = sums.sum(axis=0)
+    if len(sums) < 2 or min(total[0, 0], total[2, 2]) <= 0:
+        return Sure(0.0, np.inf)
+    shared = total[1, 2] ** 2 / (total[1, 1] * total[2, 2])
+    if shared > _COULD_BE_LATE:
+        return Sure(0.0, np.inf)
+    fits = [np.linalg.lstsq(each[:3, :3], each[:3, 3], rcond=None)[0] for each in (total, *(total - sums))]
+    turns = np.array([fit[1] / fit[0] if fit[0] else np.inf for fit in fits])
+    return Sure(float(turns[0]), float(jackknife_error(turns[1:])))
+
+
 def _problems(check: PairCheck) -> Iterator[Finding]:
     """Say what is wrong between two channels: axes, or else scale, gravity, clock and heading."""
     pair = check.pair
     frames = list(axes_apart(pair.words, check.first, check.second, pair.floor))
+    late_s = _late_alike(check) if frames else 0.0
+    if late_s:
+        if pair.exact:
+            yield pair.finding(f"in {pair.words}, the second is {off_clock(late_s)}", late_s, "s", contradiction=False)
+        return
     if frames:
         yield from (pair.finding(what, correlation) for what, correlation in frames)
         return
@@ -302,20 +346,41 @@ def _problems(check: PairCheck) -> Iterator[Finding]:
         if pair.first != "position" and abs(own) > _GRAVITY_OFF_M_S2:
             what = f"{pair.words} differ by {own:.1f} m/s^2 along {axis}, as if one included gravity"
             yield pair.finding(what, own, "m/s^2")
-    if pair.exact and check.delay.beyond(_DELAY_OFF_S):
+    if pair.exact and check.visible.any() and check.delay.beyond(_DELAY_OFF_S):
         late = check.delay.value
         yield pair.finding(f"in {pair.words}, the second is {off_clock(late)}", late, "s", contradiction=False)
-    if pair.exact and pair.second != "specific_force" and check.turn.beyond(TURNED_RAD):
+    in_plane = pair.exact and pair.second != "specific_force" and bool(check.visible[:2].all())
+    if in_plane and check.turn.beyond(TURNED_RAD):
         angle = float(np.arctan(check.turn.value))
         what = f"{pair.words} are rotated relative to each other by {abs(np.degrees(angle)):.0f} deg about the vertical"
         yield pair.finding(what, angle, "rad", contradiction=abs(angle) > ANOTHER_NORTH)
+
+
+def _late_alike(check: PairCheck) -> float:
+    """Find the delay, s, with which both move alike along all axes; 0 where there is none.
+
+    What swings at one frequency and is late by a quarter of its period looks like another axis, and by a half reversed.
+    """
+    index, moving = np.arange(len(check.first)), np.flatnonzero(check.moving)
+    most = min(int(_PER_HOP * _LATEST_S / check.hop_s), len(index))
+    for steps in (sign * size for size in range(1, most + 1) for sign in (1, -1)):
+        hops = steps / _PER_HOP
+        inside = (index + hops >= 0) & (index + hops <= index[-1])
+        alike = []
+        for axis in moving:
+            moved = np.interp(index[inside] + hops, index, check.second[:, axis])
+            with np.errstate(invalid="ignore", divide="ignore"):
+                alike.append(float(np.corrcoef(check.first[inside, axis], moved)[0, 1]))
+        if min(alike, default=0.0) > SAME:
+            return hops * check.hop_s
+    return 0.0
 
 
 def _scales_off(check: PairCheck) -> Iterator[Finding]:
     """Say which axes have scales that are off whichever side the noise is on, together where one mistake makes them."""
     # Model and vehicle may differ by a missing effect; only what no effect does counts against the thrust.
     allowed = 1 + (_SCALE_OFF if check.pair.exact else TWICE - 1)
-    known = check.r2 > SAME**2
+    known = (check.r2 > SAME**2) & check.visible
     root = np.sqrt(np.where(known, check.r2, 1.0))
     either = np.array([check.scale * root, check.scale / root])
     off = np.flatnonzero(known & ((either > allowed).all(axis=0) | (either < 1 / allowed).all(axis=0)))

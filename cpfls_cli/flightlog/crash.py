@@ -109,8 +109,9 @@ class Signs:
     def slower(self, most_hz: float) -> "Signs":
         """Take no more samples a second than are asked for; of each few the first."""
         every = max(1, int(1 / (most_hz * self.period)))
-        signs: dict[str, Any] = {each.name: getattr(self, each.name) for each in fields(self)}
-        return Signs(**{name: None if value is None else value[::every] for name, value in signs.items()})
+        held = {each.name: getattr(self, each.name) for each in fields(self)}
+        fewer: dict[str, Any] = {name: None if value is None else value[::every] for name, value in held.items()}
+        return Signs(**fewer)
 
 
 class EarlyEnd(NamedTuple):

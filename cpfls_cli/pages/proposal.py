@@ -216,6 +216,15 @@ def _position(rotor: RotorPlace, airframe: Airframe | None) -> list[float] | Non
     return [round(value, 6) + 0.0 for value in (*rotor.direction, rotor.height_m)]
 
 
+def guessed_keys(proposal: Proposal) -> tuple[str, ...]:
+    """List the keys of the config whose values the log neither states nor shows."""
+    airframe = proposal.airframe
+    rotors = ("vehicle.rotors",) if airframe is not None and airframe.sure not in ("stated", "data") else ()
+    signals = (f"import.signals.{guess.signal}" for guess in proposal.signals if guess.sure == "guess")
+    choices = (f"import.{choice.key}" for choice in proposal.choices if choice.sure == "guess")
+    return (*rotors, *choices, *signals)
+
+
 def config_text(proposal: Proposal, stated: Stated) -> str:
     """Write the config, with the reason of every guess above it."""
     names = ", ".join(one.name for one in proposal.logs)
