@@ -12,6 +12,7 @@ from cpfls_cli.consistency.axes import AXES, SAME, TWICE, axes_apart
 from cpfls_cli.consistency.findings import Finding, off_clock
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import Ground, first_derivative, fit_lean, second_derivative
+from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.weak_form.resampling import BLOCK_S, blocks_of
 from cpfls_cli.weak_form.windows import Windows
@@ -32,9 +33,12 @@ _SHARED, _ONE_SCALE = 0.5, 1.05
 _ANOTHER_LENGTH, _LEAST_OF_LEAN_S = 10.0, 5.0
 """Ratio to what the lean makes of gravity that wind and noise never make, and the length of a flight that tells it."""
 
-_COULD_BE_LATE, _LATEST_S, _PER_HOP = 0.5, 0.4, 4
-"""Share of a turn that a delay could be, the longest delay of an estimator or of telemetry, and delays that are tried
-from one window to the next."""
+LATEST_S = 0.3
+"""Longest delay of an estimator or of telemetry."""
+
+_COULD_BE_LATE, _LEAVES_LESS, _PER_HOP = 0.5, 0.5, 4
+"""Share of a turn that a delay could be, share of what a delay leaves that a turn has to leave at most, and delays that
+are tried from one window to the next."""
 
 _QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])
 _UP = np.array([0.0, 0.0, 1.0])
@@ -332,8 +336,8 @@ def _problems(check: PairCheck) -> Iterator[Finding]:
     """Say what is wrong between two channels: axes, or else scale, gravity, clock and heading."""
     pair = check.pair
     frames = list(axes_apart(pair.words, check.first, check.second, pair.floor))
-    late_s = _late_alike(check) if frames else 0.0
-    if late_s:
+    late_s, alike = _best_delay(check, np.flatnonzero(check.moving)) if frames else (0.0, 0.0)
+    if alike > SAME:
         if pair.exact:
             yield pair.finding(f"in {pair.words}, the second is {off_clock(late_s)}", late_s, "s", contradiction=False)
         return
@@ -349,31 +353,50 @@ def _problems(check: PairCheck) -> Iterator[Finding]:
     if pair.exact and check.visible.any() and check.delay.beyond(_DELAY_OFF_S):
         late = check.delay.value
         yield pair.finding(f"in {pair.words}, the second is {off_clock(late)}", late, "s", contradiction=False)
-    in_plane = pair.exact and pair.second != "specific_force" and bool(check.visible[:2].all())
-    if in_plane and check.turn.beyond(TURNED_RAD):
+    if pair.exact and pair.second != "specific_force" and _is_turned(check):
         angle = float(np.arctan(check.turn.value))
         what = f"{pair.words} are rotated relative to each other by {abs(np.degrees(angle)):.0f} deg about the vertical"
-        yield pair.finding(what, angle, "rad", contradiction=abs(angle) > ANOTHER_NORTH)
+        yield pair.finding(what, angle, "rad", contradiction=bool(abs(angle) > ANOTHER_NORTH))
 
 
-def _late_alike(check: PairCheck) -> float:
-    """Find the delay, s, with which both move alike along all axes; 0 where there is none.
+def _best_delay(check: PairCheck, axes: IntArray) -> tuple[float, float]:
+    """Find the delay, s, with which both move most alike along axes, and the least of their correlations then.
 
     What swings at one frequency and is late by a quarter of its period looks like another axis, and by a half reversed.
     """
-    index, moving = np.arange(len(check.first)), np.flatnonzero(check.moving)
-    most = min(int(_PER_HOP * _LATEST_S / check.hop_s), len(index))
-    for steps in (sign * size for size in range(1, most + 1) for sign in (1, -1)):
-        hops = steps / _PER_HOP
-        inside = (index + hops >= 0) & (index + hops <= index[-1])
-        alike = []
-        for axis in moving:
-            moved = np.interp(index[inside] + hops, index, check.second[:, axis])
-            with np.errstate(invalid="ignore", divide="ignore"):
-                alike.append(float(np.corrcoef(check.first[inside, axis], moved)[0, 1]))
-        if min(alike, default=0.0) > SAME:
-            return hops * check.hop_s
-    return 0.0
+    index = np.arange(len(check.first))
+    most = min(int(_PER_HOP * LATEST_S / check.hop_s), len(index))
+
+    def alike(steps: int) -> float:
+        places = index + steps / _PER_HOP
+        inside = (places >= 0) & (places <= index[-1])
+        moved = np.column_stack([np.interp(places[inside], index, check.second[:, axis]) for axis in axes])
+        return _correlation(check.first[inside][:, axes], moved)
+
+    if not len(axes) or not most:
+        return 0.0, 0.0
+    # In a steady circle late and early are the same; and estimates are late.
+    late, early = (largest([sign * size for size in range(1, most + 1)], alike) for sign in (1, -1))
+    best = late if alike(late) > SAME else largest([late, early], alike)
+    return best / _PER_HOP * check.hop_s, alike(best)
+
+
+def _correlation(first: Array, second: Array) -> float:
+    """Give the least correlation of columns with their like."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        pairs = zip(first.T, second.T, strict=True)
+        return float(min(np.nan_to_num(np.corrcoef(one, other)[0, 1]) for one, other in pairs))
+
+
+def _is_turned(check: PairCheck) -> bool:
+    """Tell whether a turn about the vertical leaves less between two than any delay does."""
+    plane = np.array([0, 1])
+    if not check.visible[plane].all() or not check.turn.beyond(TURNED_RAD):
+        return False
+    angle = np.arctan(check.turn.value)
+    turned = check.first[:, :2] * np.cos(angle) + check.first[:, :2] @ _QUARTER * np.sin(angle)
+    _, late = _best_delay(check, plane)
+    return 1 - _correlation(turned, check.second[:, :2]) < _LEAVES_LESS * (1 - late)
 
 
 def _scales_off(check: PairCheck) -> Iterator[Finding]:

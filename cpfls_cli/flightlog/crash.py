@@ -162,7 +162,7 @@ def resting(signs: Signs, active: BoolArray) -> BoolArray:
     lively = active & (signs.slow > _LIVELY_RAD_S)
     flies = lively if lively.sum() * signs.period > _FEWEST_S else active
     calm = averaged(signs.slow, signs.period, _REST_S) < _CALM_RAD_S
-    rests = calm & (_off_its_feet(signs, flies) | _stuck(signs, flies))
+    rests = active & calm & (_off_its_feet(signs, flies) | _stuck(signs, flies))
     window = np.ones(max(1, round(_REST_S / signs.period)), dtype=bool)
     # A mean over a time says as much of all of it.
     return np.asarray(binary_dilation(binary_opening(rests, window[: len(window) // 2 + 1]), window), dtype=bool)

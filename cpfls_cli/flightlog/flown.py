@@ -275,9 +275,13 @@ def _longest(signs: Signs, active: BoolArray, rests: BoolArray, told: str) -> Fl
     if after < len(time) and ends[chosen] is None:
         last = float(time[-1]) - end
         reasons.append(f"the last {last:.1f} s are cut: {_how(signs, slice(after, None), told)}")
-    others = [part for index, part in enumerate(cut) if index != chosen]
+    others = [
+        f"{time[a]:.1f} to {time[b - 1] if own is None else time[own.first - 1]:.1f} s"
+        for (a, b), own in zip(stretches, ends, strict=True)
+        if a != first
+    ]
     if others:
-        words = ", ".join(f"{a:.1f} to {b:.1f} s" for a, b in others)
+        words = ", ".join(others)
         reasons.append(f"it also flies at {words}; import.crop_s takes one stretch, the longest")
     whole = first == 0 and after == len(time) and ends[chosen] is None
     # How the stretch that is used ended matters more than how another one did.

@@ -222,7 +222,8 @@ def guessed_keys(proposal: Proposal) -> tuple[str, ...]:
     rotors = ("vehicle.rotors",) if airframe is not None and airframe.sure not in ("stated", "data") else ()
     signals = (f"import.signals.{guess.signal}" for guess in proposal.signals if guess.sure == "guess")
     choices = (f"import.{choice.key}" for choice in proposal.choices if choice.sure == "guess")
-    return (*rotors, *choices, *signals)
+    largest = ("vehicle.rotor_speed_max_rad_s",) if proposal.share_of_speed else ()
+    return (*rotors, *largest, *choices, *signals)
 
 
 def config_text(proposal: Proposal, stated: Stated) -> str:
