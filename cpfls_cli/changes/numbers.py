@@ -166,7 +166,7 @@ def flight_numbers(recording: Recording, full_voltage: float = 1.0) -> FlightNum
     if duration < _SHORTEST_S:
         raise InputError(
             f"{name}: flies for {duration:.2g} s of {len(signals) * signals.period:.3g} s, and {_SHORTEST_S:g} s are"
-            " the least that tell anything"
+            f" the least that tell anything{''.join(f'; {why}' for why in flown(signals).cut)}"
         )
     values: dict[str, float] = {}
     errors: dict[str, float] = {}
