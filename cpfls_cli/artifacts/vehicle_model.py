@@ -113,6 +113,13 @@ class LoopGroup:
         "share of the rotation in a band that torque explains, the least", "axis", frame=BODY, gaps=True
     )
     shown: bool = dataset("1 where so little is explained that the numbers may be those of the loop")
+    band_hz: Array | None = dataset("ends of bands, about", "band", "end", units="Hz", default=None)
+    by_band: Array | None = dataset(
+        "share of the rotation that torque explains", "band", "axis", frame=BODY, gaps=True, default=None
+    )
+    turning: Array | None = dataset(
+        "body rate, root mean square", "axis", units="rad/s", frame=BODY, gaps=True, default=None
+    )
 
     @classmethod
     def of(cls, bounds: LoopBounds) -> Self:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import binary_erosion
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.blocks import contiguous, jackknife_error
+from cpfls_cli.consistency.check import flown
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
@@ -83,9 +83,6 @@ KINDS: dict[str, Kind] = {
     "scale": Kind("1", 0.01, 0.01, 0.02),
 }
 """Of each number the first word of its name."""
-
-_FLIES, _MARGIN_S = 0.6, 0.5
-"""Share of the usual thrust above which it flies, and what is left out at either end."""
 
 _SHORTEST_S = 4.0
 """Of flight, below which it tells nothing."""
@@ -168,8 +165,8 @@ def flight_numbers(recording: Recording, full_voltage: float = 1.0) -> FlightNum
     duration = float(flies.sum() * signals.period)
     if duration < _SHORTEST_S:
         raise InputError(
-            f"{name}: flies for {duration:.2g} s, and {_SHORTEST_S:g} s are the least that tell anything; leave it out,"
-            " or check import.crop_s and the unit of the rotors' signal"
+            f"{name}: flies for {duration:.2g} s of {len(signals) * signals.period:.3g} s, and {_SHORTEST_S:g} s are"
+            f" the least that tell anything{''.join(f'; {why}' for why in flown(signals).cut)}"
         )
     values: dict[str, float] = {}
     errors: dict[str, float] = {}
@@ -184,15 +181,12 @@ def flight_numbers(recording: Recording, full_voltage: float = 1.0) -> FlightNum
 
 
 def in_flight(signals: Signals) -> BoolArray:
-    """Mark the samples at which a vehicle flies, away from take-off and landing, shape (time,)."""
-    thrust = signals.thrust
-    assert thrust is not None, "rotor speeds are there"
-    carries = thrust[thrust > 0.5 * np.quantile(thrust, 0.95)]
-    if not len(carries):
-        return np.zeros(len(signals), dtype=bool)
-    level = _FLIES * np.median(carries)
-    margin = round(_MARGIN_S / signals.period)
-    return np.asarray(binary_erosion(thrust > level, iterations=max(margin, 1), border_value=1))
+    """Mark the samples at which a vehicle flies, shape (time,): what the import finds, of all stretches of it."""
+    time = signals.time - signals.time[0]
+    flies = np.zeros(len(time), dtype=bool)
+    for begin, end in flown(signals).stretches_s:
+        flies |= (time >= begin) & (time <= end)
+    return flies
 
 
 def _agility(signals: Signals, flies: BoolArray) -> float:

@@ -23,7 +23,7 @@ from cpfls_cli.commands import report
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import hashes_of, numbered_roles
 from cpfls_cli.flights.kept_numbers import FOLDER, kept_numbers
-from cpfls_cli.pages.changed import answer
+from cpfls_cli.pages.changed import LEFT_OUT, answer
 from cpfls_cli.pages.source import source_of, unique_labels
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Command, Outcome, as_json
@@ -53,7 +53,7 @@ def run(job: Job, today: Sequence[Path], since: Sequence[Path], *, fail_on_chang
         line = Text(f"{job.output}: would be filled; the config and all inputs are good")
         return Outcome({"dry_run": True, "output": str(job.output)}, (line,))
     flights, left_out = _flights(job, kept, inputs)
-    record = _record(job, flights, [*twice, *left_out])
+    record = _record(job, flights, [*left_out, *twice])
     with filled_folder(job.output, FILES) as folder:
         written = finish(replace(job, output=folder / FILES[0]), record, {role: inputs[role] for role in flights})
         write_text(folder / FILES[2], json.dumps(as_json(written.summary), indent=1, allow_nan=False) + "\n")
@@ -105,7 +105,7 @@ def _flights(
     for side in ("today", "since"):
         if not any(role.startswith(side) for role in flights):
             raise next(error for role, error in refused.items() if role.startswith(side))
-    return flights, [f"left out: {error}" for error in refused.values()]
+    return flights, [f"{LEFT_OUT}{error}" for error in refused.values()]
 
 
 def _record(job: Job, flights: Mapping[str, FlightNumbersRecord], notes: Sequence[str]) -> ChangedRecord:
@@ -117,9 +117,9 @@ def _record(job: Job, flights: Mapping[str, FlightNumbersRecord], notes: Sequenc
     change = changed(today, before, vehicle, np.random.default_rng(job.study.seed))
     units = units_of(change.names, vehicle)
     warnings = [
+        *notes,
         *_warnings(of_today, of_before, change.names),
         *_flown_unlike(change, today, before),
-        *notes,
         *(f"{own.flight}: {words}" for own in (*of_today, *of_before) for words in own.warning),
     ]
     return ChangedRecord.of(

@@ -9,17 +9,18 @@ from pathlib import Path
 from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
 from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.config.load import parse_config, validate
-from cpfls_cli.consistency.findings import contradictions
+from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.errors import ConfigError, CpflsError, InputError, about
 from cpfls_cli.flightlog.proposal import Proposal, known_log, propose
 from cpfls_cli.flights.imported import imported
 from cpfls_cli.flights.recordings import check_flight, read_import
 from cpfls_cli.logs.formats import log_contents
-from cpfls_cli.pages.proposal import Stated, answer, asked_keys, config_text, summary
+from cpfls_cli.pages.proposal import Stated, answer, asked_keys, config_text, guessed_keys, summary
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Command, Outcome
 from cpfls_cli.vehicle_limits import beyond_any_vehicle, figures_of, room
+from cpfls_cli.words import joined
 
 _IMPORTED = 4
 
@@ -37,11 +38,15 @@ def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
             known.append(known_log(str(log), own.topics, own.units, own.parameters, own.system))
     proposal = propose(known, stated.mass_kg, stated.arm_m)
     text, output = config_text(proposal, stated), str(job.output)
-    wrong = _contradictions(text, logs[0], whole=not asked_keys(proposal, stated))
+    found = _findings(text, logs[0], whole=not asked_keys(proposal, stated))
+    wrong, doubted = _parted(found, guessed_keys(proposal))
     if not job.dry_run:
         write_text(job.output, text)
-    said = (Text(contradicted(each), "warning", always=True) for each in wrong)
-    told = summary(proposal, stated, output) | {"contradictions": list(wrong)}
+    flown = ((one.name, one.recognition.flown) for one in proposal.logs)
+    ended = (f"{name}: {own.cut[0]}" for name, own in flown if own.ended)
+    sentences = (*ended, *map(contradicted, wrong), *doubted)
+    said = (Text(each, "warning", always=True) for each in sentences)
+    told = summary(proposal, stated, output) | {"contradictions": wrong, "doubted_guesses": doubted}
     return Outcome(told, (*said, *answer(proposal, stated, output)), next=tuple(_next(job, proposal)))
 
 
@@ -85,8 +90,24 @@ def _require_possible(stated: Stated) -> None:
         raise ConfigError("\n".join(lines))
 
 
-def _contradictions(text: str, log: Path, *, whole: bool) -> tuple[str, ...]:
-    """Read the leading log by the config that is proposed, and say what of it contradicts itself, or its vehicle."""
+def _parted(findings: Sequence[Finding], guessed: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Part what contradicts itself in a log from what only contradicts a guess: no guess is held against a log."""
+    wrong, doubted = [], []
+    for finding in findings:
+        ours = [key for key in guessed if key in finding.sentence or key in finding.channels]
+        if ours:
+            many = len(ours) > 1
+            doubted.append(
+                f"{joined(ours)} {'are guesses' if many else 'is a guess'}, and {'one of them' if many else 'it'} is "
+                f"likely wrong: {finding.sentence}"
+            )
+        else:
+            wrong.append(finding.sentence)
+    return wrong, doubted
+
+
+def _findings(text: str, log: Path, *, whole: bool) -> tuple[Finding, ...]:
+    """Read the leading log by the config that is proposed, and find what of it contradicts itself, or its vehicle."""
     data = parse_config(text, "the config that is proposed")
     if not whole:
         data = {"import": data["import"] | {"torque_source": None}}
@@ -96,4 +117,5 @@ def _contradictions(text: str, log: Path, *, whole: bool) -> tuple[str, ...]:
     except CpflsError:
         # What does not import is for the person who fills it in; the import says why.
         return ()
-    return contradictions(finding.of(log.name) for finding in check_flight(flight, study, driven=whole))
+    found = (finding.of(log.name) for finding in check_flight(flight, study, driven=whole))
+    return tuple(finding for finding in found if finding.contradiction)

@@ -20,7 +20,7 @@ TWICE = 2.0
 """Ratio of two sizes that neither noise nor a filter makes: at a correlation of 0.6 noise makes up to 1.7."""
 
 _BODY_AXES = ("x (roll)", "y (pitch)", "z (yaw)")
-_TURNING_RAD_S, _TURNING_SHARE = 0.1, 0.1
+TURNING_RAD_S, _TURNING_SHARE = 0.1, 0.1
 """Standard deviation from which on an axis is judged, also as a share of that of the axis which turns most: about one
 that hardly turns, errors of the others decide."""
 
@@ -103,7 +103,7 @@ def gyroscope_apart(seen: Array, read: Array) -> tuple[tuple[Finding, ...], tupl
     """
     motion = np.maximum(seen.std(axis=0), read.std(axis=0))
     correlation = _correlated(seen, read)
-    turning = motion > max(_TURNING_RAD_S, _TURNING_SHARE * motion.max())
+    turning = motion > max(TURNING_RAD_S, _TURNING_SHARE * motion.max())
     sure = _SURE_SIGMAS / np.sqrt(len(seen) / _OVERLAP)
     unlike, scaled = [], []
     for axis in range(3):

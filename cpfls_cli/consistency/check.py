@@ -17,7 +17,8 @@ from cpfls_cli.consistency.rotors import (
 )
 from cpfls_cli.consistency.sensors import Sensors, sensors_of
 from cpfls_cli.effects.signals import Signals, stretch_of
-from cpfls_cli.flightlog.flown import find_flown, rotor_level, turning_size
+from cpfls_cli.flightlog.crash import Signs, upright_of
+from cpfls_cli.flightlog.flown import FlownPart, find_flown, rotor_shares
 from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, WindowSettings, fitting_windows
 
 _HANGS = -0.5
@@ -54,14 +55,26 @@ def _flown(part: Signals) -> Signals:
     """Cut off what is not flown; a part in which that cannot be told is taken as it is."""
     if part.rotor_speed is None or len(part) * part.period < _SHORT_S:
         return part
-    time = part.time - part.time[0]
-    height = None if part.position is None else part.position[:, 2]
-    level = rotor_level(part.rotor_speed, shares=False)
-    span = find_flown(time, level, height, turning_size(part.body_rate)).span_s
+    span = flown(part).span_s
     if span is None:
         return part
-    first, after = np.searchsorted(time, [span[0], span[1] + part.period / 2])
+    first, after = np.searchsorted(part.time - part.time[0], [span[0], span[1] + part.period / 2])
     return stretch_of(part, slice(int(first), int(after)))
+
+
+def flown(part: Signals) -> FlownPart:
+    """Find the stretches of a flight with rotors that are flown, as the import finds them."""
+    assert part.rotor_speed is not None, "asked for"
+    return find_flown(
+        Signs(
+            time=part.time - part.time[0],
+            rotors=rotor_shares(part.rotor_speed, shares=False),
+            height=None if part.position is None else part.position[:, 2],
+            body_rate=part.body_rate if "body_rate" in part.available else None,
+            upright=upright_of(part.attitude, None, "wxyz"),
+            force=part.specific_force,
+        )
+    )
 
 
 def findings_of(parts: Sequence[Signals], sensors: Sensors | None) -> tuple[Finding, ...]:

@@ -100,6 +100,12 @@ def contradictions(findings: Iterable[Finding]) -> tuple[str, ...]:
     return tuple(finding.sentence for finding in findings if finding.contradiction)
 
 
+def as_contradiction(sentence: str) -> str:
+    """Say what contradicts what: a log itself, or where keys of the vehicle are held against it, its config."""
+    whom = "its config" if "vehicle." in sentence else "itself"
+    return f"the log contradicts {whom}: {sentence}"
+
+
 def doubts(findings: Iterable[Finding]) -> tuple[str, ...]:
     """Give the sentences of the others."""
     return tuple(finding.sentence for finding in findings if not finding.contradiction)

@@ -12,7 +12,16 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.consistency.axes import AXES
 from cpfls_cli.consistency.findings import Finding, off_clock
-from cpfls_cli.consistency.motion import ANOTHER_NORTH, CHANNELS, TINY, TURNED_RAD, PairCheck, by_thrust, checked
+from cpfls_cli.consistency.motion import (
+    ANOTHER_NORTH,
+    CHANNELS,
+    LATEST_S,
+    TINY,
+    TURNED_RAD,
+    PairCheck,
+    by_thrust,
+    checked,
+)
 from cpfls_cli.consistency.repairs import ChannelRepair, is_derived
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import fit_axes
@@ -314,7 +323,7 @@ def _tuned(now: _Compared, repair: ChannelRepair, what: tuple[str, ...]) -> _Rea
         repair, more = step(repair, _clearest(against))
         what = (*what, *more)
     for _ in range(_ROUNDS if repair.delay_s else 0):
-        if abs(repair.delay_s) > min(map(len, now.flights)) * now.windows.period:
+        if abs(repair.delay_s) > LATEST_S:
             # What does not move together has no delay, and a fit of one runs away.
             return None
         # Noise shrinks what is left of a delay, so a second look is worth it.

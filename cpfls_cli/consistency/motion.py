@@ -6,12 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.consistency.axes import AXES, SAME, TWICE, axes_apart
 from cpfls_cli.consistency.findings import Finding, off_clock
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import Ground, first_derivative, fit_lean, second_derivative
+from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.weak_form.resampling import BLOCK_S, blocks_of
 from cpfls_cli.weak_form.windows import Windows
@@ -32,6 +33,14 @@ _SHARED, _ONE_SCALE = 0.5, 1.05
 _ANOTHER_LENGTH, _LEAST_OF_LEAN_S = 10.0, 5.0
 """Ratio to what the lean makes of gravity that wind and noise never make, and the length of a flight that tells it."""
 
+LATEST_S = 0.3
+"""Longest delay of an estimator or of telemetry."""
+
+_COULD_BE_LATE, _LEAVES_LESS, _PER_HOP = 0.5, 0.5, 4
+"""Share of a turn that a delay could be, share of what a delay leaves that a turn has to leave at most, and delays that
+are tried from one window to the next."""
+
+_QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])
 _UP = np.array([0.0, 0.0, 1.0])
 TINY = 1e-100
 """Square of what does not move."""
@@ -145,6 +154,8 @@ class PairCheck:
         Of the second against the first, s.
     turn : Sure
         Of the second against the first about the vertical, rad.
+    hop_s : float
+        From one window to the next, s.
     problems : tuple of Finding
         What is wrong between the two; empty where nothing is.
     agrees : bool
@@ -158,8 +169,19 @@ class PairCheck:
     r2: Array
     delay: Sure
     turn: Sure
+    hop_s: float
     problems: tuple[Finding, ...] = field(default=())
     agrees: bool = False
+
+    @property
+    def moving(self) -> BoolArray:
+        """The axes along which the first moves by more than noise, shape (3,)."""
+        return np.asarray(self.first.std(axis=0) > self.pair.floor)
+
+    @property
+    def visible(self) -> BoolArray:
+        """The axes along which one of the two moves by more than noise, shape (3,)."""
+        return np.asarray(self.moving | (self.second.std(axis=0) > self.pair.floor))
 
 
 _PAIRS = (
@@ -225,11 +247,11 @@ def _checked(pair: Pair, flights: Sequence[Signals], windows: Windows) -> PairCh
         scale=np.sign(shared) * np.sqrt(np.divide(other_power, power, out=np.zeros(3), where=moves)),
         r2=np.divide(shared**2, power * other_power, out=np.zeros(3), where=moves),
         delay=_ratio(((a - b) * slope).sum(axis=1), (slope**2).sum(axis=1), block),
-        turn=_ratio(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a[:, :2] * b[:, :2]).sum(axis=1), block),
+        turn=_turned(a, b, slope, block),
+        hop_s=windows.hop * windows.period,
     )
     problems = tuple(_problems(check))
-    moving = first.std(axis=0) > pair.floor
-    together = bool(moving.any() and (check.r2[moving] > _SHARED).all())
+    together = bool(check.moving.any() and (check.r2[check.moving] > _SHARED).all())
     return replace(check, problems=problems, agrees=together and not problems)
 
 
@@ -289,10 +311,36 @@ def _ratio(top: Array, bottom: Array, block: IntArray) -> Sure:
     return Sure(float(tops.sum() / bottoms.sum()), float(jackknife_error(left_out)))
 
 
+def _turned(a: Array, b: Array, slope: Array, block: IntArray) -> Sure:
+    """Fit the turn of one about the vertical against the other, beside what is late of it; a jackknife over blocks.
+
+    In a steady circle what is late is turned: where most of a turn could be a delay, nothing is known of it.
+    """
+    ahead, across, late, seen = a[:, :2], a[:, :2] @ _QUARTER, slope[:, :2], b[:, :2]
+    columns = np.stack([ahead, across, late], axis=2)
+    both = np.concatenate([columns, seen[:, :, None]], axis=2)
+    products = np.einsum("wax,way->wxy", both, both)
+    sums = np.stack([np.bincount(block, entry) for entry in products.reshape(len(a), -1).T], axis=1).reshape(-1, 4, 4)
+    total = sums.sum(axis=0)
+    if len(sums) < 2 or min(total[0, 0], total[2, 2]) <= 0:
+        return Sure(0.0, np.inf)
+    shared = total[1, 2] ** 2 / (total[1, 1] * total[2, 2])
+    if shared > _COULD_BE_LATE:
+        return Sure(0.0, np.inf)
+    fits = [np.linalg.lstsq(each[:3, :3], each[:3, 3], rcond=None)[0] for each in (total, *(total - sums))]
+    turns = np.array([fit[1] / fit[0] if fit[0] else np.inf for fit in fits])
+    return Sure(float(turns[0]), float(jackknife_error(turns[1:])))
+
+
 def _problems(check: PairCheck) -> Iterator[Finding]:
     """Say what is wrong between two channels: axes, or else scale, gravity, clock and heading."""
     pair = check.pair
     frames = list(axes_apart(pair.words, check.first, check.second, pair.floor))
+    late_s, alike = _best_delay(check, np.flatnonzero(check.moving)) if frames else (0.0, 0.0)
+    if alike > SAME:
+        if pair.exact:
+            yield pair.finding(f"in {pair.words}, the second is {off_clock(late_s)}", late_s, "s", contradiction=False)
+        return
     if frames:
         yield from (pair.finding(what, correlation) for what, correlation in frames)
         return
@@ -302,20 +350,60 @@ def _problems(check: PairCheck) -> Iterator[Finding]:
         if pair.first != "position" and abs(own) > _GRAVITY_OFF_M_S2:
             what = f"{pair.words} differ by {own:.1f} m/s^2 along {axis}, as if one included gravity"
             yield pair.finding(what, own, "m/s^2")
-    if pair.exact and check.delay.beyond(_DELAY_OFF_S):
+    if pair.exact and check.visible.any() and check.delay.beyond(_DELAY_OFF_S):
         late = check.delay.value
         yield pair.finding(f"in {pair.words}, the second is {off_clock(late)}", late, "s", contradiction=False)
-    if pair.exact and pair.second != "specific_force" and check.turn.beyond(TURNED_RAD):
+    if pair.exact and pair.second != "specific_force" and _is_turned(check):
         angle = float(np.arctan(check.turn.value))
         what = f"{pair.words} are rotated relative to each other by {abs(np.degrees(angle)):.0f} deg about the vertical"
-        yield pair.finding(what, angle, "rad", contradiction=abs(angle) > ANOTHER_NORTH)
+        yield pair.finding(what, angle, "rad", contradiction=bool(abs(angle) > ANOTHER_NORTH))
+
+
+def _best_delay(check: PairCheck, axes: IntArray) -> tuple[float, float]:
+    """Find the delay, s, with which both move most alike along axes, and the least of their correlations then.
+
+    What swings at one frequency and is late by a quarter of its period looks like another axis, and by a half reversed.
+    """
+    index = np.arange(len(check.first))
+    most = min(int(_PER_HOP * LATEST_S / check.hop_s), len(index))
+
+    def alike(steps: int) -> float:
+        places = index + steps / _PER_HOP
+        inside = (places >= 0) & (places <= index[-1])
+        moved = np.column_stack([np.interp(places[inside], index, check.second[:, axis]) for axis in axes])
+        return _correlation(check.first[inside][:, axes], moved)
+
+    if not len(axes) or not most:
+        return 0.0, 0.0
+    # In a steady circle late and early are the same; and estimates are late.
+    late, early = (largest([sign * size for size in range(1, most + 1)], alike) for sign in (1, -1))
+    best = late if alike(late) > SAME else largest([late, early], alike)
+    return best / _PER_HOP * check.hop_s, alike(best)
+
+
+def _correlation(first: Array, second: Array) -> float:
+    """Give the least correlation of columns with their like."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        pairs = zip(first.T, second.T, strict=True)
+        return float(min(np.nan_to_num(np.corrcoef(one, other)[0, 1]) for one, other in pairs))
+
+
+def _is_turned(check: PairCheck) -> bool:
+    """Tell whether a turn about the vertical leaves less between two than any delay does."""
+    plane = np.array([0, 1])
+    if not check.visible[plane].all() or not check.turn.beyond(TURNED_RAD):
+        return False
+    angle = np.arctan(check.turn.value)
+    turned = check.first[:, :2] * np.cos(angle) + check.first[:, :2] @ _QUARTER * np.sin(angle)
+    _, late = _best_delay(check, plane)
+    return 1 - _correlation(turned, check.second[:, :2]) < _LEAVES_LESS * (1 - late)
 
 
 def _scales_off(check: PairCheck) -> Iterator[Finding]:
     """Say which axes have scales that are off whichever side the noise is on, together where one mistake makes them."""
     # Model and vehicle may differ by a missing effect; only what no effect does counts against the thrust.
     allowed = 1 + (_SCALE_OFF if check.pair.exact else TWICE - 1)
-    known = check.r2 > SAME**2
+    known = (check.r2 > SAME**2) & check.visible
     root = np.sqrt(np.where(known, check.r2, 1.0))
     either = np.array([check.scale * root, check.scale / root])
     off = np.flatnonzero(known & ((either > allowed).all(axis=0) | (either < 1 / allowed).all(axis=0)))

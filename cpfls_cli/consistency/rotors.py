@@ -42,8 +42,8 @@ _LEANS = 0.03
 """Spread of roll and pitch in rad that no vehicle has that stands."""
 
 _REMEDY = (
-    "check the unit of import.signals.rotor_speed (or rotor_command), vehicle.mass_kg, vehicle.gravity_m_s2 and "
-    "thrust_factor_n_s2 of vehicle.rotors"
+    "check the unit of import.signals.rotor_speed (or of rotor_command, and vehicle.rotor_speed_max_rad_s), "
+    "vehicle.mass_kg, vehicle.gravity_m_s2 and thrust_factor_n_s2 of vehicle.rotors"
 )
 
 

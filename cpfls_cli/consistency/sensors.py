@@ -9,11 +9,11 @@ from scipy.special import stdtr
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width
-from cpfls_cli.consistency.axes import gyroscope_apart
+from cpfls_cli.consistency.axes import TURNING_RAD_S, gyroscope_apart
 from cpfls_cli.consistency.channels import least_noise
 from cpfls_cli.consistency.clocks import attitude_on_clock, rotors_on_clock
 from cpfls_cli.consistency.findings import AuditFinding, FaultNumber, Finding
-from cpfls_cli.consistency.gyroscope import GyroFit, fit_gyro, kinematics, scan
+from cpfls_cli.consistency.gyroscope import DelayScan, GyroFit, fit_gyro, kinematics, scan
 from cpfls_cli.consistency.majority import Settled, set_apart, settled
 from cpfls_cli.consistency.repairs import ChannelRepair
 from cpfls_cli.consistency.rotors import tells_thrust, weighed
@@ -21,7 +21,8 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.hooks import FaultFit, SensorTest
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.weak_form.windows import Windows
+from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, Windows
+from cpfls_cli.weak_form.windows import windows as windows_of
 from cpfls_cli.words import joined
 
 # Largest probability of chance, after Holm over all that is tested: an audit that cries wolf is not read.
@@ -115,6 +116,11 @@ _ROUNDING = 1e-4
 # An independent attitude leaves at least the gyroscope's own noise; this share of it is left by one that contains it.
 _SHARE_OF_NOISE = 0.3
 # About twice the most that 23 real flights show, or more: rad/s, a share, rad, s.
+_SLOWER, _FILTERED_FROM, _NEARER = (8, 4), 0.05, 0.7
+"""Times the usual length of windows in which the motion is slow; the logarithm of a ratio of sizes that is looked at,
+and the share of it that a filter leaves there at most: an error of scale leaves all."""
+
+_FILTERED = "its size beside the attitude nears 1 in slow motion, so one of the two is behind a filter"
 _GROSS = {"bias": 0.1, "scale": 0.12, "misalignment": np.radians(8.0), "delay": 0.016}
 
 
@@ -256,7 +262,8 @@ def _gyroscope(flights: Sequence[Signals], windows: Windows) -> Gyroscope:
         return Gyroscope.unjudged("the flights are too short")
     scanned = scan(cut)
     unlike, scaled = gyroscope_apart(scanned.seen, scanned.read)
-    apart = (*unlike, *scaled)
+    filtered = _is_filtered(flights, windows, scanned)
+    apart = (*unlike, *(() if filtered else scaled))
     if unlike:
         return Gyroscope.unjudged("the axes of the gyroscope and the attitude do not match", apart)
     raw = scanned.seen - np.concatenate([flight.gyro_rate(0.0) for flight in cut])
@@ -270,12 +277,34 @@ def _gyroscope(flights: Sequence[Signals], windows: Windows) -> Gyroscope:
     fits = {name: fit.of(str(test.estimate)) for name, test in _of_gyroscope().items()}
     still = "the flights barely rotate, so it would not show"
     untested = {name: still for name, numbers in fits.items() if not numbers.known.any()}
+    if filtered:
+        untested |= {name: _FILTERED for name, test in _of_gyroscope().items() if test.estimate == "scale"}
     noise = least_noise([signals.body_rate for signals in flights]) * np.sqrt((windows.weight**2).sum())
     if np.sqrt(fit.variance.max()) < _SHARE_OF_NOISE * noise:
         derived = "the attitude contains the gyroscope's own noise, so it was integrated from it and would not show it"
         untested |= {name: derived for name, test in _of_gyroscope().items() if test.integrated}
     faults = (CheckedFault(CATALOGUE[name], numbers) for name, numbers in fits.items() if name not in untested)
     return Gyroscope(tuple(faults), untested, fit, apart)
+
+
+def _is_filtered(flights: Sequence[Signals], windows: Windows, scanned: DelayScan) -> bool:
+    """Tell whether gyroscope and attitude differ in size as a filter of one makes them: in fast motion alone."""
+    gain = _gains(scanned)
+    off = (np.abs(gain) > _FILTERED_FROM) & (scanned.seen.std(axis=0) > TURNING_RAD_S)
+    if not off.any():
+        return False
+    for times in _SLOWER:
+        longer = windows_of(windows.period, times * len(windows.weight) * windows.period, 0.5)
+        cut = [motion for signals in flights if (motion := kinematics(signals, longer)) is not None]
+        if sum(len(motion.rate) for motion in cut) >= FEWEST_WINDOWS:
+            return bool((np.abs(_gains(scan(cut))[off]) < _NEARER * np.abs(gain[off])).all())
+    return False
+
+
+def _gains(scanned: DelayScan) -> Array:
+    """Give the logarithm of the size of the gyroscope's rate over that of the attitude's, shape (3,)."""
+    read, seen = np.maximum([scanned.read.std(axis=0), scanned.seen.std(axis=0)], np.finfo(float).tiny)
+    return np.asarray(np.log(read / seen))
 
 
 def _of_gyroscope() -> dict[str, SensorTest]:

@@ -70,12 +70,14 @@ def _witnesses(seen: Seen) -> Witnesses:
 
 def _read_euler(seen: Seen, named: Named) -> TakenReading:
     time, values = seen.log.values(named.group.columns)
-    unit, reason, sure, rivals = _angle_unit(named, named.scale * values)
+    grid = seen.log.grid[seen.part]
+    flown = (time >= grid[0]) & (time <= grid[-1])
+    unit, reason, sure, rivals = _angle_unit(named, named.scale * values[flown if flown.any() else slice(None)])
     if named.unit not in (None, unit):
         seen.disagree(named, unit)
     for _ in range(2):
         angles = named.scale * known_unit(unit).factor * values
-        readings = euler_readings(angles, time, seen.log.grid[seen.part])
+        readings = euler_readings(angles, time, grid)
         verdict = read_axes(readings, _witnesses(seen))
         best = verdict.best
         if best.lean is None:

@@ -1,16 +1,18 @@
 """The part of a log in which the vehicle flies: not on the ground, not idling, not disarmed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
-from scipy.ndimage import binary_closing, binary_opening
 
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.errors import SettingError
 from cpfls_cli.flightlog.clock import increasing_rows
+from cpfls_cli.flightlog.crash import ALIVE, SLOW_S, Signs, averaged, ended_early, resting, smoothed, upright_of
 from cpfls_cli.flightlog.names import BY_HAND
 from cpfls_cli.flightlog.repair import SignalTable, fill
 from cpfls_cli.flightlog.settings import ROTORS, ImportSettings
+from cpfls_cli.flightlog.stretches import live_rows
 
 _OF_HOVER = 0.6
 """Share of the level at hover below which rotors idle."""
@@ -30,11 +32,15 @@ _MARGIN_S = 0.5
 _STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
 """Below the first a vehicle stands, whatever an estimate of its height does; below the second it has to move."""
 
-_ALIVE = 0.02
-"""Share of the largest command below which rotors stand."""
+_SHAKES_RAD_S, _OF_NOISE, _LEANS_RAD = 0.3, 1.3, 0.01
+"""Vibration on a bench at most, how far the mean of noise may be beyond what its number of samples makes it, and the
+range of leans above which a vehicle moves."""
 
 _TURNS_RAD_S, _OF_TURNING = 0.2, 0.3
 """Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand."""
+
+_LONGEST_CUT_S = 3.0
+"""Longer than that no throttle is cut in flight: a fall of 44 m."""
 
 _MOST_CLOCK_HZ = 50.0
 """Rate that is enough to find a flight."""
@@ -50,27 +56,46 @@ class FlownPart:
     Attributes
     ----------
     span_s : tuple of float or None
-        Begin and end, s from the log's first stamp; None where all of it flies.
+        Begin and end of the longest stretch that flies, s from the log's first stamp; None where all of it flies.
     reasons : tuple of str
         What was cut, where, and how that was told; what else flies and is left out.
     flies : bool
         False where nothing in it flies.
+    stretches_s : tuple of tuple of float
+        Begin and end of each stretch that flies, in order.
+    ended, used : str
+        How flight ended before its time, and what is used; empty where nothing ended it.
     """
 
     span_s: tuple[float, float] | None
     reasons: tuple[str, ...]
     flies: bool = True
+    stretches_s: tuple[tuple[float, float], ...] = ()
+    ended: str = ""
+    used: str = ""
+
+    def within(self, ended: str, seconds: float) -> Self:
+        """Say that a part of so many s was looked at alone, since sources of the log ended there."""
+        if not ended or not self.flies:
+            return self
+        span = self.span_s or (0.0, round(seconds, 2))
+        words = f"the {span[1] - span[0]:.0f} s of flight in between are used"
+        return replace(
+            self,
+            span_s=span,
+            ended="; ".join(filter(None, (ended, self.ended))),
+            used=self.used if self.ended else words,
+        )
+
+    @property
+    def cut(self) -> tuple[str, ...]:
+        """What ended the flight, and what else was cut."""
+        return (*([f"{self.ended}; {self.used}"] if self.ended else []), *self.reasons)
 
 
-def rotor_level(speeds: Array, *, shares: bool) -> Array:
-    """Average speeds or commands of rotors, shape (time, rotor), as a share of their largest unless they are shares."""
-    level = speeds.mean(axis=1)
-    return np.asarray(level if shares else level / max(1.0, float(np.quantile(level, 0.98))))
-
-
-def turning_size(body_rate: Array) -> Array:
-    """Give the size of a body rate, shape (time, 3), without what it reads at rest."""
-    return np.asarray(np.linalg.norm(body_rate - np.median(body_rate, axis=0), axis=1))
+def rotor_shares(speeds: Array, *, shares: bool) -> Array:
+    """Give speeds or commands of rotors, shape (time, rotor), as shares of the largest mean unless they are so."""
+    return np.asarray(speeds if shares else speeds / max(1.0, float(np.quantile(speeds.mean(axis=1), 0.98))))
 
 
 def flown_crop(table: SignalTable, settings: ImportSettings) -> tuple[tuple[float, float] | None, tuple[str, ...]]:
@@ -81,79 +106,81 @@ def flown_crop(table: SignalTable, settings: ImportSettings) -> tuple[tuple[floa
     SettingError
         If nothing in it flies.
     """
-    rows, _ = increasing_rows(table.time)
-    table = table.rows(rows)
-    if len(table.time) < _FEWEST_ROWS:
-        return None, ()
-    step = max(float(np.median(np.diff(table.time))), 1 / _MOST_CLOCK_HZ)
-    clock = np.arange(table.time[0], table.time[-1], step)
-    known = {
-        name: fill(table.time, table.signals[name], clock)
-        for name in ("rotor_command", "rotor_speed", "position", "body_rate")
-        if name in table.signals and np.isfinite(table.signals[name]).any(axis=0).all()
-    }
-    level = height = None
-    name = next((name for name in ROTORS if name in known), None)
-    if name is not None:
-        level = rotor_level(known[name], shares=settings.signals[name].unit == "1")
-    if "position" in known:
-        height = known["position"][:, 2] * (1.0 if settings.world_frame == "ENU" else -1.0)
-    flown = find_flown(clock, level, height, turning_size(known["body_rate"]) if "body_rate" in known else None)
+    flown, off = _flown_of(table, settings)
     if not flown.flies:
         raise SettingError("crop_s", f"flown: {flown.reasons[0]}")
-    return flown.span_s, flown.reasons
+    span = None if flown.span_s is None else (flown.span_s[0] + off, flown.span_s[1] + off)
+    return span, flown.cut
 
 
-def find_flown(time: Array, level: Array | None, height: Array | None, rate: Array | None) -> FlownPart:
-    """Find the longest stretch of a log that is flown.
+def warn_of_end(table: SignalTable, settings: ImportSettings) -> tuple[str, ...]:
+    """Say how flight ends early in what a crop keeps."""
+    flown, _ = _flown_of(table, settings)
+    ended = flown.ended
+    return (f"{ended}, and import.crop_s keeps what comes after; import.crop_s: flown cuts it",) if ended else ()
 
-    Parameters
-    ----------
-    time : array, shape (time,), s
-        Uniform, from 0.
-    level : array, shape (time,), or None
-        Mean of the rotors' commands or speeds, 0 where they stand.
-    height : array, shape (time,), m, or None
-        Upward.
-    rate : array, shape (time,), rad/s, or None
-        Size of the body rate.
-    """
-    clock_hz = 1 / float(time[1] - time[0])
-    every = max(1, int(clock_hz / _MOST_CLOCK_HZ))
-    time = time[::every]
-    level, height, rate = (None if values is None else values[::every] for values in (level, height, rate))
-    period = float(time[1] - time[0])
-    active, told = _active(level, height, rate, period)
+
+def _flown_of(table: SignalTable, settings: ImportSettings) -> tuple[FlownPart, float]:
+    """Find what flies by the signals that a config maps, and the stamp that its spans count from."""
+    rows, _ = increasing_rows(table.time)
+    table = table.rows(rows)
+    live = live_rows(table)
+    table = table.rows(live.rows)
+    if len(table.time) < _FEWEST_ROWS:
+        return FlownPart(None, ()), 0.0
+    step = max(float(np.median(np.diff(table.time))), 1 / _MOST_CLOCK_HZ)
+    clock = np.arange(table.time[0], table.time[-1], step)
+    if len(clock) < _FEWEST_ROWS:
+        return FlownPart(None, ()), 0.0
+    known = {
+        name: fill(table.time, table.signals[name], clock)
+        for name in ("rotor_command", "rotor_speed", "position", "body_rate", "acceleration", "quaternion", "attitude")
+        if name in table.signals and np.isfinite(table.signals[name]).any(axis=0).all()
+    }
+    name = next((name for name in ROTORS if name in known), None)
+    rotors = None if name is None else rotor_shares(known[name], shares=settings.signals[name].unit == "1")
+    up = 1.0 if settings.world_frame == "ENU" else -1.0
+    senses = settings.acceleration_frame == "body-specific-force"
+    flown = find_flown(
+        Signs(
+            time=clock - clock[0],
+            rotors=rotors,
+            height=up * known["position"][:, 2] if "position" in known else None,
+            body_rate=known.get("body_rate"),
+            upright=upright_of(known.get("attitude"), known.get("quaternion"), settings.quaternion_order),
+            force=known.get("acceleration") if senses else None,
+        )
+    )
+    return flown.within(live.ended, float(clock[-1] - clock[0])), float(clock[0])
+
+
+def find_flown(signs: Signs) -> FlownPart:
+    """Find the stretches of a log that are flown, and the longest of them."""
+    signs = signs.slower(_MOST_CLOCK_HZ)
+    active, told = _active(signs)
     if active is None:
         return FlownPart(None, (told,), flies=False)
+    rests = resting(signs, active)
+    active = smoothed(active & ~rests, signs.period, _SHORT_S)
     if not active.any():
         return FlownPart(None, (f"no flight in it: {told} throughout",), flies=False)
-    if _still(active, height, rate):
+    if _still(signs, active):
         return FlownPart(None, ("no flight in it: the vehicle neither turns nor moves",), flies=False)
-    return _longest(time, active, told, level)
+    return _longest(signs, active, rests, told)
 
 
-def _active(
-    level: Array | None, height: Array | None, rate: Array | None, period: float
-) -> tuple[BoolArray | None, str]:
+def _active(signs: Signs) -> tuple[BoolArray | None, str]:
     """Mark the samples in which the vehicle flies, and say how that is told."""
+    level, height, rate, period = signs.level, signs.height, signs.turning, signs.period
     if level is not None:
-        level = np.nan_to_num(level)
         largest = float(np.quantile(level, 0.98))
-        if largest < _ALIVE:
-            return None, "no flight in it: the rotors stand still throughout"
-        hover = float(np.median(level[level > _OF_LARGEST * largest]))
-        carrying = level > _OF_HOVER * hover
+        if largest < ALIVE:
+            moved = rate is not None and float(np.quantile(rate, 0.9)) > _TURNS_RAD_S
+            by_hand = ", and it is turned by hand" if moved else ""
+            return None, f"no flight in it: the rotors stand still throughout{by_hand}"
+        turning = _carried(signs, largest)
         told = f"the rotors are below {100 * _OF_HOVER:.0f} % of their hover level"
-        if rate is not None and carrying.any():
-            # In free fall and in flips rotors idle too, but then the vehicle turns.
-            window = max(1, round(_SHORT_S / period))
-            turns = np.sqrt(np.convolve(rate**2, np.ones(window) / window, mode="same"))
-            lively = turns > max(_TURNS_RAD_S, _OF_TURNING * float(np.median(turns[carrying])))
-            first, last = np.flatnonzero(carrying)[[0, -1]]
-            carrying[first:last] |= ((level > _ALIVE) & lively)[first:last]
-            told += ", with hardly any rotation"
-        turning = _smoothed(carrying, period)
+        told += "" if rate is None else ", with hardly any rotation"
         if height is None or not turning.any() or turning.all():
             return turning, told
         return _off_the_ground(turning, height, period), told + ", or it is on the ground"
@@ -161,7 +188,8 @@ def _active(
         ground = float(np.quantile(height, 0.02))
         above = height - ground > max(_LEAST_HEIGHT, _OF_HEIGHT * float(np.ptp(height)))
         starts_there = abs(float(np.median(height[: max(1, round(_SHORT_S / period))])) - ground) < _LEAST_HEIGHT
-        return (_smoothed(above, period) if starts_there else np.ones(len(height), dtype=bool)), "it is on the ground"
+        flies = smoothed(above, period, _SHORT_S) if starts_there else np.ones(len(height), dtype=bool)
+        return flies, "it is on the ground"
     if rate is None:
         return (
             None,
@@ -169,6 +197,24 @@ def _active(
         )
     quiet = _quiet(rate, period)
     return ~quiet, "it does not turn at all"
+
+
+def _carried(signs: Signs, largest: float) -> BoolArray:
+    """Mark where the rotors carry the vehicle, or idle in free fall and in flips: then it turns, and not for long."""
+    level, rate = signs.level, signs.turning
+    assert level is not None, "asked for"
+    hover = float(np.median(level[level > _OF_LARGEST * largest]))
+    carrying = np.asarray(level > _OF_HOVER * hover, dtype=bool)
+    if rate is not None and carrying.any():
+        turns = np.sqrt(averaged(rate**2, signs.period, _SHORT_S))
+        lively = turns > max(_TURNS_RAD_S, _OF_TURNING * float(np.median(turns[carrying])))
+        stands = level <= ALIVE
+        for first, after in runs(stands):
+            # A throttle that is cut, and not a vehicle that is carried back to where it takes off.
+            stands[first:after] = (after - first) * signs.period > _LONGEST_CUT_S
+        first, last = np.flatnonzero(carrying)[[0, -1]]
+        carrying[first:last] |= (~stands & lively)[first:last]
+    return smoothed(carrying, signs.period, _SHORT_S)
 
 
 def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArray:
@@ -187,53 +233,76 @@ def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArr
         high = first + np.flatnonzero(risen[first:after])
         if len(high):
             off[high[0] : high[-1] + 1] = True
-    return _smoothed(off, period)
+    return smoothed(off, period, _SHORT_S)
 
 
 def _quiet(rate: Array, period: float) -> BoolArray:
-    window = max(1, round(_SHORT_S / period))
-    level = np.sqrt(np.convolve(rate**2, np.ones(window) / window, mode="same"))
+    level = np.sqrt(averaged(rate**2, period, _SHORT_S))
     return np.asarray(level < max(_STILL_RAD_S, 0.05 * float(np.quantile(level, 0.9))), dtype=bool)
 
 
-def _smoothed(marked: BoolArray, period: float) -> BoolArray:
-    """Fill short pauses, then drop short stretches."""
-    width = max(1, round(_SHORT_S / period))
-    around = np.pad(marked, width, mode="edge")
-    window = np.ones(width, dtype=np.bool_)
-    return np.asarray(binary_opening(binary_closing(around, window), window)[width:-width], dtype=np.bool_)
-
-
-def _still(active: BoolArray, height: Array | None, rate: Array | None) -> bool:
+def _still(signs: Signs, active: BoolArray) -> bool:
+    """Tell whether a vehicle whose rotors turn stands on the ground or is bound to a bench."""
+    height = signs.height
     moves = height is not None and float(np.ptp(height[active])) > _STILL_M
-    if rate is None:
+    if signs.turning is None or signs.slow is None:
         return height is not None and not moves
-    turning = float(np.sqrt(np.mean(rate[active] ** 2)))
-    return turning < _STILL_RAD_S or (turning < _SOFT_RAD_S and height is not None and not moves)
+    turning = float(np.sqrt(np.mean(signs.turning[active] ** 2)))
+    # Vibration of the rotors is no turning: its mean is that of noise.
+    slow = float(np.sqrt(np.mean(signs.slow[active] ** 2)))
+    shakes = turning < _SHAKES_RAD_S and slow < _OF_NOISE * turning / np.sqrt(SLOW_S / signs.period)
+    if signs.upright is not None:
+        upright = np.clip(np.abs(averaged(signs.upright, signs.period, SLOW_S)[active]), 0.0, 1.0)
+        shakes = shakes and float(np.ptp(np.quantile(np.arccos(upright), [0.05, 0.95]))) < _LEANS_RAD
+    if turning < _STILL_RAD_S:
+        return True
+    return not moves and (shakes or (turning < _SOFT_RAD_S and height is not None))
 
 
-def _longest(time: Array, active: BoolArray, told: str, level: Array | None) -> FlownPart:
-    stretches = runs(active)
-    first, after = max(stretches, key=lambda part: part[1] - part[0])
+def _longest(signs: Signs, active: BoolArray, rests: BoolArray, told: str) -> FlownPart:
+    time, stretches = signs.time, runs(active)
+    ends = [ended_early(signs, rests, part) for part in stretches]
+    cut = [
+        _clear_of_ground(time, first, after if end is None else end.first, early=end is not None)
+        for (first, after), end in zip(stretches, ends, strict=True)
+    ]
+    chosen = max(range(len(cut)), key=lambda index: cut[index][1] - cut[index][0])
+    (first, after), (begin, end) = stretches[chosen], cut[chosen]
+    reasons = []
+    early = [(index, each) for index, each in enumerate(ends) if each is not None]
+    if first > 0 and not any(index < chosen for index, _ in early):
+        reasons.append(f"the first {begin:.1f} s are cut: {_how(signs, slice(0, first), told)}")
+    if after < len(time) and ends[chosen] is None:
+        last = float(time[-1]) - end
+        reasons.append(f"the last {last:.1f} s are cut: {_how(signs, slice(after, None), told)}")
+    others = [
+        f"{time[a]:.1f} to {time[b - 1] if own is None else time[own.first - 1]:.1f} s"
+        for (a, b), own in zip(stretches, ends, strict=True)
+        if a != first
+    ]
+    if others:
+        words = ", ".join(others)
+        reasons.append(f"it also flies at {words}; import.crop_s takes one stretch, the longest")
+    whole = first == 0 and after == len(time) and ends[chosen] is None
+    # How the stretch that is used ended matters more than how another one did.
+    index, why = max(early, key=lambda each: each[0] == chosen, default=(chosen, None))
+    used = f"the {end - begin:.0f} s before it are used" if index == chosen else f"{begin:.1f} to {end:.1f} s are used"
+    span = None if whole else (round(begin, 2), round(end, 2))
+    return FlownPart(span, tuple(reasons), True, tuple(cut), "" if why is None else why.what, used)
+
+
+def _clear_of_ground(time: Array, first: int, after: int, *, early: bool) -> tuple[float, float]:
+    """Leave out what is close to the ground at either end of a stretch that does not begin or end with the log."""
     begin, end = float(time[first]), float(time[after - 1])
     margin = min(_MARGIN_S, (end - begin) / 10)
-    reasons = []
-    if first > 0:
-        begin += margin
-        reasons.append(f"the first {begin:.1f} s are cut: {_how(level, slice(0, first), told)}")
-    if after < len(time):
-        end -= margin
-        last = float(time[-1]) - end
-        reasons.append(f"the last {last:.1f} s are cut: {_how(level, slice(after, None), told)}")
-    others = [part for part in stretches if part[0] != first]
-    if others:
-        words = ", ".join(f"{time[a]:.1f} to {time[b - 1]:.1f} s" for a, b in others)
-        reasons.append(f"it also flies at {words}; import.crop_s takes one stretch, the longest")
-    whole = not reasons or (first == 0 and after == len(time))
-    return FlownPart(None if whole else (round(begin, 2), round(end, 2)), tuple(reasons))
+    begin += margin if first > 0 else 0.0
+    return begin, end - (0.0 if after == len(time) or early else margin)
 
 
-def _how(level: Array | None, part: slice, told: str) -> str:
-    if level is None:
+def _how(signs: Signs, part: slice, told: str) -> str:
+    if signs.level is None:
         return told
-    return "the rotors stand still" if float(np.quantile(np.nan_to_num(level)[part], 0.9)) < _ALIVE else told
+    if float(np.quantile(signs.level[part], 0.9)) >= ALIVE:
+        return told
+    by_hand = signs.slow is not None and float(np.quantile(signs.slow[part], 0.9)) > _TURNS_RAD_S
+    return "the rotors stand still" + (" while it is moved by hand" if by_hand else "")

@@ -20,7 +20,7 @@ from cpfls_cli.flightlog.conversion import (
     setpoints_to_program_frames,
     to_program_frames,
 )
-from cpfls_cli.flightlog.flown import flown_crop
+from cpfls_cli.flightlog.flown import flown_crop, warn_of_end
 from cpfls_cli.flightlog.repair import (
     SignalTable,
     crop_and_order,
@@ -120,6 +120,7 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
     crop, cut = flown_crop(read, settings) if settings.crop_s == "flown" else (settings.crop_s, ())
     settings = replace(settings, crop_s=crop)
     table, dropped = crop_and_order(read, settings)
+    cut = warn_of_end(table, settings) if mapped.crop_s != "flown" else cut
     table, asked = _without_setpoints(table)
     table = make_continuous(table)
     spikes = find_signal_spikes(table, settings)
@@ -151,8 +152,8 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
         cut_off_hz=filtered,
         updated_hz={signal.name: signal.rate_hz for signal in slow},
         warnings=(
-            *broken,
             *cut,
+            *broken,
             *warn_of_values(counts),
             *warn_of_dead(table, tuple(counts.saturated), settings),
             *warn_of_rest(table, resting, settings),

@@ -64,6 +64,7 @@ class LogTable:
         self.time_column, self.time_unit, self.time_doubt = (
             _flat_time(topics[""], units) if self.flat else ("", "s", None)
         )
+        self.origin = float(self.clock("")[0]) if self.flat else 0.0
         self.grid = np.empty(0)
 
     def parts(self, column: str) -> tuple[str, str]:

@@ -12,7 +12,8 @@ from cpfls_cli.flightlog.agreement import first_derivative, slow
 from cpfls_cli.flightlog.airframe import MovedBy, Parameters, airframe_from_motion
 from cpfls_cli.flightlog.attitude_columns import BODY_OF, doubt_reading, read_attitude
 from cpfls_cli.flightlog.conversion import as_mapped
-from cpfls_cli.flightlog.flown import FlownPart, find_flown, rotor_level, turning_size
+from cpfls_cli.flightlog.crash import Signs, upright_of
+from cpfls_cli.flightlog.flown import FlownPart, find_flown, rotor_shares
 from cpfls_cli.flightlog.log_table import LogTable, holding_values, make_grid, refuse_dead_rotors
 from cpfls_cli.flightlog.motion_columns import (
     gyroscope_first,
@@ -25,9 +26,11 @@ from cpfls_cli.flightlog.nameless import nameless_signals
 from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals
 from cpfls_cli.flightlog.readings import Reading
 from cpfls_cli.flightlog.recognised import Load, Recognition, Rival, Seen, called
+from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_mixed, find_rotors
 from cpfls_cli.flightlog.setpoint_columns import tell_setpoints
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, SignalName
+from cpfls_cli.flightlog.stretches import live_rows
 from cpfls_cli.flightlog.topics import STAMP, Topics
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
@@ -36,6 +39,9 @@ from cpfls_cli.words import some
 _DEGREES = 180 / np.pi
 _TORQUE_HZ, _FOLLOWS = 6.0, 0.3
 """Below which a torque is compared with the angular acceleration, and the correlation from which on that follows it."""
+
+_FASTEST_RAD_S = 40.0
+"""Rate that no gyroscope of a multirotor reads: 2000 deg/s are 35 rad/s."""
 
 _LATE_S = (0.0, 0.03, 0.06, 0.09)
 """By which motors and propellers follow a command, s."""
@@ -53,6 +59,9 @@ _ORDER: Final[tuple[SignalName, ...]] = (
     "thrust",
     "voltage",
 )
+_SIGNS = {"position", "body_rate", "acceleration", "attitude", "quaternion"}
+"""What tells flight, beside the rotors."""
+
 _WITH_BODY = {"body_rate", "acceleration", "attitude", "quaternion"}
 _SHOWN = 4
 """Groups of columns that are named where others are taken for the same."""
@@ -88,14 +97,15 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
         raise InputError(f"no column is recognised as a signal of a flight (columns: {shown}): {BY_HAND}")
     refuse_dead_rotors(log, named, candidates)
+    log, candidates, ended = _live_part(log, candidates)
     make_grid(log, candidates)
     rotors = find_rotors({name: _with_values(log, candidates.get(name, ())) for name in ROTORS}, parameters, system)
     rotors = rotors if rotors.speed or rotors.command else find_mixed(log) or rotors
-    level = _level(log, rotors)
-    flown = _find_flown(log, candidates, level)
+    shares = _shares(log, rotors)
+    flown = find_flown(_signs(log, candidates, shares)).within(ended, float(log.grid[-1] - log.grid[0]))
     if not flown.flies:
         raise InputError(flown.reasons[0])
-    seen = Seen(log, candidates, _part(log, flown), level)
+    seen = Seen(log, candidates, _part(log, flown), None if shares is None else shares.mean(axis=1))
     seen.warnings += [] if log.time_doubt is None else [log.time_doubt]
     position_by_velocity(seen)
     verdict = read_attitude(seen)
@@ -118,18 +128,37 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     return _gathered(seen, flown, speeds, moved, "" if driving is None else driving.kind)
 
 
+def _live_part(
+    log: LogTable, candidates: dict[SignalName, list[Named]]
+) -> tuple[LogTable, dict[SignalName, list[Named]], str]:
+    """Leave out where sources of a flat log have ended and their columns go on in straight lines; say so."""
+    if not log.flat:
+        return log, candidates, ""
+    fields = log.topics[""]
+    leading = {
+        name: np.column_stack([np.asarray(fields[column], dtype=float) for column in found[0].group.columns])
+        for name, found in candidates.items()
+    }
+    live = live_rows(SignalTable(log.clock(""), {str(name): values for name, values in leading.items()}))
+    if not live.ended:
+        return log, candidates, ""
+    part = LogTable({"": {name: values[live.rows] for name, values in fields.items()}}, log.units)
+    part.origin = log.origin
+    return part, holding_values(part, [named for found in candidates.values() for named in found]), live.ended
+
+
 def _with_values(log: LogTable, candidates: Sequence[Named]) -> list[tuple[Named, Array, Array]]:
     groups = [(named, named.group.columns) for named in candidates]
     return [(named, log.values(columns)[0], log.without_spikes(columns)) for named, columns in groups]
 
 
-def _level(log: LogTable, rotors: RotorColumns) -> Array | None:
-    """Give the mean of the rotors' commands or speeds on the clock; 0 where they stand."""
+def _shares(log: LogTable, rotors: RotorColumns) -> Array | None:
+    """Give the rotors' commands or speeds on the clock, shape (time, rotor), as shares; 0 where they stand."""
     found = rotors.command or rotors.speed
     if found is None:
         return None
     values = log.on_grid(found.columns.columns, spikes=False)
-    return rotor_level(as_mapped(values, found.columns), shares=found is rotors.command)
+    return rotor_shares(as_mapped(values, found.columns), shares=found is rotors.command)
 
 
 def _flown_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array, bool] | None:
@@ -138,16 +167,28 @@ def _flown_rotors(seen: Seen, rotors: RotorColumns) -> tuple[Array, bool] | None
     return None if found is None else (seen.mapped(found.guess), rotors.speed is None)
 
 
-def _find_flown(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], level: Array | None) -> FlownPart:
-    position, gyro = (next(iter(candidates.get(name, ())), None) for name in ("position", "body_rate"))
+def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], rotors: Array | None) -> Signs:
+    """Gather what tells flight by the names of columns, before axes and frames are known."""
+    first = {name: found[0] for name, found in candidates.items() if found}
+    values = {name: named.scale * log.on_grid(named.group.columns) for name, named in first.items() if name in _SIGNS}
     height = rate = None
-    if position is not None:
-        height = position.scale * log.on_grid(position.group.columns)[:, 2] / (1000 if position.unit == "mm" else 1)
-    if gyro is not None:
-        values = log.on_grid(gyro.group.columns)
-        factor = gyro.scale / (_DEGREES if gyro.unit == "deg/s" else 1.0)
-        rate = factor * turning_size(values)
-    return find_flown(log.grid - log.grid[0], level, height, rate)
+    if "position" in values:
+        height = values["position"][:, 2] / (1000 if first["position"].unit == "mm" else 1)
+    if "body_rate" in values:
+        unit, fast = first["body_rate"].unit, float(np.quantile(np.abs(values["body_rate"]), 0.99)) > _FASTEST_RAD_S
+        rate = values["body_rate"] / (_DEGREES if unit == "deg/s" or (unit is None and fast) else 1.0)
+    angles = values.get("attitude")
+    if angles is not None and float(np.abs(angles[:, :2]).max()) > np.pi:
+        angles = angles / _DEGREES
+    ordered = "quaternion" in first and (first["quaternion"].group.kind == "wxyz" or first["quaternion"].known)
+    return Signs(
+        time=log.grid - log.grid[0],
+        rotors=rotors,
+        height=height,
+        body_rate=rate,
+        upright=upright_of(angles, values["quaternion"] if ordered else None, "wxyz"),
+        force=values.get("acceleration"),
+    )
 
 
 def _part(log: LogTable, flown: FlownPart) -> slice:
@@ -305,7 +346,7 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
     clocked = [guess for guess in signals if guess.signal not in ("voltage", "acceleration")] or list(signals)
     base = largest(clocked, lambda guess: rates[guess.signal])
     time_column, unit = log.time_column, log.time_unit
-    begin = log.clock("")[0] if log.flat else 0.0
+    begin = log.origin
     if not log.flat:
         topic = log.parts(base.columns.columns[0])[0]
         time_column, unit = f"{topic}.{STAMP}", "us"

@@ -183,7 +183,8 @@ def _beyond_commands(found: Found, parameters: Parameters) -> Iterator[str]:
     yield (
         f"{', '.join(named.group.columns)} look like commands of rotors except {named.group.columns[index]}, which"
         f" reaches {values[np.argmax(np.abs(values[:, index])), index]:.3g}: no command is that large, from"
-        f" {time[row] - time[0]:.4g} s after the first stamp on; cut the log there, and run cpfls init again"
+        f" {time[row] - time[0]:.4g} s after the first stamp on; take the rows from there on out of the log, and run"
+        " cpfls init again"
     )
 
 

@@ -13,6 +13,7 @@ from cpfls_cli.flightlog.clock import SMALLEST_SHARE_KEPT
 from cpfls_cli.flightlog.repair import SignalTable, count_saturated
 from cpfls_cli.flightlog.settings import ROTORS, ImportSettings, SignalMap
 from cpfls_cli.units import KNOWN_UNITS
+from cpfls_cli.words import joined
 
 _SHORTEST_REST_S = 0.5
 """Shorter ones are those of a throttle that is cut in flight."""
@@ -35,6 +36,12 @@ _SHORTEST_PAUSE_S = 0.5
 _FEWEST_IN_PAUSE = 20
 _USUAL_STEPS = 10
 """Times the usual step between updates, and so many rows, from which on a source was silent."""
+
+_WITNESSES = {"body_rate", "acceleration", "rotor_speed", "rotor_command"}
+"""Signals that are never straight lines while they are measured."""
+
+_STRAIGHT = 1e-3
+"""Bend of a straight line by the rounding of a file, as a share of the largest."""
 
 _NEVER_SATURATED = {"quaternion", "voltage"}
 # A quarter turn, and a margin for noise and filters.
@@ -181,6 +188,75 @@ def _warn_of_pause(name: str, time: Array, values: Array) -> Iterator[str]:
             f"{name} does not change on any {each} {_when(time, marked)}: its source was silent there, and the last"
             " value was repeated; cut it off with import.crop_s"
         )
+
+
+@dataclass(frozen=True)
+class LiveRows:
+    """The rows in which sources of a log measure, and what the others hold.
+
+    Attributes
+    ----------
+    rows : slice
+    ended : str
+        Which signals end or begin there, and when; empty where all rows are live.
+    """
+
+    rows: slice
+    ended: str = ""
+
+
+def live_rows(table: SignalTable) -> LiveRows:
+    """Find where a source ended and its columns were extrapolated: straight lines, which noise never draws.
+
+    Signals of sensors and rotors are asked; what a slow source draws from update to update is as short everywhere.
+    """
+    first, after, ends, begins = 0, len(table.time), [], []
+    for name in _WITNESSES & table.signals.keys():
+        begin, end = _extrapolated(table.time, table.signals[name], alone=name not in ROTORS)
+        begins += [name] if begin else []
+        ends += [name] if end < len(table.time) else []
+        first, after = max(first, begin), min(after, end)
+    if after - first < _FEWEST_IN_PAUSE or not (ends or begins):
+        return LiveRows(slice(0, len(table.time)))
+    origin = table.time[0]
+    words = [
+        f"{joined(sorted(names))} run in straight lines {side}, where their source was silent"
+        for names, side in (
+            (begins, f"before {table.time[first] - origin:.1f} s"),
+            (ends, f"from {table.time[after - 1] - origin:.1f} s on"),
+        )
+        if names
+    ]
+    return LiveRows(slice(first, after), "; ".join(words))
+
+
+def _extrapolated(time: Array, values: Array, *, alone: bool) -> tuple[int, int]:
+    """Find the first live row and the one after the last; rotors may ramp, so they have to leave their range too."""
+    nothing = (0, len(time))
+    if len(time) < 2 * _FEWEST_IN_PAUSE or not np.isfinite(values).all() or not (np.diff(time) > 0).all():
+        return nothing
+    slopes = np.diff(values, axis=0) / np.diff(time)[:, None]
+    bends = np.abs(np.diff(slopes, axis=0))
+    straight = np.all(bends <= _STRAIGHT * np.quantile(bends, 0.98, axis=0), axis=1)
+    lines = runs(straight)
+    inner = [after - first for first, after in lines if first > 0 and after < len(straight)]
+    usual = float(np.median(inner)) if inner else 0.0
+    found = list(nothing)
+    for side, (first, after) in enumerate((lines[:1] + lines[-1:]) if lines else []):
+        at_edge = first == 0 if side == 0 else after == len(straight)
+        long = after - first >= max(_FEWEST_IN_PAUSE, _USUAL_STEPS * usual) and time[after] - time[first] >= (
+            _SHORTEST_PAUSE_S
+        )
+        moves = bool((np.abs(slopes[first:after]).max(axis=0) > 0).all())
+        # The corner itself is the last row that was measured.
+        rest = values[after + 1 :] if side == 0 else values[: first + 1]
+        if at_edge and long and moves and len(rest) and (alone or _leaves(values[first : after + 2], rest)):
+            found[side] = after + 1 if side == 0 else first + 1
+    return found[0], found[1]
+
+
+def _leaves(line: Array, rest: Array) -> bool:
+    return bool((np.abs(line - rest.mean(axis=0)).max(axis=0) > 2 * np.ptp(rest, axis=0)).any())
 
 
 @dataclass(frozen=True)

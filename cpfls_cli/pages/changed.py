@@ -39,6 +39,9 @@ _UNITS = {"m/s^2": "m/s²", "1": ""}
 _SHOWN_FIRST = ("rotor M1", "mass", "centre of mass", "vibration", "late", "gusts")
 """Of what would have shown, as much as a first screen has room for; of rotors the one that shows least."""
 
+LEFT_OUT = "left out: "
+"""What begins the reason for which a flight is not compared."""
+
 _OTHERS = 3
 """Of what would have shown, where nothing of that does."""
 
@@ -76,7 +79,8 @@ def answer(changed: Source[ChangedRecord], index: int = 1) -> Iterator[Block]:
     yield changed_box(record, vehicle)
     yield Facts(list(_facts(record, vehicle)))
     yield Folded("each number beside the reference, and what would have shown", [*_tables(record, vehicle, index)])
-    yield from (Text(words, "warning") for words in record.warning)
+    # A flight that is not there changes the answer.
+    yield from (Text(words, "warning", always=words.startswith(LEFT_OUT)) for words in record.warning)
 
 
 def changed_box(record: ChangedRecord, vehicle: VehicleSettings) -> Box:
@@ -227,7 +231,8 @@ def changed_blocks(changed: Source[ChangedRecord], index: int) -> Iterator[Block
     yield Facts(list(_facts(record, vehicle)))
     yield changed_figure(f"changed-{index}", record)
     yield from _tables(record, vehicle, index)
-    yield from (Text(words, "warning") for words in record.warning)
+    # A flight that is not there changes the answer.
+    yield from (Text(words, "warning", always=words.startswith(LEFT_OUT)) for words in record.warning)
 
 
 def changed_figure(name: str, record: ChangedRecord) -> Plot:

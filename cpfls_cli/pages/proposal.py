@@ -73,7 +73,7 @@ def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
     cut: list[Text] = []
     for one in proposal.logs:
         prefix = f"{one.name}: " if several else ""
-        reasons = one.recognition.flown.reasons or ("all of it is flight, nothing is cut",)
+        reasons = one.recognition.flown.cut or ("all of it is flight, nothing is cut",)
         cut += [Text(f"{prefix}{reason}") for reason in reasons]
         cut += [Text(f"{prefix}not mapped: {words}", "note") for words in one.recognition.left_out]
     yield Folded("what is cut or not mapped", cut)
@@ -183,7 +183,7 @@ def summary(proposal: Proposal, stated: Stated, output: str) -> dict[str, Any]:
         "choices": {choice.key: {"value": choice.value, **_grounds(choice)} for choice in proposal.choices},
         "crop_s": proposal.crop_s,
         "crops_s": dict(proposal.crops),
-        "cut": {one.name: list(one.recognition.flown.reasons) for one in proposal.logs},
+        "cut": {one.name: list(one.recognition.flown.cut) for one in proposal.logs},
         "left_out": {one.name: list(one.recognition.left_out) for one in proposal.logs},
         "rotors": [
             {"name": rotor.name, "spin": rotor.spin, "position_m": _position(rotor, proposal.airframe)}
@@ -214,6 +214,16 @@ def _position(rotor: RotorPlace, airframe: Airframe | None) -> list[float] | Non
     if airframe is None or not airframe.in_metres:
         return None
     return [round(value, 6) + 0.0 for value in (*rotor.direction, rotor.height_m)]
+
+
+def guessed_keys(proposal: Proposal) -> tuple[str, ...]:
+    """List the keys of the config whose values the log neither states nor shows."""
+    airframe = proposal.airframe
+    rotors = ("vehicle.rotors",) if airframe is not None and airframe.sure not in ("stated", "data") else ()
+    signals = (f"import.signals.{guess.signal}" for guess in proposal.signals if guess.sure == "guess")
+    choices = (f"import.{choice.key}" for choice in proposal.choices if choice.sure == "guess")
+    largest = ("vehicle.rotor_speed_max_rad_s",) if proposal.share_of_speed else ()
+    return (*rotors, *largest, *choices, *signals)
 
 
 def config_text(proposal: Proposal, stated: Stated) -> str:
@@ -340,7 +350,7 @@ def _import(proposal: Proposal) -> Iterator[str]:
         yield "  torque_source: null"
     alone = len(proposal.logs) == 1
     for one in proposal.logs:
-        for reason in one.recognition.flown.reasons:
+        for reason in one.recognition.flown.cut:
             yield from _comment(reason if alone else f"{one.name}: {reason}", 2)
     if proposal.crop_s == "flown":
         yield from _comment("Each log is cut to what flies in it, a later one too; to s from the first stamp now:", 2)

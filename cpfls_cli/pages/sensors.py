@@ -8,6 +8,7 @@ from typing import Any
 
 from cpfls_cli.artifacts.audit import AuditGroup
 from cpfls_cli.artifacts.gap_flights import NotExcitedGroup
+from cpfls_cli.consistency.findings import as_contradiction
 from cpfls_cli.pages.effects import effect_title, measured, titles, unit_words
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.content import Block, Box, Folded, Heading, Section, Table, Text
@@ -31,8 +32,8 @@ def settled_channels(audit: AuditGroup) -> Iterator[Text]:
 
 
 def contradicted(first: str) -> str:
-    """Say before anything else that a log contradicts itself, and where it does so first."""
-    return f"The log contradicts itself: {sentence(first)}"
+    """Say before anything else that a log contradicts itself or its config, and where it does so first."""
+    return sentence(as_contradiction(sentence(first)))
 
 
 def tell_before_search(contradictions: Sequence[str]) -> None:

@@ -32,7 +32,7 @@ from cpfls_cli.artifacts.parameters import (
 from cpfls_cli.artifacts.rebuilt import vehicle_model
 from cpfls_cli.artifacts.replay import HeldOutGroup, better_to, played_row
 from cpfls_cli.artifacts.spec import rows_of
-from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, ResponsesGroup, VehicleRecord
+from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, LoopGroup, ResponsesGroup, VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.inertia import INERTIA_PARAMETERS
@@ -53,6 +53,7 @@ from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, sty
 from cpfls_cli.report.content import Block, Cell, Facts, Folded, Heading, Listing, Plot, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, number, percent, whole_percent
 from cpfls_cli.response.mismatch import ACCEPTABLE
+from cpfls_cli.rounding import levelled
 from cpfls_cli.trajectory.consistency import coarsest_excited
 from cpfls_cli.trajectory.settings import ExciteSettings
 from cpfls_cli.validation.trust import Trust
@@ -100,6 +101,12 @@ FASTER = "LOG_BITMASK of ArduPilot (fast attitude and IMU), SDLOG_PROFILE of PX4
 
 _OF_IT = {"repeats": "comes again", "setpoints": "follows them", "past": "was foretold"}
 """Rotation that instruments know of, by their kind."""
+
+_LIVELY_RAD_S = 1.0
+"""Body rate, root mean square, above which larger turns show no more of the vehicle."""
+
+_FLOWN_BY_HAND = {"bbl", "bfl"}
+"""Formats of logs whose autopilot flies no mission file."""
 
 _FAR = 3.0
 """Factor from the stated number from which on a found one is called effective, and no property of a part."""
@@ -359,11 +366,7 @@ def _slow_words(record: VehicleRecord) -> Iterator[str]:
 def loop_words(record: VehicleRecord) -> str:
     """Say how far the loop may have misled the fit, and what to fly."""
     loop = record.loop
-    shares = joined(
-        f"{whole_percent(float(share))} of the {axis} acceleration"
-        for share, axis in zip(loop.explained[:2], ("roll", "pitch"), strict=True)
-        if np.isfinite(share)
-    )
+    shares = joined(_of_bands(loop, index, axis) for index, axis in enumerate(("roll", "pitch")))
     times = joined(
         f"{name} {number(float(low), 2)} to {number(float(high), 2)} times"
         for name, low, high in zip(INERTIA_PARAMETERS[:2], loop.low, loop.high, strict=False)
@@ -372,8 +375,39 @@ def loop_words(record: VehicleRecord) -> str:
     return (
         f"These flights show the loop, not the vehicle: torque explains {shares}. An autopilot that answers gusts, or "
         f"an effect that is missing here, makes a body look heavier or lighter than it is: {times} what was found. "
-        f"Fly in still air, with larger and faster turns, the same path several times: {WHAT_TO_FLY}"
+        f"Fly in still air, {_turns_to_fly(record)}"
     )
+
+
+def _of_bands(loop: LoopGroup, index: int, axis: str) -> str:
+    """Say what torque explains about an axis where it explains least, and where most."""
+    least, whole = loop.explained[index], f"{axis} acceleration"
+    if loop.by_band is None or loop.band_hz is None or not np.isfinite(least):
+        return (
+            f"{whole_percent(float(least))} of the {whole}" if np.isfinite(least) else f"nothing known of the {whole}"
+        )
+    shares = loop.by_band[:, index]
+    known = np.flatnonzero(np.isfinite(shares))
+    worst = int(known[np.argmin(np.abs(shares[known] - least))])
+    best = int(known[np.argmax(levelled(shares[known]))])
+    words = [
+        f"{whole_percent(float(np.clip(shares[band], 0.0, 1.0)))} from {number(float(loop.band_hz[band, 0]), 2)} to "
+        f"{number(float(loop.band_hz[band, 1]), 2)} Hz"
+        for band in dict.fromkeys((worst, best))
+    ]
+    return f"{words[0]} of the {whole}{f' ({words[1]})' if len(words) > 1 else ''}"
+
+
+def _turns_to_fly(record: VehicleRecord) -> str:
+    """Say how to turn: larger where the vehicle hardly turned, by stick where its autopilot flies no mission."""
+    turning = record.loop.turning
+    lively = turning is not None and bool((turning[:2] > _LIVELY_RAD_S).all())
+    how = "with quick turns about one axis at a time" if lively else "with larger and faster turns"
+    by_hand = "by hand, stick left and right, then forward and back, about twice a second, with pauses"
+    formats = {file.format.lower() for role, file in record.origin.inputs.items() if not role.startswith("config")}
+    if formats and formats <= _FLOWN_BY_HAND:
+        return f"{how}: {by_hand}."
+    return f"{how}, the same path several times ({by_hand}; or as a mission): {WHAT_TO_FLY}"
 
 
 def warnings(record: VehicleRecord) -> list[str]:

@@ -27,6 +27,8 @@ _BANDS = ((0.15, 0.4), (0.3, 0.8), (0.6, 1.6))
 
 Together they span what an autopilot answers late and what it answers in time, whatever its bandwidth.
 """
+_FASTER = (0.05, 0.15)
+"""Of the same kind, about 6 to 20 Hz: shown beside the others, and in no bound, for rotors and frames answer there."""
 _OVERLAP = 0.75
 _BLOCK_S = 4.0
 """Longer than what rotors and rotation remember of each other."""
@@ -51,6 +53,9 @@ class LoopBounds(NamedTuple):
     low: Array
     high: Array
     explained: Array
+    band_hz: Array = np.zeros((0, 2))
+    by_band: Array = np.zeros((0, 3))
+    turning: Array = np.full(3, np.nan)
 
     @property
     def shows_loop(self) -> bool:
@@ -83,7 +88,9 @@ def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopB
     Frisch 1934 (bounds by regression both ways); Forssell and Ljung 1999 (closed-loop identification revisited).
     """
     model = replace(model, response=replace(model.response, slow_roll_pitch=0.0, slow_yaw=0.0))
-    return bounds_between([_balanced(model, flight, part) for flight in flights for part in flight.stretches])
+    found = bounds_between([_balanced(model, flight, part) for flight in flights for part in flight.stretches])
+    rates = np.concatenate([flight.motion.rate[part] for flight in flights for part in flight.stretches])
+    return found._replace(turning=np.sqrt((rates**2).mean(axis=0)))
 
 
 class BalancedTorque(NamedTuple):
@@ -105,17 +112,22 @@ class BalancedTorque(NamedTuple):
 def bounds_between(stretches: Sequence[BalancedTorque]) -> LoopBounds:
     """Bound the factors that stretches allow; see `loop_bounds`."""
     low, high, explained = np.full(3, np.nan), np.full(3, np.nan), np.full(3, np.nan)
-    for band in _BANDS:
+    by_band = np.full((len(_BANDS) + 1, 3), np.nan)
+    for index, band in enumerate((*_BANDS, _FASTER)):
         sums = np.array([block for stretch in stretches for block in _sums(stretch, *band)])
         if len(sums) < FEWEST_BLOCKS:
             continue
         total = sums.sum(axis=0)
         seen = (total[:, 3:] < _MOST_NOISE * total[:, [0, 2]]).all(axis=1)
         lighter, heavier = np.where(seen, _factors(total), np.nan)
+        by_band[index] = lighter / heavier
+        if band == _FASTER:
+            continue
         half = half_width(jackknife_error(np.log(_factors(total - sums))), len(sums))
         low, high = np.fmin(low, lighter * np.exp(-half[0])), np.fmax(high, heavier * np.exp(half[1]))
-        explained = np.fmin(explained, lighter / heavier)
-    return LoopBounds(np.maximum(low, 1 / _ANY), np.minimum(high, _ANY), explained)
+        explained = np.fmin(explained, by_band[index])
+    bands_hz = 1 / np.array([(long_s, short_s) for short_s, long_s in (*_BANDS, _FASTER)])
+    return LoopBounds(np.maximum(low, 1 / _ANY), np.minimum(high, _ANY), explained, bands_hz, by_band)
 
 
 def _factors(sums: Array) -> Array:

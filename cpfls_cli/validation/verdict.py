@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import BoolArray
+from cpfls_cli.consistency.findings import as_contradiction
 from cpfls_cli.dynamics.rigid_body import why_unphysical
 from cpfls_cli.identification.findings import AXES, loop_in_words
 from cpfls_cli.playback.loop import LoopBounds
@@ -73,7 +74,7 @@ def contradicted(found: Verdict, contradictions: Sequence[str]) -> Verdict:
     """
     if not contradictions:
         return found
-    wrong = tuple(f"the log contradicts itself: {each}" for each in contradictions)
+    wrong = tuple(as_contradiction(each) for each in contradictions)
     against = (AGAINST,) * len(wrong)
     return replace(
         found, label=capped(found.label, wrong), reason=(*wrong, *found.reason), speaks=(*against, *found.speaks)

@@ -52,7 +52,7 @@ def flight(seconds=30.0, rate_hz=100.0, seed=3, noise=1.0, push=0.0, angle=0.25,
     position = cumulative_trapezoid(velocity, time, axis=0, initial=0)
     spin = CubicSpline(time, rate).derivative()(time)
     torque = INERTIA * spin + np.cross(rate, INERTIA * rate)
-    squared = np.column_stack([MASS * lift, torque]) @ np.linalg.inv(_mixer()).T
+    squared = np.column_stack([MASS * lift, torque]) @ np.linalg.inv(mixer()).T
 
     def noisy(values, size):
         return values + noise * size * rng.standard_normal(values.shape)
@@ -70,7 +70,7 @@ def flight(seconds=30.0, rate_hz=100.0, seed=3, noise=1.0, push=0.0, angle=0.25,
     )
 
 
-def _mixer():
+def mixer():
     hubs = np.array(HUBS, dtype=float)
     x, y = (hubs[:, axis] * ARM / np.sqrt(2) for axis in (0, 1))
     return np.array(
@@ -173,3 +173,15 @@ def ulog_of_flight(own, without=None, asked=None, **parameters):
         facts |= {f"CA_ROTOR{index}_{name}": value for name, value in hub.items()}
     fields = {name: f"uint64_t timestamp;{own}" for name, (own, _, _) in topics.items()}
     return ulogs.ulog(sorted(rows, key=lambda row: row[:2]), fields, facts | parameters)
+
+
+def run_on(contents, at_s, *groups):
+    """The same flat log with columns that run on in a straight line from a time on, as interpolators make them."""
+    columns = dict(contents.topics[""])
+    row = int(np.searchsorted(columns["t"], at_s))
+    steps = np.arange(1, len(columns["t"]) - row + 1)
+    for name in (name for name in columns if name.startswith(groups)):
+        values = columns[name].astype(float)
+        values[row:] = values[row - 1] + (values[row - 1] - values[row - 2]) * steps
+        columns[name] = values
+    return LogContents({"": columns})

@@ -144,9 +144,19 @@ def test_the_ground_is_no_flight():
     signals = recorded().signals
     idle = signals.rotor_speed.copy()
     idle[:500] *= 0.2
-    flies = in_flight(replace(signals, rotor_speed=idle))
+    flies = in_flight(replace(signals, rotor_speed=idle, position=None))
     assert not flies[:549].any()
     assert flies[560:].all()
+
+
+def test_throttle_cuts_of_acrobatic_flight_are_flight():
+    """As the import has it: a second of each three with the throttle cut, in which the vehicle turns."""
+    signals = recorded().signals
+    cut = np.mod(signals.time, 3.0) > 2.0
+    speed = np.where(cut[:, None], 0.05, 1.0) * signals.rotor_speed
+    turns = signals.body_rate + 3.0 * np.sin(5 * signals.time)[:, None] * [1.0, 1.0, 0.0]
+    lively = replace(signals, rotor_speed=speed, body_rate=turns, position=None, attitude=None)
+    assert in_flight(lively)[: -round(1.5 / PERIOD)].all()
 
 
 def test_a_weak_rotor_turns_the_body_less_however_thrust_and_yaw_turn_it_too():

@@ -3,10 +3,17 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.flightlog.crash import Signs
 from cpfls_cli.flightlog.flown import find_flown
 from cpfls_cli.flightlog.names import BY_HAND
 
 TIME = np.arange(0.0, 40.0, 0.01)
+
+
+def flown_by(level, height, rate):
+    rotors = None if level is None else np.repeat(level[:, None], 4, axis=1)
+    turns = None if rate is None else rate[:, None] * [1.0, 0.0, 0.0]
+    return find_flown(Signs(time=TIME, rotors=rotors, height=height, body_rate=turns))
 
 
 def between(begin, end, inside, outside=0.0):
@@ -14,17 +21,17 @@ def between(begin, end, inside, outside=0.0):
 
 
 def turning(begin, end, size=0.5):
-    return between(begin, end, size) * np.abs(np.sin(3 * TIME))
+    return between(begin, end, size) * np.sin(3 * TIME)
 
 
 def test_a_log_that_flies_from_first_to_last_is_not_cut():
-    flown = find_flown(TIME, np.full(len(TIME), 0.5), 1 + np.sin(TIME), turning(0, 40))
+    flown = flown_by(np.full(len(TIME), 0.5), 1 + np.sin(TIME), turning(0, 40))
     assert (flown.span_s, flown.reasons, flown.flies) == (None, (), True)
 
 
 def test_standing_and_idling_rotors_are_cut_with_a_margin():
     level = between(5, 10, 0.1) + between(10, 30, 0.5)
-    flown = find_flown(TIME, level, None, turning(10, 30))
+    flown = flown_by(level, None, turning(10, 30))
     assert flown.span_s == (pytest.approx(10.5, abs=0.1), pytest.approx(29.5, abs=0.1))
     assert flown.reasons[0].startswith("the first 10.5 s are cut: ")
     assert flown.reasons[1].endswith(" s are cut: the rotors stand still")
@@ -32,34 +39,40 @@ def test_standing_and_idling_rotors_are_cut_with_a_margin():
 
 def test_rotors_that_turn_fast_on_the_ground_do_not_fly():
     level, height = between(5, 30, 0.5), between(12, 28, 2.0)
-    flown = find_flown(TIME, level, height, turning(12, 28))
+    flown = flown_by(level, height, turning(12, 28))
     assert flown.span_s == (pytest.approx(12.5, abs=0.1), pytest.approx(27.5, abs=0.1))
 
 
 def test_a_flight_that_comes_down_to_the_height_of_its_ground_is_one():
     height = between(6, 16, 2.0) + between(22, 30, 2.0)
-    flown = find_flown(TIME, between(5, 31, 0.5), height, turning(5, 31))
+    flown = flown_by(between(5, 31, 0.5), height, turning(5, 31))
     assert flown.span_s == (pytest.approx(6.5, abs=0.1), pytest.approx(29.5, abs=0.1))
 
 
 def test_idling_in_flips_is_part_of_the_flight():
     level = between(5, 35, 0.5) - between(15, 20, 0.42)
-    lively = find_flown(TIME, level, None, turning(5, 35, 6.0))
+    lively = flown_by(level, None, turning(5, 35, 6.0))
     assert lively.span_s == (pytest.approx(5.5, abs=0.1), pytest.approx(34.5, abs=0.1))
-    quiet = find_flown(TIME, level, None, turning(5, 15, 6.0) + turning(20, 35, 6.0))
+    quiet = flown_by(level, None, turning(5, 15, 6.0) + turning(20, 35, 6.0))
     assert quiet.span_s == (pytest.approx(20.5, abs=0.6), pytest.approx(34.5, abs=0.1))
     assert any("it also flies at" in reason for reason in quiet.reasons)
 
 
 def test_height_alone_tells_a_flight():
-    flown = find_flown(TIME, None, between(10, 30, 1.0), turning(10, 30))
+    flown = flown_by(None, between(10, 30, 1.0), turning(10, 30))
     assert flown.span_s == (pytest.approx(10.5, abs=0.1), pytest.approx(29.5, abs=0.1))
 
 
 @pytest.mark.parametrize(
     ("level", "height", "rate", "reason"),
     [
-        (0 * TIME, None, turning(0, 40), "no flight in it: the rotors stand still throughout"),
+        (0 * TIME, None, 0 * TIME, "no flight in it: the rotors stand still throughout"),
+        (
+            0 * TIME,
+            None,
+            turning(0, 40),
+            "no flight in it: the rotors stand still throughout, and it is turned by hand",
+        ),
         (0 * TIME + 0.3, 0 * TIME, 0 * TIME, "no flight in it: the vehicle neither turns nor moves"),
         (
             None,
@@ -70,5 +83,5 @@ def test_height_alone_tells_a_flight():
     ],
 )
 def test_what_does_not_fly_is_said_to(level, height, rate, reason):
-    flown = find_flown(TIME, level, height, rate)
+    flown = flown_by(level, height, rate)
     assert (flown.flies, flown.reasons) == (False, (reason,))

@@ -245,7 +245,7 @@ def test_commands_that_blow_up_are_said_with_the_moment(own):
     assert recognition.rotors == 0
     (warning,) = recognition.warnings
     assert "motor_m2, which reaches 1.25e+06: no command is that large, from 15 s after the first stamp on" in warning
-    assert warning.endswith("cut the log there, and run cpfls init again")
+    assert warning.endswith("take the rows from there on out of the log, and run cpfls init again")
 
 
 def test_stamps_in_microseconds_are_known_by_their_steps(own):

@@ -7,6 +7,7 @@ import pytest
 
 from cpfls_cli.artifacts.parameters import parameters_of, vehicle_section
 from cpfls_cli.artifacts.replay import HeldOutGroup, SignalErrorGroup
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.vehicle_model import (
     FoundNumbersGroup,
     InstrumentsGroup,
@@ -21,6 +22,7 @@ from cpfls_cli.pages.vehicle_model import (
     cautions,
     found_vehicle_blocks,
     grounds,
+    loop_words,
     remainder_curves,
     title,
     warnings,
@@ -222,10 +224,32 @@ def test_flights_that_show_the_loop_are_said_first_and_leave_no_good_word():
     assert "torque explains 45 % of the roll acceleration and 47 % of the pitch acceleration" in said
     assert "Ixx 0.21 to 2.6 times and Iyy 0.23 to 2.4 times what was found" in said
     assert said.endswith(f": {WHAT_TO_FLY}")
+    assert "with larger and faster turns" in said
     for trust in (Trust.SIMULATION, Trust.CONTROL, Trust.INSIDE, Trust.NOT_JUDGED):
         assert capped(trust, (), loop=True) == Trust.LOOP
     assert capped(Trust.DO_NOT_USE, (), loop=True) == Trust.DO_NOT_USE
     assert capped(Trust.SIMULATION, ("rates are mirrored",), loop=True) == Trust.DO_NOT_USE
+
+
+def test_the_band_in_which_torque_explains_little_is_said_beside_the_one_in_which_it_explains_most():
+    loop = LoopGroup(
+        low=np.array([0.21, 0.23, np.nan]),
+        high=np.array([2.6, 2.4, np.nan]),
+        explained=np.array([0.01, 0.47, np.nan]),
+        shown=True,
+        band_hz=np.array([[2.5, 6.7], [0.63, 1.7], [6.7, 20.0]]),
+        by_band=np.array([[0.3, 0.47, np.nan], [0.01, 0.6, np.nan], [0.45, np.nan, np.nan]]),
+        turning=np.array([3.0, 3.0, 1.0]),
+    )
+    said = loop_words(replace(record_of(whole()), loop=loop))
+    assert "torque explains 1 % from 0.63 to 1.7 Hz of the roll acceleration (45 % from 6.7 to 20 Hz)" in said
+    assert "and 47 % from 2.5 to 6.7 Hz of the pitch acceleration (60 % from 0.63 to 1.7 Hz)" in said
+    assert "quick turns about one axis at a time" in said
+    assert "larger" not in said
+    origin = replace(record_of(whole()).origin, inputs={"flight-0": InputFile("fpv.bbl", "0" * 64, "bbl")})
+    by_hand = loop_words(replace(record_of(whole()), loop=loop).with_header(origin))
+    assert by_hand.endswith("stick left and right, then forward and back, about twice a second, with pauses.")
+    assert WHAT_TO_FLY not in by_hand
 
 
 def _told(record, cost=12.0, **given):

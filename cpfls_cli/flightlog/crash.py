@@ -1,0 +1,279 @@
+"""How a flight ends before its time: impact, tumble, on its back, rotors that stop in the air."""
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from scipy.ndimage import binary_closing, binary_dilation, binary_opening
+
+from cpfls_cli.arrays import Array, BoolArray, runs
+from cpfls_cli.units import STANDARD_GRAVITY
+
+ALIVE = 0.02
+"""Share of the largest command below which rotors stand."""
+
+_REST_S, _CALM_RAD_S, _LIVELY_RAD_S = 1.5, 0.5, 0.05
+"""For how long it rests at least, the rate below which it does, and that above which it surely flies."""
+
+SLOW_S = 0.5
+"""Means over so long hold no vibration."""
+
+_WEIGHT, _OFF_THRUST = (0.8, 1.2), 0.5
+"""Of gravity: size of the force that carries a vehicle at rest, and its share along the thrust below which no rotor
+does: more than 60 degrees off."""
+
+_SENSES = (0.7, 2.0)
+"""Of gravity: the median force of a log, by which an accelerometer and its unit are believed."""
+
+_STUCK, _STUCK_TIMES, _OF_RATE, _HARDLY_RAD_S = 0.15, 6.0, 0.3, 0.1
+"""Difference between rotors that turns every vehicle, as a share of the largest command and of what is usual; the rate
+below which it does not turn, as a share of what is usual and by itself."""
+
+_LAST_S, _FEWEST_S, _AT_ONCE_S = 10.0, 5.0, 2.0
+"""Before the end of a stretch, where a crash is looked for; flight before that, which tells what it does in flight; and
+the time from its last wild motion to the end, in which no pilot has recovered."""
+
+_BEYOND, _WILD_RAD_S, _WILD_RAD_S2, _HARD = 1.5, 5.0, 100.0, 3.0
+"""Times the largest of the flight before, and sizes at least, the last in gravity, that no rotor makes."""
+
+_TURN_S, _NOT_FOLLOWED = 0.1, 0.7
+"""Over which the turning of a vehicle is held against its rotors, and the share of it that they leave where it does
+not follow them."""
+
+_FALLS, _FALL_S, _DROP_M = 0.3, 0.2, 1.0
+"""Force in gravity that a vehicle feels in free fall at most, for how long, and the height that it loses in a second,
+m."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signs:
+    """What a log holds on whether the vehicle flies, on a uniform clock.
+
+    Attributes
+    ----------
+    time : array, shape (time,), s
+        From 0.
+    rotors : array, shape (time, rotor), or None
+        Commands or speeds as shares, 0 where they stand.
+    height : array, shape (time,), m, or None
+        Upward.
+    body_rate : array, shape (time, 3), rad/s, or None
+    upright : array, shape (time,), or None
+        Cosine of the lean; of either sign, as frames of logs have it.
+    force : array, shape (time, 3), body frame, or None
+        Of an accelerometer, in m/s^2 or in g.
+    """
+
+    time: Array
+    rotors: Array | None = None
+    height: Array | None = None
+    body_rate: Array | None = None
+    upright: Array | None = None
+    force: Array | None = None
+
+    @property
+    def period(self) -> float:
+        """Sampling period, s."""
+        return float(self.time[1] - self.time[0])
+
+    @cached_property
+    def level(self) -> Array | None:
+        """Mean of the rotors, shape (time,)."""
+        return None if self.rotors is None else np.nan_to_num(self.rotors.mean(axis=1))
+
+    @cached_property
+    def turning(self) -> Array | None:
+        """Size of the body rate without what it reads at rest, shape (time,), rad/s."""
+        if self.body_rate is None:
+            return None
+        return np.asarray(np.linalg.norm(self.body_rate - np.median(self.body_rate, axis=0), axis=1))
+
+    @cached_property
+    def slow(self) -> Array | None:
+        """Size of what is slow of the body rate, shape (time,), rad/s."""
+        if self.body_rate is None:
+            return None
+        rate = self.body_rate - np.median(self.body_rate, axis=0)
+        return np.asarray(np.linalg.norm(averaged(rate, self.period, SLOW_S), axis=1))
+
+    @cached_property
+    def felt(self) -> Array | None:
+        """What an accelerometer feels, shape (time, 3), in weights; None where it does not feel about one."""
+        if self.force is None:
+            return None
+        size = float(np.median(np.linalg.norm(self.force, axis=1)))
+        units = (unit for unit in (STANDARD_GRAVITY, 1.0) if _SENSES[0] < size / unit < _SENSES[1])
+        return next((self.force / unit for unit in units), None)
+
+    def slower(self, most_hz: float) -> "Signs":
+        """Take no more samples a second than are asked for; of each few the first."""
+        every = max(1, int(1 / (most_hz * self.period)))
+        held = {each.name: getattr(self, each.name) for each in fields(self)}
+        fewer: dict[str, Any] = {name: None if value is None else value[::every] for name, value in held.items()}
+        return Signs(**fewer)
+
+
+class EarlyEnd(NamedTuple):
+    """What ended a flight before its time, and its first sample."""
+
+    first: int
+    what: str
+
+
+def upright_of(attitude: Array | None, quaternion: Array | None, order: Literal["wxyz", "xyzw"]) -> Array | None:
+    """Give the cosine of the lean by roll, pitch, yaw, rad, or else by a quaternion; None without both."""
+    if attitude is not None:
+        return np.asarray(np.cos(attitude[:, 0]) * np.cos(attitude[:, 1]))
+    if quaternion is None:
+        return None
+    across = quaternion[:, 1:3] if order == "wxyz" else quaternion[:, :2]
+    return np.asarray(1 - 2 * (across**2).sum(axis=1) / np.maximum((quaternion**2).sum(axis=1), 1e-12))
+
+
+def averaged(values: Array, period: float, seconds: float) -> Array:
+    """Average values, shape (time,) or (time, column), over so many s around each sample."""
+    width = max(1, round(seconds / period))
+    window = np.ones(width) / width
+    columns = values.reshape(len(values), -1).T
+    if len(values) < width:
+        return np.broadcast_to(values.mean(axis=0), values.shape)
+    return np.column_stack([np.convolve(column, window, mode="same") for column in columns]).reshape(values.shape)
+
+
+def smoothed(marked: BoolArray, period: float, shortest_s: float) -> BoolArray:
+    """Fill short pauses, then drop short stretches."""
+    width = max(1, round(shortest_s / period))
+    around = np.pad(marked, width, mode="edge")
+    window = np.ones(width, dtype=np.bool_)
+    return np.asarray(binary_opening(binary_closing(around, window), window)[width:-width], dtype=np.bool_)
+
+
+def resting(signs: Signs, active: BoolArray) -> BoolArray:
+    """Mark where a vehicle whose rotors turn is carried by something else than them.
+
+    Rotors push along one axis of the body: where the accelerometer feels the weight along another one while the vehicle
+    hardly turns, it lies on its side or back. Without an accelerometer it lies where it is more than 90 degrees over.
+    It also rests where its rotors ask it to turn and it does not.
+    """
+    nowhere = np.zeros(len(active), dtype=bool)
+    if signs.slow is None or not active.any():
+        return nowhere
+    lively = active & (signs.slow > _LIVELY_RAD_S)
+    flies = lively if lively.sum() * signs.period > _FEWEST_S else active
+    calm = averaged(signs.slow, signs.period, _REST_S) < _CALM_RAD_S
+    rests = active & calm & (_off_its_feet(signs, flies) | _stuck(signs, flies))
+    window = np.ones(max(1, round(_REST_S / signs.period)), dtype=bool)
+    # A mean over a time says as much of all of it.
+    return np.asarray(binary_dilation(binary_opening(rests, window[: len(window) // 2 + 1]), window), dtype=bool)
+
+
+def _off_its_feet(signs: Signs, flies: BoolArray) -> BoolArray:
+    nowhere = np.zeros(len(flies), dtype=bool)
+    if signs.felt is not None:
+        thrust = np.median(signs.felt[flies], axis=0)
+        felt = averaged(signs.felt, signs.period, _REST_S)
+        size = np.linalg.norm(felt, axis=1)
+        off = felt @ thrust < _OFF_THRUST * size * float(np.linalg.norm(thrust))
+        return np.asarray(off & (size > _WEIGHT[0]) & (size < _WEIGHT[1]))
+    if signs.upright is None:
+        return nowhere
+    return np.asarray(averaged(_turned_up(signs.upright, flies), signs.period, _REST_S) < 0)
+
+
+def _turned_up(upright: Array, flies: BoolArray) -> Array:
+    return np.asarray(upright * (np.sign(np.median(upright[flies])) or 1.0))
+
+
+def _stuck(signs: Signs, flies: BoolArray) -> BoolArray:
+    if signs.rotors is None or signs.slow is None:
+        return np.zeros(len(flies), dtype=bool)
+    unlike = np.nan_to_num(signs.rotors - signs.rotors.mean(axis=1, keepdims=True))
+    asked = np.linalg.norm(averaged(unlike - np.median(unlike[flies], axis=0), signs.period, _REST_S), axis=1)
+    turns = averaged(signs.slow, signs.period, _REST_S)
+    hardly = turns < min(_HARDLY_RAD_S, _OF_RATE * float(np.median(turns[flies])))
+    return np.asarray((asked > max(_STUCK, _STUCK_TIMES * float(np.median(asked[flies])))) & hardly)
+
+
+def ended_early(signs: Signs, rests: BoolArray, part: tuple[int, int]) -> EarlyEnd | None:
+    """Say what ended a stretch of flight before its time; None where it landed, or the log ends in flight.
+
+    A crash is a motion beyond all that the flight before held, from which it does not recover: right after it the
+    vehicle rests, its rotors stop, or the log ends.
+    """
+    first, after = part
+    rests_then = bool(rests[after : after + 1].any())
+    time = signs.time
+    wild, hard = _beyond_flight(signs, part, rests_then=rests_then)
+    troubled = first + np.flatnonzero(wild)
+    lost = len(troubled) > 0 and (after - troubled[-1]) * signs.period < _AT_ONCE_S
+    # Who ends the log in a flip has lost nothing.
+    if lost and (after < len(time) or hard.any() or _ignores_rotors(signs, part, int(troubled[0]))):
+        apart = np.flatnonzero(np.diff(troubled) * signs.period > _AT_ONCE_S)
+        begin = int(troubled[apart[-1] + 1 if len(apart) else 0])
+        hits = first + np.flatnonzero(hard)
+        hits = hits[np.abs(hits - begin) * signs.period < _AT_ONCE_S / 2]
+        begin = min(begin, int(hits[0])) if len(hits) else begin
+        return EarlyEnd(begin, f"{'impact' if len(hits) else 'loss of control'} at {time[begin]:.1f} s")
+    if rests_then:
+        return EarlyEnd(after, f"from {time[after]:.1f} s on it rests on something, with its rotors on")
+    if _stops_in_the_air(signs, after):
+        return EarlyEnd(after, f"the rotors stop in the air at {time[after]:.1f} s")
+    return None
+
+
+def _beyond_flight(signs: Signs, part: tuple[int, int], *, rests_then: bool) -> tuple[BoolArray, BoolArray]:
+    """Mark, from the first sample of a stretch on, motion and force near its end that the flight before never had."""
+    first, after = part
+    count = after - first
+    last = min(round(_LAST_S / signs.period), count // 2)
+    before, late = slice(first, after - last), np.arange(count) >= count - last
+    nothing = np.zeros(count, dtype=bool)
+    if signs.turning is None or (count - last) * signs.period < _FEWEST_S:
+        return nothing, nothing
+
+    def beyond(values: Array, least: float) -> BoolArray:
+        most = float(np.max(values[before]))
+        return np.asarray(late & (values[first:after] > max(_BEYOND * most, least)), dtype=bool)
+
+    assert signs.body_rate is not None, "it turns"
+    spins = np.linalg.norm(np.gradient(signs.body_rate, signs.period, axis=0), axis=1)
+    wild = beyond(signs.turning, _WILD_RAD_S)
+    if signs.upright is not None:
+        up = _turned_up(signs.upright, np.arange(len(signs.time)) < before.stop)
+        # What never was upside down, and is.
+        wild |= late & (up[first:after] < 0) & bool((up[before] > 0).all())
+    hard = nothing if signs.felt is None else beyond(np.linalg.norm(signs.felt, axis=1), _HARD)
+    # A touchdown jolts too; but then the vehicle stands on its feet.
+    return (wild | hard | beyond(spins, _WILD_RAD_S2) if rests_then else wild), hard
+
+
+def _ignores_rotors(signs: Signs, part: tuple[int, int], troubled: int) -> bool:
+    """Tell whether a vehicle turns near the end of a stretch otherwise than its rotors turned it before."""
+    if signs.rotors is None or signs.body_rate is None:
+        return False
+    first, after = part
+    begin = max(first, troubled - round(_AT_ONCE_S / signs.period))
+    turned = np.gradient(averaged(signs.body_rate, signs.period, _TURN_S), signs.period, axis=0)
+    driven = averaged(np.nan_to_num(signs.rotors) ** 2, signs.period, _TURN_S)
+    # Motors and propellers follow a command late.
+    late = np.vstack([driven[:1]] * round(_TURN_S / signs.period) + [driven])[: len(driven)]
+    columns = np.column_stack([np.ones(len(driven)), driven, late])
+    found = np.linalg.lstsq(columns[first:begin], turned[first:begin], rcond=None)[0]
+    left = turned[begin:after] - columns[begin:after] @ found
+    return bool((left**2).sum() > _NOT_FOLLOWED * (turned[begin:after] ** 2).sum())
+
+
+def _stops_in_the_air(signs: Signs, after: int) -> bool:
+    """Tell whether rotors stop while the vehicle is high, or feels itself fall."""
+    if signs.level is None or after >= len(signs.time):
+        return False
+    second = slice(after, after + round(1.0 / signs.period))
+    if signs.level[second].min() >= ALIVE:
+        return False
+    if signs.height is not None and float(signs.height[after] - signs.height[second].min()) > _DROP_M:
+        return True
+    if signs.felt is not None:
+        light = np.linalg.norm(signs.felt[second], axis=1) < _FALLS
+        return any((b - a) * signs.period >= _FALL_S for a, b in runs(light))
+    return False

@@ -1,0 +1,113 @@
+"""Flights that end before their time, by what a vehicle does then, and what looks alike and is flight."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from tests.builders.unknown_logs import GRAVITY, INERTIA, MASS, mixer
+
+SECONDS = 40.0
+"""Of flight before what ends it."""
+
+_FIELDS = ("angles", "rate", "position", "velocity", "acceleration", "specific_force", "speed")
+
+
+def then(own, seconds, *, rate=0.0, felt=(0.0, 0.0, GRAVITY), rotors=0.0, roll=None, falls=0.0, seed=5):
+    """Append some seconds: rate about x, rad/s, force that is felt, rotors as shares of hover, roll, fall, m/s^2."""
+    rng = np.random.default_rng(seed)
+    step = own.time[1] - own.time[0]
+    late = step * np.arange(1, round(seconds / step) + 1)
+    count = len(late)
+    last = own.angles[-1]
+    angles = np.tile(last, (count, 1))
+    angles[:, 0] = last[0] + rate * late if roll is None else roll
+    down = np.column_stack([0 * late, 0 * late, -0.5 * falls * late**2])
+    more = {
+        "angles": angles,
+        "rate": np.column_stack([rate + 0 * late, 0 * late, 0 * late]) + 0.02 * rng.standard_normal((count, 3)),
+        "position": own.position[-1] + down + 0.002 * rng.standard_normal((count, 3)),
+        "velocity": np.gradient(down, step, axis=0) + 0.01 * rng.standard_normal((count, 3)),
+        "acceleration": np.tile([0.0, 0.0, -falls], (count, 1)),
+        "specific_force": np.tile(felt, (count, 1)) + 0.2 * rng.standard_normal((count, 3)),
+        "speed": np.broadcast_to(rotors, (count, 4)) * own.speed.mean() + rng.standard_normal((count, 4)),
+    }
+    longer = type(own)(**vars(own))
+    longer.time = step * np.arange(len(own.time) + count)
+    for name in _FIELDS:
+        setattr(longer, name, np.vstack([getattr(own, name), more[name]]))
+    longer.speed = np.maximum(longer.speed, 0.0)
+    longer.rotation = Rotation.from_euler("ZYX", longer.angles[:, ::-1])
+    return longer
+
+
+def joined(first, second):
+    """One flight after another."""
+    longer = type(first)(**vars(first))
+    step = first.time[1] - first.time[0]
+    longer.time = step * np.arange(len(first.time) + len(second.time))
+    for name in _FIELDS:
+        setattr(longer, name, np.vstack([getattr(first, name), getattr(second, name)]))
+    longer.rotation = Rotation.from_euler("ZYX", longer.angles[:, ::-1])
+    return longer
+
+
+UPSIDE_DOWN = (0.0, 0.0, -GRAVITY)
+ONE_AT_FULL = (1.6, 0.3, 0.3, 0.3)
+
+
+def hits(own):
+    """Hit the ground, turn over, and lie on the back with one motor at full."""
+    struck = then(own, 0.06, rate=-16.0, felt=(30.0, -20.0, 40.0), rotors=1.0)
+    rolls = then(struck, 0.3, rate=-9.0, felt=(0.0, 5.0, 8.0), rotors=ONE_AT_FULL)
+    return then(rolls, 8.0, felt=UPSIDE_DOWN, rotors=ONE_AT_FULL, roll=np.pi)
+
+
+def tumbles(own):
+    """Lose control and tumble until the log ends."""
+    return then(own, 2.5, rate=17.0, felt=(0.0, 0.0, 1.0), rotors=ONE_AT_FULL, falls=7.0)
+
+
+def turns_over(own):
+    """Tip over when landing, slowly, and lie on the back with the rotors on."""
+    tips = then(own, 1.0, rate=3.0, felt=(0.0, 7.0, 6.0), rotors=0.8)
+    return then(tips, 10.0, felt=UPSIDE_DOWN, rotors=0.8, roll=np.pi)
+
+
+def stops_in_the_air(own):
+    """Lose all rotors, fall and hit the ground on the feet."""
+    falls = then(own, 1.2, felt=(0.0, 0.0, 0.0), falls=9.8)
+    struck = then(falls, 0.04, rate=2.0, felt=(0.0, 0.0, 100.0))
+    return then(struck, 6.0)
+
+
+def held(own):
+    """Stand with the rotors on, held by something while they ask to turn."""
+    return then(own, 8.0, rotors=ONE_AT_FULL)
+
+
+def carried(own):
+    """Land, and be carried home."""
+    rng = np.random.default_rng(7)
+    home = then(then(own, 3.0), 15.0)
+    late = len(own.time) + round(3.0 / (own.time[1] - own.time[0]))
+    home.rate[late:] += 1.5 * np.sin(3 * home.time[late:, None]) + 0.1 * rng.standard_normal((len(home.time) - late, 3))
+    return home
+
+
+def flips(own):
+    """Flip over and over in the air: nearly in free fall and upside down, by the torque of the rotors."""
+    flipped = type(own)(**vars(own))
+    angles, rate, force = own.angles.copy(), own.rate.copy(), own.specific_force.copy()
+    squared = own.speed**2
+    for begin in np.arange(5.0, own.time[-1] - 0.4, 2.5):
+        turn = (own.time >= begin) & (own.time < begin + 0.7)
+        done = np.clip((own.time[turn] - begin) / 0.7, 0, 1)
+        angles[turn, 0] += np.pi * (1 - np.cos(np.pi * done))
+        rate[turn, 0] += np.pi**2 / 0.7 * np.sin(np.pi * done)
+        force[turn] *= 0.5
+        torque = INERTIA[0] * (np.pi**3 / 0.49) * np.cos(np.pi * done)
+        wanted = np.column_stack([0.5 * MASS * GRAVITY + 0 * done, torque, 0 * done, 0 * done])
+        squared[turn] = wanted @ np.linalg.inv(mixer()).T
+    flipped.angles, flipped.rate, flipped.specific_force = angles, rate, force
+    flipped.speed = np.sqrt(np.maximum(squared, 1e3))
+    flipped.rotation = Rotation.from_euler("ZYX", angles[:, ::-1])
+    return flipped

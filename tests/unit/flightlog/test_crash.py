@@ -1,0 +1,89 @@
+"""What ends a flight before its time is found, cut and said; what looks alike and is flight stays."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.flightlog.crash import Signs, upright_of
+from cpfls_cli.flightlog.flown import find_flown, rotor_shares
+from tests.builders import ended_flights as ended
+from tests.builders.unknown_logs import flight
+
+HIGH = np.array([0.0, 0.0, 30.0])
+ALL = ("height", "upright", "force")
+
+
+@pytest.fixture(scope="module")
+def own():
+    made = flight(ended.SECONDS)
+    made.position = made.position + HIGH
+    return made
+
+
+def flown(log, known=ALL):
+    signs = {
+        "height": log.position[:, 2],
+        "upright": upright_of(log.angles, None, "wxyz"),
+        "force": log.specific_force / 9.81,
+    }
+    shares = rotor_shares(log.speed, shares=False)
+    return find_flown(Signs(time=log.time, rotors=shares, body_rate=log.rate, **{name: signs[name] for name in known}))
+
+
+@pytest.mark.parametrize("known", [ALL, ("force",), ("upright",), ()])
+@pytest.mark.parametrize(
+    ("ends", "without_force", "with_force"),
+    [
+        (ended.hits, "loss of control at ", "impact at "),
+        (ended.tumbles, "loss of control at ", "loss of control at "),
+        (ended.held, "it rests on something, with its rotors on", "it rests on something, with its rotors on"),
+    ],
+)
+def test_the_part_before_a_crash_is_used(own, ends, without_force, with_force, known):
+    found = flown(ends(own), known)
+    assert found.span_s == (0.0, pytest.approx(ended.SECONDS, abs=0.3))
+    assert (with_force if "force" in known else without_force) in found.ended
+    assert found.used == "the 40 s before it are used"
+    assert found.reasons == ()
+
+
+@pytest.mark.parametrize("known", [ALL, ("force",), ("upright",)])
+def test_a_vehicle_on_its_back_does_not_fly_whatever_its_rotors_do(own, known):
+    found = flown(ended.turns_over(own), known)
+    assert found.span_s == (0.0, pytest.approx(ended.SECONDS + 0.5, abs=0.5))
+    assert found.ended
+
+
+@pytest.mark.parametrize("known", [ALL, ("force",), ("height",)])
+def test_rotors_that_stop_in_the_air_are_no_landing(own, known):
+    found = flown(ended.stops_in_the_air(own), known)
+    assert found.ended == "the rotors stop in the air at 40.0 s"
+    landed = ended.then(ended.then(own, 0.04, rate=1.0, felt=(0.0, 0.0, 40.0)), 5.0)
+    assert flown(landed, known).ended == ""
+
+
+def test_of_a_crash_amid_a_log_the_longest_stretch_is_used(own):
+    found = flown(ended.joined(ended.hits(flight(20.0)), own))
+    assert found.span_s == (pytest.approx(29.0, abs=0.7), pytest.approx(68.35, abs=0.1))
+    assert found.cut[0] == "impact at 20.0 s; 29.0 to 68.3 s are used"
+
+
+@pytest.mark.parametrize("known", [ALL, ("force",), ("upright",), ()])
+def test_flips_are_flight_also_where_the_log_ends_in_them(own, known):
+    for log in (ended.flips(own), ended.joined(own, ended.flips(flight(12.0)))):
+        assert flown(log, known).span_s is None
+
+
+def test_a_vehicle_that_is_carried_home_by_hand_is_said_to(own):
+    found = flown(ended.carried(own))
+    assert found.reasons == ("the last 18.5 s are cut: the rotors stand still while it is moved by hand",)
+
+
+@pytest.mark.parametrize("known", [ALL, ("force",), ()])
+def test_what_only_shakes_on_a_bench_does_not_fly(own, known):
+    rng = np.random.default_rng(1)
+    bench = type(own)(**vars(own))
+    bench.rate = 0.1 * rng.standard_normal(own.rate.shape)
+    bench.angles, bench.position = 0.001 * rng.standard_normal(own.rate.shape), 0 * own.position
+    bench.specific_force = np.array([0.0, 0.0, 9.81]) + 0.5 * rng.standard_normal(own.rate.shape)
+    found = flown(bench, known)
+    assert (found.flies, found.reasons) == (False, ("no flight in it: the vehicle neither turns nor moves",))
