@@ -9,8 +9,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, about
-from cpfls_cli.flightlog.airframe import Airframe, Parameters, stated_airframe, usual_airframe
+from cpfls_cli.flightlog.airframe import Airframe, stated_airframe, usual_airframe
 from cpfls_cli.flightlog.clock import common_rate, same_rate
+from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Load, Recognition, Rival
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.settings import SETPOINTS, ColumnMap, SignalMap, SignalName
@@ -34,9 +35,6 @@ DECIDES_ROTORS: Final = "a log with more motion, or a look at the vehicle, decid
 _ALIKE: Final = {True: 1.06, False: 1.12}
 """Ratio of loads up to which two flights may be of one mass: by rotor speeds and an accelerometer; otherwise, since
 batteries empty, and who leans looks heavier. By commands three flights of one Crazyflie differ by 1.06."""
-
-_MULTIROTORS: Final = (2, 13, 14, 15, 29)
-"""MAV_TYPE: quadrotor, hexarotor, octorotor, tricopter, dodecarotor."""
 
 _NOTED: Final = ("SYS_AUTOSTART", "MPC_THR_HOVER", "THR_MDL_FAC", "MOT_THST_HOVER", "MOT_THST_EXPO", "MOT_SPIN_MIN")
 
@@ -157,13 +155,9 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
     Raises
     ------
     InputError
-        If the logs are of two vehicles, of something else than a multirotor, or no mapping suits them all; or if the
-        rotors that are stated cannot turn a vehicle.
+        If the logs are of two vehicles, or no mapping suits them all; or if the rotors that are stated cannot turn a
+        vehicle, or have another arm than the one that is given.
     """
-    for one in logs:
-        kind = one.parameters.get("MAV_TYPE")
-        if kind is not None and int(float(kind)) not in _MULTIROTORS:
-            raise InputError(f"{one.name}: MAV_TYPE = {int(float(kind))} in its parameters is not a multirotor")
     for other in logs[1:]:
         _require_same_vehicle(logs[0], other)
     signals, slowest = _without_slow_voltage(logs, _merged_signals(logs))
@@ -410,13 +404,13 @@ def _of_other_load(logs: Sequence[KnownLog]) -> list[KnownLog]:
 def _airframe(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
     """Take the rotors that parameters state, else those that the motion tells, and hold the one against the other."""
     with about(logs[0].name, InputError):
-        stated = next((found for one in logs if (found := stated_airframe(one.parameters)) is not None), None)
+        own = (stated_airframe(one.parameters, one.recognition.rotors) for one in logs)
+        stated = next((found for found in own if found is not None), None)
     moved = [one.recognition.moved for one in logs if one.recognition.moved is not None]
     best = max(moved, key=lambda found: (found.clear, sum(found.explained)), default=None)
     if best is not None and best.clear and stated is None:
         return best.airframe, []
-    four = logs[0].recognition.rotors == 4
-    taken = stated or (usual_airframe(logs[0].recognition.kind) if four else None)
+    taken = stated or usual_airframe(logs[0].recognition.kind, logs[0].recognition.rotors)
     if best is None:
         return taken, []
     says = f"{best.airframe.reason}: {', '.join(f'{r.name} {_WAY[r.spin]}' for r in best.airframe.rotors)}"

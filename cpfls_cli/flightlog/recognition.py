@@ -6,13 +6,14 @@ from typing import Final
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, runs
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.agreement import first_derivative, slow
-from cpfls_cli.flightlog.airframe import MovedBy, Parameters, airframe_from_motion
+from cpfls_cli.flightlog.airframe import MovedBy, airframe_from_motion
 from cpfls_cli.flightlog.attitude_columns import BODY_OF, doubt_reading, read_attitude
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.flown import FlownPart, find_flown, rotor_level, turning_size
+from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.log_table import LogTable, holding_values, make_grid, refuse_dead_rotors
 from cpfls_cli.flightlog.motion_columns import (
     gyroscope_first,
@@ -29,6 +30,7 @@ from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_mixed, find_rot
 from cpfls_cli.flightlog.setpoint_columns import tell_setpoints
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics
+from cpfls_cli.flightlog.vehicle_kind import VehicleKind, forward_flight, refuse_other_vehicle
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.words import some
@@ -53,6 +55,9 @@ _ORDER: Final[tuple[SignalName, ...]] = (
     "thrust",
     "voltage",
 )
+_SHORTEST_HOVER_S: Final = 2.0
+"""Of a VTOL, below which nothing of it can be recognised."""
+
 _WITH_BODY = {"body_rate", "acceleration", "attitude", "quaternion"}
 _SHOWN = 4
 """Groups of columns that are named where others are taken for the same."""
@@ -77,8 +82,9 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     Raises
     ------
     InputError
-        If nothing in the log is recognised, or nothing in it flies.
+        If nothing in the log is recognised, nothing in it flies, or what flies is no multirotor.
     """
+    kind = refuse_other_vehicle(topics, parameters, system)
     log = LogTable(topics, units)
     named = named_signals(column_groups(log.names), system)
     candidates = holding_values(log, named)
@@ -95,6 +101,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     flown = _find_flown(log, candidates, level)
     if not flown.flies:
         raise InputError(flown.reasons[0])
+    flown = flown if kind is None else _hover_of(log, kind, flown)
     seen = Seen(log, candidates, _part(log, flown), level)
     seen.warnings += [] if log.time_doubt is None else [log.time_doubt]
     position_by_velocity(seen)
@@ -154,6 +161,25 @@ def _part(log: LogTable, flown: FlownPart) -> slice:
     begin, end = flown.span_s or (0.0, np.inf)
     inside = np.flatnonzero((log.grid - log.grid[0] >= begin) & (log.grid - log.grid[0] <= end))
     return slice(int(inside[0]), int(inside[-1]) + 1)
+
+
+def _hover_of(log: LogTable, kind: VehicleKind, flown: FlownPart) -> FlownPart:
+    """Keep what a VTOL flies on its rotors alone, the longest of it; a log that does not tell is kept as it is."""
+    forward = forward_flight(log.topics, log.grid)
+    what = f"{kind.what} ({kind.reason}), which is a multirotor in hover alone"
+    if forward is None:
+        return replace(flown, reasons=(*flown.reasons, f"{what}; the log does not say when it hovers"))
+    part = _part(log, flown)
+    hovers = [(first + part.start, after + part.start) for first, after in runs(~forward[part])]
+    time = log.grid - log.grid[0]
+    first, after = max(hovers, key=lambda own: own[1] - own[0], default=(0, 1))
+    begin, end = float(time[first]), float(time[after - 1])
+    if end - begin < _SHORTEST_HOVER_S:
+        raise InputError(f"a log of {what}, and it hovers for {end - begin:.3g} s of this one at a time")
+    if not forward[part].any():
+        return replace(flown, reasons=(*flown.reasons, f"{what}, and it hovers throughout"))
+    reason = f"{what}: its hover from {begin:.1f} to {end:.1f} s is used, and no flight on the wing"
+    return replace(flown, span_s=(round(begin, 2), round(end, 2)), reasons=(*flown.reasons, reason))
 
 
 # Frames.

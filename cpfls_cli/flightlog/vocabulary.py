@@ -79,6 +79,7 @@ _KNOWN: Final = """
     PX4         rotor_speed    esc_status.esc[*].esc_rpm              rpm    -    1        +
     PX4         rotor_command  actuator_motors.control[*]             1      -    1        +
     PX4         rotor_command  actuator_outputs.output[*]             -      -    1        +
+    PX4         rotor_command  actuator_outputs[1].output[*]          -      -    1        +
     PX4         voltage        battery_status.voltage_v               V      -    1        +
     ArduPilot   attitude       ATT.*                                  deg    FRD  1        +
     ArduPilot   body_rate      IMU.Gyr*                               rad/s  FRD  1        +
@@ -89,7 +90,10 @@ _KNOWN: Final = """
     ArduPilot   velocity       XKF1.V*                                m/s    NED  1        +
     ArduPilot   velocity       NKF1.V*                                m/s    NED  1        +
     ArduPilot   rotor_command  RCOU.C*                                -      -    1        +
+    # To Copter 3.3.
+    ArduPilot   rotor_command  RCOU.Ch*                               -      -    1        +
     ArduPilot   rotor_speed    ESC[*].RPM                             rpm    -    1        +
+    ArduPilot   rotor_speed    ESC*.RPM                               rpm    -    1        +
     ArduPilot   voltage        BAT.Volt                               V      -    1        +
     Betaflight  body_rate      gyroADC[*]                             deg/s  FLU  1        +
     Betaflight  acceleration   accSmooth[*]                           -      FLU  1        +

@@ -173,7 +173,7 @@ def _flown_at(fields: Mapping[str, Array]) -> float:
 
 def _system(tables: Mapping[str, np.ndarray]) -> str:
     for (said,) in _rows(tables, "MSG", Message="S"):
-        program = re.match(r"(?:APM:)?(\w+) V(\d[\w.]*)", _text(said))
+        program = re.match(r"(?:APM:)?(\w+) [Vv](\d[\w.]*)", _text(said))
         if program:
             name = program[1] if program[1].startswith("Ardu") else f"Ardu{program[1]}"
             return f"{name} {program[2]}"

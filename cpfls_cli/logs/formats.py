@@ -198,7 +198,9 @@ def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
     """Read the columns of a log that a config maps, on one clock."""
     on_one_clock = import_module("cpfls_cli.flightlog.topics").on_one_clock
     contents = log_contents(path, settings.mapped_columns)
+    refuse_other_vehicle = import_module("cpfls_cli.flightlog.vehicle_kind").refuse_other_vehicle
     with about(path, InputError):
+        refuse_other_vehicle(contents.topics, contents.parameters, contents.system)
         columns, chosen, warnings = on_one_clock(contents.topics, contents.units, settings)
     begins = contents.begins.get(str(chosen.time_column), contents.begins.get("", 0.0))
     warnings = (*contents.warnings, *warnings)
