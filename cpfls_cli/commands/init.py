@@ -35,7 +35,7 @@ def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
         own = log_contents(log)
         with about(log, InputError):
             known.append(known_log(str(log), own.topics, own.units, own.parameters, own.system))
-    proposal = propose(known, stated.mass_kg, stated.arm_m)
+    proposal = propose(known, stated.mass_kg, stated.arm_m, scale_to_arm=stated.scale_to_arm)
     text, output = config_text(proposal, stated), str(job.output)
     wrong = _contradictions(text, logs[0], whole=not asked_keys(proposal, stated))
     if not job.dry_run:

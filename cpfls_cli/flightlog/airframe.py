@@ -1,7 +1,7 @@
 """Where the rotors of a vehicle are and how they turn: from the parameters in a log, or from its motion."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import permutations
 from math import hypot
@@ -84,6 +84,8 @@ class Airframe:
         motion only suggests it.
     moment_ratio_m : float or None
         Drag factor over thrust factor that the parameters state.
+    scaled : bool
+        Whether its places are those of an arm that was given.
     """
 
     rotors: tuple[RotorPlace, ...]
@@ -91,6 +93,7 @@ class Airframe:
     reason: str
     sure: str
     moment_ratio_m: float | None = None
+    scaled: bool = False
 
     @property
     def is_guess(self) -> bool:
@@ -116,7 +119,7 @@ class Airframe:
             )
             for r in self.rotors
         )
-        return Airframe(rotors, True, self.reason, self.sure, self.moment_ratio_m)
+        return replace(self, rotors=rotors, in_metres=True, scaled=True)
 
 
 def stated_airframe(parameters: Parameters, rotors: int = 0) -> Airframe | None:

@@ -10,7 +10,7 @@ from typing import Final
 
 Parameters = Mapping[str, float | str]
 Place = tuple[float, float, int]
-"""x forward and y left, as shares of an arm, and 1 for a rotor that turns counter-clockwise seen from above, else -1."""
+"""x forward and y left, as shares of an arm, and 1 for what turns counter-clockwise seen from above, else -1."""
 
 _LAYOUTS: Final = """
     # Angle of each motor clockwise from the front, degrees, or x forward and y left; + turns counter-clockwise
@@ -79,8 +79,19 @@ LAYOUTS: Final = _layouts()
 _CLASSES: Final = {1: "quad", 2: "hexa", 3: "octa", 4: "octa quad", 5: "Y6", 12: "dodeca hexa", 14: "deca"}
 _OF_CLASS: Final = {1: 4, 2: 6, 3: 8, 4: 8, 5: 6, 7: 3, 12: 12, 14: 10}
 _TYPES: Final = {
-    **{0: "plus", 1: "X", 2: "V", 3: "H", 6: "plus, reversed", 10: "B", 11: "F", 12: "X of Betaflight"},
-    **{13: "X of DJI", 14: "X clockwise", 15: "I", 18: "X reversed", 19: "Y4"},
+    0: "plus",
+    1: "X",
+    2: "V",
+    3: "H",
+    6: "plus, reversed",
+    10: "B",
+    11: "F",
+    12: "X of Betaflight",
+    13: "X of DJI",
+    14: "X clockwise",
+    15: "I",
+    18: "X reversed",
+    19: "Y4",
 }
 _COUNTS_OF_FORMS: Final = (8, 6, 4)
 """Motors of the frames that Copter had before FRAME_CLASS (to 3.4): FRAME is their form alone."""

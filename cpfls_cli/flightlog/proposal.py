@@ -31,6 +31,12 @@ _LEAST_GAP_S, _SLOWEST_VOLTAGE_S = 0.1, 0.5
 _ROOM = 1.2
 """By which a limit of the rotor speeds lies above the fastest one that is logged."""
 
+_OF_VEHICLE: Final = ("CA_ROTOR", "FRAME", "Q_FRAME", "SYS_AUTOSTART", "CA_AIRFRAME", "MAV_TYPE")
+"""Beginnings of parameters that two logs of one vehicle have in common."""
+
+_SAME_ARM: Final = 0.05
+"""Share by which an arm that is given may differ from the places that a log states: both are rounded."""
+
 DECIDES_ROTORS: Final = "a log with more motion, or a look at the vehicle, decides"
 _ALIKE: Final = {True: 1.06, False: 1.12}
 """Ratio of loads up to which two flights may be of one mass: by rotor speeds and an accelerometer; otherwise, since
@@ -140,7 +146,9 @@ class Proposal:
         return "rotor_speed" not in names and command is not None and command.columns.unit == "1"
 
 
-def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None) -> Proposal:
+def propose(
+    logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None, *, scale_to_arm: bool = False
+) -> Proposal:
     """Make one proposal of what each of several logs is taken for.
 
     Parameters
@@ -151,6 +159,8 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
         None: not known.
     arm_m : float or None
         From the middle of the vehicle to a rotor, m; None: not known.
+    scale_to_arm : bool
+        Whether places that a log states are scaled to that arm.
 
     Raises
     ------
@@ -165,7 +175,10 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
         signals = tuple(_by_weight(guess, logs[0].recognition.speeds, mass_kg, arm_m) for guess in signals)
     airframe, doubts = _airframe(logs)
     if airframe is not None and arm_m is not None:
-        airframe = airframe.with_arm(arm_m)
+        if airframe.in_metres and not scale_to_arm:
+            _require_same_arm(logs[0].name, airframe, arm_m)
+        else:
+            airframe = airframe.with_arm(arm_m)
     rates = [one.recognition.rate_hz for one in logs]
     apart = _of_other_load(logs)
     crops = {one.name: one.recognition.flown.span_s for one in logs}
@@ -190,6 +203,15 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
     )
 
 
+def _require_same_arm(name: str, airframe: Airframe, arm_m: float) -> None:
+    """Refuse an arm beside other places that a log states: who asks knows which of the two is right."""
+    if abs(arm_m - airframe.arm_m) > _SAME_ARM * airframe.arm_m:
+        raise InputError(
+            f"{name}: --arm is {arm_m:g} m, but {airframe.reason} put the rotors {airframe.arm_m:.3g} m from the"
+            " middle: leave --arm out to take these, or add --scale-to-arm to scale them to yours"
+        )
+
+
 def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
     """Refuse two logs whose parameters, systems or rotors say that they are of two vehicles."""
     differing = []
@@ -197,9 +219,9 @@ def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
     if names[0] != names[1]:
         differing.append(f"written by {names[0] or 'something unknown'} and {names[1] or 'something unknown'}")
     for key in sorted(first.parameters.keys() & other.parameters.keys()):
-        if key.startswith(("CA_ROTOR", "FRAME_", "SYS_AUTOSTART", "CA_AIRFRAME")) and not key.endswith(
-            ("_CT", "_SLEW")
-        ):
+        if key.startswith(
+            ("CA_ROTOR", "FRAME", "Q_FRAME", "SYS_AUTOSTART", "CA_AIRFRAME", "MAV_TYPE")
+        ) and not key.endswith(("_CT", "_SLEW")):
             values = first.parameters[key], other.parameters[key]
             if values[0] != values[1]:
                 differing.append(f"{key} {_plain(values[0])} and {_plain(values[1])}")
@@ -414,11 +436,17 @@ def _airframe(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
     if best is None:
         return taken, []
     says = f"{best.airframe.reason}: {', '.join(f'{r.name} {_WAY[r.spin]}' for r in best.airframe.rotors)}"
-    if taken is None:
+    orders = (
+        [] if taken is None else [[(rotor.name, rotor.spin) for rotor in own.rotors] for own in (taken, best.airframe)]
+    )
+    differ = len(orders) == 2 and orders[0] != orders[1] and all(rotor.name for rotor in taken.rotors if taken)
+    if taken is None or (differ and taken.is_guess and best.by_axes):
+        # What is usual is a guess too, and nothing in this log speaks for it.
         return best.airframe, [f"the positions and spins of the rotors are a guess from {says}; {DECIDES_ROTORS}"]
-    orders = [[(rotor.name, rotor.spin) for rotor in found.rotors] for found in (taken, best.airframe)]
-    differ = best.clear and orders[0] != orders[1] and all(rotor.name for rotor in taken.rotors)
-    return taken, [f"the rotors are taken from {taken.reason}, which contradicts {says}"] if differ else []
+    if taken.is_guess and best.clear and not differ:
+        return replace(taken, reason=f"{taken.reason}; {best.airframe.reason}", sure="data"), []
+    contradicts = f"the rotors are taken from {taken.reason}, which contradicts {says}"
+    return taken, [contradicts] if differ and best.clear else []
 
 
 def _speed_max(logs: Sequence[KnownLog], signals: Sequence[Guess]) -> float:

@@ -439,7 +439,11 @@ def _stated_range(named: Named, parameters: Parameters) -> tuple[float, float, s
         stick = whole(parameters, "RCMAP_THROTTLE") or 3
         low, high = (float(parameters.get(f"RC{stick}_{end}", 0) or 0) for end in ("MIN", "MAX"))
         if 500 < low < high:
-            return low, high, f"RC{stick}_MIN and RC{stick}_MAX of the log, since MOT_PWM_MIN and MOT_PWM_MAX are not set"
+            return (
+                low,
+                high,
+                f"RC{stick}_MIN and RC{stick}_MAX of the log, since MOT_PWM_MIN and MOT_PWM_MAX are not set",
+            )
         return 1000.0, 2000.0, _USUAL_PULSES
     return None
 

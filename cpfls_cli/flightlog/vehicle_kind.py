@@ -25,19 +25,42 @@ _FIRMWARE: Final = {
 }
 _HELICOPTER_PARAMETERS: Final = ("H_RSC_MODE", "H_COL_MIN", "H_SWASH_TYPE", "H_SV_MAN", "H_SW_TYPE", "H_SWASH_PLATE")
 _FRAME_CLASSES: Final = {
-    **{6: HELICOPTER, 8: "a single copter with flaps", 9: "a coaxial copter with flaps"},
+    6: HELICOPTER,
+    8: "a single copter with flaps",
+    9: "a coaxial copter with flaps",
     10: "a bicopter or tail-sitter, whose two rotors tilt",
-    **{11: "a helicopter with two rotors", 13: "a helicopter with four rotors"},
+    11: "a helicopter with two rotors",
+    13: "a helicopter with four rotors",
 }
 _MAV_TYPES: Final = {
-    **{1: AIRPLANE, 3: "a coaxial helicopter", 4: HELICOPTER, 5: "an antenna tracker", 7: BLIMP, 8: BALLOON},
-    **{9: "a rocket", 10: GROUND, 11: BOAT, 12: SUBMARINE, 16: "a flapping wing", 17: "a kite"},
+    1: AIRPLANE,
+    3: "a coaxial helicopter",
+    4: HELICOPTER,
+    5: "an antenna tracker",
+    7: BLIMP,
+    8: BALLOON,
+    9: "a rocket",
+    10: GROUND,
+    11: BOAT,
+    12: SUBMARINE,
+    16: "a flapping wing",
+    17: "a kite",
     19: "a tail-sitter with two rotors",
     **dict.fromkeys(range(20, 26), VTOL),
 }
 _CA_AIRFRAMES: Final = {
-    **{1: AIRPLANE, 2: VTOL, 3: VTOL, 4: VTOL, 5: GROUND, 6: GROUND, 10: HELICOPTER, 11: HELICOPTER},
-    **{12: "a coaxial helicopter", 13: GROUND, 14: "a spacecraft", 15: "a spacecraft"},
+    1: AIRPLANE,
+    2: VTOL,
+    3: VTOL,
+    4: VTOL,
+    5: GROUND,
+    6: GROUND,
+    10: HELICOPTER,
+    11: HELICOPTER,
+    12: "a coaxial helicopter",
+    13: GROUND,
+    14: "a spacecraft",
+    15: "a spacecraft",
 }
 _AUTOSTART: Final = (
     # First and last SYS_AUTOSTART of PX4's airframes of a kind.
@@ -53,8 +76,16 @@ _MIXERS: Final = {8: AIRPLANE, 14: AIRPLANE, 15: HELICOPTER, 16: HELICOPTER, 24:
 """Mixers of Betaflight and its kin by number; 3 to 6 motors alone have any other."""
 
 _SURFACES: Final = {
-    **{4: "aileron", 16: "aileron", 19: "elevator", 21: "rudder", 24: "flaperon", 25: "flaperon", 77: "elevon"},
-    **{78: "elevon", 79: "V-tail", 80: "V-tail"},
+    4: "aileron",
+    16: "aileron",
+    19: "elevator",
+    21: "rudder",
+    24: "flaperon",
+    25: "flaperon",
+    77: "elevon",
+    78: "elevon",
+    79: "V-tail",
+    80: "V-tail",
 }
 _STEERING: Final = {26: "ground steering", 73: "left throttle of a rover", 74: "right throttle of a rover"}
 _ROTOR_HEADS: Final = {31: "rotor head of a helicopter", 32: "tail of a helicopter"}
@@ -204,4 +235,3 @@ def forward_flight(topics: Topics, grid: Array) -> BoolArray | None:
         if len(values) and len(values) == len(time):
             return np.asarray(np.isin(values[previous_rows(time, grid)], states) == inside, dtype=bool)
     return None
-

@@ -243,6 +243,8 @@ MEANINGS: Final = (
         " pwm u control output throttle omcmd esc thrust lift voltage vbat volt vbatt battery batt home global"
         f" {RATE_WORDS}",
     ),
+    # Of a matrix, whose columns have no axes in their names.
+    Meaning("position", "pos position p xyz", "numbers", 3, 1, "rotor motor imu angular home global"),
     Meaning("velocity", "vel velocity v linear twist", "xyz numbers", 3, 2, "angular acc acceleration a"),
     Meaning("acceleration", "acc accel accelerometer acceleration a sf f", "xyz numbers", 3, 2, "angular ang"),
     Meaning("body_rate", RATE_WORDS, "xyz angles numbers", 3),
@@ -256,7 +258,7 @@ MEANINGS: Final = (
     Meaning("voltage", "voltage vbat volt vbatt battery batt", "one", 1),
 )
 FAST: Final = _each("rpm erpm rads rotor om omega speed speeds velocities angular")
-ASKED: Final = _each("cmd command commands pwm u control output throttle omcmd ref des d r")
+ASKED: Final = _each("cmd command commands pwm u control output outputs throttle omcmd ref des d r")
 NOT_MEASURED: Final = _each(
     "des desired d sp setpoint ref reference target goal r cmd command ctrltarget controller cov covariance var"
     " variance bias noise std err error integral reset delta innov innovation offset mag magnetometer rc gps status"

@@ -78,6 +78,8 @@ class LogColumns:
         Stamp on the log's own clock at 0 of the column that is the clock, s.
     parameters, system
         As in `LogContents`.
+    stamped_hz : dict from str to float
+        How often a second signals were logged that have stamps of their own.
     """
 
     columns: dict[str, "Array"]
@@ -87,6 +89,7 @@ class LogColumns:
     begins: float = 0.0
     parameters: dict[str, float | str] = field(default_factory=dict)
     system: str = ""
+    stamped_hz: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,15 +199,18 @@ def log_contents(path: Path, wanted: Collection[str] | None = None) -> LogConten
 
 def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
     """Read the columns of a log that a config maps, on one clock."""
-    on_one_clock = import_module("cpfls_cli.flightlog.topics").on_one_clock
+    clocks = import_module("cpfls_cli.flightlog.topics")
     contents = log_contents(path, settings.mapped_columns)
     refuse_other_vehicle = import_module("cpfls_cli.flightlog.vehicle_kind").refuse_other_vehicle
     with about(path, InputError):
         refuse_other_vehicle(contents.topics, contents.parameters, contents.system)
-        columns, chosen, warnings = on_one_clock(contents.topics, contents.units, settings)
+        columns, chosen, warnings = clocks.on_one_clock(contents.topics, contents.units, settings)
+    stamped_hz = clocks.stamped_rates(contents.topics, chosen)
     begins = contents.begins.get(str(chosen.time_column), contents.begins.get("", 0.0))
     warnings = (*contents.warnings, *warnings)
-    return LogColumns(columns, chosen, warnings, contents.flown_at, begins, contents.parameters, contents.system)
+    return LogColumns(
+        columns, chosen, warnings, contents.flown_at, begins, contents.parameters, contents.system, stamped_hz
+    )
 
 
 def _format_of(path: Path) -> LogFormat | None:

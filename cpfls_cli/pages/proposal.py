@@ -11,9 +11,10 @@ from math import sqrt
 from typing import Any, Final
 
 from cpfls_cli.config.load import ASK, how_to_fill_in
-from cpfls_cli.flightlog.airframe import USUAL, Airframe, RotorPlace
+from cpfls_cli.flightlog.airframe import Airframe, RotorPlace, usual_airframe
+from cpfls_cli.flightlog.layouts import USUAL
 from cpfls_cli.flightlog.proposal import DECIDES_ROTORS, Proposal
-from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival
+from cpfls_cli.flightlog.recognised import Guess, KeyChoice
 from cpfls_cli.flightlog.settings import ColumnMap
 from cpfls_cli.report.content import Block, Cell, Folded, Table, Text
 from cpfls_cli.report.numbers import number
@@ -35,6 +36,7 @@ class Stated:
 
     mass_kg: float | None = None
     arm_m: float | None = None
+    scale_to_arm: bool = False
 
 
 def asked_keys(proposal: Proposal, stated: Stated) -> tuple[str, ...]:
@@ -44,9 +46,9 @@ def asked_keys(proposal: Proposal, stated: Stated) -> tuple[str, ...]:
     if not proposal.rotors:
         keys.append("vehicle.rotors")
     for index in range(proposal.rotors):
-        if airframe is None or airframe.is_guess or not airframe.in_metres:
+        if airframe is None or airframe.is_asked or not airframe.in_metres:
             keys.append(f"vehicle.rotors.{index}.position_m")
-        if airframe is None or airframe.is_guess or airframe.rotors[index].spin == 0:
+        if airframe is None or airframe.is_asked or airframe.rotors[index].spin == 0:
             keys.append(f"vehicle.rotors.{index}.spin")
     return tuple(keys)
 
@@ -264,13 +266,18 @@ def _rotors(proposal: Proposal, stated: Stated) -> Iterator[str]:
             2,
         )
         if proposal.rotors == 4:
+            frames = ((kind, usual_airframe(kind, 4)) for kind in USUAL)
             usual = (
-                f"{kind}: {', '.join(f'{place} {spin}' for place, spin in order)}" for kind, order in USUAL.items()
+                f"{kind}: {', '.join(f'{rotor.name} {rotor.spin}' for rotor in own.rotors)}"
+                for kind, own in frames
+                if own is not None
             )
             yield from _comment(f"Four in an X are usually, from M1 to M4, in {'; in '.join(usual)}.", 2)
     else:
-        if airframe.is_guess:
+        if airframe.is_asked:
             yield from _comment(f"Not known. A guess from {airframe.reason}; {DECIDES_ROTORS}.", 2)
+        elif airframe.is_guess:
+            yield from _comment(f"A guess, order and directions: {airframe.reason}; {DECIDES_ROTORS}.", 2)
         else:
             yield from _comment(f"Told by {airframe.reason}.", 2)
         if airframe.moment_ratio_m:
@@ -279,7 +286,7 @@ def _rotors(proposal: Proposal, stated: Stated) -> Iterator[str]:
                 " often a number that nobody measured.",
                 2,
             )
-        if stated.arm_m is not None:
+        if airframe.scaled and stated.arm_m is not None:
             yield from _comment(
                 f"Placed for an arm of {stated.arm_m:g} m; measured x, y and z are better: torques go with"
                 " them, and so do the moments of inertia that are found.",
@@ -297,7 +304,7 @@ def _rotors(proposal: Proposal, stated: Stated) -> Iterator[str]:
 
 
 def _rotor(rotor: RotorPlace | None, airframe: Airframe | None) -> str:
-    is_guess = airframe is not None and airframe.is_guess
+    is_guess = airframe is not None and airframe.is_asked
     position = None if rotor is None else _position(rotor, airframe)
     spin = ASK if rotor is None or rotor.spin == 0 else str(rotor.spin)
     entry = (
@@ -325,10 +332,10 @@ def _import(proposal: Proposal) -> Iterator[str]:
     choices = {choice.key: choice for choice in proposal.choices}
     for key in _ORDER:
         if key in choices:
-            yield from _entry(choices[key].reason, choices[key].rivals, [f"  {key}: {choices[key].value}"], 2)
+            yield from _entry(choices[key], [f"  {key}: {choices[key].value}"], 2)
     yield "  signals:"
     for guess in proposal.signals:
-        yield from _entry(guess.reason, guess.rivals, list(_signal(guess)), 4)
+        yield from _entry(guess, list(_signal(guess)), 4)
     if proposal.states_torque:
         yield "  torque_source: column"
     else:
@@ -361,10 +368,11 @@ def _import(proposal: Proposal) -> Iterator[str]:
         yield f"  rate_hz: {_flow(proposal.rate_hz)}"
 
 
-def _entry(reason: str, rivals: Sequence[Rival], lines: Sequence[str], indent: int) -> Iterator[str]:
-    yield from _comment(f"{capitalised(reason)}.", indent)
+def _entry(entry: Guess | KeyChoice, lines: Sequence[str], indent: int) -> Iterator[str]:
+    words = f"A guess: {entry.reason}" if entry.sure == "guess" else capitalised(entry.reason)
+    yield from _comment(f"{words}.", indent)
     yield from lines
-    for rival in rivals:
+    for rival in entry.rivals:
         yield from _comment(f"or {rival.text} ({rival.reason})", indent)
 
 

@@ -303,7 +303,10 @@ def test_a_log_of_px4_brings_its_rotors_along(proposed, tmp_path, own):
             "CA_ROTOR*_PX, _PY and the signs of _KM in the log: these 4 rotors cannot turn the vehicle about"
             " yaw by themselves; correct the parameters in the autopilot, or state vehicle.rotors by hand",
         ),
-        ({"MAV_TYPE": 1}, "MAV_TYPE = 1 in its parameters is not a multirotor"),
+        (
+            {"MAV_TYPE": 1},
+            "a log of an airplane (MAV_TYPE = 1), not of a multirotor: only vehicles that rotors carry are modelled",
+        ),
     ],
 )
 def test_parameters_that_contradict_a_multirotor_are_refused(refuse, tmp_path, own, parameters, message):
