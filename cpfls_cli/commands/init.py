@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import nan
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.errors import ConfigError, CpflsError, InputError, about
 from cpfls_cli.flightlog.proposal import Proposal, known_log, propose
 from cpfls_cli.flights.imported import imported
-from cpfls_cli.flights.recordings import check_flight, read_import
+from cpfls_cli.flights.recordings import check_flight, read_import, seen_twice
 from cpfls_cli.logs.formats import log_contents
 from cpfls_cli.pages.proposal import Stated, answer, asked_keys, config_text, summary
 from cpfls_cli.pages.sensors import contradicted
@@ -27,20 +28,26 @@ _IMPORTED = 4
 def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
     """Write a commented config for logs of one vehicle."""
     _require_possible(stated)
-    take_inputs(job, {f"log-{number}": log for number, log in enumerate(logs)})
+    inputs = take_inputs(job, {f"log-{number}": log for number, log in enumerate(logs)})
+    twice = seen_twice(inputs.values())
+    firsts: dict[str, Path] = {}
+    for log, file in zip(logs, inputs.values(), strict=True):
+        firsts.setdefault(file.sha256, log)
+    logs = list(firsts.values())
     check_outputs(job, job.output)
     known = []
     for number, log in enumerate(logs):
         job.progress(number, len(logs), log.name)
         own = log_contents(log)
         with about(log, InputError):
-            known.append(known_log(str(log), own.topics, own.units, own.parameters, own.system))
+            one = known_log(str(log), own.topics, own.units, own.parameters, own.system)
+            known.append(replace(one, of_file=own.warnings))
     proposal = propose(known, stated.mass_kg, stated.arm_m, scale_to_arm=stated.scale_to_arm)
     text, output = config_text(proposal, stated), str(job.output)
     wrong = _contradictions(text, logs[0], whole=not asked_keys(proposal, stated))
     if not job.dry_run:
         write_text(job.output, text)
-    said = (Text(contradicted(each), "warning", always=True) for each in wrong)
+    said = (Text(each, "warning", always=True) for each in (*map(contradicted, wrong), *twice))
     told = summary(proposal, stated, output) | {"contradictions": list(wrong)}
     return Outcome(told, (*said, *answer(proposal, stated, output)), next=tuple(_next(job, proposal)))
 

@@ -34,6 +34,9 @@ _ROOM = 1.2
 _OF_VEHICLE: Final = ("CA_ROTOR", "FRAME", "Q_FRAME", "SYS_AUTOSTART", "CA_AIRFRAME", "MAV_TYPE")
 """Beginnings of parameters that two logs of one vehicle have in common."""
 
+_OF_VEHICLE: Final = ("CA_ROTOR", "FRAME", "Q_FRAME", "SYS_AUTOSTART", "CA_AIRFRAME", "MAV_TYPE")
+"""Beginnings of parameters that two logs of one vehicle have in common."""
+
 _SAME_ARM: Final = 0.05
 """Share by which an arm that is given may differ from the places that a log states: both are rounded."""
 
@@ -59,6 +62,8 @@ class KnownLog:
         What wrote it; empty where that is not known.
     columns : frozenset of str
         Names of all of its columns.
+    of_file : tuple of str
+        Faults of the file, and what its reader left out.
     """
 
     name: str
@@ -66,6 +71,7 @@ class KnownLog:
     parameters: Parameters
     system: str
     columns: frozenset[str]
+    of_file: tuple[str, ...] = ()
 
 
 def known_log(name: str, topics: Topics, units: Mapping[str, str], parameters: Parameters, system: str) -> KnownLog:
@@ -182,7 +188,7 @@ def propose(
     rates = [one.recognition.rate_hz for one in logs]
     apart = _of_other_load(logs)
     crops = {one.name: one.recognition.flown.span_s for one in logs}
-    warnings = [f"{one.name}: {warning}" for one in logs for warning in one.recognition.warnings]
+    warnings = [f"{one.name}: {warning}" for one in logs for warning in (*one.of_file, *one.recognition.warnings)]
     doubts = [*doubts, *_two_masses(logs, mass_kg)]
     return Proposal(
         logs=tuple(logs),
@@ -219,9 +225,7 @@ def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
     if names[0] != names[1]:
         differing.append(f"written by {names[0] or 'something unknown'} and {names[1] or 'something unknown'}")
     for key in sorted(first.parameters.keys() & other.parameters.keys()):
-        if key.startswith(
-            ("CA_ROTOR", "FRAME", "Q_FRAME", "SYS_AUTOSTART", "CA_AIRFRAME", "MAV_TYPE")
-        ) and not key.endswith(("_CT", "_SLEW")):
+        if key.startswith(_OF_VEHICLE) and not key.endswith(("_CT", "_SLEW")):
             values = first.parameters[key], other.parameters[key]
             if values[0] != values[1]:
                 differing.append(f"{key} {_plain(values[0])} and {_plain(values[1])}")
@@ -400,9 +404,17 @@ def _two_masses(logs: Sequence[KnownLog], mass_kg: float | None) -> list[str]:
 
 
 def _by_load(logs: Sequence[KnownLog]) -> list[tuple[Load, KnownLog]]:
-    """Sort logs by what their rotors carry; none where that is told by speeds of some and commands of others."""
+    """Sort logs by what their rotors carry; none where that is told by speeds of some and commands of others.
+
+    What squared commands, or speeds without an accelerometer, tell of a flight that does not hover is how it is flown.
+    """
     measured = {one.recognition.signal("rotor_speed") is not None for one in logs}
-    known = [(load, one) for one in logs if (load := one.recognition.load) is not None]
+    loads = [(one.recognition.load, one) for one in logs]
+    known = [
+        (load, one)
+        for load, one in loads
+        if load is not None and (load.steady or (load.sensed and one.recognition.signal("rotor_speed") is not None))
+    ]
     return sorted(known, key=lambda each: (each[0].size, each[1].name)) if len(measured) == 1 else []
 
 
@@ -436,13 +448,14 @@ def _airframe(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
     if best is None:
         return taken, []
     says = f"{best.airframe.reason}: {', '.join(f'{r.name} {_WAY[r.spin]}' for r in best.airframe.rotors)}"
-    orders = (
-        [] if taken is None else [[(rotor.name, rotor.spin) for rotor in own.rotors] for own in (taken, best.airframe)]
-    )
-    differ = len(orders) == 2 and orders[0] != orders[1] and all(rotor.name for rotor in taken.rotors if taken)
-    if taken is None or (differ and taken.is_guess and best.by_axes):
+    doubt = f"the positions and spins of the rotors are a guess from {says}; {DECIDES_ROTORS}"
+    if taken is None:
+        return best.airframe, [doubt]
+    orders = [[(rotor.name, rotor.spin) for rotor in own.rotors] for own in (taken, best.airframe)]
+    differ = orders[0] != orders[1] and all(rotor.name for rotor in taken.rotors)
+    if differ and taken.is_guess and best.by_axes:
         # What is usual is a guess too, and nothing in this log speaks for it.
-        return best.airframe, [f"the positions and spins of the rotors are a guess from {says}; {DECIDES_ROTORS}"]
+        return best.airframe, [doubt]
     if taken.is_guess and best.clear and not differ:
         return replace(taken, reason=f"{taken.reason}; {best.airframe.reason}", sure="data"), []
     contradicts = f"the rotors are taken from {taken.reason}, which contradicts {says}"

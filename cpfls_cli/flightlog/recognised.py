@@ -67,10 +67,13 @@ class Load(NamedTuple):
         propellers it is as the mass.
     sensed : bool
         Whether an accelerometer tells that force; else it is gravity, and a flight that leans far looks heavier.
+    steady : bool
+        Whether it hovers, by what its rotors give from second to second: punches and dives are no load.
     """
 
     size: float
     sensed: bool
+    steady: bool
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -55,6 +55,10 @@ _ORDER: Final[tuple[SignalName, ...]] = (
     "thrust",
     "voltage",
 )
+_STEADY: Final = 0.15
+"""Share by which the squared speeds of rotors, averaged over seconds, vary in a flight that hovers and cruises: the
+specific force of a lean of 30 degrees is 15 % above gravity."""
+
 _SHORTEST_HOVER_S: Final = 2.0
 """Of a VTOL, below which nothing of it can be recognised."""
 
@@ -289,7 +293,12 @@ def _load(seen: Seen, speeds: Array) -> Load | None:
     force = np.abs(seen.mapped(seen.guesses["acceleration"])[:, 2]) if sensed else np.full(len(power), STANDARD_GRAVITY)
     known = np.isfinite(power) & np.isfinite(force)
     whole = float(force[known].sum())
-    return Load(float(power[known].sum()) / whole, sensed) if whole and power[known].any() else None
+    if not whole or not power[known].any():
+        return None
+    seconds = max(1, round(seen.rate_hz))
+    means = power[known][: int(known.sum()) // seconds * seconds].reshape(-1, seconds).mean(axis=1)
+    steady = len(means) > 1 and float(means.std()) < _STEADY * float(means.mean())
+    return Load(float(power[known].sum()) / whole, sensed, steady)
 
 
 def _doubt_columns(seen: Seen) -> None:

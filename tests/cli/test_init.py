@@ -229,7 +229,10 @@ def test_one_config_cannot_suit_logs_of_other_axes(refuse, tmp_path, own):
 def test_the_one_log_of_other_axes_is_named_to_be_left_out(refuse, tmp_path, own):
     turned = named(own.rate @ FLIP, "gyro_x", "gyro_y", "gyro_z")
     odd = write_csv(tmp_path / "odd.csv", flat_log(own, rate=turned))
-    one, two = (write_csv(tmp_path / f"{name}.csv", flat_log(own)) for name in ("one", "two"))
+    one, two = (
+        write_csv(tmp_path / f"{name}.csv", flat_log(flight(seconds=20.0, seed=seed)))
+        for name, seed in (("one", 3), ("two", 5))
+    )
     for logs in ((odd, one, two), (one, odd, two)):
         (line,) = refuse("init", *logs, "-o", tmp_path / "study.yaml")
         assert line.endswith(
