@@ -25,7 +25,7 @@ from cpfls_cli.flightlog.motion_columns import (
 from cpfls_cli.flightlog.nameless import nameless_signals
 from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals
 from cpfls_cli.flightlog.readings import Reading
-from cpfls_cli.flightlog.recognised import Load, Recognition, Rival, Seen, called
+from cpfls_cli.flightlog.recognised import Guess, Load, Recognition, Rival, Seen, called
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_mixed, find_rotors
 from cpfls_cli.flightlog.setpoint_columns import tell_setpoints
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, SignalName
@@ -95,6 +95,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     if not candidates and log.flat:
         candidates = holding_values(log, nameless_signals(topics[""], log.clock("")))
     if not candidates:
+        _refuse_unfit(log, named)
         shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
         raise InputError(f"no column is recognised as a signal of a flight (columns: {shown}): {BY_HAND}")
     refuse_dead_rotors(log, named, candidates)
@@ -127,6 +128,15 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     _list_unused(seen)
     driving = rotors.speed or rotors.command
     return _gathered(seen, flown, speeds, moved, "" if driving is None else driving.kind)
+
+
+def _refuse_unfit(log: LogTable, named: Sequence[Named]) -> None:
+    """Refuse a log that has columns of a flight by name, none of which holds one."""
+    clocks = [time for own in named if len(time := log.values(own.group.columns[:1])[0])]
+    if clocks:
+        log.require_long_enough(max(float(time[-1] - time[0]) for time in clocks))
+        names = some(list(dict.fromkeys(own.group.pattern for own in named)), _SHOWN)
+        raise InputError(f"no flight in it: {names} never change, or hold too few samples for a flight")
 
 
 def _with_values(log: LogTable, candidates: Sequence[Named]) -> list[tuple[Named, Array, Array]]:
@@ -364,4 +374,12 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
         speeds=speeds,
         load=None if speeds is None else _load(seen, speeds),
         warnings=tuple(seen.warnings),
+        unused=_unused(log, (*signals, *asked), time_column),
     )
+
+
+def _unused(log: LogTable, guesses: Sequence[Guess], time_column: str) -> tuple[str, ...]:
+    """List the columns that are mapped to nothing."""
+    used = {time_column, *(column for guess in guesses for column in guess.columns.columns)}
+    stamps = set() if log.flat else {f"{topic}.{STAMP}" for topic in log.topics}
+    return tuple(name for name in log.names if name not in used | stamps)

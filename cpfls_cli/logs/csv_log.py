@@ -77,6 +77,11 @@ def _rows(path: Path) -> Iterator[tuple[list[str], Iterator[list[str]]]]:
                 raise InputError(f"{path}: is empty; a log starts with a line of column names")
             delimiter = max(",;\t", key=first.count)
             names = [name.strip() for name in next(csv.reader([first], delimiter=delimiter))]
+            if len(names) > 1 and all(name and _is_number(name) for name in names):
+                raise InputError(
+                    f"{path}: has no line of column names: the first one holds numbers; write names above it, such as"
+                    " t,gyro_x,gyro_y,gyro_z,..."
+                )
             # Of a line without an end a part is a row, of another length than all others.
             yield names, csv.reader(iter(partial(stream.readline, _LONGEST_LINE), ""), delimiter=delimiter)
     except (OSError, EOFError, zlib.error) as error:

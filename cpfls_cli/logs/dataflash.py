@@ -12,6 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP
+from cpfls_cli.logs.foreign import SDLOG2
 from cpfls_cli.logs.formats import DATAFLASH_MAGIC, LogContents
 from cpfls_cli.logs.records import bytes_of, date, numbers, seconds, table
 
@@ -68,6 +69,8 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         if kind.begins and kind.stamp
         for topic, fields in _topics(kind, tables[kind.name], stated.get(kind.name, {}))
     }
+    if not topics and ("TIME" in tables or path.suffix.lower() == ".px4log"):
+        raise InputError(f"{path}: {SDLOG2}")
     if not topics:
         raise InputError(f"{path}: holds no messages with time stamps (TimeUS)")
     origin = min(fields[STAMP][0] for fields in topics.values())

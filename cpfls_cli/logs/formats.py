@@ -187,6 +187,9 @@ def log_contents(path: Path, wanted: Collection[str] | None = None) -> LogConten
             f"{path}: a log of a Crazyflie's uSD card in its older format, which is not read; make a CSV of it"
             " with the script of that firmware, and of a quaternion in one number four columns"
         )
+    foreign = foreign_file(path, form)
+    if foreign is not None:
+        raise InputError(f"{path}: {foreign}")
     if form is None:
         named = ", ".join(form.suffix for form in LOG_FORMATS if form.suffix)
         free = ", ".join(dict.fromkeys(form.name for form in LOG_FORMATS if form.by_content))
@@ -211,6 +214,21 @@ def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
     return LogColumns(
         columns, chosen, warnings, contents.flown_at, begins, contents.parameters, contents.system, stamped_hz
     )
+
+
+def foreign_file(path: Path, form: LogFormat | None = None) -> str | None:
+    """Say what a file is that no reader reads, and how to get a log from it; None for a log, and for what is unknown.
+
+    Parameters
+    ----------
+    form : LogFormat or None
+        That its name or its content says.
+    """
+    first = _first_line(path)
+    if form is not None and (form.begins(first) if form.magic else not first):
+        return None
+    named: str | None = import_module("cpfls_cli.logs.foreign").named_foreign(path)
+    return named
 
 
 def _format_of(path: Path) -> LogFormat | None:

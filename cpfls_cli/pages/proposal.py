@@ -78,6 +78,7 @@ def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
         reasons = one.recognition.flown.reasons or ("all of it is flight, nothing is cut",)
         cut += [Text(f"{prefix}{reason}") for reason in reasons]
         cut += [Text(f"{prefix}not mapped: {words}", "note") for words in one.recognition.left_out]
+        cut += [Text(f"{prefix}not used: {words}", "note") for words in _by_topic(one.recognition.unused)]
     yield Folded("what is cut or not mapped", cut)
     asked = asked_keys(proposal, stated)
     if asked:
@@ -86,6 +87,17 @@ def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
         known = {} if side is None else {"position_m": f"[{side}, -{side}, 0.0]"}
         how = how_to_fill_in(asked, brief=True, **known)
         yield Text(f"first edit {output}: write {_asked_words(asked)} in place of {ASK}{how}")
+
+
+def _by_topic(names: Sequence[str]) -> Iterator[str]:
+    """List columns, those of each topic by themselves, and those that differ in a number alone as one."""
+    topics: dict[str, dict[str, list[str]]] = {}
+    for name in names:
+        topic, dot, _ = name.partition(".")
+        same = topics.setdefault(topic if dot else "", {})
+        same.setdefault(re.sub(r"\d+(?=\]?$)", "*", name), []).append(name)
+    for same in topics.values():
+        yield ", ".join(_in_braces(own) for own in same.values())
 
 
 def _topic(proposal: Proposal) -> str:
@@ -187,6 +199,7 @@ def summary(proposal: Proposal, stated: Stated, output: str) -> dict[str, Any]:
         "crops_s": dict(proposal.crops),
         "cut": {one.name: list(one.recognition.flown.reasons) for one in proposal.logs},
         "left_out": {one.name: list(one.recognition.left_out) for one in proposal.logs},
+        "unused": {one.name: list(one.recognition.unused) for one in proposal.logs},
         "rotors": [
             {"name": rotor.name, "spin": rotor.spin, "position_m": _position(rotor, proposal.airframe)}
             for rotor in (proposal.airframe.rotors if proposal.airframe else ())
