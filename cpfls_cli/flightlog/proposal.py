@@ -34,9 +34,6 @@ _ROOM = 1.2
 _OF_VEHICLE: Final = ("CA_ROTOR", "FRAME", "Q_FRAME", "SYS_AUTOSTART", "CA_AIRFRAME", "MAV_TYPE")
 """Beginnings of parameters that two logs of one vehicle have in common."""
 
-_OF_VEHICLE: Final = ("CA_ROTOR", "FRAME", "Q_FRAME", "SYS_AUTOSTART", "CA_AIRFRAME", "MAV_TYPE")
-"""Beginnings of parameters that two logs of one vehicle have in common."""
-
 _SAME_ARM: Final = 0.05
 """Share by which an arm that is given may differ from the places that a log states: both are rounded."""
 

@@ -211,7 +211,7 @@ def stamped_rates(topics: Topics, settings: ImportSettings) -> dict[str, float]:
     settings : ImportSettings
         As `on_one_clock` gives them back; a flat log has one clock, and no rates.
     """
-    rates = {}
+    rates: dict[str, float] = {}
     for name, signal in settings.signals.items():
         topic, field = topic_and_field(signal.columns[0])
         own = topics.get(topic, {})

@@ -10,8 +10,8 @@ from cpfls_cli.flightlog.airframe import stated_airframe, usual_airframe
 from cpfls_cli.flightlog.layouts import LAYOUTS
 from cpfls_cli.flightlog.proposal import known_log, propose
 from cpfls_cli.flightlog.recognition import recognise
+from tests.builders.topic_logs import ardupilot, maps, proposed, topic
 from tests.builders.unknown_logs import FLIP, flat_log, flight, named, quaternion, with_ground
-from tests.unit.flightlog.test_kinds_of_logs import ardupilot, maps, proposed, topic
 
 X = {"FRAME_CLASS": 1.0, "FRAME_TYPE": 1.0}
 
