@@ -225,7 +225,8 @@ def foreign_file(path: Path, form: LogFormat | None = None) -> str | None:
         That its name or its content says.
     """
     first = _first_line(path)
-    if form is not None and (form.begins(first) if form.magic else not first):
+    known = any(other.magic and other.begins(first) for other in LOG_FORMATS)
+    if form is not None and (known or not (first or form.magic)):
         return None
     named: str | None = import_module("cpfls_cli.logs.foreign").named_foreign(path)
     return named
