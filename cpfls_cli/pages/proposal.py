@@ -117,15 +117,20 @@ def _guessed(entry: Guess | KeyChoice) -> str:
 
 
 def _in_braces(names: Sequence[str]) -> str:
-    """List names with what they begin with written once, as a shell does."""
-    first, last = min(names), max(names)
-    begin = first[: next((place for place, letter in enumerate(first) if letter != last[place : place + 1]), None)]
+    """List names with what they begin and end with written once, as a shell does."""
+    begin = _beginning(names)
     if len(names) < 2 or not begin:
         return ", ".join(names)
     rest = [name.removeprefix(begin) for name in names]
-    # An index is written whole within its bracket.
-    end = "]" if begin.endswith("[") and all(own.endswith("]") for own in rest) else ""
+    # An end that all have is none of a word, such as the bracket of an index.
+    alike = _beginning([own[::-1] for own in rest])[::-1]
+    end = next((alike[place:] for place, letter in enumerate(alike) if not letter.isalnum()), "")
     return f"{begin}{{{','.join(own.removesuffix(end) for own in rest)}}}{end}"
+
+
+def _beginning(names: Sequence[str]) -> str:
+    first, last = min(names), max(names)
+    return first[: next((place for place, letter in enumerate(first) if letter != last[place : place + 1]), None)]
 
 
 def _reasons_table(proposal: Proposal) -> Table:
