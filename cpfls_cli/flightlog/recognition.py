@@ -108,6 +108,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         raise InputError(flown.reasons[0])
     flown = flown if kind is None else _hover_of(log, kind, flown)
     seen = Seen(log, candidates, _part(log, flown), level)
+    seen.warnings += [] if kind is None else [flown.reasons[-1]]
     seen.warnings += [] if log.time_doubt is None else [log.time_doubt]
     position_by_velocity(seen)
     verdict = read_attitude(seen)

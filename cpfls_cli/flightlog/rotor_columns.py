@@ -14,7 +14,7 @@ from cpfls_cli.flightlog.log_table import LogTable
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival, Sure
 from cpfls_cli.flightlog.settings import SignalMap
-from cpfls_cli.flightlog.vehicle_kind import MOTORS
+from cpfls_cli.flightlog.vehicle_kind import MOTORS, VTOL_TYPES
 from cpfls_cli.flightlog.vocabulary import ASKED, RANGES
 from cpfls_cli.units import SPEED_UNITS, UnitName
 
@@ -330,6 +330,10 @@ def _functions(named: Named, parameters: Parameters) -> list[tuple[list[int], tu
             number = whole(parameters, name) if own else None
             if own and number is not None and number in _PX4_MOTORS:
                 found.setdefault(own[1], {})[number] = int(own[2]) - 1
+        if not found and whole(parameters, "MAV_TYPE") in VTOL_TYPES:
+            # Before 1.13 a VTOL names the outputs of the rotors that carry it by their digits.
+            digits = str(whole(parameters, "VT_MOT_ID") or "")
+            found["VT_MOT"] = {number: int(digit) - 1 for number, digit in enumerate(digits) if digit != "0"}
     motors = {prefix: [own[number] for number in sorted(own)] for prefix, own in found.items()}
     return [(own, _span(prefix, own, parameters)) for prefix, own in motors.items() if len(own) >= _FEWEST]
 

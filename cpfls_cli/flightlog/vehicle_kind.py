@@ -32,6 +32,9 @@ _FRAME_CLASSES: Final = {
     11: "a helicopter with two rotors",
     13: "a helicopter with four rotors",
 }
+VTOL_TYPES: Final = range(20, 26)
+"""MAV_TYPE of vehicles that hover on three rotors or more."""
+
 _MAV_TYPES: Final = {
     1: AIRPLANE,
     3: "a coaxial helicopter",
@@ -46,7 +49,7 @@ _MAV_TYPES: Final = {
     16: "a flapping wing",
     17: "a kite",
     19: "a tail-sitter with two rotors",
-    **dict.fromkeys(range(20, 26), VTOL),
+    **dict.fromkeys(VTOL_TYPES, VTOL),
 }
 _CA_AIRFRAMES: Final = {
     1: AIRPLANE,

@@ -128,6 +128,12 @@ def test_outputs_of_an_older_px4_are_as_many_motors_as_its_kind_of_vehicle_has(o
     assert found.columns == tuple(f"actuator_outputs.output[{index}]" for index in range(4))
 
 
+def test_the_rotors_that_carry_an_older_vtol_of_px4_are_those_that_it_names(own):
+    values = np.column_stack([gimbal(own), gimbal(own) + 9, pulses(own)])
+    found = px4(own, [values], {"MAV_TYPE": 22.0, "VT_MOT_ID": 3456.0})
+    assert found.columns == tuple(f"actuator_outputs.output[{index}]" for index in (2, 3, 4, 5))
+
+
 @pytest.mark.parametrize("frame", LAYOUTS)
 def test_rotors_of_a_known_frame_balance_and_control_each_axis(frame):
     places = np.array(LAYOUTS[frame])
