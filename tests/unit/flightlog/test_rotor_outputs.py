@@ -123,6 +123,13 @@ def test_outputs_of_px4_are_motors_by_their_functions(own):
     assert found.columns == tuple(f"actuator_outputs[1].output[{index}]" for index in (2, 3, 1, 4))
 
 
+def test_a_range_of_pulses_is_not_that_of_outputs_by_dshot(own):
+    parameters = {f"PWM_AUX_FUNC{n}": 100.0 + n for n in range(1, 5)}
+    parameters |= {f"PWM_AUX_{end}{n}": value for n in range(1, 5) for end, value in (("MIN", 1100), ("MAX", 1900))}
+    found = px4(own, [pulses(own, low=0.0, high=1500.0)], parameters)
+    assert (found.scale, found.offset) == pytest.approx((1 / 2000, -48 / 2000))
+
+
 def test_outputs_of_an_older_px4_are_as_many_motors_as_its_kind_of_vehicle_has(own):
     found = px4(own, [pulses(own, gimbal(own), gimbal(own) + 20)], {"MAV_TYPE": 2.0})
     assert found.columns == tuple(f"actuator_outputs.output[{index}]" for index in range(4))
