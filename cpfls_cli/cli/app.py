@@ -359,11 +359,19 @@ def init(
         float | None,
         typer.Option("--arm", metavar="M", min=1e-6, help="Middle to a rotor's axis, m."),
     ] = None,
+    scale_to_arm: Annotated[
+        bool, typer.Option("--scale-to-arm", help="Scale places of rotors that a log states to --arm.")
+    ] = False,
     *,
     common: Common,
 ) -> None:
     """Look into logs of one vehicle and write a config for them, with the reason of every guess."""
-    _run_without_config("init", output, common, lambda command, job: command.run(job, logs, command.Stated(mass, arm)))
+    _run_without_config(
+        "init",
+        output,
+        common,
+        lambda command, job: command.run(job, logs, command.Stated(mass, arm, scale_to_arm=scale_to_arm)),
+    )
 
 
 @_command("import")

@@ -9,7 +9,7 @@ from typing import Literal
 
 from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.files import is_hdf5
-from cpfls_cli.logs.formats import is_log
+from cpfls_cli.logs.formats import foreign_file, is_log
 
 _CONFIGS = (".yaml", ".yml")
 
@@ -78,4 +78,5 @@ def what_it_is(path: Path) -> str | None:
     if kind == "config":
         shows = shlex.join(["cpfls", "config", str(path)])
         return f"{path}: is a config, and this takes what cpfls made; `{shows}` shows it"
-    return None
+    foreign = foreign_file(path) if kind is None and path.is_file() else None
+    return None if foreign is None else f"{path}: {foreign}"

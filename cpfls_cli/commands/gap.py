@@ -29,7 +29,7 @@ from cpfls_cli.commands.numbers import why_no_body_found, with_numbers
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import learned_by, read_base
-from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, refuse_seen, split_flights
+from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, refuse_seen, seen_twice, split_flights
 from cpfls_cli.gap.naming.results import Diagnosis
 from cpfls_cli.gap.whole_vehicle import beside_rotors, has_effects, of_vehicle
 from cpfls_cli.pages.disagreement import where
@@ -127,8 +127,9 @@ def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: P
     # Those held out are behind those learned from, whoever chose them.
     files = [inputs[role] for role in roles]
     refuse_seen(files[: len(split.training)], files[len(split.training) :])
+    twice = seen_twice(files)
     learned, judged = learned_by(model), known_by(numbered_roles("flight", flights), inputs)
-    whole = with_seen(Recordings(given, read.warnings), model, learned, judged)
+    whole = with_seen(Recordings(given, (*twice, *read.warnings)), model, learned, judged)
     return _Given(whole, split, base, learned, inputs)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import nan
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.errors import ConfigError, CpflsError, InputError, about
 from cpfls_cli.flightlog.proposal import Proposal, known_log, propose
 from cpfls_cli.flights.imported import imported
-from cpfls_cli.flights.recordings import check_flight, read_import
+from cpfls_cli.flights.recordings import check_flight, read_import, seen_twice
 from cpfls_cli.logs.formats import log_contents
 from cpfls_cli.pages.proposal import Stated, answer, asked_keys, config_text, guessed_keys, summary
 from cpfls_cli.pages.sensors import contradicted
@@ -28,15 +29,21 @@ _IMPORTED = 4
 def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
     """Write a commented config for logs of one vehicle."""
     _require_possible(stated)
-    take_inputs(job, {f"log-{number}": log for number, log in enumerate(logs)})
+    inputs = take_inputs(job, {f"log-{number}": log for number, log in enumerate(logs)})
+    twice = seen_twice(inputs.values())
+    firsts: dict[str, Path] = {}
+    for log, file in zip(logs, inputs.values(), strict=True):
+        firsts.setdefault(file.sha256, log)
+    logs = list(firsts.values())
     check_outputs(job, job.output)
     known = []
     for number, log in enumerate(logs):
         job.progress(number, len(logs), log.name)
         own = log_contents(log)
         with about(log, InputError):
-            known.append(known_log(str(log), own.topics, own.units, own.parameters, own.system))
-    proposal = propose(known, stated.mass_kg, stated.arm_m)
+            one = known_log(str(log), own.topics, own.units, own.parameters, own.system)
+            known.append(replace(one, of_file=own.warnings))
+    proposal = propose(known, stated.mass_kg, stated.arm_m, scale_to_arm=stated.scale_to_arm)
     text, output = config_text(proposal, stated), str(job.output)
     found = _findings(text, logs[0], whole=not asked_keys(proposal, stated))
     wrong, doubted = _parted(found, guessed_keys(proposal))
@@ -44,7 +51,7 @@ def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
         write_text(job.output, text)
     flown = ((one.name, one.recognition.flown) for one in proposal.logs)
     ended = (f"{name}: {own.cut[0]}" for name, own in flown if own.ended)
-    sentences = (*ended, *map(contradicted, wrong), *doubted)
+    sentences = (*ended, *map(contradicted, wrong), *doubted, *twice)
     said = (Text(each, "warning", always=True) for each in sentences)
     told = summary(proposal, stated, output) | {"contradictions": wrong, "doubted_guesses": doubted}
     return Outcome(told, (*said, *answer(proposal, stated, output)), next=tuple(_next(job, proposal)))

@@ -1,21 +1,21 @@
 """Where the rotors of a vehicle are and how they turn: from the parameters in a log, or from its motion."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import permutations
-from math import cos, hypot, radians, sin
+from math import hypot
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.layouts import LAYOUTS, USUAL, Parameters, is_open, lifting_rotors, stated_frame
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
 from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.rounding import largest
 
-Parameters = Mapping[str, float | str]
 _ACCELERATION_HZ = 12.0
 """Below which torque and angular acceleration are compared: a controller answers slower, and noise is above."""
 
@@ -79,8 +79,13 @@ class Airframe:
         Whether the places are lengths; False where they are directions.
     reason : str
         Where that is known from.
+    sure : {"stated", "data", "usual", "guess"}
+        Whether parameters state it, the motion shows it clearly, it is what a kind of log has unless changed, or the
+        motion only suggests it.
     moment_ratio_m : float or None
         Drag factor over thrust factor that the parameters state.
+    scaled : bool
+        Whether its places are those of an arm that was given.
     """
 
     rotors: tuple[RotorPlace, ...]
@@ -88,45 +93,60 @@ class Airframe:
     reason: str
     sure: str
     moment_ratio_m: float | None = None
+    scaled: bool = False
 
     @property
     def is_guess(self) -> bool:
         """Whether other places, or other ways to turn, are not ruled out."""
+        return self.sure in ("usual", "guess")
+
+    @property
+    def is_asked(self) -> bool:
+        """Whether too little speaks for it to be taken without a look at the vehicle."""
         return self.sure == "guess"
+
+    @property
+    def arm_m(self) -> float:
+        """Mean distance of the rotors from the middle, m where the places are lengths."""
+        return float(np.mean([hypot(*rotor.direction) for rotor in self.rotors]))
 
     def with_arm(self, arm_m: float) -> "Airframe":
         """Give the same rotors at a distance from the middle; the mean distance where they differ."""
-        mean = float(np.mean([hypot(*rotor.direction) for rotor in self.rotors]))
-        factor = arm_m / mean
+        factor = arm_m / self.arm_m
         rotors = tuple(
             RotorPlace(
                 r.name, (factor * r.direction[0], factor * r.direction[1]), r.spin, factor * r.height_m * self.in_metres
             )
             for r in self.rotors
         )
-        return Airframe(rotors, True, self.reason, self.sure, self.moment_ratio_m)
+        return replace(self, rotors=rotors, in_metres=True, scaled=True)
 
 
-def stated_airframe(parameters: Parameters) -> Airframe | None:
+def stated_airframe(parameters: Parameters, rotors: int = 0) -> Airframe | None:
     """Read the rotors that the parameters of an autopilot state; None where they state none.
+
+    Parameters
+    ----------
+    rotors : int
+        That the log's columns show; 0 where they show none.
 
     Raises
     ------
     InputError
         If the rotors that are stated cannot turn the vehicle about all of its axes.
     """
-    found = _of_px4(parameters) or _of_ardupilot(parameters)
+    found = _of_px4(parameters) or _of_frame(parameters, rotors)
     if found is not None:
         _require_control(found)
     return found
 
 
 def _of_px4(parameters: Parameters) -> Airframe | None:
-    count = int(float(parameters.get("CA_ROTOR_COUNT", 0) or 0))
-    if count < 1 or "CA_ROTOR0_PX" not in parameters:
+    lifting = lifting_rotors(parameters)
+    if not lifting or "CA_ROTOR0_PX" not in parameters:
         return None
     rotors, ratios = [], []
-    for index in range(count):
+    for index in lifting:
         x, y, z, ratio = (float(parameters.get(f"CA_ROTOR{index}_{name}", 0.0)) for name in ("PX", "PY", "PZ", "KM"))
         # Of PX4: y to the right, z down, and a positive moment for a rotor that turns counter-clockwise.
         rotors.append(RotorPlace(_name(x, -y), (x, 0.0 - y), int(np.sign(ratio)), 0.0 - z))
@@ -141,51 +161,25 @@ def _name(x: float, y: float) -> str:
     return f"{along} {across}".strip()
 
 
-_CLASSES: Final = {1: "quad", 2: "hexa", 3: "octa"}
-_TYPES: Final = {0: "plus", 1: "X", 3: "H"}
-# Angle clockwise from the front in degrees and spin, motor by motor, as ArduPilot's motor library has them.
-_ARDUPILOT_FRAMES: Final = {
-    ("quad", "plus"): ((90, 1), (-90, 1), (0, -1), (180, -1)),
-    ("quad", "X"): ((45, 1), (-135, 1), (-45, -1), (135, -1)),
-    # Of an H the same motors turn the other way.
-    ("quad", "H"): ((45, -1), (-135, -1), (-45, 1), (135, 1)),
-    ("hexa", "plus"): ((0, -1), (180, 1), (-120, -1), (60, 1), (-60, 1), (120, -1)),
-    ("hexa", "X"): ((90, -1), (-90, 1), (-30, -1), (150, 1), (30, 1), (-150, -1)),
-    ("octa", "plus"): ((0, -1), (180, -1), (45, 1), (135, 1), (-45, 1), (-135, 1), (-90, -1), (90, -1)),
-    ("octa", "X"): ((22.5, -1), (-157.5, -1), (67.5, 1), (157.5, 1), (-22.5, 1), (-112.5, 1), (-67.5, -1), (112.5, -1)),
-}
-
-
-def _of_ardupilot(parameters: Parameters) -> Airframe | None:
-    kind = _CLASSES.get(int(float(parameters.get("FRAME_CLASS", -1))))
-    form = _TYPES.get(int(float(parameters.get("FRAME_TYPE", -1))))
-    motors = _ARDUPILOT_FRAMES.get((kind or "", form or ""))
-    if motors is None:
+def _of_frame(parameters: Parameters, rotors: int) -> Airframe | None:
+    found = stated_frame(parameters, rotors)
+    if found is None:
         return None
-    places = [(round(cos(radians(a)), 9) + 0.0, round(-sin(radians(a)), 9) + 0.0) for a, _ in motors]
-    rotors = tuple(RotorPlace(_name(*place), place, spin) for place, (_, spin) in zip(places, motors, strict=True))
-    return Airframe(rotors, False, f"FRAME_CLASS and FRAME_TYPE in the log: {kind} {form}", "stated")
+    frame, reason = found
+    return _laid_out(frame, reason, "usual" if is_open(frame, parameters) else "stated")
 
 
-_PX4_ORDER = (("front right", 1), ("rear left", 1), ("front left", -1), ("rear right", -1))
-USUAL: Final = {
-    "PX4": _PX4_ORDER,
-    "ArduPilot": _PX4_ORDER,
-    "Betaflight": (("rear right", -1), ("front right", 1), ("rear left", 1), ("front left", -1)),
-    "Crazyflie": (("front right", 1), ("rear right", -1), ("rear left", 1), ("front left", -1)),
-}
-"""Places and spins of four rotors in an X, in the order in which a kind of log numbers them."""
+def _laid_out(frame: str, reason: str, sure: str) -> Airframe:
+    rotors = tuple(RotorPlace(_name(x, y), (x, y), spin) for x, y, spin in LAYOUTS[frame])
+    return Airframe(rotors, False, reason, sure)
 
 
-def usual_airframe(kind: str) -> Airframe | None:
-    """Give the four rotors in an X as a kind of log numbers them if nothing is changed; None for an unknown kind."""
-    if kind not in USUAL:
+def usual_airframe(kind: str, rotors: int) -> Airframe | None:
+    """Give the rotors as a kind of log numbers them if nothing is changed; None where that is not known."""
+    frame = USUAL.get(kind, {}).get(rotors)
+    if frame is None:
         return None
-    corner = 1 / hypot(1.0, 1.0)
-    rotors = tuple(
-        RotorPlace(name, (corner * _CORNERS[name][0], corner * _CORNERS[name][1]), spin) for name, spin in USUAL[kind]
-    )
-    return Airframe(rotors, False, f"the numbers that {kind} gives the motors of an X unless changed", "named")
+    return _laid_out(frame, f"the numbers that {kind} gives the motors of this frame unless changed: {frame}", "usual")
 
 
 def _require_control(airframe: Airframe) -> None:

@@ -9,7 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.flightlog.repair import SignalTable
-from cpfls_cli.flightlog.settings import ImportSettings
+from cpfls_cli.flightlog.settings import COMMANDS, ImportSettings
 
 # A coarse voltage hardly changes, and nothing is derived from it.
 _NOT_JUDGED = frozenset({"voltage"})
@@ -80,14 +80,36 @@ class SlowSignal:
     between: Literal["repeated", "interpolated"]
 
 
-def slow_signals(table: SignalTable) -> tuple[SlowSignal, ...]:
+def slow_signals(table: SignalTable, stamped_hz: Mapping[str, float] | None = None) -> tuple[SlowSignal, ...]:
     """Find signals of a table as logged whose updates come at less than half the rate of the rows.
 
     Between updates the rows repeat the last value, or lie on a straight line. What a coarse resolution repeats is
     none: its steps are irregular.
+
+    Parameters
+    ----------
+    stamped_hz : mapping from str to float, optional
+        How often a second signals were logged, of those with stamps of their own: of these the stamps decide, unless
+        their values come slower still.
     """
-    found = (_slow(name, table.time, values) for name, values in table.signals.items() if name not in _NOT_JUDGED)
-    return tuple(signal for signal in found if signal is not None)
+    stamped = _stamped(table, stamped_hz or {})
+    found = {name: _slow(name, table.time, values) for name, values in table.signals.items() if name not in _NOT_JUDGED}
+    for name, own in stamped.items():
+        seen = found[name]
+        if seen is None or seen.rate_hz > _REGULAR_SHARE * own.rate_hz:
+            found[name] = own
+    return tuple(signal for signal in found.values() if signal is not None)
+
+
+def _stamped(table: SignalTable, stamped_hz: Mapping[str, float]) -> dict[str, SlowSignal]:
+    """List what was logged at less than half the rate of the rows, by its own stamps."""
+    rate = 1 / float(np.median(np.diff(table.time))) if len(table.time) > 1 else 0.0
+    slow = {name: own for name, own in stamped_hz.items() if name in table.signals and name not in _NOT_JUDGED}
+    return {
+        name: SlowSignal(name, own, "repeated" if name in COMMANDS else "interpolated")
+        for name, own in slow.items()
+        if 0 < 2 * own <= rate
+    }
 
 
 def _slow(name: str, time: Array, values: Array) -> SlowSignal | None:

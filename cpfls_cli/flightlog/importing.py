@@ -61,6 +61,7 @@ def import_log(
     *,
     rotor_torque: Callable[[LogSignals], Array] | None = None,
     delay_share: float = 1.0,
+    stamped_hz: Mapping[str, float] | None = None,
 ) -> ImportedFlight:
     """Turn the columns of a log into a flight.
 
@@ -73,6 +74,8 @@ def import_log(
         `torque_source` names the rotors.
     delay_share : float
         Leading share of the flight that an estimate of the delay may look at.
+    stamped_hz : mapping from str to float, optional
+        See `slow_signals`.
 
     Raises
     ------
@@ -83,7 +86,7 @@ def import_log(
     ComputationError
         If the pitch comes within a degree of +-90 degrees, or the delay cannot be estimated.
     """
-    signals = apply_rotor_lag(read_signals(columns, settings), settings.rotor_command_lag_s)
+    signals = apply_rotor_lag(read_signals(columns, settings, stamped_hz), settings.rotor_command_lag_s)
     if settings.torque_source in ("rotor-speed", "rotor-command"):
         if rotor_torque is None:
             raise InputError(f"import.torque_source = {settings.torque_source} needs a vehicle")
@@ -91,13 +94,17 @@ def import_log(
     return derive_flight(align_commands(signals, settings, delay_share), settings)
 
 
-def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogSignals:
+def read_signals(
+    columns: Mapping[str, Array], settings: ImportSettings, stamped_hz: Mapping[str, float] | None = None
+) -> LogSignals:
     """Read the mapped columns of a log, drop bad rows, repair bad values, and resample to one uniform clock.
 
     Parameters
     ----------
     columns : mapping from str to array, shape (sample,)
         The log.
+    stamped_hz : mapping from str to float, optional
+        See `slow_signals`.
 
     Returns
     -------
@@ -135,7 +142,7 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
     refuse_steep_pitch(on_clock)
     setpoints, unknown = _setpoints(asked, clock, mapped)
     steps = np.diff(table.time)
-    slow = slow_signals(table)
+    slow = slow_signals(table, stamped_hz)
     filtered = cut_offs(on_clock, rate_hz, slow)
     report = ImportReport(
         samples_read=len(read.time),

@@ -44,6 +44,9 @@ _SLOWEST_HZ = 0.5
 _FEWEST_SAMPLES = 20
 """For medians and rates."""
 
+_SHORTEST_S = 2.0
+"""Below which a log holds no flight."""
+
 _LARGEST_SPAN = 100
 """Time that stamps span over that which rows of one rate fill, up to which they are a clock with pauses."""
 _GRID_HZ = 100.0
@@ -57,15 +60,19 @@ class LogTable:
         self.topics, self.units = topics, units
         self.flat = set(topics) == {""}
         self.names = column_names(topics)
-        if self.flat and max(map(len, topics[""].values()), default=0) < _FEWEST_SAMPLES:
-            raise InputError(
-                f"holds only {max(map(len, topics[''].values()), default=0)} samples, too few for a flight"
-            )
+        samples = max(map(len, topics[""].values()), default=0) if self.flat else _FEWEST_SAMPLES
+        if samples < _FEWEST_SAMPLES:
+            raise InputError(f"holds only {samples} samples, too few for a flight")
         self.time_column, self.time_unit, self.time_doubt = (
             _flat_time(topics[""], units) if self.flat else ("", "s", None)
         )
         self.origin = float(self.clock("")[0]) if self.flat else 0.0
         self.grid = np.empty(0)
+
+    def require_long_enough(self, span_s: float) -> None:
+        """Refuse a log, or what of it holds a flight, that is too short to be one."""
+        if span_s < _SHORTEST_S:
+            raise InputError(f"holds only {span_s:.2g} s; a flight to learn from has at least ten")
 
     def parts(self, column: str) -> tuple[str, str]:
         """Split a column into topic and field."""
@@ -210,8 +217,7 @@ def make_grid(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) -
     clocks = [log.values(named.group.columns[:1])[0] for named in chosen]
     rate = min(_GRID_HZ, max(1 / float(np.median(np.diff(clock))) for clock in clocks))
     begin, end = min(float(clock[0]) for clock in clocks), max(float(clock[-1]) for clock in clocks)
-    if end - begin < 2.0:
-        raise InputError(f"holds only {end - begin:.2g} s; a flight to learn from has at least ten")
+    log.require_long_enough(end - begin)
     rows = max(map(len, clocks))
     if (end - begin) * rate > _LARGEST_SPAN * rows:
         raise InputError(

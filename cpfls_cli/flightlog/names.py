@@ -195,7 +195,11 @@ def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Na
     system : str
         Kind of log, as its reader names it; empty where any may be meant.
     """
-    found = [named for group in groups for named in (*_known_to_systems(group, system), *_by_words(group))]
+    known = [named for group in groups for named in _known_to_systems(group, system)]
+    kinds = {own: {named.group.columns for named in known if named.known == own} for own in (PX4, *KIN, CRAZYFLIE)}
+    # A log that does not say what wrote it is of a kind by two names at least: motor[0] alone has many authors.
+    found = [named for named in known if system or len(kinds[named.known]) > 1]
+    found += [named for group in groups for named in _by_words(group)]
     if any(is_of(system, known) for known in (PX4, ARDUPILOT, BETAFLIGHT)):
         # Of these logs all that drives rotors is in the list; words would find parameters and allocations.
         found = [named for named in found if named.known or named.signal not in (*ROTORS, "voltage")]
@@ -309,7 +313,7 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
         fast = bool(own & FAST) or (many and (words == ("w",) or ends_in_speed))
         motors = words == ("m",) or bool({"motor", "motors"} & own)
         return (fast and not own & ASKED) if signal == "rotor_speed" else bool(own & ASKED) or (motors and not fast)
-    if signal == "position":
+    if signal == "position" and group.kind != "numbers":
         return re.search(r"(^|[^A-Za-z])([Pp]|[Pp]os)?\*($|[^A-Za-z])", group.pattern) is not None
     if group.kind == "angles" and signal in ("attitude", "body_rate"):
         pqr = group.columns[0].removesuffix(group.ending) == "p"

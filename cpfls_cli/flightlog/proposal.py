@@ -9,8 +9,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, about
-from cpfls_cli.flightlog.airframe import Airframe, Parameters, stated_airframe, usual_airframe
+from cpfls_cli.flightlog.airframe import Airframe, stated_airframe, usual_airframe
 from cpfls_cli.flightlog.clock import common_rate, same_rate
+from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Load, Recognition, Rival
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.settings import SETPOINTS, ColumnMap, SignalMap, SignalName
@@ -30,13 +31,16 @@ _LEAST_GAP_S, _SLOWEST_VOLTAGE_S = 0.1, 0.5
 _ROOM = 1.2
 """By which a limit of the rotor speeds lies above the fastest one that is logged."""
 
+_OF_VEHICLE: Final = ("CA_ROTOR", "FRAME", "Q_FRAME", "SYS_AUTOSTART", "CA_AIRFRAME", "MAV_TYPE")
+"""Beginnings of parameters that two logs of one vehicle have in common."""
+
+_SAME_ARM: Final = 0.05
+"""Share by which an arm that is given may differ from the places that a log states: both are rounded."""
+
 DECIDES_ROTORS: Final = "a log with more motion, or a look at the vehicle, decides"
 _ALIKE: Final = {True: 1.06, False: 1.12}
 """Ratio of loads up to which two flights may be of one mass: by rotor speeds and an accelerometer; otherwise, since
 batteries empty, and who leans looks heavier. By commands three flights of one Crazyflie differ by 1.06."""
-
-_MULTIROTORS: Final = (2, 13, 14, 15, 29)
-"""MAV_TYPE: quadrotor, hexarotor, octorotor, tricopter, dodecarotor."""
 
 _NOTED: Final = ("SYS_AUTOSTART", "MPC_THR_HOVER", "THR_MDL_FAC", "MOT_THST_HOVER", "MOT_THST_EXPO", "MOT_SPIN_MIN")
 
@@ -55,6 +59,8 @@ class KnownLog:
         What wrote it; empty where that is not known.
     columns : frozenset of str
         Names of all of its columns.
+    of_file : tuple of str
+        Faults of the file, and what its reader left out.
     """
 
     name: str
@@ -62,6 +68,7 @@ class KnownLog:
     parameters: Parameters
     system: str
     columns: frozenset[str]
+    of_file: tuple[str, ...] = ()
 
 
 def known_log(name: str, topics: Topics, units: Mapping[str, str], parameters: Parameters, system: str) -> KnownLog:
@@ -142,7 +149,9 @@ class Proposal:
         return "rotor_speed" not in names and command is not None and command.columns.unit == "1"
 
 
-def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None) -> Proposal:
+def propose(
+    logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None, *, scale_to_arm: bool = False
+) -> Proposal:
     """Make one proposal of what each of several logs is taken for.
 
     Parameters
@@ -153,17 +162,15 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
         None: not known.
     arm_m : float or None
         From the middle of the vehicle to a rotor, m; None: not known.
+    scale_to_arm : bool
+        Whether places that a log states are scaled to that arm.
 
     Raises
     ------
     InputError
-        If the logs are of two vehicles, of something else than a multirotor, or no mapping suits them all; or if the
-        rotors that are stated cannot turn a vehicle.
+        If the logs are of two vehicles, or no mapping suits them all; or if the rotors that are stated cannot turn a
+        vehicle, or have another arm than the one that is given.
     """
-    for one in logs:
-        kind = one.parameters.get("MAV_TYPE")
-        if kind is not None and int(float(kind)) not in _MULTIROTORS:
-            raise InputError(f"{one.name}: MAV_TYPE = {int(float(kind))} in its parameters is not a multirotor")
     for other in logs[1:]:
         _require_same_vehicle(logs[0], other)
     signals, slowest = _without_slow_voltage(logs, _merged_signals(logs))
@@ -171,11 +178,14 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
         signals = tuple(_by_weight(guess, logs[0].recognition.speeds, mass_kg, arm_m) for guess in signals)
     airframe, doubts = _airframe(logs)
     if airframe is not None and arm_m is not None:
-        airframe = airframe.with_arm(arm_m)
+        if airframe.in_metres and not scale_to_arm:
+            _require_same_arm(logs[0].name, airframe, arm_m)
+        else:
+            airframe = airframe.with_arm(arm_m)
     rates = [one.recognition.rate_hz for one in logs]
     apart = _of_other_load(logs)
     crops = {one.name: one.recognition.flown.span_s for one in logs}
-    warnings = [f"{one.name}: {warning}" for one in logs for warning in one.recognition.warnings]
+    warnings = [f"{one.name}: {warning}" for one in logs for warning in (*one.of_file, *one.recognition.warnings)]
     doubts = [*doubts, *_two_masses(logs, mass_kg)]
     return Proposal(
         logs=tuple(logs),
@@ -196,6 +206,15 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
     )
 
 
+def _require_same_arm(name: str, airframe: Airframe, arm_m: float) -> None:
+    """Refuse an arm beside other places that a log states: who asks knows which of the two is right."""
+    if abs(arm_m - airframe.arm_m) > _SAME_ARM * airframe.arm_m:
+        raise InputError(
+            f"{name}: --arm is {arm_m:g} m, but {airframe.reason} put the rotors {airframe.arm_m:.3g} m from the"
+            " middle: leave --arm out to take these, or add --scale-to-arm to scale them to yours"
+        )
+
+
 def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
     """Refuse two logs whose parameters, systems or rotors say that they are of two vehicles."""
     differing = []
@@ -203,9 +222,7 @@ def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
     if names[0] != names[1]:
         differing.append(f"written by {names[0] or 'something unknown'} and {names[1] or 'something unknown'}")
     for key in sorted(first.parameters.keys() & other.parameters.keys()):
-        if key.startswith(("CA_ROTOR", "FRAME_", "SYS_AUTOSTART", "CA_AIRFRAME")) and not key.endswith(
-            ("_CT", "_SLEW")
-        ):
+        if key.startswith(_OF_VEHICLE) and not key.endswith(("_CT", "_SLEW")):
             values = first.parameters[key], other.parameters[key]
             if values[0] != values[1]:
                 differing.append(f"{key} {_plain(values[0])} and {_plain(values[1])}")
@@ -384,9 +401,17 @@ def _two_masses(logs: Sequence[KnownLog], mass_kg: float | None) -> list[str]:
 
 
 def _by_load(logs: Sequence[KnownLog]) -> list[tuple[Load, KnownLog]]:
-    """Sort logs by what their rotors carry; none where that is told by speeds of some and commands of others."""
+    """Sort logs by what their rotors carry; none where that is told by speeds of some and commands of others.
+
+    What squared commands, or speeds without an accelerometer, tell of a flight that does not hover is how it is flown.
+    """
     measured = {one.recognition.signal("rotor_speed") is not None for one in logs}
-    known = [(load, one) for one in logs if (load := one.recognition.load) is not None]
+    loads = [(one.recognition.load, one) for one in logs]
+    known = [
+        (load, one)
+        for load, one in loads
+        if load is not None and (load.steady or (load.sensed and one.recognition.signal("rotor_speed") is not None))
+    ]
     return sorted(known, key=lambda each: (each[0].size, each[1].name)) if len(measured) == 1 else []
 
 
@@ -410,21 +435,28 @@ def _of_other_load(logs: Sequence[KnownLog]) -> list[KnownLog]:
 def _airframe(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
     """Take the rotors that parameters state, else those that the motion tells, and hold the one against the other."""
     with about(logs[0].name, InputError):
-        stated = next((found for one in logs if (found := stated_airframe(one.parameters)) is not None), None)
+        own = (stated_airframe(one.parameters, one.recognition.rotors) for one in logs)
+        stated = next((found for found in own if found is not None), None)
     moved = [one.recognition.moved for one in logs if one.recognition.moved is not None]
     best = max(moved, key=lambda found: (found.clear, sum(found.explained)), default=None)
     if best is not None and best.clear and stated is None:
         return best.airframe, []
-    four = logs[0].recognition.rotors == 4
-    taken = stated or (usual_airframe(logs[0].recognition.kind) if four else None)
+    taken = stated or usual_airframe(logs[0].recognition.kind, logs[0].recognition.rotors)
     if best is None:
         return taken, []
     says = f"{best.airframe.reason}: {', '.join(f'{r.name} {_WAY[r.spin]}' for r in best.airframe.rotors)}"
+    doubt = f"the positions and spins of the rotors are a guess from {says}; {DECIDES_ROTORS}"
     if taken is None:
-        return best.airframe, [f"the positions and spins of the rotors are a guess from {says}; {DECIDES_ROTORS}"]
-    orders = [[(rotor.name, rotor.spin) for rotor in found.rotors] for found in (taken, best.airframe)]
-    differ = best.clear and orders[0] != orders[1] and all(rotor.name for rotor in taken.rotors)
-    return taken, [f"the rotors are taken from {taken.reason}, which contradicts {says}"] if differ else []
+        return best.airframe, [doubt]
+    orders = [[(rotor.name, rotor.spin) for rotor in own.rotors] for own in (taken, best.airframe)]
+    differ = orders[0] != orders[1] and all(rotor.name for rotor in taken.rotors)
+    if differ and taken.is_guess and best.by_axes:
+        # What is usual is a guess too, and nothing in this log speaks for it.
+        return best.airframe, [doubt]
+    if taken.is_guess and best.clear and not differ:
+        return replace(taken, reason=f"{taken.reason}; {best.airframe.reason}", sure="data"), []
+    contradicts = f"the rotors are taken from {taken.reason}, which contradicts {says}"
+    return taken, [contradicts] if differ and best.clear else []
 
 
 def _speed_max(logs: Sequence[KnownLog], signals: Sequence[Guess]) -> float:

@@ -67,10 +67,13 @@ class Load(NamedTuple):
         propellers it is as the mass.
     sensed : bool
         Whether an accelerometer tells that force; else it is gravity, and a flight that leans far looks heavier.
+    steady : bool
+        Whether it hovers, by what its rotors give from second to second: punches and dives are no load.
     """
 
     size: float
     sensed: bool
+    steady: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,6 +88,8 @@ class Recognition:
         Frames, the order of a quaternion, what a command is.
     left_out : tuple of str
         Sentences on columns that look like a signal and are not mapped.
+    unused : tuple of str
+        All columns that are mapped to nothing, stamps left out.
     rate_hz : float
         Of the clock.
     slowest_s, slowest_but_voltage_s : float
@@ -113,6 +118,7 @@ class Recognition:
     speeds: Array | None = field(repr=False)
     load: Load | None = None
     warnings: tuple[str, ...] = ()
+    unused: tuple[str, ...] = ()
 
     def signal(self, name: SignalName) -> Guess | None:
         """Give the guess for a signal; None where it is not recognised."""

@@ -6,14 +6,15 @@ from typing import Final
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, runs
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.agreement import first_derivative, slow
-from cpfls_cli.flightlog.airframe import MovedBy, Parameters, airframe_from_motion
+from cpfls_cli.flightlog.airframe import MovedBy, airframe_from_motion
 from cpfls_cli.flightlog.attitude_columns import BODY_OF, doubt_reading, read_attitude
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.crash import Signs, upright_of
 from cpfls_cli.flightlog.flown import FlownPart, find_flown, rotor_shares
+from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.log_table import LogTable, holding_values, make_grid, refuse_dead_rotors
 from cpfls_cli.flightlog.motion_columns import (
     gyroscope_first,
@@ -25,13 +26,14 @@ from cpfls_cli.flightlog.motion_columns import (
 from cpfls_cli.flightlog.nameless import nameless_signals
 from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals
 from cpfls_cli.flightlog.readings import Reading
-from cpfls_cli.flightlog.recognised import Load, Recognition, Rival, Seen, called
+from cpfls_cli.flightlog.recognised import Guess, Load, Recognition, Rival, Seen, called
 from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_mixed, find_rotors
 from cpfls_cli.flightlog.setpoint_columns import tell_setpoints
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, SignalName
 from cpfls_cli.flightlog.stretches import live_rows
 from cpfls_cli.flightlog.topics import STAMP, Topics
+from cpfls_cli.flightlog.vehicle_kind import VehicleKind, forward_flight, refuse_other_vehicle
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.words import some
@@ -60,7 +62,14 @@ _ORDER: Final[tuple[SignalName, ...]] = (
     "voltage",
 )
 _SIGNS = {"position", "body_rate", "acceleration", "attitude", "quaternion"}
-"""What tells flight, beside the rotors."""
+"""What shows flight, with the rotors."""
+
+_STEADY: Final = 0.15
+"""Share by which the squared speeds of rotors, averaged over seconds, vary in a flight that hovers and cruises: the
+specific force of a lean of 30 degrees is 15 % above gravity."""
+
+_SHORTEST_HOVER_S: Final = 2.0
+"""Of a VTOL, below which nothing of it can be recognised."""
 
 _WITH_BODY = {"body_rate", "acceleration", "attitude", "quaternion"}
 _SHOWN = 4
@@ -86,14 +95,16 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     Raises
     ------
     InputError
-        If nothing in the log is recognised, or nothing in it flies.
+        If nothing in the log is recognised, nothing in it flies, or what flies is no multirotor.
     """
+    kind = refuse_other_vehicle(topics, parameters, system)
     log = LogTable(topics, units)
     named = named_signals(column_groups(log.names), system)
     candidates = holding_values(log, named)
     if not candidates and log.flat:
         candidates = holding_values(log, nameless_signals(topics[""], log.clock("")))
     if not candidates:
+        _refuse_unfit(log, named)
         shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
         raise InputError(f"no column is recognised as a signal of a flight (columns: {shown}): {BY_HAND}")
     refuse_dead_rotors(log, named, candidates)
@@ -105,7 +116,9 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     flown = find_flown(_signs(log, candidates, shares)).within(ended, float(log.grid[-1] - log.grid[0]))
     if not flown.flies:
         raise InputError(flown.reasons[0])
+    flown = flown if kind is None else _hover_of(log, kind, flown)
     seen = Seen(log, candidates, _part(log, flown), None if shares is None else shares.mean(axis=1))
+    seen.warnings += [] if kind is None else [flown.reasons[-1]]
     seen.warnings += [] if log.time_doubt is None else [log.time_doubt]
     position_by_velocity(seen)
     verdict = read_attitude(seen)
@@ -145,6 +158,15 @@ def _live_part(
     part = LogTable({"": {name: values[live.rows] for name, values in fields.items()}}, log.units)
     part.origin = log.origin
     return part, holding_values(part, [named for found in candidates.values() for named in found]), live.ended
+
+
+def _refuse_unfit(log: LogTable, named: Sequence[Named]) -> None:
+    """Refuse a log that has columns of a flight by name, none of which holds one."""
+    clocks = [time for own in named if len(time := log.values(own.group.columns[:1])[0])]
+    if clocks:
+        log.require_long_enough(max(float(time[-1] - time[0]) for time in clocks))
+        names = some(list(dict.fromkeys(own.group.pattern for own in named)), _SHOWN)
+        raise InputError(f"no flight in it: {names} never change, or hold too few samples for a flight")
 
 
 def _with_values(log: LogTable, candidates: Sequence[Named]) -> list[tuple[Named, Array, Array]]:
@@ -195,6 +217,25 @@ def _part(log: LogTable, flown: FlownPart) -> slice:
     begin, end = flown.span_s or (0.0, np.inf)
     inside = np.flatnonzero((log.grid - log.grid[0] >= begin) & (log.grid - log.grid[0] <= end))
     return slice(int(inside[0]), int(inside[-1]) + 1)
+
+
+def _hover_of(log: LogTable, kind: VehicleKind, flown: FlownPart) -> FlownPart:
+    """Keep what a VTOL flies on its rotors alone, the longest of it; a log that does not tell is kept as it is."""
+    forward = forward_flight(log.topics, log.grid)
+    what = f"{kind.what} ({kind.reason}), which is a multirotor in hover alone"
+    if forward is None:
+        return replace(flown, reasons=(*flown.reasons, f"{what}; the log does not say when it hovers"))
+    part = _part(log, flown)
+    hovers = [(first + part.start, after + part.start) for first, after in runs(~forward[part])]
+    time = log.grid - log.grid[0]
+    first, after = max(hovers, key=lambda own: own[1] - own[0], default=(0, 1))
+    begin, end = float(time[first]), float(time[after - 1])
+    if end - begin < _SHORTEST_HOVER_S:
+        raise InputError(f"a log of {what}, and it hovers for {end - begin:.3g} s of this one at a time")
+    if not forward[part].any():
+        return replace(flown, reasons=(*flown.reasons, f"{what}, and it hovers throughout"))
+    reason = f"{what}: its hover from {begin:.1f} to {end:.1f} s is used, and no flight on the wing"
+    return replace(flown, span_s=(round(begin, 2), round(end, 2)), reasons=(*flown.reasons, reason))
 
 
 # Frames.
@@ -304,7 +345,12 @@ def _load(seen: Seen, speeds: Array) -> Load | None:
     force = np.abs(seen.mapped(seen.guesses["acceleration"])[:, 2]) if sensed else np.full(len(power), STANDARD_GRAVITY)
     known = np.isfinite(power) & np.isfinite(force)
     whole = float(force[known].sum())
-    return Load(float(power[known].sum()) / whole, sensed) if whole and power[known].any() else None
+    if not whole or not power[known].any():
+        return None
+    seconds = max(1, round(seen.rate_hz))
+    means = power[known][: int(known.sum()) // seconds * seconds].reshape(-1, seconds).mean(axis=1)
+    steady = len(means) > 1 and float(means.std()) < _STEADY * float(means.mean())
+    return Load(float(power[known].sum()) / whole, sensed, steady)
 
 
 def _doubt_columns(seen: Seen) -> None:
@@ -370,4 +416,12 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
         speeds=speeds,
         load=None if speeds is None else _load(seen, speeds),
         warnings=tuple(seen.warnings),
+        unused=_unused(log, (*signals, *asked), time_column),
     )
+
+
+def _unused(log: LogTable, guesses: Sequence[Guess], time_column: str) -> tuple[str, ...]:
+    """List the columns that are mapped to nothing."""
+    used = {time_column, *(column for guess in guesses for column in guess.columns.columns)}
+    stamps = set() if log.flat else {f"{topic}.{STAMP}" for topic in log.topics}
+    return tuple(name for name in log.names if name not in used | stamps)

@@ -1,17 +1,20 @@
 """Which columns drive the rotors or say how fast they turn, in which unit, and which of them are connected."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
-from cpfls_cli.flightlog.airframe import Parameters
+from cpfls_cli.arrays import Array, runs
+from cpfls_cli.flightlog.layouts import Parameters, count_by_form, lifting_rotors, stated_count, whole
 from cpfls_cli.flightlog.log_table import LogTable
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival, Sure
 from cpfls_cli.flightlog.settings import SignalMap
+from cpfls_cli.flightlog.vehicle_kind import MOTORS, VTOL_TYPES
 from cpfls_cli.flightlog.vocabulary import ASKED, RANGES
 from cpfls_cli.units import SPEED_UNITS, UnitName
 
@@ -39,6 +42,26 @@ _SAME = 0.02
 """Part of the largest one's spread below which an output is not connected to a motor."""
 
 
+_SELDOM = 0.1
+"""Share of the changes of the others below which an output is moved by hand or by a timer, and not by a controller."""
+
+_AT_REST, _STANDS_S, _AWAY = 0.02, 1.0, 0.25
+"""Share of its range from its least up to which an output stands, how long the motors have to stand for it to be known
+from which on, s, and the share away from it that no motor has then."""
+
+_PX4_MOTORS = range(101, 113)
+"""Values of *_FUNCn of PX4 that are its motors."""
+
+_RANGES = (
+    ("MOT_PWM_MIN", "MOT_PWM_MAX"),
+    ("Q_M_PWM_MIN", "Q_M_PWM_MAX"),
+    ("Q_THR_MIN_PWM", "Q_THR_MAX_PWM"),
+    ("PWM_MIN", "PWM_MAX"),
+    ("PWM_MAIN_MIN", "PWM_MAIN_MAX"),
+)
+_USUAL_PULSES = "the usual pulses: a guess, since neither MOT_PWM_MIN, MOT_PWM_MAX nor RC3_MIN, RC3_MAX is in the log"
+
+
 class _Unit(NamedTuple):
     """The unit of columns with scale and offset, and what tells it."""
 
@@ -58,11 +81,14 @@ class RotorGuess:
     ----------
     kind : str
         Kind of log that is known for such columns; empty where none is.
+    left_out : tuple of str
+        Sentences on outputs beside them that move and drive no motor.
     """
 
     guess: Guess
     rate_hz: float
     kind: str
+    left_out: tuple[str, ...] = ()
 
     @property
     def columns(self) -> SignalMap:
@@ -107,7 +133,7 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
         next((guess for own in candidates if (guess := _guess(own, parameters)) is not None), None)
         for candidates in (speeds, found["rotor_command"])
     )
-    left_out = []
+    left_out = [words for guess in (speed, command) if guess is not None for words in guess.left_out]
     if speed is not None and command is not None:
         counts = [len(guess.columns.columns) for guess in (speed, command)]
         if speed.rate_hz * _MUCH_FASTER < command.rate_hz:
@@ -195,19 +221,19 @@ def _is_electric(named: Named) -> bool:
 def _guess(found: Found, parameters: Parameters) -> RotorGuess | None:
     """Take columns that are connected in the unit that is stated or fits; None where none does."""
     named, time, values = found
-    chosen = _connected(named, values, parameters)
-    if len(chosen) < _FEWEST:
+    chosen = _connected(found, parameters)
+    if len(chosen.outputs) < _FEWEST:
         return None
-    columns, values = tuple(named.group.columns[index] for index in chosen), values[:, chosen]
+    columns, values = tuple(named.group.columns[index] for index in chosen.outputs), values[:, chosen.outputs]
     is_speed = named.signal == "rotor_speed"
-    taken = _speed_unit(named, values, parameters) if is_speed else _command_unit(named, values, parameters)
+    taken = _speed_unit(named, values, parameters) if is_speed else _command_unit(named, values, parameters, chosen)
     if taken is None:
         return None
     sure, rivals = taken.sure, taken.rivals
-    if len(chosen) == _FEWEST < len(named.group.columns):
-        every = ", ".join(named.group.columns)
-        left = ", ".join(column for column in named.group.columns if column not in columns)
-        sure, rivals = "guess", (*rivals, Rival(f"columns: [{every}]", f"if {left}, which never changes, is a rotor's"))
+    still = [column for column in named.group.columns if column not in (*columns, *chosen.others)]
+    if len(columns) == _FEWEST and still and not chosen.stated:
+        every = f"columns: [{', '.join(named.group.columns)}]"
+        sure, rivals = "guess", (*rivals, Rival(every, f"if {', '.join(still)}, which never changes, is a rotor's"))
     sign = tuple(float(value) for value in np.where(np.median(values, axis=0) < 0, -1.0, 1.0))
     guess = Guess(
         signal=named.signal,
@@ -222,25 +248,134 @@ def _guess(found: Found, parameters: Parameters) -> RotorGuess | None:
         sure=sure,
         rivals=rivals,
     )
-    return RotorGuess(guess, 1 / float(np.median(np.diff(time))), named.known)
+    left_out = tuple(f"{column}: {why}" for column, why in chosen.others.items())
+    return RotorGuess(guess, 1 / float(np.median(np.diff(time))), named.known, left_out)
 
 
-def _connected(named: Named, values: Array, parameters: Parameters) -> list[int]:
-    """List the outputs that move together with the most moving one; a count that is stated wins."""
-    count = int(float(parameters.get("CA_ROTOR_COUNT", 0) or 0))
-    functions = {
-        int(float(parameters[f"SERVO{output}_FUNCTION"])): output - 1
-        for output in range(1, values.shape[1] + 1)
-        if f"SERVO{output}_FUNCTION" in parameters
-    }
-    # ArduPilot numbers its motors 33 to 40 and on; which output each has is free.
-    motors = [functions[number] for number in range(33, 41) if number in functions]
-    if named.known == "ArduPilot" and len(motors) >= _FEWEST:
-        return motors
-    if named.known == "PX4" and _FEWEST <= count <= values.shape[1] and "output" not in named.group.pattern:
-        return list(range(count))
+class _Connected(NamedTuple):
+    """The outputs that drive motors, in the order of the motors.
+
+    Attributes
+    ----------
+    stated : bool
+        Whether parameters name them.
+    others : dict from column to str
+        What moves and is no motor, and why.
+    span : tuple of float and str, or None
+        Range of the outputs that their own parameters state, and the names of these.
+    """
+
+    outputs: list[int]
+    stated: bool
+    others: dict[str, str]
+    span: tuple[float, float, str] | None = None
+
+
+def _connected(found: Found, parameters: Parameters) -> _Connected:
+    """Find the motors among outputs: by their functions, by the frame's number, or because they move together."""
+    named, time, values = found
     spread = values.std(axis=0)
-    return [index for index, own in enumerate(spread) if own > _SAME * float(spread.max()) > 0]
+    moving = [index for index, own in enumerate(spread) if own > _SAME * float(spread.max()) > 0]
+    of_outputs = "output" in named.group.pattern
+    functions = _functions(named, parameters)
+    for motors, span in functions:
+        if {*motors} <= {*range(values.shape[1])} and len({*motors} & {*moving}) >= _FEWEST:
+            return _Connected(motors, True, _not_motors(named, moving, motors, "no function of a motor"), span)
+    if named.known == "PX4" and not of_outputs and _FEWEST <= len(lifting_rotors(parameters)) <= values.shape[1]:
+        return _Connected(lifting_rotors(parameters), True, {})
+    if functions:
+        # The motors are connected elsewhere.
+        return _Connected([], True, {})
+    odd = _other_functions(named, parameters, moving)
+    odd |= _driven_apart(time, values, [index for index in moving if index not in odd])
+    kept = [index for index in moving if index not in odd]
+    others = {named.group.columns[index]: why for index, why in odd.items()}
+    count = stated_count(parameters) or count_by_form(parameters, len(kept))
+    if named.known in ("PX4", "ArduPilot") and count is not None and {*range(count)} <= {*kept}:
+        motors = list(range(count))
+        more = _not_motors(named, kept, motors, f"the frame has {count} motors")
+        return _Connected(motors, True, others | more)
+    return _Connected(kept, False, others)
+
+
+def _other_functions(named: Named, parameters: Parameters, moving: Sequence[int]) -> dict[int, str]:
+    """List outputs of an ArduPilot that have another function than a motor."""
+    if named.known != "ArduPilot" or named.signal != "rotor_command":
+        return {}
+    keys = {f"{prefix}{index + 1}_FUNCTION": index for index in moving for prefix in ("SERVO", "RC")}
+    numbers = {key: whole(parameters, key) or 0 for key in keys}
+    return {
+        index: f"it moves, but {key} = {numbers[key]}: no motor"
+        for key, index in keys.items()
+        if numbers[key] not in (0, *MOTORS)
+    }
+
+
+def _not_motors(named: Named, moving: Sequence[int], motors: Sequence[int], why: str) -> dict[str, str]:
+    return {named.group.columns[index]: f"it moves, but {why}" for index in moving if index not in motors}
+
+
+def _functions(named: Named, parameters: Parameters) -> list[tuple[list[int], tuple[float, float, str] | None]]:
+    """List by each group of parameters that give outputs a function the outputs of motors, from 0, and their range."""
+    if named.signal != "rotor_command":
+        return []
+    found: dict[str, dict[int, int]] = {}
+    if named.known == "ArduPilot":
+        for prefix, output in product(("SERVO", "RC"), range(1, len(named.group.columns) + 1)):
+            number = whole(parameters, f"{prefix}{output}_FUNCTION")
+            if number in MOTORS:
+                found.setdefault(prefix, {})[MOTORS.index(number)] = output - 1
+    elif named.known == "PX4" and "output" in named.group.pattern:
+        for name in sorted(parameters):
+            own = re.fullmatch(r"(\w+)_FUNC(\d+)", name)
+            number = whole(parameters, name) if own else None
+            if own and number is not None and number in _PX4_MOTORS:
+                found.setdefault(own[1], {})[number] = int(own[2]) - 1
+        if not found and whole(parameters, "MAV_TYPE") in VTOL_TYPES:
+            # Before 1.13 a VTOL names the outputs of the rotors that carry it by their digits.
+            digits = str(whole(parameters, "VT_MOT_ID") or "")
+            found["VT_MOT"] = {number: int(digit) - 1 for number, digit in enumerate(digits) if digit != "0"}
+    motors = {prefix: [own[number] for number in sorted(own)] for prefix, own in found.items()}
+    return [(own, _span(prefix, own, parameters)) for prefix, own in motors.items() if len(own) >= _FEWEST]
+
+
+def _span(prefix: str, outputs: Sequence[int], parameters: Parameters) -> tuple[float, float, str] | None:
+    """Give the range that PX4 states of each output, where it is that of all motors."""
+    ends = {
+        tuple(float(parameters.get(f"{prefix}_{end}{output + 1}", 0)) for end in ("MIN", "MAX")) for output in outputs
+    }
+    low, high = ends.pop() if len(ends) == 1 else (0.0, 0.0)
+    return (low, high, f"{prefix}_MIN and _MAX of the log") if low < high else None
+
+
+def _driven_apart(time: Array, values: Array, moving: Sequence[int]) -> dict[int, str]:
+    """List outputs that do not move as a motor does, with the reason: a camera, a gimbal or a landing gear.
+
+    What drives a motor changes as often as what drives the others, and stands at its least while they stand.
+    """
+    if len(moving) <= _FEWEST:
+        return {}
+    own = values[:, moving]
+    changes = (np.diff(own, axis=0) != 0).mean(axis=0)
+    odd = {
+        moving[index]: f"it moves, but changes in {100 * share:.2g} % of the rows where the others do in"
+        f" {100 * float(np.median(changes)):.2g} %: no motor"
+        for index, share in enumerate(changes)
+        if share < _SELDOM * float(np.median(changes))
+    }
+    least = own.min(axis=0) + _AT_REST * np.ptp(own, axis=0)
+    resting = (own <= least).sum(axis=1) >= max(_FEWEST, (len(moving) + 1) // 2)
+    stands = np.zeros(len(time), dtype=bool)
+    for first, after in runs(resting):
+        stands[first:after] = time[after - 1] - time[first] >= _STANDS_S
+    if stands.any():
+        level = (np.median(own[stands], axis=0) - own.min(axis=0)) / np.ptp(own, axis=0)
+        odd |= {
+            moving[index]: "it stands away from its least while the motors stand: no motor"
+            for index, share in enumerate(level)
+            if share > _AWAY and moving[index] not in odd
+        }
+    return odd if len(moving) - len(odd) >= _FEWEST else {}
 
 
 def _speed_unit(named: Named, values: Array, parameters: Parameters) -> _Unit:
@@ -264,15 +399,17 @@ def _speed_unit(named: Named, values: Array, parameters: Parameters) -> _Unit:
     return _Unit("rad/s", 1.0, 0.0, called, "guess", (rival,))
 
 
-def _command_unit(named: Named, values: Array, parameters: Parameters) -> _Unit | None:
+def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _Connected) -> _Unit | None:
     """Tell the unit of commands: parameters and the name first, then the first of `RANGES` that holds the numbers."""
     low, high = float(values.min()), float(np.quantile(values, 0.999))
     called = f"called {named.group.pattern}, up to {high:.4g}"
-    stated = _stated_range(named, parameters)
-    if stated is not None:
+    stated = chosen.span or _stated_range(named, parameters)
+    # Pulses are stated of outputs that send numbers in another way too, such as DShot.
+    if stated is not None and _holds(stated[0], stated[1], values):
         begin, end, where = stated
         reason = f"{called}: {begin:g} to {end:g} by {where}"
-        return _Unit("1", 1 / (end - begin), -begin / (end - begin), reason, "named")
+        sure: Sure = "guess" if where == _USUAL_PULSES else "named"
+        return _Unit("1", 1 / (end - begin), -begin / (end - begin), reason, sure)
     if named.known == "Crazyflie":
         return _Unit("1", named.scale, 0.0, f"{called}: 16 bits, as on a Crazyflie", "named")
     words = {*named.group.words}
@@ -294,21 +431,32 @@ def _command_unit(named: Named, values: Array, parameters: Parameters) -> _Unit 
     return None
 
 
+def _holds(low: float, high: float, values: Array) -> bool:
+    """Tell whether a range is that of most of the commands that are not 0."""
+    own = values[values > 0]
+    return bool(len(own) and low <= float(np.median(own)) <= high)
+
+
 def _stated_range(named: Named, parameters: Parameters) -> tuple[float, float, str] | None:
     """Give the range of outputs that the log's parameters state."""
     if named.known == "Betaflight" and "motorOutput" in parameters:
         low, high = (float(part) for part in str(parameters["motorOutput"]).split(",")[:2])
         return low, high, "motorOutput of the header"
-    for low_name, high_name in (
-        ("MOT_PWM_MIN", "MOT_PWM_MAX"),
-        ("PWM_MIN", "PWM_MAX"),
-        ("PWM_MAIN_MIN", "PWM_MAIN_MAX"),
-    ):
+    for low_name, high_name in _RANGES:
         low, high = (float(parameters.get(name, 0) or 0) for name in (low_name, high_name))
         if 500 < low < high and ("output" in named.group.pattern or named.known == "ArduPilot"):
             return low, high, f"{low_name} and {high_name} of the log"
     if named.known == "ArduPilot":
-        return 1000.0, 2000.0, "the usual pulses, since MOT_PWM_MIN and MOT_PWM_MAX are not set"
+        # Where both are 0, and before they were, motors have the range of the throttle's stick.
+        stick = whole(parameters, "RCMAP_THROTTLE") or 3
+        low, high = (float(parameters.get(f"RC{stick}_{end}", 0) or 0) for end in ("MIN", "MAX"))
+        if 500 < low < high:
+            return (
+                low,
+                high,
+                f"RC{stick}_MIN and RC{stick}_MAX of the log, since MOT_PWM_MIN and MOT_PWM_MAX are not set",
+            )
+        return 1000.0, 2000.0, _USUAL_PULSES
     return None
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.flightlog.agreement import slow
-from cpfls_cli.flightlog.airframe import Parameters
 from cpfls_cli.flightlog.conversion import attitude_from_quaternion
+from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.log_table import LogTable
 from cpfls_cli.flightlog.names import Named, column_groups, is_of, wished_signals
 from cpfls_cli.flightlog.recognised import Guess, Rival, Seen, Sure

@@ -12,13 +12,12 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.clock import increasing_rows
 from cpfls_cli.flightlog.conversion import columns_in_words, present_choices
 from cpfls_cli.flightlog.repair import align_quaternion_signs, unwrap_angles
-from cpfls_cli.flightlog.settings import SETPOINTS, ImportSettings, SignalMap
+from cpfls_cli.flightlog.settings import COMMANDS, SETPOINTS, ImportSettings, SignalMap
 from cpfls_cli.units import known_unit
 
 Topics = Mapping[str, Mapping[str, Array]]
 STAMP = "timestamp"
 """The field of a topic that holds its time stamps."""
-_COMMANDS = ("torque", "body_torque", "thrust", "rotor_command")
 _ANGLES_THAT_JUMP = (0, 2)
 _STEPS_HELD = 3
 """Of its usual steps for which a setpoint stays: the next one may be lost, and behind two nobody asks for it."""
@@ -158,7 +157,7 @@ def _resampled(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Arra
                 if _step(clocks[topic]) > settings.gap_s:
                     slow = _slowness(topic, clocks[topic], settings.gap_s)
                     raise InputError(f"{slow}: raise import.gap_s, or leave its signals out of import.signals")
-                between = hold_previous if name in _COMMANDS else interpolate
+                between = hold_previous if name in COMMANDS else interpolate
                 values = between(clocks[topic], values, target, settings.gap_s)
             columns[column] = values
     return columns, (*warnings, *_warn_of_thinning(base, {topic: clocks[topic] for topic in sorted(used)}))
@@ -202,6 +201,24 @@ def _warn_of_thinning(base: str, clocks: Mapping[str, Array]) -> tuple[str, ...]
         f" noise into the flight: name the faster one in import.time_column"
         for topic, rate_hz in faster.items()
     )
+
+
+def stamped_rates(topics: Topics, settings: ImportSettings) -> dict[str, float]:
+    """Count how often a second each mapped signal was logged, by the stamps of its own topic, lost samples left out.
+
+    Parameters
+    ----------
+    settings : ImportSettings
+        As `on_one_clock` gives them back; a flat log has one clock, and no rates.
+    """
+    rates: dict[str, float] = {}
+    for name, signal in settings.signals.items():
+        topic, field = topic_and_field(signal.columns[0])
+        own = topics.get(topic, {})
+        if topic and name not in SETPOINTS and field in own and STAMP in own:
+            time, _ = _present(own[STAMP], np.asarray(own[field], dtype=float))
+            rates[name] = (len(time) - 1) / float(time[-1] - time[0]) if len(time) > 1 else 0.0
+    return rates
 
 
 def _step(time: Array) -> float:

@@ -79,6 +79,7 @@ _KNOWN: Final = """
     PX4         rotor_speed    esc_status.esc[*].esc_rpm              rpm    -    1        +
     PX4         rotor_command  actuator_motors.control[*]             1      -    1        +
     PX4         rotor_command  actuator_outputs.output[*]             -      -    1        +
+    PX4         rotor_command  actuator_outputs[1].output[*]          -      -    1        +
     PX4         voltage        battery_status.voltage_v               V      -    1        +
     ArduPilot   attitude       ATT.*                                  deg    FRD  1        +
     ArduPilot   body_rate      IMU.Gyr*                               rad/s  FRD  1        +
@@ -89,7 +90,10 @@ _KNOWN: Final = """
     ArduPilot   velocity       XKF1.V*                                m/s    NED  1        +
     ArduPilot   velocity       NKF1.V*                                m/s    NED  1        +
     ArduPilot   rotor_command  RCOU.C*                                -      -    1        +
+    # To Copter 3.3.
+    ArduPilot   rotor_command  RCOU.Ch*                               -      -    1        +
     ArduPilot   rotor_speed    ESC[*].RPM                             rpm    -    1        +
+    ArduPilot   rotor_speed    ESC*.RPM                               rpm    -    1        +
     ArduPilot   voltage        BAT.Volt                               V      -    1        +
     Betaflight  body_rate      gyroADC[*]                             deg/s  FLU  1        +
     Betaflight  acceleration   accSmooth[*]                           -      FLU  1        +
@@ -239,6 +243,8 @@ MEANINGS: Final = (
         " pwm u control output throttle omcmd esc thrust lift voltage vbat volt vbatt battery batt home global"
         f" {RATE_WORDS}",
     ),
+    # Of a matrix, whose columns have no axes in their names.
+    Meaning("position", "pos position p xyz", "numbers", 3, 1, "rotor motor imu angular home global"),
     Meaning("velocity", "vel velocity v linear twist", "xyz numbers", 3, 2, "angular acc acceleration a"),
     Meaning("acceleration", "acc accel accelerometer acceleration a sf f", "xyz numbers", 3, 2, "angular ang"),
     Meaning("body_rate", RATE_WORDS, "xyz angles numbers", 3),
@@ -252,7 +258,7 @@ MEANINGS: Final = (
     Meaning("voltage", "voltage vbat volt vbatt battery batt", "one", 1),
 )
 FAST: Final = _each("rpm erpm rads rotor om omega speed speeds velocities angular")
-ASKED: Final = _each("cmd command commands pwm u control output throttle omcmd ref des d r")
+ASKED: Final = _each("cmd command commands pwm u control output outputs throttle omcmd ref des d r")
 NOT_MEASURED: Final = _each(
     "des desired d sp setpoint ref reference target goal r cmd command ctrltarget controller cov covariance var"
     " variance bias noise std err error integral reset delta innov innovation offset mag magnetometer rc gps status"

@@ -42,6 +42,7 @@ def imported(log: Path, study: Study) -> ImportedFlight:
             rotor_torque=_rotor_torque(study),
             # The delay is a parameter too: the part of the flight that is held out must not choose it.
             delay_share=study.identification.training_share,
+            stamped_hz=read.stamped_hz,
         )
     report = replace(
         flight.report,

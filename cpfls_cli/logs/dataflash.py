@@ -12,6 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP
+from cpfls_cli.logs.foreign import SDLOG2
 from cpfls_cli.logs.formats import DATAFLASH_MAGIC, DATAFLASH_TEXT_MAGIC, LogContents
 from cpfls_cli.logs.records import bytes_of, date, numbers, seconds, table
 
@@ -78,6 +79,8 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         if kind.name in tables and kind.stamp
         for topic, fields in _topics(kind, tables[kind.name], stated.get(kind.name, {}))
     }
+    if not topics and ("TIME" in tables or path.suffix.lower() == ".px4log"):
+        raise InputError(f"{path}: {SDLOG2}")
     if not topics:
         raise InputError(f"{path}: holds no messages with time stamps (TimeUS)")
     origin = min(fields[STAMP][0] for fields in topics.values())
@@ -230,7 +233,7 @@ def _flown_at(fields: Mapping[str, Array]) -> float:
 
 def _system(tables: Mapping[str, np.ndarray]) -> str:
     for (said,) in _rows(tables, "MSG", Message="S"):
-        program = re.match(r"(?:APM:)?(\w+) V(\d[\w.]*)", _text(said))
+        program = re.match(r"(?:APM:)?(\w+) [Vv](\d[\w.]*)", _text(said))
         if program:
             name = program[1] if program[1].startswith("Ardu") else f"Ardu{program[1]}"
             return f"{name} {program[2]}"

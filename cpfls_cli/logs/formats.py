@@ -79,6 +79,8 @@ class LogColumns:
         Stamp on the log's own clock at 0 of the column that is the clock, s.
     parameters, system
         As in `LogContents`.
+    stamped_hz : dict from str to float
+        How often a second signals were logged that have stamps of their own.
     """
 
     columns: dict[str, "Array"]
@@ -88,6 +90,7 @@ class LogColumns:
     begins: float = 0.0
     parameters: dict[str, float | str] = field(default_factory=dict)
     system: str = ""
+    stamped_hz: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,6 +189,9 @@ def log_contents(path: Path, wanted: Collection[str] | None = None) -> LogConten
             f"{path}: a log of a Crazyflie's uSD card in its older format, which is not read; make a CSV of it"
             " with the script of that firmware, and of a quaternion in one number four columns"
         )
+    foreign = foreign_file(path, form)
+    if foreign is not None:
+        raise InputError(f"{path}: {foreign}")
     if form is None:
         named = ", ".join(form.suffix for form in LOG_FORMATS if form.suffix)
         free = ", ".join(dict.fromkeys(form.name for form in LOG_FORMATS if form.by_content))
@@ -198,13 +204,34 @@ def log_contents(path: Path, wanted: Collection[str] | None = None) -> LogConten
 
 def read_log(path: Path, settings: "ImportSettings") -> LogColumns:
     """Read the columns of a log that a config maps, on one clock."""
-    on_one_clock = import_module("cpfls_cli.flightlog.topics").on_one_clock
+    clocks = import_module("cpfls_cli.flightlog.topics")
     contents = log_contents(path, settings.mapped_columns)
+    refuse_other_vehicle = import_module("cpfls_cli.flightlog.vehicle_kind").refuse_other_vehicle
     with about(path, InputError):
-        columns, chosen, warnings = on_one_clock(contents.topics, contents.units, settings)
+        refuse_other_vehicle(contents.topics, contents.parameters, contents.system)
+        columns, chosen, warnings = clocks.on_one_clock(contents.topics, contents.units, settings)
+    stamped_hz = clocks.stamped_rates(contents.topics, chosen)
     begins = contents.begins.get(str(chosen.time_column), contents.begins.get("", 0.0))
     warnings = (*contents.warnings, *warnings)
-    return LogColumns(columns, chosen, warnings, contents.flown_at, begins, contents.parameters, contents.system)
+    return LogColumns(
+        columns, chosen, warnings, contents.flown_at, begins, contents.parameters, contents.system, stamped_hz
+    )
+
+
+def foreign_file(path: Path, form: LogFormat | None = None) -> str | None:
+    """Say what a file is that no reader reads, and how to get a log from it; None for a log, and for what is unknown.
+
+    Parameters
+    ----------
+    form : LogFormat or None
+        That its name or its content says.
+    """
+    first = _first_line(path)
+    known = any(other.magic and other.begins(first) for other in LOG_FORMATS)
+    if form is not None and (known or not (first or form.magic)):
+        return None
+    named: str | None = import_module("cpfls_cli.logs.foreign").named_foreign(path)
+    return named
 
 
 def _format_of(path: Path) -> LogFormat | None:

@@ -17,8 +17,9 @@ import scipy.io
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import FileState, is_sealed, longest_read_s, most_held, state_of
-from cpfls_cli.logs.formats import LogContents
+from cpfls_cli.logs.formats import MOST_LISTED, LogContents
 from cpfls_cli.units import known_unit
+from cpfls_cli.words import some
 
 _MOST_COLUMNS = 64
 _PROBE = """
@@ -65,7 +66,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
                 raise InputError(f"{path}: {found.fault}")
             if found.artifact:
                 raise InputError(f"{path}: is an artifact of this program ({found.artifact}), not a log")
-        columns, units = _of_hdf5(path, wanted) if hdf5 else (dict(_named(_of_mat(path), wanted)), {})
+        columns, units, names = _of_hdf5(path, wanted) if hdf5 else _of_matlab(path, wanted)
     except InputError:
         raise
     except Exception as error:
@@ -73,7 +74,10 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         raise InputError(f"{path}: cannot be read as {'HDF5' if hdf5 else 'MATLAB'}: {error}") from None
     if not columns:
         raise InputError(f"{path}: holds no vectors or matrices of numbers")
-    return LogContents({"": columns}, units)
+    read = {name.partition("[")[0] for name in columns}
+    others = [name for name in names if name not in read] if wanted is None else []
+    warnings = (f"arrays that are no columns of numbers are left out: {some(others, MOST_LISTED)}",) if others else ()
+    return LogContents({"": columns}, units, warnings=warnings)
 
 
 def is_log(path: Path) -> bool:
@@ -114,18 +118,25 @@ def _probed(state: FileState) -> _Probed:
     return _Probed(True, done.stdout.strip())
 
 
-def _of_hdf5(path: Path, wanted: Collection[str] | None) -> tuple[dict[str, Array], dict[str, str]]:
+def _of_matlab(path: Path, wanted: Collection[str] | None) -> tuple[dict[str, Array], dict[str, str], list[str]]:
+    arrays = list(_of_mat(path))
+    return dict(_named(arrays, wanted)), {}, [name for name, array in arrays if array.size > 1]
+
+
+def _of_hdf5(path: Path, wanted: Collection[str] | None) -> tuple[dict[str, Array], dict[str, str], list[str]]:
     columns: dict[str, Array] = {}
     units: dict[str, str] = {}
     with h5py.File(path, "r") as file:
-        for name, dataset in _datasets(file):
+        found = _datasets(file)
+        names = [name for name, dataset in found if (dataset.size or 0) > 1]
+        for name, dataset in found:
             own = dict(_named([(name, dataset)], wanted))
             unit = dataset.attrs.get("units", dataset.attrs.get("unit", ""))
             unit = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit
             factor = known_unit(unit).factor if unit in _TIME_UNITS else 1.0
             columns |= {column: factor * values for column, values in own.items()}
             units |= {column: "s" if unit in _TIME_UNITS else unit for column in own if isinstance(unit, str) and unit}
-    return columns, units
+    return columns, units, names
 
 
 def _datasets(file: h5py.File) -> list[tuple[str, Any]]:

@@ -11,9 +11,10 @@ from math import sqrt
 from typing import Any, Final
 
 from cpfls_cli.config.load import ASK, how_to_fill_in
-from cpfls_cli.flightlog.airframe import USUAL, Airframe, RotorPlace
+from cpfls_cli.flightlog.airframe import Airframe, RotorPlace, usual_airframe
+from cpfls_cli.flightlog.layouts import USUAL
 from cpfls_cli.flightlog.proposal import DECIDES_ROTORS, Proposal
-from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival
+from cpfls_cli.flightlog.recognised import Guess, KeyChoice
 from cpfls_cli.flightlog.settings import ColumnMap
 from cpfls_cli.report.content import Block, Cell, Folded, Table, Text
 from cpfls_cli.report.numbers import number
@@ -35,6 +36,7 @@ class Stated:
 
     mass_kg: float | None = None
     arm_m: float | None = None
+    scale_to_arm: bool = False
 
 
 def asked_keys(proposal: Proposal, stated: Stated) -> tuple[str, ...]:
@@ -44,9 +46,9 @@ def asked_keys(proposal: Proposal, stated: Stated) -> tuple[str, ...]:
     if not proposal.rotors:
         keys.append("vehicle.rotors")
     for index in range(proposal.rotors):
-        if airframe is None or airframe.is_guess or not airframe.in_metres:
+        if airframe is None or airframe.is_asked or not airframe.in_metres:
             keys.append(f"vehicle.rotors.{index}.position_m")
-        if airframe is None or airframe.is_guess or airframe.rotors[index].spin == 0:
+        if airframe is None or airframe.is_asked or airframe.rotors[index].spin == 0:
             keys.append(f"vehicle.rotors.{index}.spin")
     return tuple(keys)
 
@@ -76,6 +78,7 @@ def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
         reasons = one.recognition.flown.cut or ("all of it is flight, nothing is cut",)
         cut += [Text(f"{prefix}{reason}") for reason in reasons]
         cut += [Text(f"{prefix}not mapped: {words}", "note") for words in one.recognition.left_out]
+        cut += [Text(f"{prefix}not used: {words}", "note") for words in _by_topic(one.recognition.unused)]
     yield Folded("what is cut or not mapped", cut)
     asked = asked_keys(proposal, stated)
     if asked:
@@ -84,6 +87,17 @@ def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
         known = {} if side is None else {"position_m": f"[{side}, -{side}, 0.0]"}
         how = how_to_fill_in(asked, brief=True, **known)
         yield Text(f"first edit {output}: write {_asked_words(asked)} in place of {ASK}{how}")
+
+
+def _by_topic(names: Sequence[str]) -> Iterator[str]:
+    """List columns, those of each topic by themselves, and those that differ in a number alone as one."""
+    topics: dict[str, dict[str, list[str]]] = {}
+    for name in names:
+        topic, dot, _ = name.partition(".")
+        same = topics.setdefault(topic if dot else "", {})
+        same.setdefault(re.sub(r"\d+(?=\]?$)", "*", name), []).append(name)
+    for same in topics.values():
+        yield ", ".join(_in_braces(own) for own in same.values())
 
 
 def _topic(proposal: Proposal) -> str:
@@ -103,15 +117,20 @@ def _guessed(entry: Guess | KeyChoice) -> str:
 
 
 def _in_braces(names: Sequence[str]) -> str:
-    """List names with what they begin with written once, as a shell does."""
-    first, last = min(names), max(names)
-    begin = first[: next((place for place, letter in enumerate(first) if letter != last[place : place + 1]), None)]
+    """List names with what they begin and end with written once, as a shell does."""
+    begin = _beginning(names)
     if len(names) < 2 or not begin:
         return ", ".join(names)
     rest = [name.removeprefix(begin) for name in names]
-    # An index is written whole within its bracket.
-    end = "]" if begin.endswith("[") and all(own.endswith("]") for own in rest) else ""
+    # An end that all have is none of a word, such as the bracket of an index.
+    alike = _beginning([own[::-1] for own in rest])[::-1]
+    end = next((alike[place:] for place, letter in enumerate(alike) if not letter.isalnum()), "")
     return f"{begin}{{{','.join(own.removesuffix(end) for own in rest)}}}{end}"
+
+
+def _beginning(names: Sequence[str]) -> str:
+    first, last = min(names), max(names)
+    return first[: next((place for place, letter in enumerate(first) if letter != last[place : place + 1]), None)]
 
 
 def _reasons_table(proposal: Proposal) -> Table:
@@ -185,6 +204,7 @@ def summary(proposal: Proposal, stated: Stated, output: str) -> dict[str, Any]:
         "crops_s": dict(proposal.crops),
         "cut": {one.name: list(one.recognition.flown.cut) for one in proposal.logs},
         "left_out": {one.name: list(one.recognition.left_out) for one in proposal.logs},
+        "unused": {one.name: list(one.recognition.unused) for one in proposal.logs},
         "rotors": [
             {"name": rotor.name, "spin": rotor.spin, "position_m": _position(rotor, proposal.airframe)}
             for rotor in (proposal.airframe.rotors if proposal.airframe else ())
@@ -274,13 +294,18 @@ def _rotors(proposal: Proposal, stated: Stated) -> Iterator[str]:
             2,
         )
         if proposal.rotors == 4:
+            frames = ((kind, usual_airframe(kind, 4)) for kind in USUAL)
             usual = (
-                f"{kind}: {', '.join(f'{place} {spin}' for place, spin in order)}" for kind, order in USUAL.items()
+                f"{kind}: {', '.join(f'{rotor.name} {rotor.spin}' for rotor in own.rotors)}"
+                for kind, own in frames
+                if own is not None
             )
             yield from _comment(f"Four in an X are usually, from M1 to M4, in {'; in '.join(usual)}.", 2)
     else:
-        if airframe.is_guess:
+        if airframe.is_asked:
             yield from _comment(f"Not known. A guess from {airframe.reason}; {DECIDES_ROTORS}.", 2)
+        elif airframe.is_guess:
+            yield from _comment(f"A guess, order and directions: {airframe.reason}; {DECIDES_ROTORS}.", 2)
         else:
             yield from _comment(f"Told by {airframe.reason}.", 2)
         if airframe.moment_ratio_m:
@@ -289,7 +314,7 @@ def _rotors(proposal: Proposal, stated: Stated) -> Iterator[str]:
                 " often a number that nobody measured.",
                 2,
             )
-        if stated.arm_m is not None:
+        if airframe.scaled and stated.arm_m is not None:
             yield from _comment(
                 f"Placed for an arm of {stated.arm_m:g} m; measured x, y and z are better: torques go with"
                 " them, and so do the moments of inertia that are found.",
@@ -307,7 +332,7 @@ def _rotors(proposal: Proposal, stated: Stated) -> Iterator[str]:
 
 
 def _rotor(rotor: RotorPlace | None, airframe: Airframe | None) -> str:
-    is_guess = airframe is not None and airframe.is_guess
+    is_guess = airframe is not None and airframe.is_asked
     position = None if rotor is None else _position(rotor, airframe)
     spin = ASK if rotor is None or rotor.spin == 0 else str(rotor.spin)
     entry = (
@@ -335,10 +360,10 @@ def _import(proposal: Proposal) -> Iterator[str]:
     choices = {choice.key: choice for choice in proposal.choices}
     for key in _ORDER:
         if key in choices:
-            yield from _entry(choices[key].reason, choices[key].rivals, [f"  {key}: {choices[key].value}"], 2)
+            yield from _entry(choices[key], [f"  {key}: {choices[key].value}"], 2)
     yield "  signals:"
     for guess in proposal.signals:
-        yield from _entry(guess.reason, guess.rivals, list(_signal(guess)), 4)
+        yield from _entry(guess, list(_signal(guess)), 4)
     if proposal.states_torque:
         yield "  torque_source: column"
     else:
@@ -371,10 +396,11 @@ def _import(proposal: Proposal) -> Iterator[str]:
         yield f"  rate_hz: {_flow(proposal.rate_hz)}"
 
 
-def _entry(reason: str, rivals: Sequence[Rival], lines: Sequence[str], indent: int) -> Iterator[str]:
-    yield from _comment(f"{capitalised(reason)}.", indent)
+def _entry(entry: Guess | KeyChoice, lines: Sequence[str], indent: int) -> Iterator[str]:
+    words = f"A guess: {entry.reason}" if entry.sure == "guess" else capitalised(entry.reason)
+    yield from _comment(f"{words}.", indent)
     yield from lines
-    for rival in rivals:
+    for rival in entry.rivals:
         yield from _comment(f"or {rival.text} ({rival.reason})", indent)
 
 

@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+import scipy.io
 import yaml
 
 from tests.builders.unknown_logs import FLIP, HUBS, flat_log, flight, named, ulog_of_flight, with_ground, write_csv
@@ -229,7 +230,10 @@ def test_one_config_cannot_suit_logs_of_other_axes(refuse, tmp_path, own):
 def test_the_one_log_of_other_axes_is_named_to_be_left_out(refuse, tmp_path, own):
     turned = named(own.rate @ FLIP, "gyro_x", "gyro_y", "gyro_z")
     odd = write_csv(tmp_path / "odd.csv", flat_log(own, rate=turned))
-    one, two = (write_csv(tmp_path / f"{name}.csv", flat_log(own)) for name in ("one", "two"))
+    one, two = (
+        write_csv(tmp_path / f"{name}.csv", flat_log(flight(seconds=20.0, seed=seed)))
+        for name, seed in (("one", 3), ("two", 5))
+    )
     for logs in ((odd, one, two), (one, odd, two)):
         (line,) = refuse("init", *logs, "-o", tmp_path / "study.yaml")
         assert line.endswith(
@@ -303,7 +307,10 @@ def test_a_log_of_px4_brings_its_rotors_along(proposed, tmp_path, own):
             "CA_ROTOR*_PX, _PY and the signs of _KM in the log: these 4 rotors cannot turn the vehicle about"
             " yaw by themselves; correct the parameters in the autopilot, or state vehicle.rotors by hand",
         ),
-        ({"MAV_TYPE": 1}, "MAV_TYPE = 1 in its parameters is not a multirotor"),
+        (
+            {"MAV_TYPE": 1},
+            "a log of an airplane (MAV_TYPE = 1), not of a multirotor: only vehicles that rotors carry are modelled",
+        ),
     ],
 )
 def test_parameters_that_contradict_a_multirotor_are_refused(refuse, tmp_path, own, parameters, message):
@@ -397,3 +404,71 @@ def test_two_masses_in_one_config_are_said_by_how_much(proposed, tmp_path, own, 
         assert float(found[2]) == pytest.approx(0.044, abs=0.001)
         assert ("or its battery is lower" in result.stderr) == (by == "command")
         assert "its own --mass" in result.stderr
+
+
+def test_how_two_pilots_fly_is_no_mass(proposed, tmp_path, own):
+    """Squared commands of punches and dives are larger on average, and the vehicle is the same."""
+    logs = []
+    for number in range(2):
+        other = flight(seconds=20.0, seed=3 + number)
+        punches = 1 + number * (0.3 + 0.5 * np.sign(np.sin(1.5 * other.time)))
+        values = 0.4 / own.speed.mean() * np.sqrt(punches)[:, None] * other.speed
+        commands = named(values, *(f"cmd{motor}" for motor in range(1, 5)))
+        logs.append(write_csv(tmp_path / f"{number}.csv", flat_log(other, speed=commands)))
+    result, _, _ = proposed(*logs, "--mass", "0.037", "--arm", "0.05")
+    assert "it weighs" not in result.stderr
+    learns = next(line for line in result.stdout.splitlines() if "cpfls vehicle" in line)
+    assert "0.h5" in learns
+    assert "1.h5" in learns
+
+
+def test_a_file_that_is_given_twice_is_counted_once_and_said(proposed, tmp_path, own):
+    first = write_csv(tmp_path / "one.csv", flat_log(own))
+    copy = write_csv(tmp_path / "copy.csv", flat_log(own))
+    result, _, _ = proposed(first, copy, "--mass", MASS, "--arm", ARM, "--json")
+    assert "copy.csv: is given twice, also as one.csv" in result.stderr
+    assert json.loads(result.stdout)["logs"] == [str(first)]
+
+
+def test_every_column_that_is_not_used_is_listed(proposed, tmp_path, own):
+    others = {"extra": named(own.rate, "oil[0]", "oil[1]", "oil[2]"), "more": {"paint": own.time}}
+    log = write_csv(tmp_path / "log.csv", flat_log(own, **others))
+    result, _, _ = proposed(log, "--mass", MASS, "--arm", ARM, "-v")
+    assert "not used: oil[{0,1,2}], paint" in result.stdout
+
+
+def test_matrices_of_usual_names_are_read_by_what_moves(proposed, tmp_path, own):
+    """A motor[*] of nobody in particular is not one of Betaflight, whose numbers nothing here speaks for."""
+    data = {"time": own.time[:, None], "position": own.position, "attitude": own.angles, "gyro": own.rate}
+    path = tmp_path / "log.mat"
+    scipy.io.savemat(path, data | {"motor": 1000 + own.speed, "films": np.zeros((5, 4, 3))})
+    result, text, config = proposed(path, "--mass", MASS, "--arm", ARM)
+    signals = config["import"]["signals"]
+    assert signals["position"]["columns"] == [f"position[{axis}]" for axis in range(3)]
+    assert signals["rotor_command"]["columns"] == [f"motor[{index}]" for index in range(4)]
+    assert "Betaflight" not in text
+    assert "contradicts itself" not in result.stderr
+    assert "arrays that are no columns of numbers are left out: films" in result.stderr
+
+
+def test_what_a_log_does_not_state_is_marked_a_guess_in_the_config(proposed, tmp_path, own):
+    commands = named(1000 + own.speed, *(f"motor[{index}]" for index in range(4)))
+    log = write_csv(tmp_path / "log.csv", flat_log(own, speed=commands))
+    _, text, _ = proposed(log, "--mass", MASS, "--arm", ARM)
+    assert "# A guess: called motor[*], up to" in text
+
+
+def test_an_arm_beside_places_that_a_log_states_is_asked_for(cpfls, refuse, tmp_path, own):
+    log = tmp_path / "log.ulg"
+    log.write_bytes(ulog_of_flight(own))
+    (line,) = refuse("init", log, "-o", tmp_path / "study.yaml", "--arm", "0.3")
+    assert "leave --arm out to take these, or add --scale-to-arm" in line
+    assert cpfls("init", log, "-o", tmp_path / "study.yaml", "--arm", "0.3", "--scale-to-arm").exit_code == 0
+
+
+def test_a_log_of_a_moment_says_how_short_it_is(refuse, tmp_path):
+    short = tmp_path / "log.ulg"
+    short.write_bytes(ulog_of_flight(flight(seconds=0.4)))
+    assert refuse("init", short, "-o", tmp_path / "study.yaml") == [
+        f"{short}: holds only 0.39 s; a flight to learn from has at least ten"
+    ]

@@ -132,7 +132,7 @@ def test_no_rows(wrong, write):
     assert wrong(log) == ["LOG: holds column names but no samples"]
 
 
-@pytest.mark.parametrize("content", [b"", b"hello", b"PAR1" + bytes(100) + b"PAR1"])
+@pytest.mark.parametrize("content", [b"hello", b"PAR1" + bytes(100) + b"PAR1"])
 def test_what_is_no_parquet(wrong, tmp_path, content):
     path = tmp_path / "log.parquet"
     path.write_bytes(content)

@@ -208,7 +208,7 @@ def test_a_slow_topic_is_named(wrong):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "LOG: not a ULog file: it does not start like one"),
+        (b"", "LOG: an empty file: nothing was logged, or the copy failed"),
         (b"t,roll\n0,1\n", "LOG: seems to hold CSV, unlike the ending of its name; rename it to end in .csv"),
         (header()[:10], "LOG: a broken ULog file: "),
         (header(), "LOG: a ULog file without samples: was the logger stopped at once, or the file cut off?"),

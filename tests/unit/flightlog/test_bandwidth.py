@@ -95,3 +95,14 @@ def test_a_coarse_signal_and_a_smooth_one_are_not_slow():
 
 def test_what_is_updated_a_hundred_times_a_second_is_fast_enough():
     assert slow({"rotor_command": WAVES[np.arange(2000) // 2 * 2]}, TIME / 10, 500.0) == []
+
+
+def test_what_has_stamps_of_its_own_is_as_fast_as_these_say_whatever_is_lost():
+    sent = TIME[::17][np.arange(len(TIME[::17])) % 5 > 0]
+    lossy = np.interp(TIME, sent, np.sin(sent))
+    (found,) = slow_signals(SignalTable(TIME, {"rotor_speed": lossy[:, None]}), {"rotor_speed": 2.4})
+    assert (found.name, found.rate_hz, found.between) == ("rotor_speed", 2.4, "interpolated")
+    assert slow_signals(SignalTable(TIME, {"rotor_speed": WAVES}), {"rotor_speed": 40.0}) == ()
+    # Values that come slower than their stamps are as slow as they come.
+    (slower,) = slow_signals(SignalTable(TIME, {"rotor_command": held(WAVES)}), {"rotor_command": 20.0})
+    assert slower.rate_hz == pytest.approx(10, rel=0.01)

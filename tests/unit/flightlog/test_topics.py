@@ -7,7 +7,7 @@ import pytest
 
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.settings import ColumnMap, ImportSettings, SignalMap
-from cpfls_cli.flightlog.topics import hold_previous, interpolate, on_one_clock, topic_and_field
+from cpfls_cli.flightlog.topics import hold_previous, interpolate, on_one_clock, stamped_rates, topic_and_field
 
 GYRO = 0.004 * np.arange(500)
 SLOW = 0.001 + 0.02 * np.arange(100)
@@ -232,3 +232,13 @@ def test_stamps_that_go_back_or_repeat_are_passed_over_and_nothing_gives_nothing
     values = np.array([0.0, 1.0, 9.0, 9.0, 2.0])
     np.testing.assert_allclose(between(time, values, np.array([0.1, 0.2]), 1.0), [1.0, 2.0])
     assert np.isnan(between(time, np.full(5, np.nan), time, 1.0)).all()
+
+
+def test_how_often_a_signal_was_logged_is_counted_by_the_stamps_of_its_topic():
+    kept = np.array([0.0, 0.3, 0.6, 1.2, 1.5, 1.8, 2.4, 3.0])
+    topics = {"gyro": gyro(), "battery": {"timestamp": kept, "v": kept}}
+    settings = ImportSettings(
+        time_column=None, torque_source=None, signals=signals(body_rate=RATE, voltage=["battery.v"])
+    )
+    assert stamped_rates(topics, settings) == pytest.approx({"body_rate": 250, "voltage": 7 / 3})
+    assert stamped_rates({"": {"gyro.x": GYRO}}, settings) == {}

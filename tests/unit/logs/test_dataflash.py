@@ -98,7 +98,7 @@ def test_bytes_that_are_lost_or_strange_are_warned_of_and_cost_the_message_befor
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "not a DataFlash log: it does not start like one (encrypted, or of another kind?)"),
+        (b"", "an empty file: nothing was logged, or the copy failed"),
         (bytes(range(256)), "not a DataFlash log: it does not start like one (encrypted, or of another kind?)"),
         (b"t,roll\n0,1\n", "seems to hold CSV, unlike the ending of its name; rename it to end in .csv"),
         (log()[:60], "holds no messages with time stamps (TimeUS)"),

@@ -1,0 +1,92 @@
+"""What a log says it flies: what no rotors carry is refused with what it is, a VTOL is used where it hovers."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.vehicle_kind import forward_flight, other_vehicle, refuse_other_vehicle
+
+SURFACES = {"SERVO1_FUNCTION": 4.0, "SERVO2_FUNCTION": 19.0, "SERVO3_FUNCTION": 70.0, "SERVO4_FUNCTION": 21.0}
+MOTORS = {f"SERVO{output}_FUNCTION": 32.0 + output for output in range(1, 5)}
+
+
+def status(**fields):
+    values = {name: np.asarray(own, dtype=float) for name, own in fields.items()}
+    return {"vehicle_status": {"timestamp": np.arange(len(next(iter(values.values()))), dtype=float), **values}}
+
+
+@pytest.mark.parametrize(
+    ("system", "parameters", "topics", "what"),
+    [
+        ("ArduPlane 4.3.7", {"Q_ENABLE": 0.0}, {}, "an airplane"),
+        ("ArduPlane 3.1.2beta1", {}, {}, "an airplane"),
+        ("ArduRover 2.46beta2", {"FRAME_CLASS": 1.0}, {}, "a ground vehicle or a boat"),
+        ("ArduSub 4.1", {"FRAME_CLASS": 1.0}, {}, "a submarine"),
+        ("ArduCopter 4.5", {"FRAME_CLASS": 6.0}, {}, "a helicopter"),
+        ("ArduCopter 3.2", {"H_COL_MIN": 1250.0}, {}, "a helicopter"),
+        ("", SURFACES, {}, "an airplane"),
+        ("", {"RC1_FUNCTION": 77.0, "RC2_FUNCTION": 78.0}, {}, "an airplane"),
+        ("", {"SERVO1_FUNCTION": 26.0, "SERVO3_FUNCTION": 73.0}, {}, "a ground vehicle"),
+        ("PX4 1.13.0", {"MAV_TYPE": 1.0}, {}, "an airplane"),
+        ("PX4 1.15.0", {"MAV_TYPE": 2.0, "CA_AIRFRAME": 6.0}, {}, "a ground vehicle"),
+        ("PX4 1.10.0", {"SYS_AUTOSTART": 2106.0}, {}, "an airplane"),
+        ("PX4 1.10.0", {"SYS_AUTOSTART": 16001.0}, {}, "a helicopter"),
+        ("PX4 1.10.0", {"SYS_AUTOSTART": 50003.0}, {}, "a ground vehicle"),
+        ("PX4 1.12.0", {}, status(vehicle_type=[2, 2]), "an airplane"),
+        ("PX4 1.9.0", {}, status(is_rotary_wing=[0, 0], is_vtol=[0, 0]), "something without rotors that carry it"),
+        ("Rotorflight 4.3.0", {}, {}, "a helicopter"),
+        ("INAV 7.1.0", {"platform_type": "AIRPLANE"}, {}, "an airplane"),
+        ("INAV 7.1.0", {}, {"": {"fwAltP": np.zeros(2), "motor[0]": np.zeros(2)}}, "an airplane"),
+        ("Betaflight 4.4.0", {"mixer": 14.0}, {}, "an airplane"),
+        (
+            "Betaflight 4.4.0",
+            {},
+            {"": {"gyroADC[0]": np.zeros(2), "motor[0]": np.zeros(2), "servo[3]": np.zeros(2)}},
+            "an airplane or its like",
+        ),
+    ],
+)
+def test_what_no_rotors_carry_is_refused_with_what_it_is(system, parameters, topics, what):
+    found = other_vehicle(topics, parameters, system)
+    assert found is not None
+    assert (found.what, found.hovers) == (what, False)
+    with pytest.raises(InputError, match=f"a log of {what} "):
+        refuse_other_vehicle(topics, parameters, system)
+
+
+@pytest.mark.parametrize(
+    ("system", "parameters", "topics"),
+    [
+        ("ArduCopter 4.5", {"FRAME_CLASS": 1.0, **MOTORS, "SERVO9_FUNCTION": 7.0}, {}),
+        ("ArduCopter 3.3", {"FRAME": 1.0, "RC7_FUNCTION": 10.0}, {}),
+        ("PX4 1.15.0", {"MAV_TYPE": 13.0, "SYS_AUTOSTART": 6001.0, "CA_AIRFRAME": 0.0}, status(vehicle_type=[1, 1])),
+        ("Betaflight 4.4.0", {}, {"": {"gyroADC[0]": np.zeros(2), **{f"motor[{n}]": np.zeros(2) for n in range(4)}}}),
+        ("", {}, {}),
+    ],
+)
+def test_a_multirotor_is_none_of_them(system, parameters, topics):
+    assert other_vehicle(topics, parameters, system) is None
+
+
+@pytest.mark.parametrize(
+    ("system", "parameters", "topics"),
+    [
+        ("ArduPlane 4.3.7", {"Q_ENABLE": 1.0, **SURFACES}, {}),
+        ("PX4 1.14.0", {"MAV_TYPE": 22.0}, {}),
+        ("PX4 1.14.0", {"SYS_AUTOSTART": 13000.0}, {}),
+        ("PX4 1.14.0", {}, status(is_vtol=[1, 1], vehicle_type=[1, 2])),
+    ],
+)
+def test_a_vtol_hovers(system, parameters, topics):
+    found = refuse_other_vehicle(topics, parameters, system)
+    assert found is not None
+    assert found.hovers
+
+
+def test_forward_flight_is_told_by_states_and_modes():
+    grid = np.array([0.5, 1.5, 2.5])
+    by_type = forward_flight(status(vehicle_type=[1, 2, 1]), grid)
+    assert by_type.tolist() == [False, True, False]
+    by_mode = forward_flight({"MODE": {"timestamp": np.arange(3.0), "Mode": np.array([18.0, 5.0, 19.0])}}, grid)
+    assert by_mode.tolist() == [False, True, False]
+    assert forward_flight({}, grid) is None
