@@ -244,7 +244,7 @@ MEANINGS: Final = (
         f" {RATE_WORDS}",
     ),
     # Of a matrix, whose columns have no axes in their names.
-    Meaning("position", "pos position p xyz", "numbers", 3, 1, "rotor motor imu angular home global"),
+    Meaning("position", "pos position xyz", "numbers", 3, 1, "rotor motor imu angular home global axis nav"),
     Meaning("velocity", "vel velocity v linear twist", "xyz numbers", 3, 2, "angular acc acceleration a"),
     Meaning("acceleration", "acc accel accelerometer acceleration a sf f", "xyz numbers", 3, 2, "angular ang"),
     Meaning("body_rate", RATE_WORDS, "xyz angles numbers", 3),
