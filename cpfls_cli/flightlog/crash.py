@@ -34,6 +34,9 @@ _LAST_S, _FEWEST_S, _AT_ONCE_S = 10.0, 5.0, 2.0
 """Before the end of a stretch, where a crash is looked for; flight before that, which tells what it does in flight; and
 the time from its last wild motion to the end, in which no pilot has recovered."""
 
+_THEN_S, _LIES_S = 1.0, 3.0
+"""After the end of a stretch, where its crash may go on, and until when a vehicle that crashed lies."""
+
 _BEYOND, _WILD_RAD_S, _WILD_RAD_S2, _HARD = 1.5, 5.0, 100.0, 3.0
 """Times the largest of the flight before, and sizes at least, the last in gravity, that no rotor makes."""
 
@@ -149,7 +152,14 @@ def smoothed(marked: BoolArray, period: float, shortest_s: float) -> BoolArray:
     return np.asarray(binary_opening(binary_closing(around, window), window)[width:-width], dtype=np.bool_)
 
 
-def resting(signs: Signs, active: BoolArray) -> BoolArray:
+class Resting(NamedTuple):
+    """Where something else than its rotors carries a vehicle that may fly, and where it lies on its side or back."""
+
+    carried: BoolArray
+    lies: BoolArray
+
+
+def resting(signs: Signs, active: BoolArray) -> Resting:
     """Mark where a vehicle whose rotors turn is carried by something else than them.
 
     Rotors push along one axis of the body: where the accelerometer feels the weight along another one while the vehicle
@@ -158,14 +168,16 @@ def resting(signs: Signs, active: BoolArray) -> BoolArray:
     """
     nowhere = np.zeros(len(active), dtype=bool)
     if signs.slow is None or not active.any():
-        return nowhere
+        return Resting(nowhere, nowhere)
     lively = active & (signs.slow > _LIVELY_RAD_S)
     flies = lively if lively.sum() * signs.period > _FEWEST_S else active
     calm = averaged(signs.slow, signs.period, _REST_S) < _CALM_RAD_S
-    rests = active & calm & (_off_its_feet(signs, flies) | _stuck(signs, flies))
+    lies = calm & _off_its_feet(signs, flies)
+    rests = active & calm & (lies | _stuck(signs, flies))
     window = np.ones(max(1, round(_REST_S / signs.period)), dtype=bool)
     # A mean over a time says as much of all of it.
-    return np.asarray(binary_dilation(binary_opening(rests, window[: len(window) // 2 + 1]), window), dtype=bool)
+    carried = binary_dilation(binary_opening(rests, window[: len(window) // 2 + 1]), window)
+    return Resting(np.asarray(carried, dtype=bool), np.asarray(lies, dtype=bool))
 
 
 def _off_its_feet(signs: Signs, flies: BoolArray) -> BoolArray:
@@ -195,16 +207,17 @@ def _stuck(signs: Signs, flies: BoolArray) -> BoolArray:
     return np.asarray((asked > max(_STUCK, _STUCK_TIMES * float(np.median(asked[flies])))) & hardly)
 
 
-def ended_early(signs: Signs, rests: BoolArray, part: tuple[int, int]) -> EarlyEnd | None:
+def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> EarlyEnd | None:
     """Say what ended a stretch of flight before its time; None where it landed, or the log ends in flight.
 
     A crash is a motion beyond all that the flight before held, from which it does not recover: right after it the
     vehicle rests, its rotors stop, or the log ends.
     """
     first, after = part
-    rests_then = bool(rests[after : after + 1].any())
+    rests_then = bool(rests.carried[after : after + 1].any())
+    lies_then = rests_then or bool(rests.lies[after : after + round(_LIES_S / signs.period)].any())
     time = signs.time
-    wild, hard = _beyond_flight(signs, part, rests_then=rests_then)
+    wild, hard = _beyond_flight(signs, part, lies_then=lies_then)
     troubled = first + np.flatnonzero(wild)
     lost = len(troubled) > 0 and (after - troubled[-1]) * signs.period < _AT_ONCE_S
     # Who ends the log in a flip has lost nothing.
@@ -214,7 +227,7 @@ def ended_early(signs: Signs, rests: BoolArray, part: tuple[int, int]) -> EarlyE
         hits = first + np.flatnonzero(hard)
         hits = hits[np.abs(hits - begin) * signs.period < _AT_ONCE_S / 2]
         begin = min(begin, int(hits[0])) if len(hits) else begin
-        return EarlyEnd(begin, f"{'impact' if len(hits) else 'loss of control'} at {time[begin]:.1f} s")
+        return EarlyEnd(min(begin, after), f"{'impact' if len(hits) else 'loss of control'} at {time[begin]:.1f} s")
     if rests_then:
         return EarlyEnd(after, f"from {time[after]:.1f} s on it rests on something, with its rotors on")
     if _stops_in_the_air(signs, after):
@@ -222,19 +235,21 @@ def ended_early(signs: Signs, rests: BoolArray, part: tuple[int, int]) -> EarlyE
     return None
 
 
-def _beyond_flight(signs: Signs, part: tuple[int, int], *, rests_then: bool) -> tuple[BoolArray, BoolArray]:
+def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> tuple[BoolArray, BoolArray]:
     """Mark, from the first sample of a stretch on, motion and force near its end that the flight before never had."""
     first, after = part
-    count = after - first
-    last = min(round(_LAST_S / signs.period), count // 2)
-    before, late = slice(first, after - last), np.arange(count) >= count - last
-    nothing = np.zeros(count, dtype=bool)
-    if signs.turning is None or (count - last) * signs.period < _FEWEST_S:
+    last = min(round(_LAST_S / signs.period), (after - first) // 2)
+    before = slice(first, after - last)
+    # Rotors may drop at the impact.
+    stop = min(len(signs.time), after + round(_THEN_S / signs.period))
+    late = np.arange(first, stop) >= before.stop
+    nothing = np.zeros(stop - first, dtype=bool)
+    if signs.turning is None or (before.stop - first) * signs.period < _FEWEST_S:
         return nothing, nothing
 
     def beyond(values: Array, least: float) -> BoolArray:
         most = float(np.max(values[before]))
-        return np.asarray(late & (values[first:after] > max(_BEYOND * most, least)), dtype=bool)
+        return np.asarray(late & (values[first:stop] > max(_BEYOND * most, least)), dtype=bool)
 
     assert signs.body_rate is not None, "it turns"
     spins = np.linalg.norm(np.gradient(signs.body_rate, signs.period, axis=0), axis=1)
@@ -242,10 +257,10 @@ def _beyond_flight(signs: Signs, part: tuple[int, int], *, rests_then: bool) -> 
     if signs.upright is not None:
         up = _turned_up(signs.upright, np.arange(len(signs.time)) < before.stop)
         # What never was upside down, and is.
-        wild |= late & (up[first:after] < 0) & bool((up[before] > 0).all())
+        wild |= late & (up[first:stop] < 0) & bool((up[before] > 0).all())
     hard = nothing if signs.felt is None else beyond(np.linalg.norm(signs.felt, axis=1), _HARD)
     # A touchdown jolts too; but then the vehicle stands on its feet.
-    return (wild | hard | beyond(spins, _WILD_RAD_S2) if rests_then else wild), hard
+    return (wild | hard | beyond(spins, _WILD_RAD_S2) if lies_then else wild), hard
 
 
 def _ignores_rotors(signs: Signs, part: tuple[int, int], troubled: int) -> bool:

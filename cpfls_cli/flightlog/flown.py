@@ -8,7 +8,17 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.errors import SettingError
 from cpfls_cli.flightlog.clock import increasing_rows
-from cpfls_cli.flightlog.crash import ALIVE, SLOW_S, Signs, averaged, ended_early, resting, smoothed, upright_of
+from cpfls_cli.flightlog.crash import (
+    ALIVE,
+    SLOW_S,
+    Resting,
+    Signs,
+    averaged,
+    ended_early,
+    resting,
+    smoothed,
+    upright_of,
+)
 from cpfls_cli.flightlog.names import BY_HAND
 from cpfls_cli.flightlog.repair import SignalTable, fill
 from cpfls_cli.flightlog.settings import ROTORS, ImportSettings
@@ -161,7 +171,7 @@ def find_flown(signs: Signs) -> FlownPart:
     if active is None:
         return FlownPart(None, (told,), flies=False)
     rests = resting(signs, active)
-    active = smoothed(active & ~rests, signs.period, _SHORT_S)
+    active = smoothed(active & ~rests.carried, signs.period, _SHORT_S)
     if not active.any():
         return FlownPart(None, (f"no flight in it: {told} throughout",), flies=False)
     if _still(signs, active):
@@ -259,7 +269,7 @@ def _still(signs: Signs, active: BoolArray) -> bool:
     return not moves and (shakes or (turning < _SOFT_RAD_S and height is not None))
 
 
-def _longest(signs: Signs, active: BoolArray, rests: BoolArray, told: str) -> FlownPart:
+def _longest(signs: Signs, active: BoolArray, rests: Resting, told: str) -> FlownPart:
     time, stretches = signs.time, runs(active)
     ends = [ended_early(signs, rests, part) for part in stretches]
     cut = [

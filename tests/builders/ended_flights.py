@@ -61,6 +61,12 @@ def hits(own):
     return then(rolls, 8.0, felt=UPSIDE_DOWN, rotors=ONE_AT_FULL, roll=np.pi)
 
 
+def hits_with_rotors_that_drop(own):
+    """Hit the ground with rotors that drop at once, turn over, and lie on the back, disarmed."""
+    struck = then(own, 0.06, rate=-16.0, felt=(30.0, -20.0, 40.0), rotors=0.2)
+    return then(then(struck, 0.3, rate=-9.0, rotors=0.2), 8.0, felt=UPSIDE_DOWN, roll=np.pi)
+
+
 def tumbles(own):
     """Lose control and tumble until the log ends."""
     return then(own, 2.5, rate=17.0, felt=(0.0, 0.0, 1.0), rotors=ONE_AT_FULL, falls=7.0)

@@ -8,6 +8,8 @@ import pytest
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.init import _findings as of_proposal
+from cpfls_cli.commands.init import _parted as parted
+from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.consistency.rotors import meant_unit
 from tests.builders.closed_loop_flights import COARSE, VEHICLE, flown, signals_of
 from tests.builders.command_line import run, undrawn
@@ -162,3 +164,15 @@ def test_the_unit_that_carries_the_vehicle_is_told_where_the_declared_one_does_n
     assert meant_unit(vehicle, 1e-4 * flight.rotor_speed, flight.attitude, declared) is None
     if meant in ("rad/s", "Hz"):
         assert meant_unit(vehicle, factor * flight.rotor_speed, 0.001 * flight.attitude, declared) is None
+
+
+def test_what_contradicts_a_guess_of_init_accuses_the_guess_and_not_the_log():
+    ours = Finding("judged by the motion, the rotors are", "check vehicle.rotors and import.body_frame", ("rotors",))
+    theirs = Finding("the velocity is in km/h", "check import.signals.velocity", ("velocity",))
+    guessed = ("vehicle.rotors", "import.body_frame", "import.signals.rotor_command")
+    wrong, doubted = parted([ours, theirs], guessed)
+    assert wrong == [theirs.sentence]
+    assert doubted == [
+        f"vehicle.rotors and import.body_frame are guesses, and one of them is likely wrong: {ours.sentence}"
+    ]
+    assert parted([ours, theirs], ()) == ([ours.sentence, theirs.sentence], [])

@@ -34,6 +34,7 @@ def flown(log, known=ALL):
     ("ends", "without_force", "with_force"),
     [
         (ended.hits, "loss of control at ", "impact at "),
+        (ended.hits_with_rotors_that_drop, "loss of control at ", "impact at "),
         (ended.tumbles, "loss of control at ", "loss of control at "),
         (ended.held, "it rests on something, with its rotors on", "it rests on something, with its rotors on"),
     ],
