@@ -98,13 +98,12 @@ _COUNTS_OF_FORMS: Final = (8, 6, 4)
 
 # First and last SYS_AUTOSTART of PX4 that is a frame of one kind.
 _AIRFRAMES: Final = (
-    (4000, 4999, "quad X"),
+    (4000, 4899, "quad X"),
     (5000, 5999, "quad plus"),
     (6000, 6999, "hexa X"),
     (7000, 7999, "hexa plus"),
     (8000, 8999, "octa X"),
     (9000, 9999, "octa plus"),
-    (10000, 10999, "quad X"),
     (11000, 11999, "hexa coaxial"),
     (12000, 12999, "octa quad X"),
     (24000, 24999, "dodeca hexa X"),

@@ -171,6 +171,12 @@ def propose(
         If the logs are of two vehicles, or no mapping suits them all; or if the rotors that are stated cannot turn a
         vehicle, or have another arm than the one that is given.
     """
+    winged = next((one for one in logs if one.recognition.winged), None)
+    if winged is not None and len(logs) > 1:
+        # One crop suits no two logs, and what flies in a log is told by its rotors alone.
+        raise InputError(
+            f"{winged.name}: flies on the wing for a part, which is cut in seconds: run cpfls init for it alone"
+        )
     for other in logs[1:]:
         _require_same_vehicle(logs[0], other)
     signals, slowest = _without_slow_voltage(logs, _merged_signals(logs))

@@ -90,6 +90,8 @@ class Recognition:
         Sentences on columns that look like a signal and are not mapped.
     unused : tuple of str
         All columns that are mapped to nothing, stamps left out.
+    winged : bool
+        Whether it is of a VTOL and flies on the wing for a part, which is cut.
     rate_hz : float
         Of the clock.
     slowest_s, slowest_but_voltage_s : float
@@ -119,6 +121,7 @@ class Recognition:
     load: Load | None = None
     warnings: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
+    winged: bool = False
 
     def signal(self, name: SignalName) -> Guess | None:
         """Give the guess for a signal; None where it is not recognised."""

@@ -116,7 +116,8 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     flown = find_flown(_signs(log, candidates, shares)).within(ended, float(log.grid[-1] - log.grid[0]))
     if not flown.flies:
         raise InputError(flown.reasons[0])
-    flown = flown if kind is None else _hover_of(log, kind, flown)
+    carried = flown if kind is None else _hover_of(log, kind, flown)
+    winged, flown = carried.span_s != flown.span_s, carried
     seen = Seen(log, candidates, _part(log, flown), None if shares is None else shares.mean(axis=1))
     seen.warnings += [] if kind is None else [flown.reasons[-1]]
     seen.warnings += [] if log.time_doubt is None else [log.time_doubt]
@@ -138,7 +139,8 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     tell_setpoints(seen, parameters, system)
     _list_unused(seen)
     driving = rotors.speed or rotors.command
-    return _gathered(seen, flown, speeds, moved, "" if driving is None else driving.kind)
+    found = _gathered(seen, flown, speeds, moved, "" if driving is None else driving.kind)
+    return replace(found, winged=winged)
 
 
 def _live_part(

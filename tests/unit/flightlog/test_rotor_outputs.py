@@ -219,6 +219,9 @@ def test_a_vtol_is_used_where_it_hovers(own):
     flown = recognise(topics, {}, X, "ArduCopter 4.5").flown
     assert flown.span_s == pytest.approx((5.5, 15.0), abs=0.6)
     assert "its hover from" in flown.reasons[-1]
+    known = known_log("log", topics, {}, X, "ArduCopter 4.5")
+    with pytest.raises(InputError, match="flies on the wing for a part"):
+        propose([known, known], None, None)
     forward = SimpleNamespace(**status | {"vehicle_type": np.full(3, 2.0)})
     with pytest.raises(InputError, match=r"a VTOL .*which is a multirotor in hover alone, and it hovers for 0 s"):
         recognise(topics | {"vehicle_status": vars(forward)}, {}, X, "ArduCopter 4.5")
