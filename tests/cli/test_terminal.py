@@ -172,8 +172,16 @@ def test_notes_leave_the_answer_on_the_screen(told):
 @pytest.mark.parametrize(
     ("options", "shown"),
     [
-        ({}, ["gap:  40%  half of it", "gap:  80%  most of it"]),
-        ({"verbose": True}, ["gap:  20%  ", "gap:  40%  half of it", "gap:  80%  most of it", "gap: 100%  "]),
+        ({}, ["gap:  40%  92 s left  half of it", "gap:  80%  31 s left  most of it"]),
+        (
+            {"verbose": True},
+            [
+                "gap:  20%  8 s left  ",
+                "gap:  40%  92 s left  half of it",
+                "gap:  80%  31 s left  most of it",
+                "gap: 100%  ",
+            ],
+        ),
         ({"quiet": True}, []),
     ],
 )
