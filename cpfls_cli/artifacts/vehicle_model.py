@@ -308,6 +308,9 @@ class VehicleRecord(ModelRecord):
     rotors_told: float | None = dataset(
         "how often the logs tell the rotors, the slowest of them", units="Hz", default=None
     )
+    logged_by: tuple[str, ...] | None = dataset(
+        "what wrote the logs, each once; none where they do not say", "system", default=None
+    )
     difference: DifferencesGroup | None = group(default=None)
     contradiction: tuple[str, ...] | None = dataset(
         "contradictions within the flights or with the vehicle", "contradiction", default=None
@@ -329,6 +332,7 @@ class VehicleRecord(ModelRecord):
         *,
         fading_s: float | None = None,
         rotors_told: float | None = None,
+        logged_by: Sequence[str] = (),
         commanded: bool,
         shares: bool = False,
     ) -> Self:
@@ -359,6 +363,7 @@ class VehicleRecord(ModelRecord):
             guess=found.guessed or None,
             full_speed=found.model.vehicle.rotor_speed_max_rad_s if shares else None,
             rotors_told=rotors_told,
+            logged_by=tuple(logged_by) or None,
             difference=columns_of(DifferencesGroup, found.differences) if found.differences else None,
             contradiction=None if contradictions is None else tuple(contradictions),
             disturbance=None if found.gusts is None else DisturbanceGroup.of(found.gusts),

@@ -144,6 +144,14 @@ TimeLimitOption = Annotated[
         help="Stop the search after TIME (90, 90s, 10m, 2h) and write the best so far; --resume goes on.",
     ),
 ]
+AnywayOption = Annotated[
+    bool,
+    typer.Option(
+        "--anyway",
+        help="Search in logs that contradict themselves, or are too slow to tell what is sought, too; nothing found "
+        "there is to be used.",
+    ),
+]
 ResumeSweepOption = Annotated[
     bool,
     typer.Option("--resume", help="Go on with a sweep that was stopped, from OUTPUT.partial and OUTPUT.checkpoint."),
@@ -438,10 +446,14 @@ def vehicle(
     held_out: HeldOutOption = None,
     resume: ResumeOption = False,
     write_config: WriteConfigOption = None,
+    anyway: AnywayOption = False,
     *,
     common: Common,
 ) -> None:
     """Find a whole vehicle in flights with rotor speeds: rotors, inertia and effects, fitted on what they predict."""
+    if anyway:
+        # The artifact holds it with its config.
+        common = replace(common, overrides=[*(common.overrides or []), "playback.anyway=true"])
 
     def call(command: Any, job: Job) -> Any:
         copy = None if write_config is None else command.ConfigCopy(config.name, common.data(config), write_config)

@@ -30,6 +30,7 @@ from cpfls_cli.logs.formats import log_contents, read_log
 from cpfls_cli.pages.gains import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import trust_words
+from cpfls_cli.pages.vehicle_model import slow_words
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.numbers import number, percent
@@ -223,6 +224,9 @@ def _missing(job: Job, record: VehicleRecord) -> str:
     if record.verdict is Trust.NOT_JUDGED and not judged:
         return "The flight that is missing: one that is kept aside to judge it, `cpfls vehicle` with --held-out FLIGHT"
     planned = " ".join(map(str, to_fly(job)))
+    slow = next(slow_words(record), "")
+    if slow:
+        return f"{slow} Then: {planned}, flown in still air, and `cpfls vehicle` again"
     return f"The flight that is missing: {planned}, flown in still air, then `cpfls vehicle` again"
 
 

@@ -22,6 +22,7 @@ from cpfls_cli.pages.vehicle_model import (
     found_vehicle_blocks,
     grounds,
     remainder_curves,
+    slow_words,
     title,
     warnings,
 )
@@ -183,8 +184,12 @@ def test_logs_too_slow_for_what_is_flown_are_to_be_faster_before_another_flight(
     record = replace(record, found=replace(record.found, determined=np.zeros(2, dtype=bool)))
     assert record.verdict == Trust.NOT_DETERMINED
     (said,) = [line for line in cautions(replace(record, rotors_told=9.9)) if "rotors" in line]
-    assert said.startswith("The logs tell the rotors 9.9 times a second, and nothing of motion above 5.0 Hz; another ")
-    assert "logged 50 times a second or faster: LOG_BITMASK of ArduPilot" in said
+    assert said.startswith("The rotors are logged 9.9 times a second, which shows no motion above 5.0 Hz. Log rotors ")
+    assert "at 50 Hz or more first: PX4: SDLOG_PROFILE = 17" in said
+    assert "ArduPilot: LOG_BITMASK = 438271" in said
+    (own,) = slow_words(replace(record, rotors_told=9.9, logged_by=("Betaflight 4.5.1",)))
+    assert "first: Betaflight: blackbox_sample_rate = 1/4 and" in own
+    assert "PX4" not in own
     assert not any("logged" in line for line in cautions(replace(record, rotors_told=49.9)))
 
 
