@@ -152,6 +152,14 @@ AnywayOption = Annotated[
         "there is to be used.",
     ),
 ]
+ExportAnywayOption = Annotated[
+    bool,
+    typer.Option(
+        "--anyway",
+        help="Also where numbers of the model are impossible, its search was stopped or its verdict is do-not-use; the "
+        "file says so first.",
+    ),
+]
 ResumeSweepOption = Annotated[
     bool,
     typer.Option("--resume", help="Go on with a sweep that was stopped, from OUTPUT.partial and OUTPUT.checkpoint."),
@@ -709,12 +717,17 @@ def export(
             help="Prefix of the names in C, name in JSON and XML; default: from the name of FILE.",
         ),
     ] = None,
+    anyway: ExportAnywayOption = False,
     *,
     common: Common,
 ) -> None:
     """Write a model as code or for a simulator; flights, replays, gaps and others for Foxglove or PlotJuggler."""
     chosen = form and form.value
-    _run_without_config("export", output, common, lambda command, job: command.run(job, model, chosen, name))
+
+    def call(command: Any, job: Job) -> Any:
+        return command.run(job, model, chosen, name, anyway=anyway)
+
+    _run_without_config("export", output, common, call)
 
 
 @_command()
@@ -723,11 +736,16 @@ def spread(
     output: OutputOption,
     count: Annotated[int, typer.Option("-n", "--count", metavar="N", min=2, help="Vehicles to draw.")] = 1000,
     seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Of the draws.")] = 1,
+    anyway: ExportAnywayOption = False,
     *,
     common: Common,
 ) -> None:
     """Draw vehicles from what the flights of one tell, for simulators that fly many: .yaml, .json or .npz."""
-    _run_without_config("spread", output, common, lambda command, job: command.run(job, model, count, seed))
+
+    def call(command: Any, job: Job) -> Any:
+        return command.run(job, model, count, seed, anyway=anyway)
+
+    _run_without_config("spread", output, common, call)
 
 
 @_command("verify-export")

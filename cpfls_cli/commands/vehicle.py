@@ -101,7 +101,7 @@ def run(
             _responses(vehicle, training),
             fading_s=fading_s,
             rotors_told=min(flight.told_hz for flight in training),
-            logged_by=dict.fromkeys(flight.system for flight in training if flight.system),
+            logged_by=tuple(dict.fromkeys(flight.system for flight in training if flight.system)),
             commanded=commanded,
             shares=any(flight.shares for flight in training),
         )
