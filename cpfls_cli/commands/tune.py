@@ -22,7 +22,7 @@ from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.commands.numbers import to_fly, with_numbers
 from cpfls_cli.config.study import Study
-from cpfls_cli.errors import InputError, install_command
+from cpfls_cli.errors import InputError
 from cpfls_cli.export.parameter_files import parameter_file
 from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.models import read_model
@@ -57,7 +57,6 @@ def run(
     """Find gains and write them, and a file of parameters beside."""
     asked = AskedMargins() if asked is None else asked
     own = AUTOPILOTS[autopilot]
-    _require_control()
     roles = numbered_roles("flight", flights)
     inputs = begin(job, {"model": model} | roles)
     record = _trusted(job, model)
@@ -193,13 +192,6 @@ def _steps(autopilot: Autopilot, values: Mapping[str, float], today: Mapping[str
             f"{number(autopilot.law(values).rate_hz, 4)} steps of the law in a second are assumed; a log of your "
             "vehicle tells them (--flight)"
         )
-
-
-def _require_control() -> None:
-    from importlib.util import find_spec
-
-    if find_spec("control") is None:
-        raise InputError(f"margins need the package control: {install_command('tune')}")
 
 
 def _trusted(job: Job, model: Path) -> VehicleRecord:
