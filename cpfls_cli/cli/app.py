@@ -18,6 +18,7 @@ from cpfls_cli.cli.options import (
     ConfigArgument,
     OutputOption,
     SeveralAfterOption,
+    moments,
     seconds,
     sheet,
     with_common,
@@ -375,11 +376,37 @@ def init(
         float | None,
         typer.Option("--arm", metavar="M", min=1e-6, help="Middle to a rotor's axis, m."),
     ] = None,
+    inertia: Annotated[
+        Any,  # Of a tuple typer takes three words.
+        typer.Option(
+            "--inertia",
+            metavar="IXX,IYY,IZZ",
+            parser=moments,
+            help="Moments of inertia where they are known, from CAD, a swing test or an earlier study, kg m^2.",
+        ),
+    ] = None,
+    thrust_factor: Annotated[
+        float | None,
+        typer.Option(
+            "--thrust-factor",
+            metavar="N_S2",
+            min=1e-12,
+            help="Thrust of a rotor over its squared speed in rad/s, N s^2, where a data sheet tells it.",
+        ),
+    ] = None,
+    drag_factor: Annotated[
+        float | None,
+        typer.Option("--drag-factor", metavar="N_M_S2", min=1e-15, help="Torque of its drag over the same, N m s^2."),
+    ] = None,
     *,
     common: Common,
 ) -> None:
     """Look into logs of one vehicle and write a config for them, with the reason of every guess."""
-    _run_without_config("init", output, common, lambda command, job: command.run(job, logs, command.Stated(mass, arm)))
+
+    def call(command: Any, job: Job) -> Any:
+        return command.run(job, logs, command.Stated(mass, arm, inertia, thrust_factor, drag_factor))
+
+    _run_without_config("init", output, common, call)
 
 
 @_command("import")
@@ -625,9 +652,10 @@ def changed(
     since: Annotated[
         list[Path],
         typer.Option(
+            "--reference",
             "--since",
-            metavar="REFERENCE...",
-            help="Flights or logs of the same vehicle from before; several after one another, three or more.",
+            metavar="FLIGHT...",
+            help="Flights or logs of the same vehicle from before, three or more, one after another.",
             show_default=False,
         ),
     ],

@@ -58,7 +58,7 @@ LINES = (
     "trajectory study.yaml -o 3.h5 --hover 4 --repeat 2 --excite roll --signal multisine --band 0.5,4 --size 5",
     "simulate study.yaml path.h5 -o 4.h5 --mode closed-loop --effect com_offset=0.01,0 --gusts --model vehicle.h5",
     "simulate study.yaml 3.h5 -o 16.h5 --autopilot px4",
-    "init rotors.csv -o 5.yaml --mass 6 --arm 0.3",
+    "init rotors.csv -o 5.yaml --mass 6 --arm 0.3 --inertia 0.6,0.6,1.2 --thrust-factor 1e-4 --drag-factor 2e-6",
     "import study.yaml log.csv -o 6.h5",
     "reduce study.yaml flight.h5 -o selection.h5",
     f"identify study.yaml flight.h5 -o model.h5 --selection selection.h5 {LEARN} --time-limit 0.001",
