@@ -19,7 +19,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.effects import effect_title, unit_words
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.trust import model_words, trust_facts
+from cpfls_cli.pages.trust import model_words, stopped_words, trust_facts
 from cpfls_cli.report.content import Block, Box, Facts, Heading, Table, impossible, in_short
 from cpfls_cli.report.numbers import number, plain, whole_percent
 from cpfls_cli.words import joined
@@ -70,7 +70,9 @@ def trust_box(model: Source[Any]) -> Box:
     """Say how far to trust a model, and why."""
     record = model.record
     kind, words = _kind_of(record), model_words(record)
-    return Box(words.short.upper(), f"{model.label}: {kind.title(record)}", list(kind.grounds(record)), words.tone)
+    stopped = stopped_words(record)
+    title = f"{model.label}: {f'{stopped}; ' if stopped else ''}{kind.title(record)}"
+    return Box(words.short.upper(), title, list(kind.grounds(record)), words.tone)
 
 
 def cautions_of(record: ModelRecord, path: object) -> tuple[str, ...]:
@@ -83,8 +85,7 @@ def cautions_of(record: ModelRecord, path: object) -> tuple[str, ...]:
     """
     said = [] if record.header is None else list(record.header.cautions)
     if record.stopped:
-        again = f"`cpfls {record.FORMAT.made_by} --resume` goes on"
-        said.append(f"{path}: is incomplete: its search was stopped; {again}")
+        said.append(f"{path}: is incomplete: its search was {stopped_words(record)}")
     return (*said, *(f"{path}: {each}" for each in against(record)))
 
 

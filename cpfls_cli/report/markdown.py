@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from cpfls_cli.errors import visible
 from cpfls_cli.report.content import (
     STRUCK,
     Block,
@@ -75,7 +76,7 @@ def _marked(text: str, tone: Tone) -> str:
 
 def _plain(text: str) -> str:
     """Write text so that nothing in it is markup."""
-    line = " ".join(text.split()).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    line = " ".join(visible(text).split()).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
     parts = [_SPECIAL.sub(r"\\\1", part) for part in STRUCK.split(line)]
     # Every second one is struck through.
     line = "".join(f"~~{part}~~" if place % 2 else part for place, part in enumerate(parts))
