@@ -74,7 +74,10 @@ def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
     named = [(guess.signal, guess.rivals) for guess in proposal.signals]
     for name, rivals in [*named, *((choice.key, choice.rivals) for choice in proposal.choices)]:
         for rival in rivals:
-            yield Text(f"{name}: the data cannot rule out {rival.text}: {rival.reason}", "warning")
+            other = (
+                f"{rival.text} if it is wrong" if rival.text.startswith("leave ") else f"it may also be {rival.text}"
+            )
+            yield Text(f"{name}: a guess; {other}: {rival.reason}", "warning")
     cut: list[Text] = []
     for one in proposal.logs:
         prefix = f"{one.name}: " if several else ""

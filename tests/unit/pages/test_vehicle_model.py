@@ -164,7 +164,7 @@ def test_a_number_that_no_vehicle_has_is_not_told_and_no_value_in_a_table():
     ]
     assert ["centre of mass along x, m", "—", "—", "—", "—", "no: impossible"] in rows
     assert ["linear damping d_x", "N m s/rad", "—", "—", "—"] in rows
-    assert "centre of mass along x and linear damping d_x: no such vehicle has it" in " ".join(cautions(record))
+    assert "centre of mass along x and linear damping d_x: impossible for such a vehicle" in " ".join(cautions(record))
 
 
 def test_headline_table_and_section_follow_from_one_judgement_of_what_is_told():
