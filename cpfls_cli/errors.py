@@ -7,8 +7,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
-"""Characters that act on a terminal; line breaks and tabs may."""
+_CONTROL = re.compile(
+    "[\\x00-\\x08\\x0b-\\x1f\\x7f-\\x9f\\xad\\u061c\\u180e\\u200b-\\u200f\\u2028-\\u202e\\u2060-\\u206f\\ufeff\\ufff9-\\ufffb"
+    "\\U000e0000-\\U000e007f]"
+)
+"""What a terminal or a page obeys or does not show: controls but line breaks and tabs, and what turns text."""
 
 
 class CpflsError(Exception):
@@ -90,7 +93,7 @@ def about(what: object, *kinds: type[CpflsError]) -> Iterator[None]:
 
 
 def visible(text: str) -> str:
-    """Write control characters as escapes: names in files are data, and may hold what a terminal takes for orders."""
+    """Write control characters as escapes: names in files are data, and may hold what is taken for orders."""
     return _CONTROL.sub(lambda found: repr(found.group())[1:-1], text)
 
 

@@ -17,7 +17,7 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 _SEAL = b"cpfls sha256 "
 _SEAL_BYTES = len(_SEAL) + 64 + 1
 _BLOCK = 1 << 20
-_LEAST_S, _BYTES_PER_SECOND = 20.0, 5e6
+_LEAST_S, _BYTES_PER_SECOND = 10.0, 5e6
 _PLAIN, _TIMES = 1 << 27, 200
 """Bytes of numbers that a log may hold whatever its size, and in sizes of it beyond: signals hardly compress."""
 

@@ -8,8 +8,8 @@ from textwrap import wrap
 
 
 def joined(words: Iterable[str], last: str = "and") -> str:
-    """Join words to a phrase, without repeating one."""
-    *others, final = dict.fromkeys(words)
+    """Join words to a phrase, without repeating one; of none, an empty one."""
+    *others, final = dict.fromkeys(words) or ("",)
     return f"{', '.join(others)} {last} {final}" if others else final
 
 

@@ -239,6 +239,10 @@ def _refuse_links(file: h5py.File) -> None:
         raise ValueError(f"{found[0]} is a {kind}; an artifact must hold all that it refers to")
 
 
+_MOST_PACKED = 1100
+"""Bytes that gzip makes of one, at most: 1032 where all are equal."""
+
+
 def _dataset(file: h5py.File, path: str) -> h5py.Dataset | None:
     # By the library below: a dataset looked up and asked by its object takes three times as long.
     found = h5py.h5o.open(file.id, path.encode())
@@ -249,6 +253,11 @@ def _dataset(file: h5py.File, path: str) -> h5py.Dataset | None:
         raise ValueError(f"{path} lies in another file; an artifact must hold all that it refers to")
     if found.get_space().get_simple_extent_type() == h5py.h5s.NULL:
         raise ValueError(f"{path} holds nothing, not even a shape")
+    declared = found.get_space().get_simple_extent_npoints() * found.get_type().get_size()
+    held = found.get_storage_size() * (_MOST_PACKED if made.get_nfilters() else 1)
+    if declared > held:
+        # What no program has written reads as one number over and over, for as long as the shape says.
+        raise ValueError(f"{path} declares {declared:.3g} bytes, and the file holds {held:.3g} of them at most")
     return h5py.Dataset(found, readonly=True)
 
 

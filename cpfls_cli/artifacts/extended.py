@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.audit import AuditGroup
 from cpfls_cli.artifacts.gap_effects import GapChangeGroup, NamedEffectsGroup, PlaybackChangeGroup, effect_summary
-from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
+from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup, of_no_body
 from cpfls_cli.artifacts.replay import trust_by_playback
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, record
 from cpfls_cli.inertia import six_parameters
@@ -103,6 +103,11 @@ class ExtendedRecord(ModelRecord):
     def trust(self) -> str:
         """What playback on flights held out says of it, as far as they do not contradict themselves."""
         return capped(trust_by_playback(self.playback), self.audit.contradiction or ())
+
+    @property
+    def impossible(self) -> tuple[str, ...]:
+        """Moments of inertia of no body, those of what it was built on among them."""
+        return of_no_body(self.vehicle)
 
     @property
     def summary(self) -> dict[str, Any]:

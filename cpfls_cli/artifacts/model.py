@@ -12,7 +12,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.audit import AuditGroup
 from cpfls_cli.artifacts.learned import LearnedFlight, LearnedGroup, learned_in
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, group_of, record
-from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
+from cpfls_cli.inertia import INERTIA_PARAMETERS, beyond_any_body, more_than_others, six_parameters
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.validation.trust import Trust
@@ -313,6 +313,15 @@ class VehicleGroup:
         }
 
 
+def of_no_body(vehicle: VehicleGroup) -> tuple[str, ...]:
+    """Name the moments of inertia of a vehicle that are those of no body of its mass between its rotors."""
+    pairs = zip(INERTIA_PARAMETERS[:3], vehicle.inertia.tolist(), strict=False)
+    moments = {f"inertia.{name}": value for name, value in pairs}
+    excess = {f"inertia.{name}" for name in more_than_others(list(moments.values()))}
+    wrong = {*beyond_any_body(vehicle.mass, vehicle.rotor.position, moments), *excess}
+    return tuple(name for name in moments if name in wrong)
+
+
 @record
 class ModelRecord(Record):
     """What every artifact `cpfls/model` holds, whoever found it."""
@@ -344,6 +353,11 @@ class ModelRecord(Record):
     def stopped(self) -> str:
         """Why the search for it ended before its end; empty where it did not."""
         return ""
+
+    @property
+    def impossible(self) -> tuple[str, ...]:
+        """Numbers of it that no such vehicle has, by the names of a fit."""
+        return ()
 
     @property
     def provenance(self) -> dict[str, Any]:

@@ -50,7 +50,7 @@ OF_TURNING = frozenset(FOUND_AS[key] for key in (DRAG, *INERTIA))
 
 _UNITS = {THRUST: "N s^2", DRAG: "N m s^2", LAG: "s", DELAY: "s", **dict.fromkeys(CENTRE, "m")}
 ON_BOUND = "at the limit of the search"
-OF_NONE = "no such vehicle has it: a number that predicts, and none that is found"
+OF_NONE = "impossible for such a vehicle; it fits these flights, but is not a constant of the vehicle"
 
 STATED = (THRUST, DRAG, *INERTIA)
 """What a config states, where it states anything."""

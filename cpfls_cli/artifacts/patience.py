@@ -1,4 +1,4 @@
-"""How long HDF5 may read a file: a process beside this one ends it, with a message, where it never comes back.
+"""How long HDF5 may read a file: a process beside this one says where it never comes back, and a timer ends it.
 
 In a damaged file HDF5 may follow addresses in a circle. It holds the interpreter then, so that neither a thread nor a
 handler of signals runs. A seal shows damage, but not where somebody has sealed it again.
@@ -10,19 +10,20 @@ import atexit
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any, ClassVar
 
-from cpfls_cli.errors import visible
+from cpfls_cli.errors import InputError, visible
 from cpfls_cli.files import longest_read_s
 
 if TYPE_CHECKING:
     import subprocess
 
 _WATCH = """
-import os, queue, signal, sys, threading
+import os, queue, signal, sys, threading, time
 
 told = queue.Queue()
 
@@ -48,6 +49,9 @@ while True:
     if stopped and wait:
         wait, why = GRACE, "interrupted while HDF5 was reading it"
 os.write(2, f"cpfls: error: {path}: {why}\\n".encode("utf-8", "surrogateescape"))
+if not stopped:
+    # It ends by its own timer, with an exit code; the thread that listens then ends this process.
+    time.sleep(GRACE)
 os.kill(int(sys.argv[1]), getattr(signal, "SIGKILL", signal.SIGTERM))
 os._exit(0)
 """
@@ -55,6 +59,11 @@ _STOPS = bytes([signal.SIGINT, signal.SIGTERM])
 _GRACE_S = 3.0
 """After a signal, in which a sound file is read to the end of one dataset and the program ends by itself."""
 _GOES_ON = b"0 \n"
+_AFTER_S = 1.0
+"""By which the program ends later than the process beside it says why."""
+
+_MONOTONIC, _BY_THREAD = 1, 2
+"""A clock, and the way in which a timer of POSIX calls a function, as Linux numbers them."""
 
 
 class _Watch:
@@ -116,7 +125,48 @@ class _Watch:
             self._process.wait()
 
 
+class _Timer:
+    """Ends the program with the exit code of wrong input, whatever holds the interpreter.
+
+    Linux calls `_exit` in a thread of its own, which needs no interpreter; elsewhere the process beside ends it.
+    """
+
+    def __init__(self) -> None:
+        self._timer: Any = None
+        self._set: Callable[..., object] | None = None
+        if not sys.platform.startswith("linux"):
+            return
+        import ctypes
+
+        with suppress(OSError, AttributeError):
+            library = ctypes.CDLL(None)
+
+            class Event(ctypes.Structure):
+                _fields_: ClassVar = [
+                    ("value", ctypes.c_void_p),
+                    ("signal", ctypes.c_int),
+                    ("notify", ctypes.c_int),
+                    ("function", ctypes.c_void_p),
+                    ("rest", ctypes.c_char * 56),
+                ]
+
+            timer, ends = ctypes.c_void_p(), ctypes.cast(library._exit, ctypes.c_void_p).value
+            event = Event(value=InputError.exit_code, notify=_BY_THREAD, function=ends)
+            if library.timer_create(_MONOTONIC, ctypes.byref(event), ctypes.byref(timer)) == 0:
+                self._timer, self._set = timer, library.timer_settime
+
+    def ends_in(self, seconds: float) -> None:
+        """Begin to count; 0 stops that."""
+        if self._set is not None:
+            import ctypes
+
+            # Seconds and nanoseconds between two ends, and to the first.
+            self._set(self._timer, 0, (ctypes.c_long * 4)(0, 0, int(seconds), int(1e9 * (seconds % 1.0))), None)
+
+
 _WATCHED = _Watch()
+_timer_of = cache(lambda _process: _Timer())
+"""Of a process: one that was forked has none of its parent's."""
 
 
 def end_what_hangs() -> None:
@@ -134,10 +184,12 @@ def patient(path: Path) -> Iterator[None]:
     watch.depth += 1
     seconds = longest_read_s(path.stat().st_size)
     watch.tell(f"{seconds:.0f} {visible(str(path)).replace(chr(10), ' ')}\n".encode("utf-8", "surrogateescape"))
-    before = watch.wake()
+    before, timer = watch.wake(), _timer_of(os.getpid())
+    timer.ends_in(seconds + _AFTER_S)
     try:
         yield
     finally:
+        timer.ends_in(0.0)
         if before is not None:
             signal.set_wakeup_fd(before)
         watch.tell(_GOES_ON)

@@ -11,12 +11,12 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.disturbance import DisturbanceGroup
 from cpfls_cli.artifacts.learned import LearnedGroup
-from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup
+from cpfls_cli.artifacts.model import ModelRecord, VehicleGroup, of_no_body
 from cpfls_cli.artifacts.parameters import DRAG, FOUND_AS, GUESSES, INERTIA, is_learned, parameters_of
 from cpfls_cli.artifacts.replay import FADING, HeldOutGroup, trust_by_playback
 from cpfls_cli.artifacts.response import NOT_ACCEPTABLE, NOT_JUDGED, response_word
 from cpfls_cli.artifacts.spec import BODY, Format, columns_of, dataset, group, group_of, record, rows_of
-from cpfls_cli.inertia import EXPLAINED, beyond_any_body, more_than_others
+from cpfls_cli.inertia import EXPLAINED
 from cpfls_cli.response.mismatch import ROTATION, THRUST
 from cpfls_cli.validation.trust import GOOD, Trust, capped
 
@@ -273,13 +273,6 @@ class ObserverGroup:
         return {"past_s": self.past, "rate_1_s": self.rate.tolist(), "memory_s": self.memory.tolist()}
 
 
-def _of_no_body(vehicle: VehicleGroup) -> set[str]:
-    """Name the moments of inertia of a vehicle that are those of no body of its mass between its rotors."""
-    moments = {FOUND_AS[key]: float(value) for key, value in zip(INERTIA[:3], vehicle.inertia, strict=False)}
-    excess = {f"inertia.{name}" for name in more_than_others(list(moments.values()))}
-    return {*beyond_any_body(vehicle.mass, vehicle.rotor.position, moments), *excess}
-
-
 @record
 class VehicleRecord(ModelRecord):
     """The artifact `cpfls/model` of a vehicle found in flights."""
@@ -315,6 +308,9 @@ class VehicleRecord(ModelRecord):
     rotors_told: float | None = dataset(
         "how often the logs tell the rotors, the slowest of them", units="Hz", default=None
     )
+    logged_by: tuple[str, ...] | None = dataset(
+        "what wrote the logs, each once; none where they do not say", "system", default=None
+    )
     difference: DifferencesGroup | None = group(default=None)
     contradiction: tuple[str, ...] | None = dataset(
         "contradictions within the flights or with the vehicle", "contradiction", default=None
@@ -336,6 +332,7 @@ class VehicleRecord(ModelRecord):
         *,
         fading_s: float | None = None,
         rotors_told: float | None = None,
+        logged_by: Sequence[str] = (),
         commanded: bool,
         shares: bool = False,
     ) -> Self:
@@ -366,6 +363,7 @@ class VehicleRecord(ModelRecord):
             guess=found.guessed or None,
             full_speed=found.model.vehicle.rotor_speed_max_rad_s if shares else None,
             rotors_told=rotors_told,
+            logged_by=tuple(logged_by) or None,
             difference=columns_of(DifferencesGroup, found.differences) if found.differences else None,
             contradiction=None if contradictions is None else tuple(contradictions),
             disturbance=None if found.gusts is None else DisturbanceGroup.of(found.gusts),
@@ -440,15 +438,14 @@ class VehicleRecord(ModelRecord):
     @property
     def impossible(self) -> tuple[str, ...]:
         """Numbers that were found and that no such vehicle has."""
-        wrong = {row["name"] for row in rows_of(self.found) if not row.get("possible", True)} | _of_no_body(
-            self.vehicle
-        )
+        wrong = {row["name"] for row in rows_of(self.found) if not row.get("possible", True)}
+        wrong |= {*of_no_body(self.vehicle)}
         return tuple(name for name in self.named if name in wrong)
 
     @property
     def unreal(self) -> tuple[str, ...]:
         """Moments of inertia about roll and pitch that its forecast turns by and that are on a bound, or of no body."""
-        wrong = {*self.on_bound, *_of_no_body(self.forecast or self.vehicle)}
+        wrong = {*self.on_bound, *of_no_body(self.forecast or self.vehicle)}
         turning = (FOUND_AS[key] for key in INERTIA[:2])
         return tuple(name for name in turning if name in wrong and name in self.named)
 

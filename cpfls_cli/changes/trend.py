@@ -12,7 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.changes.judge import FALSE_ALARM, Change, beyond_chance, judged
 from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.changes.reference import FEWEST, Reference, expected_covariance, kinds_of, learned_covariance
-from cpfls_cli.errors import InputError, install_command
+from cpfls_cli.errors import InputError
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
@@ -302,9 +302,7 @@ def _search(white: Array) -> KernelCPD:
 
 
 def load_ruptures() -> type[KernelCPD]:
-    """Load the search for change points, or refuse where it is not installed."""
-    try:
-        from ruptures import KernelCPD
-    except ImportError:
-        raise InputError(f"a trend needs the package ruptures; {install_command('trend')}") from None
+    """Load the search for change points."""
+    from ruptures import KernelCPD
+
     return KernelCPD  # type: ignore[no-any-return]

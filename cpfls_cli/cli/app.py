@@ -18,6 +18,7 @@ from cpfls_cli.cli.options import (
     ConfigArgument,
     OutputOption,
     SeveralAfterOption,
+    moments,
     seconds,
     sheet,
     with_common,
@@ -142,6 +143,22 @@ TimeLimitOption = Annotated[
         metavar="TIME",
         parser=seconds,
         help="Stop the search after TIME (90, 90s, 10m, 2h) and write the best so far; --resume goes on.",
+    ),
+]
+AnywayOption = Annotated[
+    bool,
+    typer.Option(
+        "--anyway",
+        help="Search in logs that contradict themselves, or are too slow to tell what is sought, too; nothing found "
+        "there is to be used.",
+    ),
+]
+ExportAnywayOption = Annotated[
+    bool,
+    typer.Option(
+        "--anyway",
+        help="Also where numbers of the model are impossible, its search was stopped or its verdict is do-not-use; the "
+        "file says so first.",
     ),
 ]
 ResumeSweepOption = Annotated[
@@ -362,16 +379,38 @@ def init(
     scale_to_arm: Annotated[
         bool, typer.Option("--scale-to-arm", help="Scale places of rotors that a log states to --arm.")
     ] = False,
+    inertia: Annotated[
+        Any,  # Of a tuple typer takes three words.
+        typer.Option(
+            "--inertia",
+            metavar="IXX,IYY,IZZ",
+            parser=moments,
+            help="Moments of inertia where they are known, from CAD, a swing test or an earlier study, kg m^2.",
+        ),
+    ] = None,
+    thrust_factor: Annotated[
+        float | None,
+        typer.Option(
+            "--thrust-factor",
+            metavar="N_S2",
+            min=1e-12,
+            help="Thrust of a rotor over its squared speed in rad/s, N s^2, where a data sheet tells it.",
+        ),
+    ] = None,
+    drag_factor: Annotated[
+        float | None,
+        typer.Option("--drag-factor", metavar="N_M_S2", min=1e-15, help="Torque of its drag over the same, N m s^2."),
+    ] = None,
     *,
     common: Common,
 ) -> None:
     """Look into logs of one vehicle and write a config for them, with the reason of every guess."""
-    _run_without_config(
-        "init",
-        output,
-        common,
-        lambda command, job: command.run(job, logs, command.Stated(mass, arm, scale_to_arm=scale_to_arm)),
-    )
+
+    def call(command: Any, job: Job) -> Any:
+        stated = command.Stated(mass, arm, inertia, thrust_factor, drag_factor, scale_to_arm)
+        return command.run(job, logs, stated)
+
+    _run_without_config("init", output, common, call)
 
 
 @_command("import")
@@ -446,10 +485,14 @@ def vehicle(
     held_out: HeldOutOption = None,
     resume: ResumeOption = False,
     write_config: WriteConfigOption = None,
+    anyway: AnywayOption = False,
     *,
     common: Common,
 ) -> None:
     """Find a whole vehicle in flights with rotor speeds: rotors, inertia and effects, fitted on what they predict."""
+    if anyway:
+        # The artifact holds it with its config.
+        common = replace(common, overrides=[*(common.overrides or []), "playback.anyway=true"])
 
     def call(command: Any, job: Job) -> Any:
         copy = None if write_config is None else command.ConfigCopy(config.name, common.data(config), write_config)
@@ -613,9 +656,10 @@ def changed(
     since: Annotated[
         list[Path],
         typer.Option(
+            "--reference",
             "--since",
-            metavar="REFERENCE...",
-            help="Flights or logs of the same vehicle from before; several after one another, three or more.",
+            metavar="FLIGHT...",
+            help="Flights or logs of the same vehicle from before, three or more, one after another.",
             show_default=False,
         ),
     ],
@@ -705,12 +749,17 @@ def export(
             help="Prefix of the names in C, name in JSON and XML; default: from the name of FILE.",
         ),
     ] = None,
+    anyway: ExportAnywayOption = False,
     *,
     common: Common,
 ) -> None:
     """Write a model as code or for a simulator; flights, replays, gaps and others for Foxglove or PlotJuggler."""
     chosen = form and form.value
-    _run_without_config("export", output, common, lambda command, job: command.run(job, model, chosen, name))
+
+    def call(command: Any, job: Job) -> Any:
+        return command.run(job, model, chosen, name, anyway=anyway)
+
+    _run_without_config("export", output, common, call)
 
 
 @_command()
@@ -719,11 +768,16 @@ def spread(
     output: OutputOption,
     count: Annotated[int, typer.Option("-n", "--count", metavar="N", min=2, help="Vehicles to draw.")] = 1000,
     seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Of the draws.")] = 1,
+    anyway: ExportAnywayOption = False,
     *,
     common: Common,
 ) -> None:
     """Draw vehicles from what the flights of one tell, for simulators that fly many: .yaml, .json or .npz."""
-    _run_without_config("spread", output, common, lambda command, job: command.run(job, model, count, seed))
+
+    def call(command: Any, job: Job) -> Any:
+        return command.run(job, model, count, seed, anyway=anyway)
+
+    _run_without_config("spread", output, common, call)
 
 
 @_command("verify-export")

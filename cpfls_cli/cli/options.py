@@ -8,7 +8,7 @@ import functools
 import inspect
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
@@ -92,7 +92,7 @@ class Commands(TyperGroup):
 
 
 class SeveralAfterOption(TyperCommand):
-    """A command whose options that may be repeated take all values that follow, as a shell writes ``--since old/*``."""
+    """A command whose options that may be repeated take all values that follow, as of ``--reference old/*``."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Repeat such an option before each of its values."""
@@ -236,6 +236,22 @@ def seconds(text: str) -> float:
     return value
 
 
+def moments(text: str | Sequence[float]) -> tuple[float, float, float]:
+    """Read three moments of inertia, such as ``0.011,0.012,0.02``.
+
+    Returns
+    -------
+    tuple of float, kg m^2
+    """
+    try:
+        x, y, z = (float(part) for part in (text.split(",") if isinstance(text, str) else text))
+    except ValueError:
+        x = y = z = math.nan
+    if not all(0.0 < value < math.inf for value in (x, y, z)):
+        raise typer.BadParameter(f"{text!r} is not three moments of inertia above 0; write IXX,IYY,IZZ in kg m^2")
+    return x, y, z
+
+
 WORKFLOWS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
         "I have logs and want a model",
@@ -247,15 +263,15 @@ WORKFLOWS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
         "My simulator differs from flight",
         (
-            "cpfls simulate study.yaml today.csv --autopilot px4 -o twin.h5",
             "cpfls gap study.yaml logs/* -o gap",
+            "cpfls simulate study.yaml today.csv --autopilot px4 -o twin.h5",
             "cpfls report study.yaml twin.h5 -o twin.html",
         ),
     ),
     (
         "Something changed",
         (
-            "cpfls changed study.yaml today.csv --since logs/* -o changed",
+            "cpfls changed study.yaml today.csv --reference logs/* -o changed",
             "cpfls trend study.yaml logs -o trend",
         ),
     ),

@@ -233,14 +233,23 @@ def _silent(done: float, total: int, note: str = "") -> None:
 
 def _log_progress(title: str, *, asked: bool) -> Callable[..., None]:
     """Write a line at most once a second, for logs, and the last; unasked once a minute."""
-    last, every = [time.monotonic()], _ASKED_S if asked else _UNASKED_S
+    started, every = time.monotonic(), _ASKED_S if asked else _UNASKED_S
+    last = [started]
 
     def show(done: float, total: int, note: str = "") -> None:
-        if time.monotonic() - last[0] >= every or (asked and done == total):
-            last[0] = time.monotonic()
-            print(f"{title}: {done / total:4.0%}  {visible(note)}", file=sys.stderr, flush=True)
+        now = time.monotonic()
+        if now - last[0] >= every or (asked and done == total):
+            last[0] = now
+            # Of nothing, all is done.
+            share = done / total if total else 1.0
+            left = f"  {_duration((now - started) * (1 / share - 1))} left" if 0 < share < 1 else ""
+            print(f"{title}: {share:4.0%}{left}  {visible(note)}", file=sys.stderr, flush=True)
 
     return show
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
 def _mute_output() -> None:

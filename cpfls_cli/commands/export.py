@@ -29,7 +29,7 @@ ENDINGS = {form: chosen.ending for form, chosen in FORMS.items()} | VIEWERS
 _IMPORTED = ("casadi", "jax", "numpy", "rotorpy")
 
 
-def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
+def run(job: Job, model: Path, form: str | None, name: str | None, *, anyway: bool = False) -> Outcome:
     """Write a model in another form."""
     form = form or _form_of(job.output)
     if job.output.suffix != ENDINGS[form]:
@@ -41,7 +41,7 @@ def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     source = take_inputs(job, {"model": model})["model"]
     # The file that was asked for first: a message about its folder is to name it.
     check_outputs(job, *reversed(outputs))
-    sheet = sheet_of(model, prefix, source, force=job.force)
+    sheet = sheet_of(model, prefix, source, force=job.force, anyway=anyway)
     made = exported(sheet, form, job.output.name)
     texts = dict(zip(outputs, made.texts.values(), strict=True))
     if not job.dry_run:
@@ -62,6 +62,7 @@ def _summary(job: Job, form: str, sheet: Sheet, made: Exported, sizes: dict[str,
         "complete": sheet.complete,
         "verdict": sheet.verdict,
         "cautions": list(sheet.cautions),
+        "impossible": sheet.impossible or None,
         "rotors": sheet.model.rotors,
         "weights": len(sheet.weights),
         "effects": [effect.name for effect in sheet.model.effects],

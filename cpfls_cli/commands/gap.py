@@ -99,7 +99,7 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path
         # Without a bar of its own: the bar is that of the whole.
         report.run(replace(job, output=folder / "report.html", progress=lambda *_: None), written)
     job.progress(1, 1)
-    return Outcome(summary, tuple(_blocks(job, answers)), next=(_next(job, answers, flights, model),))
+    return Outcome(summary, tuple(_blocks(job, answers)), next=(_next(job, answers, [*flights, *held_out], model),))
 
 
 def _next(job: Job, answers: _Answers, flights: Sequence[Path], model: Path | None) -> Command:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
 from cpfls_cli.artifacts.output import write_text
+from cpfls_cli.config.check import why_no_body
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.errors import ConfigError, CpflsError, InputError, about
@@ -20,6 +21,7 @@ from cpfls_cli.pages.proposal import Stated, answer, asked_keys, config_text, gu
 from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Command, Outcome
+from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle_limits import beyond_any_vehicle, figures_of, room
 from cpfls_cli.words import joined
 
@@ -45,8 +47,11 @@ def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
             known.append(replace(one, of_file=own.warnings))
     proposal = propose(known, stated.mass_kg, stated.arm_m, scale_to_arm=stated.scale_to_arm)
     text, output = config_text(proposal, stated), str(job.output)
-    found = _findings(text, logs[0], whole=not asked_keys(proposal, stated))
-    wrong, doubted = _parted(found, guessed_keys(proposal))
+    whole = not asked_keys(proposal, stated)
+    if whole and stated.knows_constants:
+        # Numbers that the log's rotors make impossible, such as a thrust that lifts nothing.
+        validate(parse_config(text, str(job.output)), str(job.output))
+    wrong, doubted = _parted(_findings(text, logs[0], whole=whole), guessed_keys(proposal))
     if not job.dry_run:
         write_text(job.output, text)
     flown = ((one.name, one.recognition.flown) for one in proposal.logs)
@@ -54,21 +59,29 @@ def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
     sentences = (*ended, *map(contradicted, wrong), *doubted, *twice)
     said = (Text(each, "warning", always=True) for each in sentences)
     told = summary(proposal, stated, output) | {"contradictions": wrong, "doubted_guesses": doubted}
-    return Outcome(told, (*said, *answer(proposal, stated, output)), next=tuple(_next(job, proposal)))
+    return Outcome(told, (*said, *answer(proposal, stated, output)), next=tuple(_next(job, proposal, logs)))
 
 
-def _next(job: Job, proposal: Proposal) -> Iterator[Command]:
-    """Give the commands that import logs of one mass, and the one that learns from all but the last, which judges."""
-    logs = [Path(name) for name in proposal.equal]
+def _next(job: Job, proposal: Proposal, given: Sequence[Path]) -> Iterator[Command]:
+    """Give the commands that import all logs, and one that learns from those of one mass but the last, which judges.
+
+    Logs whose rotors carry something else are played back along, which shows how far off the same vehicle is there.
+    """
     # Many logs are taken as they are.
-    as_logs = bool(proposal.rotors) and len(logs) > _IMPORTED
-    flights = logs if as_logs else [job.beside(name) for name in _flight_names(logs)]
-    for log, flight in zip([] if as_logs else logs, flights, strict=False):
+    as_logs = bool(proposal.rotors) and len(given) > _IMPORTED
+    named = list(given) if as_logs else [job.beside(name) for name in _flight_names(given)]
+    for log, flight in zip([] if as_logs else given, named, strict=False):
         yield ("cpfls", "import", job.output, log, "-o", flight)
+    equal = {Path(name) for name in proposal.equal}
+    flights = [flight for log, flight in zip(given, named, strict=True) if log in equal]
+    others = [flight for flight in named if flight not in flights]
     learned, judged = (flights[:-1], flights[-1:]) if len(flights) > 1 else (flights, [])
     if proposal.rotors:
         apart = [word for flight in judged for word in ("--held-out", flight)]
         yield ("cpfls", "vehicle", job.output, *learned, *apart, "-o", job.beside("vehicle.h5"))
+        if others:
+            played = job.beside("other-loads.h5")
+            yield ("cpfls", "replay", job.output, job.beside("vehicle.h5"), *others, "-o", played)
     elif proposal.states_torque:
         apart = [word for flight in judged for word in ("--validate", flight)]
         yield ("cpfls", "identify", job.output, *learned, *apart, "-o", job.beside("model.h5"))
@@ -84,17 +97,36 @@ def _flight_names(logs: Sequence[Path]) -> list[str]:
 
 
 def _require_possible(stated: Stated) -> None:
-    """Refuse a mass and an arm that no vehicle has, before a log is read; by its arms it is taken for a quadrotor.
+    """Refuse numbers that no vehicle has, before a log is read; by its arms it is taken for a quadrotor.
 
     Raises
     ------
     ConfigError
     """
-    arm = nan if stated.arm_m is None else stated.arm_m
-    known = {"mass": nan if stated.mass_kg is None else stated.mass_kg, "arm": arm, "room": room(arm, 4), "rotors": 4.0}
-    lines = [f"--{each.name} = {known[each.name]:g}: {each.why}" for each in beyond_any_vehicle(figures_of(**known))]
+    arm, moments = _or_nan(stated.arm_m), stated.inertia_kg_m2 or (nan,)
+    known = {
+        "mass": _or_nan(stated.mass_kg),
+        "arm": arm,
+        "room": room(arm, 4),
+        "rotors": 4.0,
+        "inertia": max(moments),
+        "least_inertia": min(moments),
+        "thrust_factor": _or_nan(stated.thrust_factor_n_s2),
+        "drag_factor": _or_nan(stated.drag_factor_n_m_s2),
+    }
+    lines = [
+        f"--{each.name.replace('_', '-')} = {known[each.name]:g}: {each.why}"
+        for each in beyond_any_vehicle(figures_of(**known))
+    ]
+    if stated.inertia_kg_m2 is not None and not lines:
+        why = why_no_body(VehicleSettings(inertia_kg_m2=stated.inertia_kg_m2))
+        lines += [f"--inertia = {','.join(f'{each:g}' for each in moments)}: {why}"] if why else []
     if lines:
         raise ConfigError("\n".join(lines))
+
+
+def _or_nan(value: float | None) -> float:
+    return nan if value is None else value
 
 
 def _parted(findings: Sequence[Finding], guessed: Sequence[str]) -> tuple[list[str], list[str]]:

@@ -59,10 +59,12 @@ def with_numbers_of(job: Job, found: Path) -> Job:
     """
     if not (found.is_file() and holds(found, VehicleRecord)):
         raise InputError(f"--model {found}: is not a vehicle that `cpfls vehicle` found")
+    open_ = [name.replace("_", " ") for name in job.study.vehicle.unknown]
+    if not open_:
+        job.cautions[f"--model {found.name}: not used; the config states all numbers of the vehicle"] = None
+        return job
     job.cautions.update(dict.fromkeys(cautions_of(read_record(found, VehicleRecord), found.name)))
-    unknown = joined(name.replace("_", " ") for name in job.study.vehicle.unknown)
-    if unknown:
-        job.cautions[f"{unknown}: null in the config, taken from {found.name}"] = None
+    job.cautions[f"{joined(open_)}: null in the config, taken from {found.name}"] = None
     return _with_found(job, found)
 
 

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from cpfls_cli.artifacts.formats import record_of_format
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.spec import Record
-from cpfls_cli.artifacts.store import Outline, findings_of, read_any, read_outline
+from cpfls_cli.artifacts.store import Outline, findings_of, read_any, read_outline, read_record
 from cpfls_cli.errors import InputError
-from cpfls_cli.pages.trust import trust_facts
+from cpfls_cli.pages.trust import stopped_words, trust_facts
 from cpfls_cli.report.content import Block, Facts, Folded, Table, Text
 from cpfls_cli.report.outcome import Outcome
 
@@ -122,7 +123,11 @@ def check(path: Path) -> Outcome:
     """Check an artifact against its format; the exit code is 1 where it does not keep to it."""
     spec, findings = findings_of(path)
     summary = {"file": str(path), "format": spec.name, "good": not findings, "findings": findings}
-    said = [Text(f"{path}: {finding}") for finding in findings] or [Text(f"{path}: good ({spec.name})")]
+    kind = None if findings else record_of_format(spec.name, spec.kind)
+    stopped = stopped_words(read_record(path, kind)) if kind is not None and issubclass(kind, ModelRecord) else ""
+    good = f"keeps to its format ({spec.name}), but its search was {stopped}" if stopped else f"good ({spec.name})"
+    summary |= {"stopped": stopped} if stopped else {}
+    said = [Text(f"{path}: {finding}") for finding in findings] or [Text(f"{path}: {good}")]
     rest = said[_FINDINGS_SHOWN:]
     more = [Folded(f"{len(rest)} more findings", rest)] if rest else []
     followed = () if findings else (("cpfls", "info", path),)

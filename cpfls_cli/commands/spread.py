@@ -22,7 +22,7 @@ from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome
 
 
-def run(job: Job, model: Path, count: int, seed: int) -> Outcome:
+def run(job: Job, model: Path, count: int, seed: int, *, anyway: bool = False) -> Outcome:
     """Draw vehicles, and write them."""
     ending = require_ending(str(job.output), job.output.suffix)
     source = take_inputs(job, {"model": model})["model"]
@@ -33,7 +33,7 @@ def run(job: Job, model: Path, count: int, seed: int) -> Outcome:
             f"{model}: is a model of `cpfls {record.FORMAT.made_by}`, which holds no covariance of its numbers; "
             "`cpfls vehicle` finds a vehicle with one"
         )
-    sheet = sheet_of(model, identifier(model.stem), source, force=job.force)
+    sheet = sheet_of(model, identifier(model.stem), source, force=job.force, anyway=anyway)
     with about(model, InputError, ComputationError):
         require_sure(known := estimates(record))
         if job.dry_run:

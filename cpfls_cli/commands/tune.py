@@ -22,7 +22,7 @@ from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.commands.numbers import to_fly, with_numbers
 from cpfls_cli.config.study import Study
-from cpfls_cli.errors import InputError, install_command
+from cpfls_cli.errors import InputError
 from cpfls_cli.export.parameter_files import parameter_file
 from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.models import read_model
@@ -30,6 +30,7 @@ from cpfls_cli.logs.formats import log_contents, read_log
 from cpfls_cli.pages.gains import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trust import trust_words
+from cpfls_cli.pages.vehicle_model import slow_words
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.numbers import number, percent
@@ -56,7 +57,6 @@ def run(
     """Find gains and write them, and a file of parameters beside."""
     asked = AskedMargins() if asked is None else asked
     own = AUTOPILOTS[autopilot]
-    _require_control()
     roles = numbered_roles("flight", flights)
     inputs = begin(job, {"model": model} | roles)
     record = _trusted(job, model)
@@ -194,13 +194,6 @@ def _steps(autopilot: Autopilot, values: Mapping[str, float], today: Mapping[str
         )
 
 
-def _require_control() -> None:
-    from importlib.util import find_spec
-
-    if find_spec("control") is None:
-        raise InputError(f"margins need the package control: {install_command('tune')}")
-
-
 def _trusted(job: Job, model: Path) -> VehicleRecord:
     """Read a vehicle that is good for simulation and control, and refuse others with the flight that is missing."""
     if not holds(model, VehicleRecord):
@@ -223,6 +216,9 @@ def _missing(job: Job, record: VehicleRecord) -> str:
     if record.verdict is Trust.NOT_JUDGED and not judged:
         return "The flight that is missing: one that is kept aside to judge it, `cpfls vehicle` with --held-out FLIGHT"
     planned = " ".join(map(str, to_fly(job)))
+    slow = next(slow_words(record), "")
+    if slow:
+        return f"{slow} Then: {planned}, flown in still air, and `cpfls vehicle` again"
     return f"The flight that is missing: {planned}, flown in still air, then `cpfls vehicle` again"
 
 

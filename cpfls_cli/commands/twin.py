@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.job import Job, begin, finish, go_on
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.rebuilt import estimates
 from cpfls_cli.artifacts.replay import VEHICLE, contradictions_of
@@ -74,7 +74,12 @@ def run(job: Job, path: Path, model: Path | None) -> Outcome:
         vehicles = _vehicles(study, model)
         played_gusts(list(vehicles.values())[-1], settings.gusts)
     possible = _possible(model, vehicles[model.name], study) if settings.gusts and model is not None else None
-    asked = asked_of(flight, settings, study.vehicle, share=_thrust_is_share(path, study))
+    try:
+        asked = asked_of(flight, settings, study.vehicle, share=_thrust_is_share(path, study))
+    except InputError as error:
+        instead = go_on(job, "gap", path, output=job.beside("gap"))
+        words = " ".join(map(str, instead))
+        raise InputError(f"{error}. Without setpoints `{words}` says where the model of the config differs") from None
     if job.dry_run:
         return nothing_written(job)
     flown: dict[str, TwinFlight] = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from fnmatch import fnmatch
@@ -23,12 +24,14 @@ from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.playback import flights_to_play, played
 from cpfls_cli.flights.recordings import refuse_seen, seen_twice
 from cpfls_cli.pages.model import answer
-from cpfls_cli.pages.sensors import tell_before_search
+from cpfls_cli.pages.sensors import NOTHING_COMES, contradicted, tell_before_search
 from cpfls_cli.pages.source import source_of
+from cpfls_cli.pages.vehicle_model import slow_words, too_slow
 from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.loop import shows_loop_anyhow
 from cpfls_cli.playback.parameters import MASS, blocks_of
 from cpfls_cli.playback.replay import fading, replay
-from cpfls_cli.playback.settings import GroupSettings
+from cpfls_cli.playback.settings import GroupSettings, PlaybackSettings
 from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError
 from cpfls_cli.playback.vehicle import FoundVehicle, find_vehicle
 from cpfls_cli.report.content import Text
@@ -76,16 +79,16 @@ def run(
     _check_blocks(study)
     _check_groups(study.playback.groups, read[: len(flights)])
     training, rest = read[: len(flights)], read[len(flights) :]
-    tell_before_search(contradictions_of(read) or ())
+    settings, limit = _what_can_come(job, read, training)
     if job.dry_run:
         return nothing_written(job)
     if kept is None:
         checkpoint.remove()
     with checkpoint.kept():
-        vehicle, signal = _found(job, training, checkpoint, kept or {})
+        vehicle, signal = _found(job, training, settings, checkpoint, kept or {})
         fading_s = fading([flight.playback for flight in training], _horizon(job, training[0]))
         judged = _judged(vehicle, rest, job, fading_s) if rest else None
-        warnings = [*twice, *(warning for flight in read for warning in flight.warnings)]
+        warnings = [*limit, *twice, *(warning for flight in read for warning in flight.warnings)]
         commanded = any(flight.parts[0].commanded for flight in training)
         samples = [sum(map(len, flight.parts)) for flight in training]
         parts = LearnedGroup.parts(learned, [(own, own) for own in samples])
@@ -98,6 +101,7 @@ def run(
             _responses(vehicle, training),
             fading_s=fading_s,
             rotors_told=min(flight.told_hz for flight in training),
+            logged_by=tuple(dict.fromkeys(flight.system for flight in training if flight.system)),
             commanded=commanded,
             shares=any(flight.shares for flight in training),
         )
@@ -121,6 +125,9 @@ def next_commands(
     page = ("cpfls", "report", config, job.output, "-o", job.output.with_suffix(".html"))
     if not record.complete:
         return (page,)
+    if any(slow_words(record)):
+        # No flight that is planned tells more before the logs are faster.
+        return (page,)
     if record.trust in (Trust.LOOP, Trust.NOT_DETERMINED, Trust.LACKING, Trust.DO_NOT_USE):
         mission = job.output.with_name(f"{name}-mission.h5")
         return page, to_fly(job, mission)
@@ -139,6 +146,31 @@ def _write_config(config: ConfigCopy | None, record: VehicleRecord) -> tuple[Tex
     return (Text(f"{config.copy}: written, the config with these constants"),)
 
 
+def _what_can_come(
+    job: Job, flights: Sequence[LoggedFlight], training: Sequence[LoggedFlight]
+) -> tuple[PlaybackSettings, tuple[str, ...]]:
+    """Refuse logs that contradict themselves, and seek no more than slow ones can tell; first a word of it.
+
+    Returns
+    -------
+    PlaybackSettings
+    tuple of str
+        What to say beside the answer.
+    """
+    settings, wrong = job.study.playback, contradictions_of(flights) or ()
+    if wrong and not settings.anyway:
+        raise InputError("\n".join(map(contradicted, wrong)) + f"\n{NOTHING_COMES}")
+    tell_before_search(wrong)
+    own = [flight for flight in training if not flight.group]
+    told_hz = min(flight.told_hz for flight in own)
+    along = [flight.playback for flight in own]
+    if settings.anyway or not shows_loop_anyhow(job.study.vehicle, along, told_hz):
+        return settings, ()
+    said = too_slow(told_hz, [flight.system for flight in own])
+    logging.getLogger("cpfls_cli").warning(said)
+    return replace(settings, leave_out=blocks_of(job.study.vehicle), history_s=0.0), (said,)
+
+
 def _require_rotors(flight: LoggedFlight) -> None:
     if flight.playback.wrench is not None:
         raise InputError(
@@ -148,7 +180,11 @@ def _require_rotors(flight: LoggedFlight) -> None:
 
 
 def _found(
-    job: Job, flights: Sequence[LoggedFlight], checkpoint: VehicleCheckpoint, kept: Kept
+    job: Job,
+    flights: Sequence[LoggedFlight],
+    settings: PlaybackSettings,
+    checkpoint: VehicleCheckpoint,
+    kept: Kept,
 ) -> tuple[FoundVehicle, int | None]:
     """Search; an interrupt ends the search, and its number is given beside what has been found until then."""
     study, watch = job.study, Watch(job, None)
@@ -166,7 +202,7 @@ def _found(
     along = [flight.playback for flight in flights]
     with settings_of("playback", study), watch.deferring():
         try:
-            vehicle = find_vehicle(study.vehicle, along, study.playback, generator(study, "vehicle"), progress, kept)
+            vehicle = find_vehicle(study.vehicle, along, settings, generator(study, "vehicle"), progress, kept)
         except SearchStoppedError as error:
             raise (without_model("interrupted", watch.signal) or error) from None
     return vehicle, watch.signal

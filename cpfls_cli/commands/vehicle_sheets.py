@@ -19,25 +19,34 @@ from cpfls_cli.export.holding import Missing, Off, sized
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.flights.models import rebuilt
 from cpfls_cli.pages.export import identified_evidence, identified_warnings
-from cpfls_cli.pages.model import against, worth_in_words
+from cpfls_cli.pages.model import against, impossible_in_words, worth_in_words
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.validation.trust import Trust
 
 
-def sheet_of(path: Path, name: str, file: InputFile, *, force: bool) -> Sheet:
-    """Read any model; one that nobody should use, or whose search was stopped, needs `force` and is marked."""
+def sheet_of(path: Path, name: str, file: InputFile, *, force: bool, anyway: bool = False) -> Sheet:
+    """Read any model; one that nobody should use, or whose search was stopped, needs `force` and is marked.
+
+    Numbers that no vehicle has need `anyway`, which does for the others too.
+    """
     record = read_record(path, ModelRecord)
     sheet = _bare_sheet(path, record)
     if isinstance(sheet.model.fuzzy, InertiaFunctions):
         _require_usable(sheet.model.fuzzy, path)
+    if sheet.impossible and not anyway:
+        raise InputError(
+            f"{path}: impossible numbers, which no such vehicle has: {sheet.impossible}; --anyway exports them all the "
+            "same, and says so in the first line"
+        )
+    force = force or anyway
     if not (sheet.complete or force):
         raise InputError(
             f"{path}: the search for this model did not come to its end ({sheet.stopped}); "
-            f"`cpfls {record.FORMAT.made_by} ... --resume` goes on, --force exports the model as it is, marked as "
+            f"`cpfls {record.FORMAT.made_by} ... --resume` goes on, --anyway exports the model as it is, marked as "
             "incomplete"
         )
     if sheet.verdict == "do-not-use" and not force:
-        raise InputError(f"{path}: its verdict is do-not-use; --force exports it anyway, marked as such")
+        raise InputError(f"{path}: its verdict is do-not-use; --anyway exports it, marked as such")
     return replace(sheet, name=name, file=path.name, sha256=file.sha256)
 
 
@@ -54,6 +63,7 @@ def bare_sheet(record: ModelRecord, model: VehicleModel) -> Sheet:
         stopped=record.stopped or None,
         cautions=() if isinstance(record, IdentifiedRecord) else (*record.origin.cautions, *against(record)),
         evidence=identified_evidence(record) if isinstance(record, IdentifiedRecord) else {},
+        impossible=impossible_in_words(record),
     )
 
 

@@ -59,7 +59,7 @@ def run(model: Path, flight: Path, options: Options, *, force: bool, dry_run: bo
         raise InputError(
             f"{model}: is an export; name the model that it was made from, which is exported again and flown"
         )
-    sheet = sheet_of(model, identifier(model.stem), input_file(model), force=force)
+    sheet = sheet_of(model, identifier(model.stem), input_file(model), force=force, anyway=True)
     made = exported(sheet, options.form, f"{sheet.name}.py")
     study = stored_study(sheet.origin.config, sheet.file)
     read = read_model(model, study)

@@ -105,6 +105,8 @@ class Sheet:
         What speaks against using it, of an identified model, on the screen alone.
     cautions : tuple of str
         What speaks against using it, at the top of every file.
+    impossible : str
+        Its numbers that no such vehicle has, in the first line of every file; empty where all can be.
     """
 
     name: str
@@ -121,6 +123,7 @@ class Sheet:
     floor: tuple[float, ...] = (np.nan,) * 6
     warnings: tuple[str, ...] = ()
     cautions: tuple[str, ...] = ()
+    impossible: str = ""
 
     @property
     def identified(self) -> InertiaFunctions | None:
@@ -192,6 +195,8 @@ class Sheet:
         return [*self._marks(), *self.cautions, *self._structure(), *self.worth]
 
     def _marks(self) -> Iterator[str]:
+        if self.impossible:
+            yield f"IMPOSSIBLE NUMBERS, which no such vehicle has: {self.impossible}."
         if self.stopped is not None:
             why = f" ({self.stopped})" if self.stopped else ""
             yield f"INCOMPLETE MODEL: its search did not run to the end{why}. Do not fly with it."
@@ -204,7 +209,8 @@ class Sheet:
             f"Vehicle: {model.vehicle.mass_kg:.6g} kg, {model.rotors} rotors; delay {response.delay_s:.4g} s, "
             f"lag {response.lag_s:.4g} s, slow actuation {response.slow_roll_pitch:.4g} (roll, pitch) and "
             f"{response.slow_yaw:.4g} (yaw) within {response.slow_s:.4g} s; law of the rotors w^2 + "
-            f"{model.thrust_linear:.4g} w_hover w; {len(self.weights)} weights."
+            f"{model.thrust_linear:.4g} w_hover w; {len(self.weights)} coefficients of torque "
+            "and force."
         )
         if model.effects:
             yield f"Effects: {', '.join(CATALOGUE[effect.name].title for effect in model.effects)}."

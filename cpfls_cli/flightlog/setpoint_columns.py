@@ -247,7 +247,7 @@ def _by_motion(own: _Candidate, fit: "_Following") -> Guess | str:
     turned = f" with {', '.join(opposed)} reversed" if opposed else ""
     size = "" if own.states_unit else f", in {mapped.unit} by its size"
     loose = [axis for axis, not_told in zip(axes, fit.loose, strict=True) if not_told]
-    doubts = [*own.doubts, *([f"{', '.join(loose)} is not followed"] if loose else [])]
+    doubts = [*own.doubts, *([f"the measured motion does not follow {', '.join(loose)}"] if loose else [])]
     rivals = tuple(Rival(f"leave {own.signal} out", doubt) for doubt in doubts)
     reason = f"{own.called}; the {what} follows it{turned} (correlation {share}){size}"
     sure: Sure = "guess" if rivals else "data"

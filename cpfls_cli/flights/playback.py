@@ -132,7 +132,14 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
     updated = flight.updated_hz.get(actuation)
     about = (words[actuation], named, wrong)
     return LoggedFlight(
-        flight.name, parts, hold or usual, *about, shares=shares, updated_hz=updated, begins=flight.begins
+        flight.name,
+        parts,
+        hold or usual,
+        *about,
+        shares=shares,
+        updated_hz=updated,
+        begins=flight.begins,
+        system=flight.system,
     )
 
 

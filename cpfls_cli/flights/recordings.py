@@ -68,6 +68,8 @@ class ReadFlight:
         Updates a second of signals that its log has more rows than.
     begins : float
         Stamp of the log's own clock at time 0, s; NaN where there is none.
+    system : str
+        What wrote the log; empty where it does not say.
     """
 
     name: str
@@ -77,6 +79,7 @@ class ReadFlight:
     flown_at: float = nan
     updated_hz: Mapping[str, float] = field(default_factory=dict)
     begins: float = nan
+    system: str = ""
 
 
 def read_flights(paths: Sequence[Path], study: Study) -> Recordings:
@@ -106,7 +109,8 @@ def read_flight(path: Path, study: Study) -> ReadFlight:
     record = read_record(path, FlightRecord)
     updated = {} if record.quality is None else record.quality.updated_hz
     units = units_of(path, record.origin, study)
-    return ReadFlight(path.name, record.signals, units, (), updated_hz=updated, begins=record.begins)
+    system = "" if record.autopilot is None else record.autopilot.system
+    return ReadFlight(path.name, record.signals, units, (), updated_hz=updated, begins=record.begins, system=system)
 
 
 def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> ReadFlight:
@@ -114,19 +118,20 @@ def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> Rea
     for part in parts:
         _require_speeds(name, part, study)
     first = parts[0]
+    flown_at, system = first.report.flown_at, first.report.system
     updated = min((part.report.updated_hz for part in parts), key=lambda each: min(each.values(), default=np.inf))
     done = tuple(f"{what} ({count})" for what, count in log_findings(first.report).items())
     signals = [FlightRecord.of_import(part, {}).signals for part in parts]
     if len(parts) == 1:
         notes = (*done, *first.report.warnings)
         begins = first.report.first_stamp_s + first.report.span_s[0]
-        return ReadFlight(name, signals[0], _units(study), notes, first.report.flown_at, updated, begins)
+        return ReadFlight(name, signals[0], _units(study), notes, flown_at, updated, begins, system)
     shared = [each for each in signals[0] if all(each in own for own in signals)]
     for own, part in zip(signals, parts, strict=True):
         own["time"] = own["time"] + part.report.span_s[0]
     joined = {each: np.concatenate([own[each] for own in signals]) for each in shared}
     begins = first.report.first_stamp_s
-    return ReadFlight(name, joined, _units(study), (), first.report.flown_at, updated, begins)
+    return ReadFlight(name, joined, _units(study), (), flown_at, updated, begins, system)
 
 
 def _require_speeds(log: str, part: ImportedFlight, study: Study) -> None:

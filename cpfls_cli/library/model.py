@@ -284,7 +284,7 @@ class Model:
         name : str, optional
             Prefix of names in C, name in JSON; without it, from the name of the file.
         force : bool
-            Replace existing files, and export a model whose search was stopped or whose verdict is do-not-use.
+            Replace existing files, and export what was stopped, is not to be used, or has impossible numbers.
 
         Returns
         -------
@@ -293,7 +293,7 @@ class Model:
         """
         from cpfls_cli.commands import export
 
-        outcome = export.run(self._job(Path(path), force), self._file("export"), form, name)
+        outcome = export.run(self._job(Path(path), force), self._file("export"), form, name, anyway=force)
         _warn(outcome, 3)
         return [Path(file) for file in outcome.summary["output"]]
 

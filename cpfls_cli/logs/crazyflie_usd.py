@@ -17,6 +17,8 @@ _STAMPS = {1: ("<u4", 10**3), 2: ("<u8", 10**6)}
 """Type of the stamps and how many there are in a second, by version of the format."""
 _NUMBER = 2
 _CHECK_SUM = 4
+_LETTERS = "BbHhIiQqefd"
+"""Types of numbers that a log may hold."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,10 @@ def _header(content: bytes) -> tuple[int, dict[int, _Event], int]:
         for _ in range(variables):
             # A name and the letter of its type, as in group.name(f).
             variable, place = _text(content, place)
-            fields.append((variable[:-3], f"<{np.dtype(variable[-2]).str[1:]}"))
+            letter = variable[-2]
+            if letter not in _LETTERS:
+                raise ValueError(f"the type {letter!r} of {variable}")
+            fields.append((variable[:-3], f"<{np.dtype(letter).str[1:]}"))
         events[number] = _Event(name, np.dtype(fields))
     return version, events, place
 

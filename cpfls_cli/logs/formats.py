@@ -136,14 +136,13 @@ _OLDER_USD = re.compile(rb"[\x01-\xff][A-Za-z]\w*(\.\w+)*\([BbHhIifd]\),")
 """A count of names, and the first of them with the letter of its type."""
 
 _PYARROW = {"packages": ("pyarrow", "pyarrow.parquet"), "extra": "parquet"}
-_PYULOG = {"packages": ("pyulog",), "extra": "ulog"}
 _ROSBAGS = {"packages": ("rosbags",), "extra": "rosbag"}
 _OURS_TOO = {"shared": True}
 _TABLE: tuple[tuple[str, str, str, bytes, str, dict[str, Any]], ...] = (
     (".csv", "CSV", "CSV", b"", "csv_log", {}),
     (".csv.gz", "CSV", "gzip-compressed data", GZIP_MAGIC, "csv_log", {}),
     (".parquet", "Parquet", "Parquet", b"PAR1", "parquet_log", _PYARROW),
-    (".ulg", "ULog", "ULog", ULOG_MAGIC, "ulog", _PYULOG),
+    (".ulg", "ULog", "ULog", ULOG_MAGIC, "ulog", {}),
     (".bin", "ArduPilot DataFlash", "a DataFlash log", DATAFLASH_MAGIC, "dataflash", {}),
     (".log", "ArduPilot DataFlash", "a DataFlash log in text", DATAFLASH_TEXT_MAGIC, "dataflash", {}),
     (".bbl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, "blackbox", {}),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from cpfls_cli.report.numbers import number
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -75,6 +75,31 @@ def cause_name(cause: str) -> str:
     if kind == "follow":
         return f"{of} that follows otherwise"
     return _NAMES.get(cause, cause)
+
+
+_MEANS = {
+    "load": "thrust that a rotor is asked for over its share of the weight",
+    "turn": "squared speed of a rotor over what it is commanded",
+    "answer": "time by which a rotor's speed follows its command",
+    "vibration": "root mean square above 20 Hz",
+    "unbalance": "acceleration that turns with a rotor",
+    "follow": "angular acceleration over that of the rotors' torque",
+    "late": "time by which the rotation follows the rotors",
+    "gusts": "angular acceleration that the rotors do not explain",
+    "lean": "mean horizontal thrust over mass",
+    "felt": "mean of the accelerometer, along z less gravity",
+    "drift": "mean rate of the gyroscope beside that of the attitude",
+    "swing": "mass on a cable over that of the vehicle",
+    "battery": "voltage that flight draws from the battery",
+    "scale": "rate of the gyroscope over that of the attitude",
+}
+"""What a number is, by the first word of its name."""
+
+
+def number_meanings(names: Iterable[str]) -> str:
+    """Define the kinds of numbers that a table lists, each once."""
+    kinds = dict.fromkeys(name.split()[0] for name in names)
+    return "; ".join(f"{kind}: {_MEANS[kind]}" for kind in kinds if kind in _MEANS)
 
 
 def what_to_check(cause: str) -> str:

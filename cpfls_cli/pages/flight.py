@@ -1,4 +1,4 @@
-"""The page of a flight: what was flown, what was repaired, what it lacks; and of its vehicle; Figure 4, Table 3."""
+"""The page of a flight: what was flown, what was repaired, what it lacks; and of its vehicle; Figure 4."""
 
 from __future__ import annotations
 
@@ -174,7 +174,7 @@ def torque_figure(name: str, label: str, time: Array, torque: Array) -> Plot:
 def vehicle_section(sources: Sources) -> Section:
     """Show the vehicle of the study: Table 3 of the paper."""
     caption = (
-        "Table 3. The vehicle of the study config. A range means that the rotors differ; the arm is the distance of a "
+        "The vehicle of the study config. A range means that the rotors differ; the arm is the distance of a "
         "rotor from the z axis."
     )
     blocks: list[Block] = [Table("table-3-vehicle", caption, ("Quantity", "Study"), list(_vehicle_rows(sources)))]

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from cpfls_cli.artifacts.flight_numbers import FlightNumbersRecord
+from cpfls_cli.pages.change_words import number_meanings
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.content import Block, Cell, Table, Text
 from cpfls_cli.report.numbers import number
@@ -24,5 +25,6 @@ def answer(flight: Source[FlightNumbersRecord], index: int = 1) -> Iterator[Bloc
     ]
     header = ("Number", "Value", "Error", "Unit")
     caption = f"What {record.flight} tells of its vehicle, with standard errors over blocks of the flight."
-    yield Table(f"flight-numbers-{index}", caption, header, rows, frozenset({0, 3}))
+    meanings = number_meanings(record.number)
+    yield Table(f"flight-numbers-{index}", caption, header, rows, frozenset({0, 3}), legend=meanings)
     yield from (Text(words, "warning") for words in record.warning)

@@ -10,14 +10,17 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.identified import IdentifiedRecord
-from cpfls_cli.artifacts.model import EffectsGroup, InertiaFunctionsGroup, ModelRecord, ResponseGroup, RotorsGroup
+from cpfls_cli.artifacts.model import InertiaFunctionsGroup, ModelRecord, ResponseGroup
+from cpfls_cli.artifacts.parameters import name_of
 from cpfls_cli.artifacts.rebuilt import model_effects
+from cpfls_cli.artifacts.spec import rows_of
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.effects import effect_title, unit_words
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.trust import model_words, trust_facts
-from cpfls_cli.report.content import Block, Box, Facts, Heading, Table, in_short
+from cpfls_cli.pages.trust import model_words, stopped_words, trust_facts
+from cpfls_cli.report.content import Block, Box, Facts, Heading, Table, impossible, in_short
 from cpfls_cli.report.numbers import number, plain, whole_percent
 from cpfls_cli.words import joined
 
@@ -67,7 +70,9 @@ def trust_box(model: Source[Any]) -> Box:
     """Say how far to trust a model, and why."""
     record = model.record
     kind, words = _kind_of(record), model_words(record)
-    return Box(words.short.upper(), f"{model.label}: {kind.title(record)}", list(kind.grounds(record)), words.tone)
+    stopped = stopped_words(record)
+    title = f"{model.label}: {f'{stopped}; ' if stopped else ''}{kind.title(record)}"
+    return Box(words.short.upper(), title, list(kind.grounds(record)), words.tone)
 
 
 def cautions_of(record: ModelRecord, path: object) -> tuple[str, ...]:
@@ -80,14 +85,23 @@ def cautions_of(record: ModelRecord, path: object) -> tuple[str, ...]:
     """
     said = [] if record.header is None else list(record.header.cautions)
     if record.stopped:
-        again = f"`cpfls {record.FORMAT.made_by} --resume` goes on"
-        said.append(f"{path}: is incomplete: its search was stopped; {again}")
+        said.append(f"{path}: is incomplete: its search was {stopped_words(record)}")
     return (*said, *(f"{path}: {each}" for each in against(record)))
 
 
 def against(record: ModelRecord) -> Iterator[str]:
     """Say what speaks against a model itself."""
     return _kind_of(record).cautions(record)
+
+
+def impossible_in_words(record: ModelRecord) -> str:
+    """List the numbers of a model that no such vehicle has, with their values; empty where all can be."""
+    moments = zip(INERTIA_PARAMETERS, record.vehicle.inertia.tolist(), strict=True)
+    known = {f"inertia.{name}": (value, "kg m^2") for name, value in moments}
+    if isinstance(record, VehicleRecord):
+        known |= {row["name"]: (row["value"], row["unit"]) for row in rows_of(record.found)}
+    shown = ((name_of(name), *known[name]) for name in record.impossible)
+    return joined(f"{name} {number(value, 3)} {unit}".removesuffix(" 1") for name, value, unit in shown)
 
 
 def worth_in_words(record: ModelRecord) -> Iterator[str]:
@@ -100,19 +114,19 @@ def model_blocks(model: Source[Any], index: int, sources: Sources) -> Iterator[B
     yield from [Heading(model.label)] if len(sources.of_kind(ModelRecord)) > 1 else []
     yield Facts(facts(model.record))
     if model.record.vehicle.effect.name:
-        yield _effects_table(f"model-effects-{index}", model.record.vehicle.effect)
+        yield _effects_table(f"model-effects-{index}", model.record)
 
 
 def facts(record: ModelRecord) -> list[tuple[str, str]]:
     """Say how far to trust a model, what it learned from, and what it is made of."""
     vehicle, repair = record.vehicle, record.vehicle.repair
     moments = zip(INERTIA_PARAMETERS, vehicle.inertia.tolist(), strict=True)
-    rigid = " ".join(f"{name} {number(value)}" for name, value in moments if value)
+    rigid = " ".join(_marked(record, f"inertia.{name}", f"{name} {number(value)}") for name, value in moments if value)
     rows = [
         *trust_facts(record),
         ("Mass", f"{plain(vehicle.mass)} kg"),
         ("Inertia, kg m²", rigid if vehicle.inertia_functions is None else _functions(vehicle.inertia_functions)),
-        ("Rotors", _rotors(vehicle.rotor)),
+        ("Rotors", _rotors(record)),
         ("Their response", _response(vehicle.response)),
         ("Effects", joined(map(_effect, vehicle.effect.name)) if vehicle.effect.name else "none"),
     ]
@@ -144,10 +158,20 @@ def _functions(inertia: InertiaFunctionsGroup) -> str:
     )
 
 
-def _rotors(rotors: RotorsGroup) -> str:
+def _marked(record: ModelRecord, name: str, shown: str) -> str:
+    """Strike a number through that no vehicle has."""
+    return impossible(shown) if name in record.impossible else shown
+
+
+def _rotors(record: ModelRecord) -> str:
+    rotors = record.vehicle.rotor
+    thrust, drag = (
+        _marked(record, name, _range(values))
+        for name, values in (("thrust_factor", rotors.thrust_factor), ("drag_factor", rotors.drag_factor))
+    )
     square = "w²" if not rotors.thrust_linear else f"w² + {number(rotors.thrust_linear, 3)} w_h w"
     return (
-        f"{len(rotors.spin)}; thrust {_range(rotors.thrust_factor)} N s² and drag {_range(rotors.drag_factor)} N m s² "
+        f"{len(rotors.spin)}; thrust {thrust} N s² and drag {drag} N m s² "
         f"times {square}, to {plain(rotors.speed_max)} rad/s"
     )
 
@@ -174,13 +198,14 @@ def _effect(name: str) -> str:
     return "numbers refitted" if CATALOGUE[name].kind == "parameter" else effect_title(name)
 
 
-def _effects_table(name: str, group: EffectsGroup) -> Table:
+def _effects_table(name: str, record: ModelRecord) -> Table:
     rows = []
-    for effect in model_effects(group):
+    for effect in model_effects(record.vehicle.effect):
         known = {each.name: each for each in effect.known.numbers}
         for index, (label, value) in enumerate(effect.values.items()):
             words = f"{label}: {known[label].meaning}" if label in known else label
             unit = unit_words(known[label].unit) if label in known else ""
-            rows.append([_effect(effect.name) if index == 0 else "", words, number(value), unit])
+            shown = _marked(record, f"{effect.name}.{label}", number(value))
+            rows.append([_effect(effect.name) if index == 0 else "", words, shown, unit])
     header = ("Effect", "Number", "Value", "Unit")
     return Table(name, "The numbers of its effects.", header, rows, frozenset({0, 1, 3}), frozenset({1}))

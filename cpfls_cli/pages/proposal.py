@@ -22,9 +22,6 @@ from cpfls_cli.words import capitalised, joined
 
 _WIDTH = 110
 _SURE: Final = {"data": "the data", "named": "its name", "guess": "a guess"}
-NOT_KNOWN: Final = {"inertia": "null", "thrust": "null", "drag": "null"}
-"""What stands for numbers that the identification of the vehicle finds."""
-
 _SPINS: Final = {1: "ccw", -1: "cw", 0: "turning an unknown way"}
 _ORDER: Final = ("body_frame", "world_frame", "quaternion_order", "acceleration_frame", "rotor_command_is")
 _FASTEST_HZ, _RATE_HZ, _LOWPASS_HZ = 500.0, 250.0, 60.0
@@ -32,11 +29,19 @@ _FASTEST_HZ, _RATE_HZ, _LOWPASS_HZ = 500.0, 250.0, 60.0
 
 @dataclass(frozen=True)
 class Stated:
-    """What the person who asks knows of the vehicle."""
+    """What the person who asks knows of the vehicle; what is None is not known, and for `cpfls vehicle` to find."""
 
     mass_kg: float | None = None
     arm_m: float | None = None
+    inertia_kg_m2: tuple[float, float, float] | None = None
+    thrust_factor_n_s2: float | None = None
+    drag_factor_n_m_s2: float | None = None
     scale_to_arm: bool = False
+
+    @property
+    def knows_constants(self) -> bool:
+        """Whether it is any of what `cpfls vehicle` finds."""
+        return (self.inertia_kg_m2, self.thrust_factor_n_s2, self.drag_factor_n_m_s2) != (None, None, None)
 
 
 def asked_keys(proposal: Proposal, stated: Stated) -> tuple[str, ...]:
@@ -71,7 +76,10 @@ def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
     named = [(guess.signal, guess.rivals) for guess in proposal.signals]
     for name, rivals in [*named, *((choice.key, choice.rivals) for choice in proposal.choices)]:
         for rival in rivals:
-            yield Text(f"{name}: the data cannot rule out {rival.text}: {rival.reason}", "warning")
+            other = (
+                f"{rival.text} if it is wrong" if rival.text.startswith("leave ") else f"it may also be {rival.text}"
+            )
+            yield Text(f"{name}: a guess; {other}: {rival.reason}", "warning")
     cut: list[Text] = []
     for one in proposal.logs:
         prefix = f"{one.name}: " if several else ""
@@ -267,8 +275,9 @@ def _vehicle(proposal: Proposal, stated: Stated) -> Iterator[str]:
     if stated.mass_kg is None:
         yield from _comment("In kg, as it flew, with battery: no log states it.", 2)
     yield f"  mass_kg: {ASK if stated.mass_kg is None else _flow(stated.mass_kg)}"
-    yield from _comment("null: not known; `cpfls vehicle` finds what the flights determine.", 2)
-    yield f"  inertia_kg_m2: {NOT_KNOWN['inertia']}"
+    if None in (stated.inertia_kg_m2, stated.thrust_factor_n_s2, stated.drag_factor_n_m_s2):
+        yield from _comment("null: not known; `cpfls vehicle` finds what the flights determine.", 2)
+    yield f"  inertia_kg_m2: {_flow(stated.inertia_kg_m2 and list(stated.inertia_kg_m2))}"
     if proposal.share_of_speed:
         yield from _comment(
             "The commands are shares of the largest speed, which the log does not state: with a different number here "
@@ -283,7 +292,7 @@ def _rotors(proposal: Proposal, stated: Stated) -> Iterator[str]:
     if not proposal.rotors:
         states = "states a torque and no rotors" if proposal.states_torque else "has no columns of rotors"
         yield from _comment(f"The log {states}; the vehicle has some all the same, in its order, one line each:", 2)
-        yield f"  #{_rotor(None, None)[3:]}"
+        yield f"  #{_rotor(None, None, stated)[3:]}"
         yield f"  rotors: {ASK}"
         return
     airframe = proposal.airframe
@@ -328,17 +337,18 @@ def _rotors(proposal: Proposal, stated: Stated) -> Iterator[str]:
             )
     yield "  rotors:"
     for index in range(proposal.rotors):
-        yield _rotor(None if airframe is None else airframe.rotors[index], airframe)
+        yield _rotor(None if airframe is None else airframe.rotors[index], airframe, stated)
 
 
-def _rotor(rotor: RotorPlace | None, airframe: Airframe | None) -> str:
+def _rotor(rotor: RotorPlace | None, airframe: Airframe | None, stated: Stated) -> str:
     is_guess = airframe is not None and airframe.is_asked
     position = None if rotor is None else _position(rotor, airframe)
     spin = ASK if rotor is None or rotor.spin == 0 else str(rotor.spin)
     entry = (
         f"    - {{position_m: {ASK if position is None or is_guess else _flow(position)},"
         f" spin: {ASK if is_guess else spin},"
-        f" thrust_factor_n_s2: {NOT_KNOWN['thrust']}, drag_factor_n_m_s2: {NOT_KNOWN['drag']}}}"
+        f" thrust_factor_n_s2: {_flow(stated.thrust_factor_n_s2)},"
+        f" drag_factor_n_m_s2: {_flow(stated.drag_factor_n_m_s2)}}}"
     )
     if rotor is None:
         return entry

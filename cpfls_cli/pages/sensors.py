@@ -36,12 +36,17 @@ def contradicted(first: str) -> str:
     return sentence(as_contradiction(sentence(first)))
 
 
+NOTHING_COMES = (
+    "Nothing is searched, for nothing found could be used. Correct what is wrong, in the section `import` of the "
+    "config or in `vehicle`, or leave that flight out; --anyway searches all the same."
+)
+"""What to do about logs that contradict themselves."""
+
+
 def tell_before_search(contradictions: Sequence[str]) -> None:
     """Say at once, above the progress, that what a long search finds cannot be used."""
     if contradictions:
-        logging.getLogger("cpfls_cli").warning(
-            "%s No model found in it can be used: Ctrl-C ends the search.", contradicted(contradictions[0])
-        )
+        logging.getLogger("cpfls_cli").warning("%s No model found in it can be used.", contradicted(contradictions[0]))
 
 
 def _faults(audit: AuditGroup) -> Iterator[Block]:

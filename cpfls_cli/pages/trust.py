@@ -66,6 +66,13 @@ def model_words(model: ModelRecord) -> Words:
     )
 
 
+def stopped_words(model: ModelRecord) -> str:
+    """Say why the search for a model ended before its end, and how to go on; empty where it did not."""
+    reason = model.stopped
+    said = reason if reason in ("", "interrupted") else f"stopped ({reason.replace('-', ' ')})"
+    return said and f"{said}, go on with `cpfls {model.FORMAT.made_by.split(',')[0]} ... --resume`"
+
+
 def trust_facts(model: ModelRecord) -> list[tuple[str, str]]:
     """Say in a word how far to trust a model, and which flights it learned from."""
     return [("How far to trust it", model_words(model).sentence), ("Learned from", learned_words(model))]

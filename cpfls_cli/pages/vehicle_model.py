@@ -35,6 +35,7 @@ from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import InstrumentsGroup, LoopGroup, ResponsesGroup, VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.effects.scales import hover_speed
+from cpfls_cli.flightlog.logging_rates import log_faster
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.disturbance import gust_blocks
 from cpfls_cli.pages.repeats import WHAT_TO_FLY
@@ -96,9 +97,6 @@ _FLIGHTS = {
 }
 """What would tell a constant that the flights do not."""
 
-FASTER = "LOG_BITMASK of ArduPilot (fast attitude and IMU), SDLOG_PROFILE of PX4 (high rate)"
-"""What makes autopilots log faster."""
-
 _OF_IT = {"repeats": "comes again", "setpoints": "follows them", "past": "was foretold"}
 """Rotation that instruments know of, by their kind."""
 
@@ -107,6 +105,9 @@ _LIVELY_RAD_S = 1.0
 
 _FLOWN_BY_HAND = {"bbl", "bfl"}
 """Formats of logs whose autopilot flies no mission file."""
+
+_LEAST_HZ = 1 / coarsest_excited(ExciteSettings())
+"""At which rotors have to be logged for what a flight is asked to show."""
 
 _FAR = 3.0
 """Factor from the stated number from which on a found one is called effective, and no property of a part."""
@@ -183,7 +184,7 @@ def _against(record: VehicleRecord) -> Iterator[str]:
         yield from playback_words(Trust.DO_NOT_USE, None, record.contradiction)
         return
     if record.trust in (Trust.LOOP, Trust.LACKING, Trust.NOT_DETERMINED):
-        yield from _slow_words(record)
+        yield from slow_words(record)
     if record.trust == Trust.LOOP or (record.loop.shown and record.instruments is None):
         yield loop_words(record)
     heavy = too_heavy(record)
@@ -352,15 +353,28 @@ def _share_words(share: Array, error: Array) -> str:
     return f"{roll} of the roll and {pitch} of the pitch"
 
 
-def _slow_words(record: VehicleRecord) -> Iterator[str]:
+def slow_words(record: VehicleRecord) -> Iterator[str]:
     """Say of logs too slow for what a flight is asked to show that no flight helps before they are faster."""
-    least = 1 / coarsest_excited(ExciteSettings())
-    if record.rotors_told is not None and round(record.rotors_told) < round(least):
-        yield (
-            f"The logs tell the rotors {number(record.rotors_told, 2)} times a second, and nothing of motion above "
-            f"{number(record.rotors_told / 2, 2)} Hz; another flight tells no more until rotors and body rates are "
-            f"logged {least:g} times a second or faster: {FASTER}."
-        )
+    if record.rotors_told is not None and round(record.rotors_told) < round(_LEAST_HZ):
+        yield f"{_slowly_logged(record.rotors_told, record.logged_by or ())} Flights logged so say no more."
+
+
+def _slowly_logged(told_hz: float, systems: Sequence[str]) -> str:
+    """Say how slowly rotors are logged, and what to set in the autopilots."""
+    return (
+        f"The rotors are logged {number(told_hz, 2)} times a second, which shows no motion above "
+        f"{number(told_hz / 2, 2)} Hz. Log rotors and body rates at {_LEAST_HZ:g} Hz or more first: "
+        f"{log_faster(*systems)}."
+    )
+
+
+def too_slow(told_hz: float, systems: Sequence[str]) -> str:
+    """Say of rotors logged so slowly that no body can be found what is computed then."""
+    return (
+        f"{_slowly_logged(told_hz, systems)} Inertia, drag factor, lag and effects cannot be found in these flights; "
+        "only the constants that the config leaves open are fitted, of which the thrust factor may be told. --anyway "
+        "searches all the same."
+    )
 
 
 def loop_words(record: VehicleRecord) -> str:
@@ -374,8 +388,8 @@ def loop_words(record: VehicleRecord) -> str:
     )
     return (
         f"These flights show the loop, not the vehicle: torque explains {shares}. An autopilot that answers gusts, or "
-        f"an effect that is missing here, makes a body look heavier or lighter than it is: {times} what was found. "
-        f"Fly in still air, {_turns_to_fly(record)}"
+        f"an effect that is missing here, makes a body look heavier or lighter than it is: {times} what was found."
+        + ("" if any(slow_words(record)) else f" Fly in still air, {_turns_to_fly(record)}")
     )
 
 

@@ -133,6 +133,8 @@ class LoggedFlight:
         How often the log tells what drives the playback; None where that is as often as there are samples.
     begins : float
         Stamp of the log's own clock at time 0, s; NaN where there is none.
+    system : str
+        What wrote the log; empty where it does not say.
     """
 
     name: str
@@ -145,6 +147,7 @@ class LoggedFlight:
     shares: bool = False
     updated_hz: float | None = None
     begins: float = np.nan
+    system: str = ""
 
     @property
     def told_hz(self) -> float:

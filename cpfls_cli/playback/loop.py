@@ -19,7 +19,9 @@ from cpfls_cli.blocks import FEWEST_BLOCKS, contiguous, half_width, jackknife_er
 from cpfls_cli.inertia import EXPLAINED
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.table import WrenchTable
+from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, windows
 
 _BANDS = ((0.15, 0.4), (0.3, 0.8), (0.6, 1.6))
@@ -29,6 +31,10 @@ Together they span what an autopilot answers late and what it answers in time, w
 """
 _FASTER = (0.05, 0.15)
 """Of the same kind, about 6 to 20 Hz: shown beside the others, and in no bound, for rotors and frames answer there."""
+_FASTEST_HZ = 6.0
+"""Top of the fastest band."""
+_LAGS = (0.0, 0.01, 0.02, 0.05, 0.1)
+"""Lags of rotors that are tried where none is known, s."""
 _OVERLAP = 0.75
 _BLOCK_S = 4.0
 """Longer than what rotors and rotation remember of each other."""
@@ -91,6 +97,23 @@ def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopB
     found = bounds_between([_balanced(model, flight, part) for flight in flights for part in flight.stretches])
     rates = np.concatenate([flight.motion.rate[part] for flight in flights for part in flight.stretches])
     return found._replace(turning=np.sqrt((rates**2).mean(axis=0)))
+
+
+def shows_loop_anyhow(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], told_hz: float) -> bool:
+    """Tell before any search whether no body can be found, because the rotors are logged too slowly.
+
+    They are where two updates do not fit into a period of the fastest band, and with no lag of the rotors the torque
+    explains the rotation about roll and pitch. Neither depends on the size of the inertia.
+
+    Parameters
+    ----------
+    told_hz : float, Hz
+        How often the logs tell the rotors.
+    """
+    if told_hz >= 2 * _FASTEST_HZ:
+        return False
+    lagging = (VehicleModel(vehicle=vehicle, response=RotorResponse(lag_s=lag)) for lag in _LAGS)
+    return all(loop_bounds(model, flights).shows_loop for model in lagging)
 
 
 class BalancedTorque(NamedTuple):

@@ -42,6 +42,9 @@ class PlaybackSettings(Settings):
         tuple[str, ...],
         Doc("blocks that are not tried, such as inertia, an effect, remainder or remainder_force (docs/playback.md)"),
     ] = ()
+    anyway: Annotated[
+        bool, Doc("search in logs that contradict themselves or are too slow to tell what is sought, too; --anyway")
+    ] = False
     groups: Annotated[
         tuple[GroupSettings, ...],
         Doc("other configurations of the vehicle, fitted at once; flights of none are those of the section vehicle"),

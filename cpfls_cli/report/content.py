@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
@@ -19,6 +20,15 @@ Tone = Literal["plain", "note", "good", "warning"]
 """How much something stands out."""
 
 Drawn = Literal["line", "points", "bars", "band", "map", "mark"]
+
+
+STRUCK = re.compile(r"~~([^~]*)~~(?= impossible)")
+"""A number in a text that is struck through; the word behind it says the same where nothing can be struck."""
+
+
+def impossible(number: str) -> str:
+    """Mark a number that no vehicle has."""
+    return f"~~{number}~~ impossible"
 
 
 @dataclass(frozen=True)

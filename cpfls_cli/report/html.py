@@ -12,8 +12,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.errors import visible
 from cpfls_cli.report.canvas import evenly_spread
-from cpfls_cli.report.content import Document, Panel, Series, Table
+from cpfls_cli.report.content import STRUCK, Document, Panel, Series, Table
 from cpfls_cli.report.numbers import number, plain
 
 _CODE = re.compile("`([^`]+)`")
@@ -44,8 +45,8 @@ def _template() -> Template:
 
 
 def with_code(text: str) -> Markup:
-    """Escape a sentence, and set what stands between backticks in it, a command or a key, as code."""
-    return Markup(_CODE.sub(r"<code>\1</code>", str(escape(text))))
+    """Escape a sentence, set what stands between backticks in it as code, and strike numbers that no vehicle has."""
+    return Markup(STRUCK.sub(r"<s>\1</s>", _CODE.sub(r"<code>\1</code>", str(escape(visible(text))))))
 
 
 @dataclass

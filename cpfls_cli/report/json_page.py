@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.report.content import Block, Document, Facts, Folded, Origin, Panel, Plot, Series, Table, Text
+from cpfls_cli.report.content import STRUCK, Block, Document, Facts, Folded, Origin, Panel, Plot, Series, Table, Text
 
 _DIGITS = 6
 
@@ -35,7 +35,7 @@ def _block(block: Block) -> dict[str, Any]:
         case Folded():
             return {"kind": block.kind, "summary": block.summary, "blocks": [_block(inner) for inner in block.blocks]}
         case Facts():
-            return {"kind": block.kind, "rows": [list(row) for row in block.rows]}
+            return {"kind": block.kind, "rows": [[_bare(term), _bare(value)] for term, value in block.rows]}
         case Text():
             return {"kind": block.kind, "text": block.text, "tone": block.tone}
         case Plot():
@@ -43,6 +43,11 @@ def _block(block: Block) -> dict[str, Any]:
             return {"kind": "figure", **words, "panels": [_panel(panel) for panel in block.picture.panels]}
         case _:
             return {"kind": block.kind, **asdict(block)}
+
+
+def _bare(text: str) -> str:
+    """Leave out what strikes a number through; the word behind it stays."""
+    return STRUCK.sub(r"\1", text)
 
 
 def _table(table: Table) -> dict[str, Any]:
@@ -58,7 +63,7 @@ def _table(table: Table) -> dict[str, Any]:
         "name": table.name,
         "caption": table.explained,
         "header": list(table.header),
-        "rows": [[cell.text for cell in line] for line in cells],
+        "rows": [[_bare(cell.text) for cell in line] for line in cells],
         "marked": marked,
     }
 

@@ -5,7 +5,21 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from cpfls_cli.report.content import Block, Box, Document, Facts, Folded, Heading, Listing, Plot, Table, Text, Tone
+from cpfls_cli.errors import visible
+from cpfls_cli.report.content import (
+    STRUCK,
+    Block,
+    Box,
+    Document,
+    Facts,
+    Folded,
+    Heading,
+    Listing,
+    Plot,
+    Table,
+    Text,
+    Tone,
+)
 
 _SPECIAL = re.compile(r"([\\`*_\[\]|~#$])")
 _BEGINS = re.compile(r"^(\d+)([.)])(?=\s|$)|^([-+=])")
@@ -62,5 +76,8 @@ def _marked(text: str, tone: Tone) -> str:
 
 def _plain(text: str) -> str:
     """Write text so that nothing in it is markup."""
-    line = " ".join(text.split()).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
-    return _BEGINS.sub(lambda m: f"{m[1]}\\{m[2]}" if m[1] else f"\\{m[3]}", _SPECIAL.sub(r"\\\1", line))
+    line = " ".join(visible(text).split()).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    parts = [_SPECIAL.sub(r"\\\1", part) for part in STRUCK.split(line)]
+    # Every second one is struck through.
+    line = "".join(f"~~{part}~~" if place % 2 else part for place, part in enumerate(parts))
+    return _BEGINS.sub(lambda m: f"{m[1]}\\{m[2]}" if m[1] else f"\\{m[3]}", line)

@@ -7,7 +7,20 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from cpfls_cli.errors import visible
-from cpfls_cli.report.content import Block, Box, Facts, Folded, Heading, Listing, Plot, Table, Text, Tone, unfolded
+from cpfls_cli.report.content import (
+    STRUCK,
+    Block,
+    Box,
+    Facts,
+    Folded,
+    Heading,
+    Listing,
+    Plot,
+    Table,
+    Text,
+    Tone,
+    unfolded,
+)
 from cpfls_cli.words import broken
 
 if TYPE_CHECKING:
@@ -113,7 +126,7 @@ def _drawn(table: Table, colour: bool, *, unbroken: bool = False, words: bool = 
         Columns by which it is too wide, which its sentences give.
     """
     drawn = _grid(colour, header=any(table.header))
-    cells = [[visible(cell.text) for cell in row] for row in table.cells]
+    cells = [[STRUCK.sub(r"\1", visible(cell.text)) for cell in row] for row in table.cells]
     texts = [[visible(title), *(row[column] for row in cells)] for column, title in enumerate(table.header)]
     long = _narrowed(texts, table.sentences, excess)
     for column, (title, *entries) in enumerate(texts):
@@ -148,7 +161,9 @@ def _narrowed(texts: Sequence[Sequence[str]], sentences: Iterable[int], excess: 
 def _rich(text: str, style: str = "") -> RichText:
     from rich.text import Text as RichText
 
-    return RichText(text, style)
+    # Every second part is struck through, where a terminal can.
+    parts = STRUCK.split(text)
+    return RichText.assemble(*((part, f"{style} strike" if at % 2 else style) for at, part in enumerate(parts)))
 
 
 def _grid(colour: bool, *, header: bool) -> RichTable:

@@ -148,8 +148,9 @@ def asked_of(flight: LoggedFlight, settings: ClosedLoopSettings, vehicle: Vehicl
     kind = ANGLE_LAW if known("attitude") and all(part.attitude is not None for part in parts) else RATE_LAW
     if not known(kind):
         raise InputError(
-            f"{flight.name}: nothing that the law could be asked for is known throughout: map setpoint_attitude (with "
-            "the attitude) or setpoint_body_rate in import.signals"
+            f"{flight.name}: the config maps no setpoints that this log holds throughout, so no autopilot can be flown "
+            "along it: log setpoints of attitude or body rates, and map them as setpoint_attitude (with attitude) or "
+            "setpoint_body_rate in import.signals"
         )
     told = known("thrust")
     if not told and any(part.rotor_speed is None for part in parts):

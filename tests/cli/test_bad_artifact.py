@@ -271,3 +271,24 @@ def test_what_leads_elsewhere_is_refused(refuse, changed, pipeline):
     assert refuse("check", path) == [
         f"{path}: damaged: delay/value lies in another file; an artifact must hold all that it refers to"
     ]
+
+
+@pytest.mark.parametrize("packing", [{}, {"compression": "gzip"}])
+@pytest.mark.parametrize("words", [("check",), ("info",), ("reduce",), ("report",), ("export",)])
+def test_a_shape_that_the_file_cannot_hold_is_refused_before_it_is_read(
+    cpfls, study, changed, tmp_path, words, packing
+):
+    """Nothing was ever written of it, and HDF5 would make a number for each place of a billion."""
+
+    def huge(file):
+        shape = (10**9, *file["body_rate"].shape[1:])
+        del file["body_rate"]
+        file.create_dataset("body_rate", shape, "f8", chunks=(8192, *shape[1:]), fillvalue=1.0, **packing)
+
+    flight = changed("flight", huge)
+    (command,) = words
+    given = {"reduce": (study,), "report": (study,)}.get(command, ())
+    output = {"check": (), "info": (), "export": ("-o", tmp_path / "out.csv")}.get(command, ("-o", tmp_path / "out.md"))
+    result = cpfls(command, *given, flight, *output)
+    assert result.exit_code == 2
+    assert "damaged: body_rate declares 2.4e+10 bytes, and the file holds 0 of them at most" in result.stderr

@@ -72,7 +72,7 @@ def test_gap_names_no_gap_and_no_effect(logs, name, tmp_path):
 def test_a_vehicle_found_in_it_is_not_to_be_used(logs, name, tmp_path):
     wrong = WRONG[name]
     config, (first, second) = logs(wrong.sign)
-    words = (first, "--held-out", second, "-o", tmp_path / "vehicle.h5", *asked(wrong))
+    words = (first, "--held-out", second, "-o", tmp_path / "vehicle.h5", "--anyway", *asked(wrong))
     with undrawn():
         result = run("vehicle", config, *words)
     assert result.exit_code == 0, result.stderr
@@ -85,11 +85,24 @@ def test_a_vehicle_found_in_it_is_not_to_be_used(logs, name, tmp_path):
     assert wrong.words in summary["contradictions"][0]
 
 
-@pytest.mark.parametrize(("option", "says"), [((), True), (("-q",), False)])
-def test_vehicle_says_it_before_it_searches(logs, option, says, tmp_path):
+@pytest.mark.parametrize("options", [(), ("--dry-run",), ("-q",)])
+def test_vehicle_says_it_and_does_not_search(logs, options, tmp_path):
     wrong = WRONG[next(iter(WRONG))]
     config, (first, _) = logs(wrong.sign)
-    result = run("vehicle", config, first, "-o", tmp_path / "v.h5", "--dry-run", *option, *asked(wrong))
+    result = run("vehicle", config, first, "-o", tmp_path / "v.h5", *options, *asked(wrong))
+    assert (result.exit_code, result.stdout) == (2, "")
+    first, *_, last = result.stderr.splitlines()
+    assert SAID in first
+    assert wrong.words in first
+    assert last.endswith("or leave that flight out; --anyway searches all the same.")
+    assert not (tmp_path / "v.h5").exists()
+
+
+@pytest.mark.parametrize(("option", "says"), [((), True), (("-q",), False)])
+def test_vehicle_searches_anyway_and_says_it_first(logs, option, says, tmp_path):
+    wrong = WRONG[next(iter(WRONG))]
+    config, (first, _) = logs(wrong.sign)
+    result = run("vehicle", config, first, "-o", tmp_path / "v.h5", "--dry-run", "--anyway", *option, *asked(wrong))
     assert result.exit_code == 0
     assert (begins(wrong) in result.stderr) is says
     assert (wrong.words in result.stderr) is says

@@ -103,7 +103,7 @@ def test_an_incomplete_model_is_refused_and_marked_with_force(cpfls, refuse, mod
     (line,) = refuse(*words)
     assert line == (
         f"{model}: the search for this model did not come to its end (time-limit); `cpfls identify ... --resume` goes "
-        "on, --force exports the model as it is, marked as incomplete"
+        "on, --anyway exports the model as it is, marked as incomplete"
     )
     result = cpfls(*words, "--force", "--json")
     assert result.exit_code == 0
@@ -322,7 +322,7 @@ def test_a_model_that_was_judged_unfit_is_marked(cpfls, refuse, model, tmp_path)
         verdict__speaks=np.array([1, -1]),
     )
     (line,) = refuse("export", model, "-o", tmp_path / "m.c")
-    assert line == f"{model}: its verdict is do-not-use; --force exports it anyway, marked as such"
+    assert line == f"{model}: its verdict is do-not-use; --anyway exports it, marked as such"
     assert not (tmp_path / "m.c").exists()
     result = cpfls("export", model, "-o", tmp_path / "m.c", "--force")
     assert result.exit_code == 0

@@ -211,7 +211,7 @@ def test_a_vehicle_that_should_not_be_used(cpfls, refuse, vehicle, tmp_path, mon
     monkeypatch.setattr(VehicleRecord, "verdict", "do-not-use")
     output = tmp_path / f"uav.{ending}"
     (line,) = refuse("export", vehicle, "-o", output)
-    assert line == f"{vehicle}: its verdict is do-not-use; --force exports it anyway, marked as such"
+    assert line == f"{vehicle}: its verdict is do-not-use; --anyway exports it, marked as such"
     result = cpfls("export", vehicle, "-o", output, "--force")
     assert result.exit_code == 0
     mark = "DO NOT USE: this is the verdict on the model"

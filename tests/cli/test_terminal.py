@@ -12,8 +12,11 @@ import pytest
 from cpfls_cli import compiling
 from cpfls_cli.cli.options import Common
 from cpfls_cli.cli.terminal import progress_bar, tell
+from cpfls_cli.errors import visible
 from cpfls_cli.report.content import Folded, Text
+from cpfls_cli.report.html import with_code
 from cpfls_cli.report.outcome import Outcome
+from cpfls_cli.report.terminal import terminal_lines
 from tests.builders.forked import Forked
 
 
@@ -172,8 +175,16 @@ def test_notes_leave_the_answer_on_the_screen(told):
 @pytest.mark.parametrize(
     ("options", "shown"),
     [
-        ({}, ["gap:  40%  half of it", "gap:  80%  most of it"]),
-        ({"verbose": True}, ["gap:  20%  ", "gap:  40%  half of it", "gap:  80%  most of it", "gap: 100%  "]),
+        ({}, ["gap:  40%  92 s left  half of it", "gap:  80%  31 s left  most of it"]),
+        (
+            {"verbose": True},
+            [
+                "gap:  20%  8 s left  ",
+                "gap:  40%  92 s left  half of it",
+                "gap:  80%  31 s left  most of it",
+                "gap: 100%  ",
+            ],
+        ),
         ({"quiet": True}, []),
     ],
 )
@@ -247,3 +258,12 @@ def test_help_into_a_device_that_is_full():
         words = [sys.executable, "-m", "cpfls_cli", "gap", "--help"]
         done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert (done.returncode, done.stderr) == (1, "cpfls: error: output: No space left on device\n")
+
+
+@pytest.mark.parametrize("order", ["\u202e", "\u2066", "\u200b", "\x1b[2J", "\u00ad"])
+def test_what_turns_or_hides_text_in_a_name_reaches_no_terminal_and_no_page(order):
+    block = Text(f"gyro_x{order} is no column")
+    escaped = repr(order)[1:-1]
+    assert "".join(terminal_lines([block])) == f"gyro_x{escaped} is no column"
+    assert order not in with_code(block.text)
+    assert visible("a table\n\tß → µ ́") == "a table\n\tß → µ ́"

@@ -4,7 +4,6 @@ import csv
 import json
 import pickle
 import shutil
-import sys
 from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
@@ -186,10 +185,3 @@ def test_a_folder_of_others_is_not_filled(refuse, logs, tmp_path):
     (tmp_path / "own.txt").write_text("mine")
     (message,) = refuse("trend", logs / "study.yaml", logs / "logs" / "log1.csv", "-o", tmp_path)
     assert "exists already and is not empty" in message
-
-
-def test_without_the_package(refuse, logs, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "ruptures", None)
-    (message,) = refuse("trend", logs / "study.yaml", logs / "logs" / "log1.csv", "-o", tmp_path / "trend")
-    assert "a trend needs the package ruptures" in message
-    assert "cpfls[trend]" in message

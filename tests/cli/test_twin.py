@@ -207,3 +207,13 @@ def test_a_flight_that_was_simulated_knows_its_autopilot(cpfls, tmp_path):
     said = json.loads(result.stdout)
     assert (said["autopilot"], said["gains"]["source"], said["thrust_from"]) == ("crazyflie", "simulation", "setpoint")
     assert not said["vehicles"]["vehicle"]["channels"]["roll rate"]["parts"]
+
+
+def test_a_log_without_setpoints_says_what_it_lacks_and_what_to_type_instead(refuse, logged, tmp_path):
+    data = yaml.safe_load((logged / "study.yaml").read_text())
+    data["import"]["signals"].pop("setpoint_attitude")
+    study, log = tmp_path / "without.yaml", logged / "log.ulg"
+    study.write_text(yaml.safe_dump(data))
+    (line,) = refuse("simulate", study, log, "--autopilot", "px4", "-o", tmp_path / "t.h5")
+    assert line.startswith("log.ulg: the config maps no setpoints that this log holds throughout")
+    assert f"Without setpoints `cpfls gap {study} {log} -o {tmp_path / 'gap'}` says where" in line

@@ -2,7 +2,6 @@
 
 import json
 import struct
-import sys
 from pathlib import Path
 
 import h5py
@@ -224,11 +223,6 @@ def test_a_slow_topic_is_named(wrong):
 def test_what_is_no_ulog(wrong, content, message):
     (line,) = wrong(content)
     assert line.startswith(message)
-
-
-def test_without_the_package(wrong, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyulog", None)
-    assert wrong(ulog()) == ['LOG: reading .ulg needs the package pyulog; pip install "cpfls[ulog]"']
 
 
 def test_the_example_gives_torques_in_the_directions_of_px4(cpfls, write, tmp_path):

@@ -408,7 +408,8 @@ def test_a_velocity_in_another_unit_is_said(cpfls, config, flights, tmp_path):
     shutil.copy(flights[0], flight)
     with edited(flight) as file:
         file["velocity"][:] *= 3.6
-    for words in (("vehicle", config, flight, "--held-out", flights[1]), ("replay", config, "vehicle", flight)):
+    found = ("vehicle", config, flight, "--held-out", flights[1], "--anyway")
+    for words in (found, ("replay", config, "vehicle", flight)):
         result = cpfls(*words, "-o", tmp_path / "out.h5", "--force")
         assert result.exit_code == 0, result.stderr
         said = "The log contradicts itself: kmh.h5: the velocity is in km/h, judged by the position"

@@ -37,6 +37,6 @@ def test_every_commit_is_checked_as_lint_checks():
 def test_every_extra_that_a_message_names_exists_and_has_its_row():
     code = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "cpfls_cli").rglob("*.py"))
     named = {*re.findall(r"install_command\([\"'](\w+)", code), *(form.extra for form in LOG_FORMATS if form.extra)}
-    assert {"dask", "notebook", "parquet", "rosbag", "ulog"} <= named <= EXTRAS.keys()
+    assert {"dask", "notebook", "parquet", "rosbag"} <= named <= EXTRAS.keys()
     page = (ROOT / "docs" / "dependencies.md").read_text(encoding="utf-8")
     assert set(re.findall(r"^\| `([\w-]+)` \| \w", page, re.MULTILINE)) == EXTRAS.keys()

@@ -162,6 +162,10 @@ def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> 
     return tuple(NotExcited(name, reason) for name, reason in reasons if reason)
 
 
+_RADIUS = "rotor radius"
+"""A signal that comes from the config, not from a log."""
+
+
 def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSettings) -> tuple[Alternative, ...]:
     """List the rivals of named effects that the flights lack signals for: what was not tried is not beaten.
 
@@ -172,7 +176,10 @@ def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSetti
         for name in (name for name in CATALOGUE[effect.name].rivals if name not in settings.ignore):
             missing, to_log = _lacked(hypothesis, CATALOGUE[name])
             if missing and not {"command", "measured_rotor_speed"} & {*missing}:
-                told = f"log {' and '.join(to_log)}, without which it was not tried"
+                logged = [name for name in to_log if name != _RADIUS]
+                asked = [f"log {' and '.join(logged)}"] if logged else []
+                asked += ["state rotors.radius_m in the config"] if _RADIUS in to_log else []
+                told = f"{' and '.join(asked)}, without which it was not tried"
                 rivals.append(Alternative(name, effect.name, np.nan, told))
     return tuple(rivals)
 

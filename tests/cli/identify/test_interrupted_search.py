@@ -135,7 +135,11 @@ def test_search_out_of_time_keeps_a_model_and_goes_on(cpfls, words, whole, tmp_p
         f"{NOTE}{output}: is incomplete, because --time-limit ended the search; the same command with --resume goes on"
     )
     monkeypatch.undo()
+    go_on = "its search was stopped (time limit), go on with `cpfls identify ... --resume`"
+    assert cpfls("check", output).stdout.startswith(f"{output}: keeps to its format (cpfls/model), but {go_on}\n")
+    assert go_on.removeprefix("its search was ") in cpfls("info", output).stdout
     assert cpfls(*words, "-o", output, "--resume", "--time-limit", "2h").exit_code == 0
+    assert cpfls("check", output).stdout.startswith(f"{output}: good (cpfls/model)\n")
     assert output.read_bytes() == whole.read_bytes()
 
 

@@ -293,7 +293,7 @@ def test_an_axis_that_nothing_follows_makes_a_guess(own, asked):
     known, _ = found(flat_log(own, wished=named(wished, "roll_sp", "pitch_sp", "yaw_sp")).topics, "")
     (rival,) = known["setpoint_attitude"].rivals
     assert known["setpoint_attitude"].sure == "guess"
-    assert rival.reason == "yaw_sp is not followed"
+    assert rival.reason == "the measured motion does not follow yaw_sp"
 
 
 def test_words_for_a_wish_still_make_no_measurement():

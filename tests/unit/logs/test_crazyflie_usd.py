@@ -81,3 +81,11 @@ def test_what_is_no_log(read, content, message):
     with pytest.raises(InputError) as caught:
         read(content)
     assert f"log00: {message}" in str(caught.value)
+
+
+@pytest.mark.parametrize("letter", ["F", "a", "O", "g", "x", " "])
+def test_a_letter_of_no_number_is_a_broken_header_without_a_warning(read, letter):
+    """NumPy takes some of them for types: complex numbers, text of old, objects."""
+    content = usd({"fixed": {"log.x": "f"}}, [("fixed", 0, [1.0])])
+    with pytest.raises(InputError, match="a broken log of a Crazyflie's uSD card: its header: the type"):
+        read(content.replace(b"log.x(f)", f"log.x({letter})".encode()))

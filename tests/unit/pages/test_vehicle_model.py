@@ -24,6 +24,7 @@ from cpfls_cli.pages.vehicle_model import (
     grounds,
     loop_words,
     remainder_curves,
+    slow_words,
     title,
     warnings,
 )
@@ -165,7 +166,7 @@ def test_a_number_that_no_vehicle_has_is_not_told_and_no_value_in_a_table():
     ]
     assert ["centre of mass along x, m", "—", "—", "—", "—", "no: impossible"] in rows
     assert ["linear damping d_x", "N m s/rad", "—", "—", "—"] in rows
-    assert "centre of mass along x and linear damping d_x: no such vehicle has it" in " ".join(cautions(record))
+    assert "centre of mass along x and linear damping d_x: impossible for such a vehicle" in " ".join(cautions(record))
 
 
 def test_headline_table_and_section_follow_from_one_judgement_of_what_is_told():
@@ -185,8 +186,12 @@ def test_logs_too_slow_for_what_is_flown_are_to_be_faster_before_another_flight(
     record = replace(record, found=replace(record.found, determined=np.zeros(2, dtype=bool)))
     assert record.verdict == Trust.NOT_DETERMINED
     (said,) = [line for line in cautions(replace(record, rotors_told=9.9)) if "rotors" in line]
-    assert said.startswith("The logs tell the rotors 9.9 times a second, and nothing of motion above 5.0 Hz; another ")
-    assert "logged 50 times a second or faster: LOG_BITMASK of ArduPilot" in said
+    assert said.startswith("The rotors are logged 9.9 times a second, which shows no motion above 5.0 Hz. Log rotors ")
+    assert "at 50 Hz or more first: PX4: SDLOG_PROFILE = 17" in said
+    assert "ArduPilot: LOG_BITMASK = 438271" in said
+    (own,) = slow_words(replace(record, rotors_told=9.9, logged_by=("Betaflight 4.5.1",)))
+    assert "first: Betaflight: blackbox_sample_rate = 1/4 and" in own
+    assert "PX4" not in own
     assert not any("logged" in line for line in cautions(replace(record, rotors_told=49.9)))
 
 

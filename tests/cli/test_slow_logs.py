@@ -1,0 +1,76 @@
+"""Motors that PX4 logs ten times a second: no search for what they cannot show, and what to set is said at once."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from tests.builders.unknown_logs import flight, ulog_of_flight
+
+pytestmark = pytest.mark.usefixtures("undrawn")
+CURE = "PX4: SDLOG_PROFILE = 17 (bits 0 and 4: default and high rate)"
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    """Two flights by how many samples their motors are logged apart."""
+    folder = tmp_path_factory.mktemp("slow")
+
+    def call(every):
+        paths = [folder / f"{number}-every-{every}.ulg" for number in (1, 2)]
+        for number, path in enumerate(paths):
+            own = flight(seconds=30, seed=number)
+            motors = np.hstack([(own.speed / 1000.0) ** 2, np.full((len(own.speed), 8), np.nan)])
+            path.write_bytes(ulog_of_flight(own, asked={"actuator_motors": ("float[12] control", every, motors)}))
+        return paths
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def slow(cpfls, logs):
+    """The config that `init` writes, its logs, and what it said."""
+    first, second = logs(10)
+    config = first.with_name("study.yaml")
+    said = cpfls("init", first, second, "--mass", 0.8, "--arm", 0.16, "-o", config)
+    assert said.exit_code == 0, said.stderr
+    return config, first, second, said
+
+
+def test_init_says_what_to_set(slow):
+    assert f"log them at 100 Hz or more ({CURE}" in slow[-1].stderr
+
+
+def test_vehicle_says_it_first_and_fits_only_what_can_be_told(cpfls, slow):
+    config, first, second, _ = slow
+    output = config.with_name("vehicle.h5")
+    result = cpfls("vehicle", config, first, "--held-out", second, "-o", output)
+    assert result.exit_code == 0, result.stderr
+    assert result.stderr.startswith("vehicle: The rotors are logged 10 times a second")
+    assert CURE in result.stderr.splitlines()[0]
+    assert "Fly in still air" not in result.stdout
+    assert "cpfls trajectory" not in result.stdout
+    told = read_record(output, VehicleRecord).summary
+    assert told["verdict"] == "shows-the-loop"
+    assert told["evaluated"] <= 2
+    assert set(told["not_determined"]) == {"drag_factor", "inertia.Ixx", "inertia.Iyy", "inertia.Izz"}
+    assert abs(told["parameters"]["rotors.thrust_factor_n_s2"]["value"] / 6e-6 - 1) < 0.02
+
+
+def test_tune_asks_for_faster_logs_before_a_flight(cpfls, slow):
+    config = slow[0]
+    result = cpfls("tune", config, config.with_name("vehicle.h5"), "--autopilot", "px4", "-o", config.with_name("g.h5"))
+    assert result.exit_code == 2
+    assert result.stderr.index(CURE) < result.stderr.index("cpfls trajectory")
+
+
+def test_anyway_searches_what_is_slow(cpfls, slow):
+    config, first, _, _ = slow
+    result = cpfls("vehicle", config, first, "--anyway", "-o", config.with_name("anyway.h5"), "--dry-run")
+    assert (result.exit_code, "times a second" in result.stderr) == (0, False)
+
+
+def test_of_fast_logs_nothing_is_said(cpfls, slow, logs):
+    first, _ = logs(1)
+    result = cpfls("vehicle", slow[0], first, "--dry-run", "-o", first.with_name("fast.h5"))
+    assert (result.exit_code, "times a second" in result.stderr) == (0, False)
