@@ -238,9 +238,12 @@ _WITHOUT_SHOWS = patch.object(_Space, "shows", lambda *_: np.nan)
 """What would show is not asked of vehicles that nobody changed, and takes long."""
 
 
+_NO_CAUSE = "cause not named"
+
+
 def _alarms(runs: Sequence[Change]) -> list[object]:
-    alarms = [run for run in runs if run.found]
-    said = ", ".join(sorted("+".join(found.cause.name for found in run.found) for run in alarms))
+    alarms = [run for run in runs if run.changed]
+    said = ", ".join(sorted("+".join(found.cause.name for found in run.found) or _NO_CAUSE for run in alarms))
     return [len(runs), len(alarms), sum(run.p_value <= 0.05 for run in runs), said or "—"]
 
 
@@ -288,10 +291,10 @@ def _verdict(case: Case, run: Change) -> Verdict:
         for found in run.found
         for size, true in zip(found.sizes, case.right.get(found.cause.name, ()), strict=False)
     )
-    names = "+".join(found.cause.name + "?" * (found.belief < NAMED) for found in run.found)
+    names = "+".join(found.cause.name + "?" * (found.belief < NAMED) for found in run.found) or _NO_CAUSE * run.changed
     rights = set(case.right)
     right, wrong = bool(rights & sure), bool(sure - rights - _part_of(rights))
-    return Verdict(bool(run.found), right, not right and bool(rights & listed), wrong, held, names)
+    return Verdict(run.changed, right, not right and bool(rights & listed), wrong, held, names)
 
 
 def _part_of(rights: Iterable[str]) -> set[str]:

@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import check
-from cpfls_cli.consistency.findings import Finding
+from cpfls_cli.consistency.findings import Finding, contradictions
 from cpfls_cli.consistency.rotors import meant_unit
 from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError
@@ -68,6 +68,8 @@ class ReadFlight:
         Updates a second of signals that its log has more rows than.
     begins : float
         Stamp of the log's own clock at time 0, s; NaN where there is none.
+    stated : mapping of str to str
+        What the log says of its vehicle, as `stated_vehicle`; empty where nothing is known of it.
     """
 
     name: str
@@ -77,6 +79,25 @@ class ReadFlight:
     flown_at: float = nan
     updated_hz: Mapping[str, float] = field(default_factory=dict)
     begins: float = nan
+    stated: Mapping[str, str] = field(default_factory=dict)
+
+
+class ReadAlone(NamedTuple):
+    """One flight that was read by itself.
+
+    Attributes
+    ----------
+    full_voltage : float
+        What its voltages are shares of, V; 1 where it states shares.
+    contradictions : tuple of str
+        Sentences: what of the flight contradicts itself or its vehicle.
+    """
+
+    flight: ReadFlight
+    recording: Recording
+    full_voltage: float
+    warnings: tuple[str, ...]
+    contradictions: tuple[str, ...]
 
 
 def read_flights(paths: Sequence[Path], study: Study) -> Recordings:
@@ -88,15 +109,13 @@ def read_flights(paths: Sequence[Path], study: Study) -> Recordings:
     return Recordings(tuple(recordings), (*warnings, *notes))
 
 
-def read_alone(path: Path, study: Study) -> tuple[Recording, float, tuple[str, ...], float]:
-    """Read one flight: with it the voltage that its voltages are shares of, 1 where it states shares, and warnings.
-
-    Last comes when it was flown, as `ReadFlight.flown_at`.
-    """
+def read_alone(path: Path, study: Study) -> ReadAlone:
+    """Read one flight, and hold it against itself and its vehicle."""
     flight = read_flight(path, study)
     recording, about = _recording(flight, study)
     volts = _largest_volts(recording.signals, flight)
-    return (_share(recording, volts) if volts else recording), volts or 1.0, about, flight.flown_at
+    wrong = contradictions(check_flight(flight, study))
+    return ReadAlone(flight, _share(recording, volts) if volts else recording, volts or 1.0, about, wrong)
 
 
 def read_flight(path: Path, study: Study) -> ReadFlight:
@@ -106,7 +125,8 @@ def read_flight(path: Path, study: Study) -> ReadFlight:
     record = read_record(path, FlightRecord)
     updated = {} if record.quality is None else record.quality.updated_hz
     units = units_of(path, record.origin, study)
-    return ReadFlight(path.name, record.signals, units, (), updated_hz=updated, begins=record.begins)
+    stated = {} if record.stated is None else record.stated.facts
+    return ReadFlight(path.name, record.signals, units, (), updated_hz=updated, begins=record.begins, stated=stated)
 
 
 def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> ReadFlight:
@@ -120,13 +140,14 @@ def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> Rea
     if len(parts) == 1:
         notes = (*done, *first.report.warnings)
         begins = first.report.first_stamp_s + first.report.span_s[0]
-        return ReadFlight(name, signals[0], _units(study), notes, first.report.flown_at, updated, begins)
+        stated = first.report.stated
+        return ReadFlight(name, signals[0], _units(study), notes, first.report.flown_at, updated, begins, stated)
     shared = [each for each in signals[0] if all(each in own for own in signals)]
     for own, part in zip(signals, parts, strict=True):
         own["time"] = own["time"] + part.report.span_s[0]
     joined = {each: np.concatenate([own[each] for own in signals]) for each in shared}
     begins = first.report.first_stamp_s
-    return ReadFlight(name, joined, _units(study), (), first.report.flown_at, updated, begins)
+    return ReadFlight(name, joined, _units(study), (), first.report.flown_at, updated, begins, first.report.stated)
 
 
 def _require_speeds(log: str, part: ImportedFlight, study: Study) -> None:

@@ -9,7 +9,7 @@ from cpfls_cli.report.content import Block, Box, Document, Facts, Folded, Headin
 
 _SPECIAL = re.compile(r"([\\`*_\[\]|~#$])")
 _BEGINS = re.compile(r"^(\d+)([.)])(?=\s|$)|^([-+=])")
-_TONES: dict[Tone, str] = {"note": "Note", "good": "Good", "warning": "Warning"}
+_TONES: dict[Tone, str] = {"note": "Note", "good": "Good", "warning": "Warning", "unsure": "Not known"}
 
 
 def markdown_page(document: Document) -> str:

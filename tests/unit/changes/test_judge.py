@@ -86,7 +86,7 @@ def test_quiet_numbers_of_another_kind_tell_nothing_of_a_change():
 
 @pytest.mark.parametrize("losses", [0, 1])
 def test_evidence_by_quadrature(losses):
-    """One direction, sizes integrated one by one; of a loss those above 0 count nineteen times as much."""
+    """One direction, sizes of either width integrated one by one; of a loss those above 0 count nineteen times."""
     direction = np.array([0.8, -0.3, 1.5])
     own, covariance = space([Cause("rotor M1", direction[:, None], 0.1, "1", losses=losses)], freedom=1e9)
     row = np.array([1.2, 0.4, 2.0])
@@ -95,9 +95,10 @@ def test_evidence_by_quadrature(losses):
     def density(size):
         apart = row - size * direction
         sign = 1.0 if not losses else 2 * (0.95 if size > 0 else 0.05)
-        return np.exp(-0.5 * apart @ precision @ apart) * norm.pdf(size) * sign
+        prior = 0.9 * norm.pdf(size) + 0.1 * norm.pdf(size, scale=10.0)
+        return np.exp(-0.5 * apart @ precision @ apart) * prior * sign
 
-    expected = np.log(quad(density, -9, 9, points=[0.0])[0]) + 0.5 * row @ precision @ row
+    expected = np.log(quad(density, -30, 30, points=[0.0], limit=200)[0]) + 0.5 * row @ precision @ row
     assert own.evidence(own.whitened(row[:, None]), [0])[0, 0] == pytest.approx(expected, abs=1e-6)
 
 

@@ -16,8 +16,8 @@ from tests.builders.drawn_numbers import DEVIATION, NAMES, QUAD, flights
 
 @pytest.fixture(autouse=True)
 def _few_draws(monkeypatch):
-    """As many as a rate of false alarms of 0.01 needs to be told at all."""
-    monkeypatch.setattr(module, "_DRAWS", 150)
+    """As many as the rate of false alarms of each test, 0.005, needs to be told at all."""
+    monkeypatch.setattr(module, "_DRAWS", 300)
 
 
 def row_of(given):
