@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 CANNOT_TELL = "CANNOT TELL"
 """The verdict where no change would have shown, or a log is wrong."""
 
+_BESIDE = {"follow": "gusts", "scale": "drift"}
+"""Kinds of ratios, and those that a flight has beside them wherever it holds their channels."""
+
 _BY_CHANCE = ("late", "answer", "unbalance", "swing", "battery")
 """Kinds of which a good flight can hold too little."""
 
@@ -230,9 +233,15 @@ class ChangedRecord(FoundRecord):
         """What is said first: that nothing changed only of good logs, and where a change would have shown."""
         if self.changed:
             return "CHANGED"
-        if self.contradiction or not self.has_size:
+        if self.contradiction or self.undetermined or not self.has_size:
             return CANNOT_TELL
         return "NO CHANGE SEEN" if self.short_of or self.lost else "NO CHANGE"
+
+    @property
+    def undetermined(self) -> list[str]:
+        """Ratios that today's flights hold the channels of, and which may be zero or reversed there."""
+        parts = ((name, *name.split()) for name in self.missing if name.split()[0] in _BESIDE)
+        return [name for name, kind, axis in parts if f"{_BESIDE[kind]} {axis}" in self.number]
 
     @property
     def lost(self) -> list[str]:

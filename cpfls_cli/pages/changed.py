@@ -88,16 +88,18 @@ def answer(changed: Source[ChangedRecord], index: int = 1) -> Iterator[Block]:
 
 def changed_box(record: ChangedRecord, vehicle: VehicleSettings) -> Box:
     """Say in a sentence what changed, or that nothing did and what would have shown, or why neither can be said."""
-    wrong = [contradicted(each) for each in record.contradiction]
+    wrong = first_of_each(record.contradiction)
     lacks = [*([_lost(record)] if record.lost else []), *([_assumed(record)] if record.short_of else [])]
     if record.changed:
         first, *more = _what_changed(record, vehicle)
         also = [f"And: {each[:1].lower()}{each[1:]}" for each in more]
-        return Box(record.verdict, first, [*also, *wrong, *lacks], "warning")
+        return Box(record.verdict, first, [*wrong, *also, *lacks], "warning")
     beyond = "what is usual of vehicles" if record.short_of else "what flights of this vehicle differ by"
     if wrong:
         said = f"Nothing is beyond {beyond}, which says little of such a log."
         return Box(record.verdict, wrong[0], [*wrong[1:], said, *lacks], "unsure")
+    if record.undetermined:
+        return Box(record.verdict, _undetermined(record), lacks, "unsure")
     if not record.has_size:
         return Box(record.verdict, NOTHING_SHOWS, lacks, "unsure")
     within = f"nothing beyond {beyond}; {unchanged_within(record, vehicle)}"
@@ -110,6 +112,22 @@ NOTHING_SHOWS = (
 )
 
 
+def first_of_each(contradictions: Sequence[str]) -> list[str]:
+    """Say of each flight that contradicts itself what comes first."""
+    return [contradicted(each) for each in {own.partition(": ")[0]: own for own in reversed(contradictions)}.values()]
+
+
+def _undetermined(record: ChangedRecord) -> str:
+    """Say which ratios may be anything today."""
+    return (
+        f"{joined(record.undetermined)} may be zero or reversed today, and {_IS_REVERSED}; nothing is beyond the limits "
+        "in the other numbers"
+    )
+
+
+_IS_REVERSED = "in no reference flight: a gyroscope that is mirrored or dead, rotors that are exchanged, or a log that is read wrongly"
+
+
 def unchanged_within(record: FoundRecord, vehicle: VehicleSettings) -> str:
     """Say below which sizes a change would not have shown, of the first that are looked for."""
     return f"unchanged within these sizes: {', '.join(list(would_have_shown(record, vehicle))[:_WITHIN])}"
@@ -119,9 +137,8 @@ def _what_changed(record: ChangedRecord, vehicle: VehicleSettings) -> Iterator[s
     """Say each change that was found, or else which numbers are off; and which are turned round."""
     if record.reversed:
         yield sentence(
-            f"{joined(record.reversed)} {'is' if len(record.reversed) == 1 else 'are'} reversed, or nothing, and in no "
-            "reference flight: a gyroscope that is mirrored or dead, rotors that are exchanged, or a log that is read "
-            "wrongly"
+            f"{joined(record.reversed)} {'is' if len(record.reversed) == 1 else 'are'} reversed, or nothing, and "
+            f"{_IS_REVERSED}"
         )
     yield from (sentence(told(record, index, vehicle)) for index in range(len(record.found.cause)))
     if not record.found.cause and (record.p_value <= record.false_alarm or record.beyond.any()):
@@ -222,8 +239,9 @@ def checks(record: FoundRecord, among: Sequence[int] | None = None) -> Iterator[
 
 def _chance(record: ChangedRecord) -> str:
     today, before = len(record.today), len(record.before)
+    of_others = "in the other numbers " if record.reversed else ""
     return (
-        f"an unchanged vehicle looks like this with p = {number(record.p_value, 1)}; {today} "
+        f"{of_others}an unchanged vehicle looks like this with p = {number(record.p_value, 1)}; {today} "
         f"flight{'s' if today > 1 else ''} of today beside {before} of the reference"
     )
 

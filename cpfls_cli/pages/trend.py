@@ -14,6 +14,7 @@ from cpfls_cli.pages.changed import (
     MOST_MOVED,
     NOTHING_SHOWS,
     checks,
+    first_of_each,
     most_moved,
     natural_unit,
     no_known_change,
@@ -21,7 +22,6 @@ from cpfls_cli.pages.changed import (
     unchanged_within,
     would_have_shown,
 )
-from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.canvas import BASELINE, GREY, band, in_columns, legend_over, plot
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Heading, Plot, Table, Text, in_short
@@ -56,7 +56,7 @@ def answer(trend: Source[TrendRecord], index: int = 1) -> Iterator[Block]:
 
 def trend_box(record: TrendRecord, vehicle: VehicleSettings) -> Box:
     """Say in a sentence for each change point what changed; the last comes first, for the vehicle flies as that."""
-    wrong = [contradicted(each) for each in record.contradiction]
+    wrong = first_of_each(record.contradiction)
     if record.changed:
         first, *more = _what_changed(record, vehicle)
         return Box(record.verdict, first, [*more, *wrong], "warning")
