@@ -120,12 +120,15 @@ def first_of_each(contradictions: Sequence[str]) -> list[str]:
 def _undetermined(record: ChangedRecord) -> str:
     """Say which ratios may be anything today."""
     return (
-        f"{joined(record.undetermined)} may be zero or reversed today, and {_IS_REVERSED}; nothing is beyond the limits "
-        "in the other numbers"
+        f"{joined(record.undetermined)} may be zero or reversed today, and {_IS_REVERSED}; the other numbers are "
+        "within their limits"
     )
 
 
-_IS_REVERSED = "in no reference flight: a gyroscope that is mirrored or dead, rotors that are exchanged, or a log that is read wrongly"
+_IS_REVERSED = (
+    "in no reference flight: a gyroscope that is mirrored or dead, rotors that are exchanged, "
+    "or a log that is read wrongly"
+)
 
 
 def unchanged_within(record: FoundRecord, vehicle: VehicleSettings) -> str:
